@@ -1,0 +1,1 @@
+//! Documents in TOML, JSON and YAML, and errors that point at the line.

@@ -1,0 +1,1 @@
+//! Factor graphs: scalars, manifolds, residuals, noise, losses, keys, values, registration.

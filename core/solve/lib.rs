@@ -1,0 +1,1 @@
+//! Compiled problems, sparse linear algebra and solvers.

@@ -1,0 +1,1 @@
+//! Strategies and laws that every manifold and factor is tested by.

@@ -1,0 +1,1 @@
+//! File formats: g2o, TORO, TUM trajectories, detections.

@@ -1,0 +1,1 @@
+//! Rotations, poses and points, and the factors between them.

@@ -1,0 +1,1 @@
+//! Object SLAM: data sources, simulator, semantics, pipeline, metrics.
