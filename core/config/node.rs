@@ -1,0 +1,140 @@
+//! A document as a tree in which everything knows its place: one type for all formats.
+use crate::diagnostic::Diagnostic;
+use crate::problem::Problem;
+use crate::source::Place;
+use indexmap::IndexMap;
+use serde_path_to_error::{Path, Segment};
+
+/// Tables and arrays may be nested this deep.
+pub const MAX_DEPTH: usize = 64;
+
+/// A value and its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node {
+    /// Where it is written.
+    pub place: Place,
+    /// What it is.
+    pub value: Value,
+}
+
+/// What TOML, JSON and YAML can all say.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// Nothing; TOML has none.
+    Null,
+    /// True or false.
+    Bool(bool),
+    /// A whole number.
+    Integer(i64),
+    /// Any other number; may be infinite or NaN until it is read.
+    Float(f64),
+    /// A text.
+    String(String),
+    /// Values in order.
+    Array(Vec<Node>),
+    /// Named values in order.
+    Table(Table),
+}
+
+/// Named values, in the order of the document.
+pub type Table = IndexMap<String, Field>;
+
+/// A named value: the name is the table's key.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// Where the name is written.
+    pub key: Place,
+    /// The value.
+    pub node: Node,
+}
+
+impl Node {
+    /// A value at a place.
+    pub fn new(place: Place, value: Value) -> Self {
+        Node { place, value }
+    }
+
+    /// As JSON, in which serde types are read; every number that is not finite is an error.
+    pub fn to_json(&self) -> Result<serde_json::Value, Vec<Diagnostic>> {
+        let mut errors = Vec::new();
+        let json = self.json(&mut errors);
+        if errors.is_empty() { Ok(json) } else { Err(errors) }
+    }
+
+    fn json(&self, errors: &mut Vec<Diagnostic>) -> serde_json::Value {
+        match &self.value {
+            Value::Null => serde_json::Value::Null,
+            Value::Bool(value) => (*value).into(),
+            Value::Integer(value) => (*value).into(),
+            Value::Float(value) => match serde_json::Number::from_f64(*value) {
+                Some(number) => number.into(),
+                None => {
+                    let text = match self.place.text() {
+                        "" => value.to_string(),
+                        text => text.to_owned(),
+                    };
+                    errors.push(Diagnostic::new(self.place.clone(), Problem::NotFinite { text }));
+                    serde_json::Value::Null
+                }
+            },
+            Value::String(value) => value.clone().into(),
+            Value::Array(items) => items.iter().map(|item| item.json(errors)).collect(),
+            Value::Table(table) => {
+                table.iter().map(|(key, field)| (key.clone(), field.node.json(errors))).collect()
+            }
+        }
+    }
+
+    /// The deepest node on a serde path that exists, and the key that it stands under.
+    pub fn find(&self, path: &Path) -> Found<'_> {
+        let mut found = Found { node: self, key: None, complete: true };
+        for segment in path {
+            let next = match (segment, &found.node.value) {
+                (Segment::Map { key } | Segment::Enum { variant: key }, Value::Table(table)) => {
+                    table.get(key).map(|field| (&field.node, Some(&field.key)))
+                }
+                (Segment::Seq { index }, Value::Array(items)) => items.get(*index).map(|item| (item, None)),
+                _ => None,
+            };
+            match (next, segment) {
+                (Some((node, key)), _) => found = Found { node, key, complete: true },
+                // a unit variant is the string itself
+                (None, Segment::Enum { .. }) => {}
+                (None, _) => return Found { complete: false, ..found },
+            }
+        }
+        found
+    }
+
+    /// In words, for messages: `the number 3`, `a table`.
+    pub fn in_words(&self) -> String {
+        match &self.value {
+            Value::Null => "nothing".into(),
+            Value::Bool(value) => value.to_string(),
+            Value::Integer(value) => format!("the number {value}"),
+            Value::Float(value) => format!("the number {value}"),
+            Value::String(value) => format!("the text {:?}", cut(value)),
+            Value::Array(_) => "an array".into(),
+            Value::Table(_) => "a table".into(),
+        }
+    }
+}
+
+/// What [`Node::find`] came to.
+#[derive(Debug, Clone, Copy)]
+pub struct Found<'a> {
+    /// The deepest node that exists.
+    pub node: &'a Node,
+    /// Its key, if it is in a table.
+    pub key: Option<&'a Place>,
+    /// Whether the whole path exists.
+    pub complete: bool,
+}
+
+/// The start of a text, so that messages stay short.
+pub(crate) fn cut(text: &str) -> String {
+    match text.char_indices().nth(60) {
+        Some((end, _)) => text.get(..end).unwrap_or_default().to_owned() + "…",
+        None => text.to_owned(),
+    }
+}

@@ -1,0 +1,122 @@
+//! Texts with a name, and places in them.
+use std::fmt;
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+/// A text that was read, and where it came from. Cloning shares it.
+#[derive(Clone)]
+pub struct Source(Arc<Text>);
+
+struct Text {
+    name: String,
+    text: String,
+    /// Byte offsets at which lines begin; found when the first place is shown.
+    lines: OnceLock<Vec<usize>>,
+}
+
+impl Source {
+    /// `name` is shown before every place: the path of a file, or `--set` for an override.
+    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Source(Arc::new(Text { name: name.into(), text: text.into(), lines: OnceLock::new() }))
+    }
+
+    /// The path of the file, or what else stands for it.
+    pub fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    /// The whole text.
+    pub fn text(&self) -> &str {
+        &self.0.text
+    }
+
+    /// A place in this text, cut to its length.
+    pub fn place(&self, span: Range<usize>) -> Place {
+        let end = span.end.min(self.text().len());
+        Place { source: self.clone(), span: span.start.min(end)..end }
+    }
+
+    /// Line and column of a byte offset, both from 1; the column counts characters.
+    pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
+        let text = self.text();
+        let lines = self.0.lines.get_or_init(|| {
+            std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect()
+        });
+        let line = lines.partition_point(|&start| start <= offset).max(1);
+        let start = lines.get(line - 1).copied().unwrap_or_default();
+        let column = text.get(start..offset).map_or(0, |before| before.chars().count());
+        (line, column + 1)
+    }
+}
+
+impl PartialEq for Source {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0) || (self.name() == other.name() && self.text() == other.text())
+    }
+}
+
+impl fmt::Debug for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Source").field(&self.name()).finish()
+    }
+}
+
+/// Some bytes of a source: what a value was written as.
+#[derive(Clone, PartialEq)]
+pub struct Place {
+    /// The text.
+    pub source: Source,
+    /// The bytes.
+    pub span: Range<usize>,
+}
+
+impl Place {
+    /// The line, from 1.
+    pub fn line(&self) -> usize {
+        self.source.line_and_column(self.span.start).0
+    }
+
+    /// The column in characters, from 1.
+    pub fn column(&self) -> usize {
+        self.source.line_and_column(self.span.start).1
+    }
+
+    /// What is written there.
+    pub fn text(&self) -> &str {
+        self.source.text().get(self.span.clone()).unwrap_or_default()
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (line, column) = self.source.line_and_column(self.span.start);
+        write!(f, "{}:{line}:{column}", self.source.name())
+    }
+}
+
+impl fmt::Debug for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_characters() {
+        let source = Source::new("a.toml", "α = 1\nβγ = x\n");
+        let at = source.text().find('x').unwrap();
+        assert_eq!(source.place(at..at + 1).to_string(), "a.toml:2:6");
+        assert_eq!(source.place(at..at + 1).text(), "x");
+    }
+
+    #[test]
+    fn places_past_the_end_are_cut() {
+        let source = Source::new("a.toml", "a\n");
+        assert_eq!(source.place(9..12).to_string(), "a.toml:2:1");
+        assert_eq!(source.place(9..12).text(), "");
+        assert_eq!(Source::new("b", "").place(0..0).to_string(), "b:1:1");
+    }
+}
