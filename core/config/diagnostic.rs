@@ -7,7 +7,7 @@ use std::fmt;
 /// One thing that is wrong, and where. Displays as `file:line:column: what (what to do)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnostic {
-    /// Where.
+    /// Where: at most one line.
     pub place: Place,
     /// What.
     pub problem: Problem,
@@ -16,15 +16,16 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// A problem at a place.
+    /// A problem at a place, of which the first line is kept.
     pub fn new(place: Place, problem: Problem) -> Self {
-        Diagnostic { place, problem, related: None }
+        Diagnostic { place: place.first_line(), problem, related: None }
     }
 
     /// The second of two things of one name, of which there may be one only.
     pub fn duplicate(what: &str, name: &str, second: Place, first: Place) -> Self {
         let problem = Problem::Duplicate { what: what.into(), name: name.into() };
-        Diagnostic { place: second, problem, related: Some((first, "first given here".into())) }
+        let related = Some((first, "first given here".into()));
+        Diagnostic { related, ..Diagnostic::new(second, problem) }
     }
 
     /// The line, from 1.

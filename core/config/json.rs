@@ -106,6 +106,7 @@ fn number_of(text: &str) -> Value {
 }
 
 fn syntax(place: Place, message: &str) -> Diagnostic {
-    let message = message.chars().take(1).flat_map(char::to_lowercase).chain(message.chars().skip(1)).collect();
+    let message =
+        message.chars().take(1).flat_map(char::to_lowercase).chain(message.chars().skip(1)).collect();
     Diagnostic::new(place, Problem::Syntax { format: "JSON", message })
 }

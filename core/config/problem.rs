@@ -115,7 +115,9 @@ impl Problem {
     pub fn help(&self) -> Option<String> {
         match self {
             Problem::UnknownFormat => Some("use .toml, .json, .yaml or .yml".into()),
-            Problem::UnknownField { known, .. } if known.is_empty() => Some("there are no fields here".into()),
+            Problem::UnknownField { known, .. } if known.is_empty() => {
+                Some("there are no fields here".into())
+            }
             Problem::UnknownField { field: name, known } | Problem::UnknownName { name, known, .. } => {
                 advice(name, known)
             }

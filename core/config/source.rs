@@ -10,14 +10,24 @@ pub struct Source(Arc<Text>);
 struct Text {
     name: String,
     text: String,
+    /// Given on the command line: the name says it all, lines and columns nothing.
+    argument: bool,
     /// Byte offsets at which lines begin; found when the first place is shown.
     lines: OnceLock<Vec<usize>>,
 }
 
 impl Source {
-    /// `name` is shown before every place: the path of a file, or `--set` for an override.
+    /// `name`, the path of a file, is shown before every place.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
-        Source(Arc::new(Text { name: name.into(), text: text.into(), lines: OnceLock::new() }))
+        let (name, text) = (name.into(), text.into());
+        Source(Arc::new(Text { name, text, argument: false, lines: OnceLock::new() }))
+    }
+
+    /// The argument of a command line option, as in `--set a=1`. Shown whole in place of a line.
+    pub fn argument(option: &str, text: impl Into<String>) -> Self {
+        let text = text.into();
+        let name = format!("{option} {text}");
+        Source(Arc::new(Text { name, text, argument: true, lines: OnceLock::new() }))
     }
 
     /// The path of the file, or what else stands for it.
@@ -81,6 +91,12 @@ impl Place {
         self.source.line_and_column(self.span.start).1
     }
 
+    /// The part on the first line, so that a message about a long table does not show all of it.
+    pub fn first_line(&self) -> Place {
+        let length = self.text().find(['\n', '\r']).unwrap_or(self.span.len());
+        Place { source: self.source.clone(), span: self.span.start..self.span.start + length }
+    }
+
     /// What is written there.
     pub fn text(&self) -> &str {
         self.source.text().get(self.span.clone()).unwrap_or_default()
@@ -89,6 +105,9 @@ impl Place {
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.source.0.argument {
+            return f.write_str(self.source.name());
+        }
         let (line, column) = self.source.line_and_column(self.span.start);
         write!(f, "{}:{line}:{column}", self.source.name())
     }

@@ -9,7 +9,7 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     known
         .into_iter()
         .map(|k| (strsim::damerau_levenshtein(&wanted, &normal(k)), k))
-        .filter(|(distance, k)| *distance <= k.chars().count().max(wanted.chars().count()).div_ceil(3))
+        .filter(|(distance, k)| *distance <= k.chars().count().max(wanted.chars().count()) / 3)
         .min_by(|a, b| a.0.cmp(&b.0).then_with(|| a.1.cmp(b.1)))
         .map(|(_, k)| k)
 }
@@ -60,6 +60,7 @@ mod tests {
         assert_eq!(nearest("gaussian", ["huber", "cauchy"]), None);
         assert_eq!(nearest("", ["huber"]), None);
         assert_eq!(nearest("x", []), None);
+        assert_eq!(nearest("x", ["y"]), None);
     }
 
     #[test]

@@ -112,10 +112,15 @@ fn first_of_two(source: &Source, table: &DeTable<'_>, second: &Range<usize>) -> 
             if key.get_ref() == name && span.end <= second.start && later {
                 found = Some(span);
             }
-            open.extend(tables(value).into_iter().filter(|(span, _)| {
-                let inline = source.text().get(span.clone()).is_some_and(|t| t.starts_with('{'));
-                !inline || span.end >= second.end
-            }).map(|(_, table)| table));
+            open.extend(
+                tables(value)
+                    .into_iter()
+                    .filter(|(span, _)| {
+                        let inline = source.text().get(span.clone()).is_some_and(|t| t.starts_with('{'));
+                        !inline || span.end >= second.end
+                    })
+                    .map(|(_, table)| table),
+            );
         }
     }
     found.map(|span| source.place(span))

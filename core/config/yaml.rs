@@ -12,7 +12,7 @@ use saphyr_parser::{Event, Parser, ScalarStyle, Span, Tag};
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// How many values all aliases of a document together may stand for.
+/// How many values all anchors and aliases of a document together may stand for.
 const MAX_ALIASED: usize = 1_000_000;
 
 /// Parses a document.
@@ -93,7 +93,7 @@ impl<'a> Builder<'a> {
             }
             Event::Scalar(text, style, anchor, tag) => {
                 let value = self.scalar(text, style, tag.as_deref(), &place);
-                self.close(Node::new(place, value), anchor);
+                self.close(Node::new(place, value), anchor)?;
             }
             Event::SequenceStart(anchor, tag) => {
                 self.open(place, anchor, Kind::Array(Vec::new()), tag, "seq")?;
@@ -109,7 +109,7 @@ impl<'a> Builder<'a> {
                         Kind::Array(items) => Value::Array(items),
                         Kind::Table(table, _) => Value::Table(table),
                     };
-                    self.close(Node::new(self.source.place(done.start..end), value), done.anchor);
+                    self.close(Node::new(self.source.place(done.start..end), value), done.anchor)?;
                 }
             }
             Event::Alias(anchor) => self.alias(anchor, place)?,
@@ -137,20 +137,22 @@ impl<'a> Builder<'a> {
     }
 
     /// Puts a finished node where it belongs: into its array, as the key or the value of its table, or at the root.
-    fn close(&mut self, node: Node, anchor: usize) {
+    fn close(&mut self, node: Node, anchor: usize) -> Result<(), Diagnostics> {
         if anchor > 0 {
-            self.anchors.insert(anchor, (node.clone(), count(&node)));
+            let size = count(&node);
+            self.charge(size, &node.place)?;
+            self.anchors.insert(anchor, (node.clone(), size));
         }
         let Some(parent) = self.open.last_mut() else {
             self.root = Some(node);
-            return;
+            return Ok(());
         };
         parent.end = parent.end.max(node.place.span.end);
         match &mut parent.kind {
             Kind::Array(items) => items.push(node),
             Kind::Table(_, key @ None) => *key = Some(key_of(node, &mut self.errors)),
             Kind::Table(table, key) => {
-                let Some((name, key)) = key.take() else { return };
+                let Some((name, key)) = key.take() else { return Ok(()) };
                 match table.entry(name) {
                     Entry::Vacant(entry) => {
                         entry.insert(Field { key, node });
@@ -162,22 +164,29 @@ impl<'a> Builder<'a> {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Every copy that an anchor or an alias makes counts.
+    fn charge(&mut self, size: usize, place: &Place) -> Result<(), Diagnostics> {
+        self.aliased = self.aliased.saturating_add(size);
+        if self.aliased > MAX_ALIASED {
+            return Err(Diagnostic::new(place.clone(), Problem::TooManyAliases { limit: MAX_ALIASED }).into());
+        }
+        Ok(())
     }
 
     fn alias(&mut self, anchor: usize, place: Place) -> Result<(), Diagnostics> {
-        let Some((node, size)) = self.anchors.get(&anchor) else {
+        let Some(&(_, size)) = self.anchors.get(&anchor) else {
             return Err(syntax(place, "this alias stands within what it stands for").into());
         };
-        self.aliased += size;
-        if self.aliased > MAX_ALIASED {
-            return Err(Diagnostic::new(place, Problem::TooManyAliases { limit: MAX_ALIASED }).into());
-        }
+        self.charge(size, &place)?;
+        let Some((node, _)) = self.anchors.get(&anchor) else { return Ok(()) };
         if self.open.len() + depth(node) > MAX_DEPTH {
             return Err(too_deep(place).into());
         }
         let node = node.clone();
-        self.close(node, 0);
-        Ok(())
+        self.close(node, 0)
     }
 
     fn scalar(&mut self, text: Cow<'_, str>, style: ScalarStyle, tag: Option<&Tag>, place: &Place) -> Value {
@@ -198,7 +207,11 @@ impl<'a> Builder<'a> {
 
     fn byte(&self, character: usize) -> usize {
         let end = self.source.text().len();
-        if self.bytes.is_empty() { character.min(end) } else { self.bytes.get(character).copied().unwrap_or(end) }
+        if self.bytes.is_empty() {
+            character.min(end)
+        } else {
+            self.bytes.get(character).copied().unwrap_or(end)
+        }
     }
 }
 

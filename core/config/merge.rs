@@ -1,0 +1,31 @@
+//! One document over another, as variants of a run are.
+use crate::node::{Node, Table, Value};
+
+/// Puts `patch` over `base`: tables are merged field by field, everything else is replaced. A table whose `type` differs
+/// replaces the other as well, since its fields belong to another type.
+pub fn merge(base: &mut Node, patch: Node) {
+    match (&mut base.value, patch.value) {
+        (Value::Table(old), Value::Table(new)) if same_type(old, &new) => {
+            for (name, field) in new {
+                match old.get_mut(&name) {
+                    Some(there) => {
+                        there.key = field.key;
+                        merge(&mut there.node, field.node);
+                    }
+                    None => {
+                        old.insert(name, field);
+                    }
+                }
+            }
+        }
+        (_, value) => *base = Node::new(patch.place, value),
+    }
+}
+
+fn same_type(old: &Table, new: &Table) -> bool {
+    match (old.get("type"), new.get("type")) {
+        (Some(old), Some(new)) => old.node.value == new.node.value,
+        (None, Some(_)) => false,
+        _ => true,
+    }
+}
