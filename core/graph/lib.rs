@@ -1,1 +1,46 @@
-//! Factor graphs: scalars, manifolds, residuals, noise, losses, keys, values, registration.
+//! Factor graphs: what a variable is, what a factor is, and how the two are named and stored.
+//!
+//! Two views of one graph. *Dynamic, for people*: [`Graph`] and [`Values`] hold trait objects by
+//! [`Key`], from Rust or from documents. *Columnar, for the machine*: [`batch::Batch`] and
+//! [`column::Column`] hold each concrete type contiguously; the loop over them is monomorphised
+//! where a type is registered.
+//!
+//! The way in for authors is [`Residual`]; for new types of variables, [`Manifold`].
+pub mod batch;
+pub mod catalogue;
+pub mod checked;
+pub mod column;
+mod dimension;
+mod direction;
+mod factor;
+mod graph;
+mod key;
+pub mod loss;
+mod manifold;
+mod many;
+pub mod noise;
+pub mod normal_equations;
+mod residual;
+mod scalar;
+mod values;
+mod variable;
+mod variables;
+
+pub use dimension::{Block, Dimension, Matrix, Vector};
+pub use direction::{Direction, NoDirection};
+pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
+pub use graph::{Fixed, Graph, GraphError};
+pub use key::Key;
+pub use manifold::{Manifold, Tangent};
+pub use many::{List, Many};
+pub use noise::Noise;
+pub use residual::{Jacobians, Lifted, Refs, Residual};
+pub use scalar::{Jet, JetOf, Lift, Scalar};
+pub use values::{ValueError, Values};
+pub use variable::{ErasedManifold, Variable};
+pub use variables::Variables;
+
+#[doc(hidden)]
+pub mod __private {
+    pub use {inventory, schemars, serde_path_to_error, typetag};
+}

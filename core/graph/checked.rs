@@ -1,0 +1,44 @@
+//! Numbers that are checked when they are read.
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A finite number above zero.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "f64", into = "f64")]
+#[schemars(extend("exclusiveMinimum" = 0))]
+pub struct Positive(f64);
+
+/// A number that should be positive and is not.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("expected a finite number above zero, got {0}")]
+pub struct NotPositive(pub f64);
+
+impl Positive {
+    /// # Errors
+    /// Where `x` is zero, negative or not finite.
+    pub fn new(x: f64) -> Result<Self, NotPositive> {
+        if x > 0.0 && x.is_finite() { Ok(Self(x)) } else { Err(NotPositive(x)) }
+    }
+    /// For literals in code; a constant that is not positive does not compile where `const` is asked for.
+    pub const fn literal(x: f64) -> Self {
+        assert!(x > 0.0 && x < f64::INFINITY);
+        Self(x)
+    }
+    /// The number.
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+}
+
+impl TryFrom<f64> for Positive {
+    type Error = NotPositive;
+    fn try_from(x: f64) -> Result<Self, NotPositive> {
+        Self::new(x)
+    }
+}
+
+impl From<Positive> for f64 {
+    fn from(x: Positive) -> f64 {
+        x.0
+    }
+}

@@ -1,0 +1,142 @@
+//! Factors in a graph: any registered residual, with its keys, noise and loss.
+use crate::batch::{Batch, BatchOf};
+use crate::catalogue::{Kind, Signature};
+use crate::dimension::Dimension;
+use crate::key::Key;
+use crate::loss::Loss;
+use crate::noise::{Noise, Whitener};
+use crate::residual::Residual;
+use crate::variable::Variable;
+use crate::variables::Variables;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use std::any::{Any, TypeId};
+use std::fmt::Debug;
+use std::sync::Arc;
+
+/// A registered residual. Implemented by [`register_factor!`](crate::register_factor).
+#[typetag::serde(tag = "type")]
+pub trait Factor: Debug + Send + Sync {
+    /// Everything else.
+    fn erased(&self) -> &dyn ErasedResidual;
+}
+
+impl Kind for dyn Factor {
+    const NAME: &'static str = "factor";
+}
+
+/// One factor of a graph.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FactorEntry {
+    /// The variables that it connects, in the order of the residual's arguments.
+    pub keys: Vec<Key>,
+    /// The residual and its parameters.
+    pub factor: Arc<dyn Factor>,
+    /// What its residual is measured in.
+    #[serde(default, skip_serializing_if = "Noise::is_default")]
+    pub noise: Noise,
+    /// How much of a large residual counts; all of it, where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub loss: Option<Arc<dyn Loss>>,
+}
+
+impl FactorEntry {
+    /// Sets the noise.
+    pub fn noise(&mut self, noise: Noise) -> &mut Self {
+        self.noise = noise;
+        self
+    }
+    /// Sets the loss.
+    pub fn loss(&mut self, loss: impl Loss + 'static) -> &mut Self {
+        self.loss = Some(Arc::new(loss));
+        self
+    }
+}
+
+/// A residual and its Jacobian blocks, one for each variable, not whitened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Linearization {
+    /// The residual.
+    pub residual: Vec<f64>,
+    /// Rows × tangent dimension, by variable.
+    pub jacobians: Vec<DMatrix<f64>>,
+}
+
+/// The object-safe face of [`Residual`], implemented once for all of them.
+pub trait ErasedResidual: Send + Sync {
+    /// For a downcast to the concrete type.
+    fn as_any(&self) -> &dyn Any;
+    /// The concrete type.
+    fn type_id(&self) -> TypeId;
+    /// Rows and variables.
+    fn signature(&self) -> Signature;
+    /// An empty batch for factors of this type, with noise and loss of the given kinds.
+    fn new_batch(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> Box<dyn Batch>;
+    /// The residual; `None` where number or types of variables do not fit.
+    fn residual(&self, variables: &[&dyn Variable]) -> Option<Vec<f64>>;
+    /// Whether the residual means anything there; `None` where variables do not fit.
+    fn is_defined(&self, variables: &[&dyn Variable]) -> Option<bool>;
+    /// The residual with its Jacobian, analytic where the author wrote one.
+    fn linearize(&self, variables: &[&dyn Variable]) -> Option<Linearization>;
+    /// The residual with its Jacobian by automatic differentiation.
+    fn autodiff(&self, variables: &[&dyn Variable]) -> Option<Linearization>;
+}
+
+/// What the catalogue says of a factor.
+pub fn signature<R: Residual>() -> Signature {
+    let (variables, many) = R::Variables::types();
+    Signature { rows: Some(R::Dim::N), variables, many, tangent: &[] }
+}
+
+/// Runs one of the two ways to linearize over blocks that are poisoned first.
+fn linearization<R: Residual>(
+    residual: &R,
+    variables: &[&dyn Variable],
+    run: impl FnOnce(
+        &R,
+        crate::Refs<'_, R::Variables>,
+        &[bool],
+        &mut crate::Jacobians<R>,
+    ) -> crate::Vector<R::Dim>,
+) -> Option<Linearization> {
+    let refs = R::Variables::downcast(variables)?;
+    let mut blocks = R::Variables::blocks::<R::Dim>(variables.len());
+    R::Variables::each::<R::Dim>(&mut blocks, |_, block| block.fill(f64::NAN));
+    let value = run(residual, refs, &vec![true; variables.len()], &mut blocks);
+    let mut jacobians = Vec::with_capacity(variables.len());
+    R::Variables::each::<R::Dim>(&mut blocks, |_, block| {
+        let columns = block.len() / R::Dim::N;
+        jacobians.push(DMatrix::from_column_slice(R::Dim::N, columns, block));
+    });
+    Some(Linearization { residual: value.as_ref().to_vec(), jacobians })
+}
+
+impl<R: Residual> ErasedResidual for R {
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+    fn type_id(&self) -> TypeId {
+        TypeId::of::<R>()
+    }
+    fn signature(&self) -> Signature {
+        signature::<R>()
+    }
+    fn new_batch(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> Box<dyn Batch> {
+        Box::new(BatchOf::<R>::new(noise, loss))
+    }
+    fn residual(&self, variables: &[&dyn Variable]) -> Option<Vec<f64>> {
+        let refs = R::Variables::downcast(variables)?;
+        let value = Residual::residual::<f64>(self, R::Variables::lift(&refs));
+        Some(value.as_ref().to_vec())
+    }
+    fn is_defined(&self, variables: &[&dyn Variable]) -> Option<bool> {
+        Some(Residual::is_defined(self, R::Variables::downcast(variables)?))
+    }
+    fn linearize(&self, variables: &[&dyn Variable]) -> Option<Linearization> {
+        linearization(self, variables, R::linearize)
+    }
+    fn autodiff(&self, variables: &[&dyn Variable]) -> Option<Linearization> {
+        linearization(self, variables, R::Variables::autodiff)
+    }
+}

@@ -1,0 +1,224 @@
+//! The dynamic view of a graph: what people build, edit, read and write.
+use crate::catalogue::manifold_name;
+use crate::factor::{Factor, FactorEntry};
+use crate::key::Key;
+use crate::noise::{Noise, NoiseError};
+use crate::values::Values;
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Factors between named variables, and which variables are held.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Graph {
+    factors: Vec<FactorEntry>,
+    #[serde(skip_serializing_if = "IndexMap::is_empty")]
+    fixed: IndexMap<Key, Fixed>,
+}
+
+/// How much of a variable is held at its initial value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(untagged)]
+pub enum Fixed {
+    /// All of it (`true`), or nothing.
+    Whole(bool),
+    /// These directions of its tangent space, by name.
+    Directions(Vec<String>),
+}
+
+/// What is wrong between a graph and its values. `factor` counts from 0 in the order of the graph.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GraphError {
+    /// A factor on a variable that has no value.
+    #[error("factor {factor} ({name}): there is no variable `{key}`")]
+    MissingVariable {
+        /// The factor.
+        factor: usize,
+        /// Its type's name.
+        name: &'static str,
+        /// Which of its keys, from 0.
+        position: usize,
+        /// The key.
+        key: Key,
+    },
+    /// A factor with more or fewer keys than its residual has variables.
+    #[error("factor {factor} ({name}) connects {expected} variables, got {found} keys")]
+    WrongArity {
+        /// The factor.
+        factor: usize,
+        /// Its type's name.
+        name: &'static str,
+        /// Number of its residual's variables.
+        expected: usize,
+        /// Number of its keys.
+        found: usize,
+    },
+    /// A factor on a variable of another type.
+    #[error("factor {factor} ({name}): variable `{key}` is of type {found}, expected {expected}")]
+    WrongType {
+        /// The factor.
+        factor: usize,
+        /// Its type's name.
+        name: &'static str,
+        /// Which of its keys, from 0.
+        position: usize,
+        /// The key.
+        key: Key,
+        /// The type that the residual takes there.
+        expected: &'static str,
+        /// The type that the variable has.
+        found: &'static str,
+    },
+    /// A factor on the same variable twice.
+    #[error("factor {factor} ({name}) names the variable `{key}` twice")]
+    RepeatedVariable {
+        /// The factor.
+        factor: usize,
+        /// Its type's name.
+        name: &'static str,
+        /// Which of its keys, from 0.
+        position: usize,
+        /// The key.
+        key: Key,
+    },
+    /// A noise that does not fit.
+    #[error("factor {factor} ({name}): {source}")]
+    Noise {
+        /// The factor.
+        factor: usize,
+        /// Its type's name.
+        name: &'static str,
+        /// What is wrong with it.
+        source: NoiseError,
+    },
+    /// A variable that is held, and is not there.
+    #[error("`{key}` is to be held fixed, but there is no such variable")]
+    MissingFixed {
+        /// The key.
+        key: Key,
+    },
+    /// A direction that the variable's tangent space does not have.
+    #[error("`{key}` has no direction `{direction}`; its directions are {}", tangent.join(", "))]
+    UnknownDirection {
+        /// The key.
+        key: Key,
+        /// What was asked for.
+        direction: String,
+        /// What there is.
+        tangent: &'static [&'static str],
+    },
+    /// A value with a coordinate that is not finite.
+    #[error("the value of `{key}` is not finite")]
+    NotFinite {
+        /// The key.
+        key: Key,
+    },
+}
+
+impl Graph {
+    /// No factors.
+    pub fn new() -> Self {
+        Self::default()
+    }
+    /// Adds a factor between variables, with unit noise and no loss until those are set:
+    /// `graph.add(["x0", "x1"], between).noise(Noise::sigma(0.1)?).loss(Cauchy::default())`.
+    pub fn add<K: Into<Key>>(
+        &mut self,
+        keys: impl IntoIterator<Item = K>,
+        factor: impl Factor + 'static,
+    ) -> &mut FactorEntry {
+        let keys = keys.into_iter().map(Into::into).collect();
+        self.push(FactorEntry { keys, factor: Arc::new(factor), noise: Noise::unit(), loss: None })
+    }
+    /// Adds a factor.
+    pub fn push(&mut self, entry: FactorEntry) -> &mut FactorEntry {
+        self.factors.push(entry);
+        let last = self.factors.len() - 1;
+        &mut self.factors[last]
+    }
+    /// The factors, in order.
+    pub fn factors(&self) -> &[FactorEntry] {
+        &self.factors
+    }
+    /// The factors, to be changed.
+    pub fn factors_mut(&mut self) -> &mut Vec<FactorEntry> {
+        &mut self.factors
+    }
+    /// Holds a variable at its initial value.
+    pub fn fix(&mut self, key: impl Into<Key>) {
+        self.fixed.insert(key.into(), Fixed::Whole(true));
+    }
+    /// Holds some directions of a variable's tangent space, by name. The directions are those at the
+    /// variable's own estimate.
+    pub fn fix_directions(&mut self, key: impl Into<Key>, directions: &[&str]) {
+        let directions = directions.iter().map(|d| (*d).to_owned()).collect();
+        self.fixed.insert(key.into(), Fixed::Directions(directions));
+    }
+    /// Sets how much of a variable is held.
+    pub fn set_fixed(&mut self, key: impl Into<Key>, fixed: Fixed) {
+        match fixed {
+            Fixed::Whole(false) => self.fixed.shift_remove(&key.into()),
+            fixed => self.fixed.insert(key.into(), fixed),
+        };
+    }
+    /// The variables that are held, wholly or in part.
+    pub fn fixed(&self) -> &IndexMap<Key, Fixed> {
+        &self.fixed
+    }
+
+    /// Everything that is wrong between this graph and `values`; empty, where it can be compiled.
+    pub fn check(&self, values: &Values) -> Vec<GraphError> {
+        let mut errors = vec![];
+        for (i, entry) in self.factors.iter().enumerate() {
+            check_factor(i, entry, values, &mut errors);
+        }
+        for (key, fixed) in &self.fixed {
+            let Some(value) = values.variable(key.as_str()) else {
+                errors.push(GraphError::MissingFixed { key: key.clone() });
+                continue;
+            };
+            let tangent = value.erased().tangent();
+            if let Fixed::Directions(directions) = fixed {
+                let unknown = directions.iter().filter(|d| !tangent.contains(&d.as_str()));
+                errors.extend(unknown.map(|d| GraphError::UnknownDirection {
+                    key: key.clone(),
+                    direction: d.clone(),
+                    tangent,
+                }));
+            }
+        }
+        let bad = values.iter().filter(|(_, v)| !v.erased().is_finite());
+        errors.extend(bad.map(|(key, _)| GraphError::NotFinite { key: key.clone() }));
+        errors
+    }
+}
+
+fn check_factor(factor: usize, entry: &FactorEntry, values: &Values, errors: &mut Vec<GraphError>) {
+    let name = entry.factor.typetag_name();
+    let signature = entry.factor.erased().signature();
+    let (found, expected) = (entry.keys.len(), signature.variables.len());
+    if (signature.many && found == 0) || (!signature.many && found != expected) {
+        errors.push(GraphError::WrongArity { factor, name, expected, found });
+    } else {
+        let types = signature.variables.iter().cycle();
+        for (position, (key, expected)) in entry.keys.iter().zip(types).enumerate() {
+            let key = key.clone();
+            match values.variable(key.as_str()) {
+                None => errors.push(GraphError::MissingVariable { factor, name, position, key }),
+                Some(v) if v.erased().type_id() != *expected => {
+                    let (expected, found) = (manifold_name(*expected), v.typetag_name());
+                    errors.push(GraphError::WrongType { factor, name, position, key, expected, found });
+                }
+                Some(_) if entry.keys[..position].contains(&key) => {
+                    errors.push(GraphError::RepeatedVariable { factor, name, position, key });
+                }
+                Some(_) => {}
+            }
+        }
+    }
+    if let Err(source) = entry.noise.whitener(signature.rows.unwrap_or(0)) {
+        errors.push(GraphError::Noise { factor, name, source });
+    }
+}

@@ -1,0 +1,79 @@
+//! Robust losses: how much of a large residual counts.
+//!
+//! One convention throughout. A factor with whitened residual r costs ½ρ(s), s = ‖r‖², and enters
+//! the normal equations with the weight ρ'(s). Each ρ has ρ(0) = 0 and, but for L1, ρ(s) ≈ s near 0:
+//! a small residual costs what it costs without a loss.
+use crate::catalogue::Kind;
+use crate::column::Plain;
+use std::any::{Any, TypeId};
+use std::fmt::Debug;
+
+mod kernels;
+pub use kernels::{Cauchy, Dcs, Fair, GemanMcClure, Huber, L1, L2, Tukey, Welsch};
+
+/// The author's trait: ρ and its derivative. Register it with [`register_loss!`](crate::register_loss).
+pub trait RobustLoss: Debug + Clone + Send + Sync + 'static {
+    /// (ρ(s), ρ'(s)) at the squared norm `s` of a whitened residual.
+    fn rho(&self, s: f64) -> (f64, f64);
+}
+
+/// A robust loss, chosen by name.
+#[typetag::serde(tag = "type")]
+pub trait Loss: Debug + Send + Sync {
+    /// Everything else.
+    fn erased(&self) -> &dyn ErasedLoss;
+}
+
+impl Kind for dyn Loss {
+    const NAME: &'static str = "loss";
+}
+
+/// The object-safe face of [`RobustLoss`], implemented once for all of them.
+pub trait ErasedLoss: Send + Sync {
+    /// For a downcast to the concrete type.
+    fn as_any(&self) -> &dyn Any;
+    /// Room for the losses of a batch.
+    fn column(&self) -> Box<dyn LossColumn>;
+    /// (ρ(s), ρ'(s)).
+    fn rho(&self, s: f64) -> (f64, f64);
+}
+
+impl<L: RobustLoss> ErasedLoss for L {
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+    fn column(&self) -> Box<dyn LossColumn> {
+        Box::new(Plain::<L>(Vec::new()))
+    }
+    fn rho(&self, s: f64) -> (f64, f64) {
+        RobustLoss::rho(self, s)
+    }
+}
+
+/// The losses of a batch's factors, one type: called once for a chunk of factors.
+pub trait LossColumn: Send + Sync {
+    /// The type of its losses.
+    fn loss_type(&self) -> TypeId;
+    /// Appends a loss of that type; others are left out.
+    fn push(&mut self, loss: &dyn Loss);
+    /// Turns the squared norms of factors `first..` into weights; returns ½ Σ ρ.
+    fn weigh(&self, first: usize, squared: &mut [f64]) -> f64;
+}
+
+impl<L: RobustLoss> LossColumn for Plain<L> {
+    fn loss_type(&self) -> TypeId {
+        TypeId::of::<L>()
+    }
+    fn push(&mut self, loss: &dyn Loss) {
+        self.0.extend(loss.erased().as_any().downcast_ref::<L>().cloned());
+    }
+    fn weigh(&self, first: usize, squared: &mut [f64]) -> f64 {
+        let mut cost = 0.0;
+        for (s, loss) in squared.iter_mut().zip(&self.0[first..]) {
+            let (rho, weight) = RobustLoss::rho(loss, *s);
+            *s = weight;
+            cost += rho;
+        }
+        0.5 * cost
+    }
+}

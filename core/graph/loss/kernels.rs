@@ -1,0 +1,240 @@
+//! The losses themselves. `scale` is in units of the whitened residual, so σ's: dimensionless.
+use super::RobustLoss;
+use crate::checked::Positive;
+use crate::register_loss;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Declares a loss with one scale: its docs, its default and its ρ.
+macro_rules! loss {
+    ($(#[$doc:meta])* $type:ident, $name:literal, $scale:literal, |$s:ident, $k:ident| $rho:expr) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct $type {
+            /// Where the loss departs from squares, in σ's.
+            pub scale: Positive,
+        }
+        impl $type {
+            /// A loss of this scale.
+            ///
+            /// # Errors
+            /// Where `scale` is not positive and finite.
+            pub fn new(scale: f64) -> Result<Self, crate::checked::NotPositive> {
+                Ok(Self { scale: Positive::new(scale)? })
+            }
+        }
+        impl Default for $type {
+            fn default() -> Self {
+                Self { scale: Positive::literal($scale) }
+            }
+        }
+        impl RobustLoss for $type {
+            #[inline]
+            fn rho(&self, $s: f64) -> (f64, f64) {
+                let $k = self.scale.get();
+                $rho
+            }
+        }
+        register_loss!($name, $type);
+    };
+}
+
+/// No robustness: ρ = s. The same as no loss at all.
+///
+/// ```toml
+/// loss = { type = "l2" }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct L2 {}
+impl RobustLoss for L2 {
+    #[inline]
+    fn rho(&self, s: f64) -> (f64, f64) {
+        (s, 1.0)
+    }
+}
+register_loss!("l2", L2);
+
+/// The norm instead of its square: ρ = 2√s.
+///
+/// The weight 1/√s has no bound; below √s = 1e-6 the loss goes on as a parabola of the same slope.
+///
+/// ```toml
+/// loss = { type = "l1" }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct L1 {}
+impl RobustLoss for L1 {
+    #[inline]
+    fn rho(&self, s: f64) -> (f64, f64) {
+        const SMALL: f64 = 1e-6;
+        let r = s.sqrt();
+        if r < SMALL { (s / SMALL, 1.0 / SMALL) } else { (2.0 * r - SMALL, 1.0 / r) }
+    }
+}
+register_loss!("l1", L1);
+
+loss! {
+    /// Squares up to the scale k, linear beyond: ρ = s for √s ≤ k, 2k√s - k² beyond.
+    ///
+    /// ```toml
+    /// loss = { type = "huber", scale = 1.345 }
+    /// ```
+    Huber, "huber", 1.345, |s, k| {
+        let r = s.sqrt();
+        if r <= k { (s, 1.0) } else { (2.0 * k * r - k * k, k / r) }
+    }
+}
+
+loss! {
+    /// Grows with the logarithm: ρ = k² ln(1 + s/k²).
+    ///
+    /// ```toml
+    /// loss = { type = "cauchy", scale = 1.0 }
+    /// ```
+    Cauchy, "cauchy", 1.0, |s, k| {
+        let k2 = k * k;
+        (k2 * (s / k2).ln_1p(), 1.0 / (1.0 + s / k2))
+    }
+}
+
+loss! {
+    /// Ignores what lies beyond the scale: ρ = k²/3 (1 - (1 - s/k²)³) up to √s = k, k²/3 beyond.
+    ///
+    /// ```toml
+    /// loss = { type = "tukey", scale = 4.685 }
+    /// ```
+    Tukey, "tukey", 4.685, |s, k| {
+        let k2 = k * k;
+        let u = 1.0 - s / k2;
+        if u > 0.0 { (k2 / 3.0 * (1.0 - u * u * u), u * u) } else { (k2 / 3.0, 0.0) }
+    }
+}
+
+loss! {
+    /// Saturates at k²: ρ = k² s / (k² + s).
+    ///
+    /// ```toml
+    /// loss = { type = "geman_mcclure", scale = 1.0 }
+    /// ```
+    GemanMcClure, "geman_mcclure", 1.0, |s, k| {
+        let k2 = k * k;
+        let u = k2 / (k2 + s);
+        (s * u, u * u)
+    }
+}
+
+loss! {
+    /// Saturates at k², faster: ρ = k² (1 - exp(-s/k²)).
+    ///
+    /// ```toml
+    /// loss = { type = "welsch", scale = 2.985 }
+    /// ```
+    Welsch, "welsch", 2.985, |s, k| {
+        let k2 = k * k;
+        (-k2 * (-s / k2).exp_m1(), (-s / k2).exp())
+    }
+}
+
+loss! {
+    /// Between squares and the norm: ρ = 2k² (√s/k - ln(1 + √s/k)).
+    ///
+    /// ```toml
+    /// loss = { type = "fair", scale = 1.4 }
+    /// ```
+    Fair, "fair", 1.4, |s, k| {
+        let u = s.sqrt() / k;
+        // the difference loses its digits where u is small: ρ = s (1 - 2u/3 + u²/2 - …) there
+        let rho = if u < 1e-4 { s * (1.0 - u * (2.0 / 3.0) + u * u * 0.5) } else { 2.0 * k * k * (u - u.ln_1p()) };
+        (rho, 1.0 / (1.0 + u))
+    }
+}
+
+loss! {
+    /// Dynamic covariance scaling: squares up to s = k, then each factor is scaled down by 2k/(k + s).
+    ///
+    /// Unlike the others its scale Φ = k is that of s itself, as in the paper (Agarwal et al., ICRA
+    /// 2013, eq. 15): ρ = min over z in \[0, 1\] of z² s + Φ (1 - z)².
+    ///
+    /// ```toml
+    /// loss = { type = "dcs", scale = 1.0 }
+    /// ```
+    Dcs, "dcs", 1.0, |s, k| {
+        if s <= k {
+            (s, 1.0)
+        } else {
+            let z = 2.0 * k / (k + s);
+            (z * z * s + k * (1.0 - z) * (1.0 - z), z * z)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loss::Loss;
+    use proptest::prelude::*;
+
+    fn all(k: f64) -> Vec<Box<dyn Loss>> {
+        vec![
+            Box::new(L2 {}),
+            Box::new(L1 {}),
+            Box::new(Huber::new(k).unwrap()),
+            Box::new(Cauchy::new(k).unwrap()),
+            Box::new(Tukey::new(k).unwrap()),
+            Box::new(GemanMcClure::new(k).unwrap()),
+            Box::new(Welsch::new(k).unwrap()),
+            Box::new(Fair::new(k).unwrap()),
+            Box::new(Dcs::new(k).unwrap()),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn weight_is_the_derivative_of_rho(k in 0.05..20.0f64, s in 1e-3..400.0f64) {
+            for loss in all(k) {
+                let loss = loss.erased();
+                let h = 1e-5 * s;
+                let numeric = (loss.rho(s + h).0 - loss.rho(s - h).0) / (2.0 * h);
+                let (_, weight) = loss.rho(s);
+                // second derivatives jump at the scale of Huber and Tukey
+                prop_assert!((numeric - weight).abs() < 1e-4 * (1.0 + weight), "{numeric} {weight} {s} {k}");
+            }
+        }
+
+        #[test]
+        fn small_residuals_cost_their_square(k in 0.5..20.0f64, s in 0.0..1e-9f64) {
+            for loss in all(k) {
+                if loss.typetag_name() != "l1" {
+                    let (rho, weight) = loss.erased().rho(s);
+                    prop_assert!((rho - s).abs() <= 1e-3 * s && (weight - 1.0).abs() < 1e-3);
+                }
+            }
+        }
+
+        #[test]
+        fn cost_never_falls_and_weight_never_rises(k in 0.05..20.0f64, s in 0.0..1e6f64, more in 0.0..1e6f64) {
+            for loss in all(k) {
+                let ((rho, weight), (rho_more, weight_more)) = (loss.erased().rho(s), loss.erased().rho(s + more));
+                prop_assert!(rho_more >= rho * (1.0 - 1e-12) && weight_more <= weight * (1.0 + 1e-12));
+            }
+        }
+    }
+
+    #[test]
+    fn a_residual_of_zero_costs_nothing_and_is_finite() {
+        for loss in all(1.0) {
+            let (rho, weight) = loss.erased().rho(0.0);
+            assert!(rho == 0.0 && weight.is_finite(), "{loss:?}");
+        }
+    }
+
+    #[test]
+    fn a_scale_must_be_positive() {
+        for bad in ["-1.0", "0.0", "1e999"] {
+            assert!(serde_json::from_str::<Cauchy>(&format!("{{\"scale\":{bad}}}")).is_err());
+        }
+    }
+}

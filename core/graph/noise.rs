@@ -1,0 +1,426 @@
+//! Gaussian noise of a measurement, and whitening by it.
+//!
+//! A closed set: every Gaussian noise is one of four forms of a square-root information W, with
+//! whitened residual W r and Ω = WᵀW. Rows that are not observed have a zero row and column in W.
+use crate::dimension::{Block, Dimension, Matrix, Vector};
+use nalgebra::{Cholesky, DMatrix};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The noise of a measurement; unit, where nothing is said.
+///
+/// In documents one of `{ sigma = 0.1 }`, `{ sigmas = [0.1, 0.2] }`, `{ covariance = [[…], […]] }`,
+/// `{ information = [[…], […]] }` or `{}`; with `observed = [true, false, …]` where some rows of the
+/// residual were not measured.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Spec", into = "Spec")]
+#[schemars(with = "Spec")]
+pub struct Noise {
+    model: Model,
+    observed: Option<Vec<bool>>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq)]
+enum Model {
+    #[default]
+    Unit,
+    Isotropic(f64),
+    Diagonal(Vec<f64>),
+    Covariance(DMatrix<f64>),
+    Information(DMatrix<f64>),
+}
+
+/// Noise, as documents write it.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Noise")]
+struct Spec {
+    /// Standard deviation of every row, in the row's units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sigma: Option<f64>,
+    /// Standard deviation of each row.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sigmas: Option<Vec<f64>>,
+    /// Covariance matrix, by rows: symmetric and positive definite.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    covariance: Option<Vec<Vec<f64>>>,
+    /// Information matrix, by rows: symmetric and positive definite.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    information: Option<Vec<Vec<f64>>>,
+    /// Which rows of the residual were measured; all, where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    observed: Option<Vec<bool>>,
+}
+
+/// What is wrong with a noise.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoiseError {
+    /// A standard deviation that is not a positive number.
+    #[error("a standard deviation must be a finite number above zero, got {0}")]
+    NotPositive(f64),
+    /// A matrix with rows of different lengths.
+    #[error("expected a square matrix, got {rows} rows of which row {row} has {columns} entries")]
+    NotSquare {
+        /// Number of rows.
+        rows: usize,
+        /// The row whose length differs, from 0.
+        row: usize,
+        /// Its length.
+        columns: usize,
+    },
+    /// A matrix with an entry that is not a number.
+    #[error("entry ({0}, {1}) of the matrix is not finite")]
+    NotFinite(usize, usize),
+    /// A matrix that differs from its transpose.
+    #[error("the matrix is not symmetric: entry ({row}, {column}) is {upper}, its mirror {lower}")]
+    NotSymmetric {
+        /// Row, from 0.
+        row: usize,
+        /// Column, from 0.
+        column: usize,
+        /// The entry.
+        upper: f64,
+        /// The entry on the other side of the diagonal.
+        lower: f64,
+    },
+    /// A matrix with a direction of no or negative variance.
+    #[error("the matrix is not positive definite: its smallest eigenvalue is {smallest:e}")]
+    NotPositiveDefinite {
+        /// Smallest eigenvalue.
+        smallest: f64,
+    },
+    /// More than one form at once.
+    #[error("expected one of sigma, sigmas, covariance, information; got {0}")]
+    Ambiguous(String),
+    /// A noise of one size for a residual of another.
+    #[error("the noise has {found} rows, the residual {expected}")]
+    Dimension {
+        /// Rows of the residual.
+        expected: usize,
+        /// Rows of the noise.
+        found: usize,
+    },
+    /// A measurement of nothing.
+    #[error("no row is observed; leave the factor out instead")]
+    NothingObserved,
+}
+
+fn sigma(s: f64) -> Result<f64, NoiseError> {
+    // 1/σ has to be a number too
+    if s > 0.0 && s.is_finite() && (1.0 / s).is_finite() { Ok(s) } else { Err(NoiseError::NotPositive(s)) }
+}
+
+/// The matrix, checked to be symmetric and positive definite.
+fn spd(m: DMatrix<f64>) -> Result<DMatrix<f64>, NoiseError> {
+    let n = m.nrows();
+    let scale = m.amax();
+    for r in 0..n {
+        for c in 0..n {
+            if !m[(r, c)].is_finite() {
+                return Err(NoiseError::NotFinite(r, c));
+            }
+            if (m[(r, c)] - m[(c, r)]).abs() > 1e-9 * scale {
+                return Err(NoiseError::NotSymmetric {
+                    row: r,
+                    column: c,
+                    upper: m[(r, c)],
+                    lower: m[(c, r)],
+                });
+            }
+        }
+    }
+    if n == 0 || Cholesky::new(m.clone()).is_none() {
+        let smallest = if n == 0 { 0.0 } else { m.symmetric_eigenvalues().min() };
+        return Err(NoiseError::NotPositiveDefinite { smallest });
+    }
+    Ok(m)
+}
+
+impl Noise {
+    /// Standard deviation 1 in every row.
+    pub fn unit() -> Self {
+        Self::default()
+    }
+    /// The same standard deviation in every row.
+    ///
+    /// # Errors
+    /// Where it is not a positive number.
+    pub fn sigma(s: f64) -> Result<Self, NoiseError> {
+        Ok(Model::Isotropic(sigma(s)?).into())
+    }
+    /// A standard deviation for each row.
+    ///
+    /// # Errors
+    /// Where one is not a positive number.
+    pub fn sigmas(s: &[f64]) -> Result<Self, NoiseError> {
+        Ok(Model::Diagonal(s.iter().map(|s| sigma(*s)).collect::<Result<_, _>>()?).into())
+    }
+    /// A covariance matrix.
+    ///
+    /// # Errors
+    /// Where it is not symmetric and positive definite.
+    pub fn covariance(m: DMatrix<f64>) -> Result<Self, NoiseError> {
+        Ok(Model::Covariance(spd(m)?).into())
+    }
+    /// An information matrix, the inverse of a covariance.
+    ///
+    /// # Errors
+    /// Where it is not symmetric and positive definite.
+    pub fn information(m: DMatrix<f64>) -> Result<Self, NoiseError> {
+        Ok(Model::Information(spd(m)?).into())
+    }
+    /// The same noise, of a measurement that has only these rows. The others are marginalised.
+    #[must_use]
+    pub fn observing(mut self, rows: &[bool]) -> Self {
+        self.observed = Some(rows.to_vec());
+        self
+    }
+    /// Which rows were measured; `None` for all.
+    pub fn observed(&self) -> Option<&[bool]> {
+        self.observed.as_deref()
+    }
+    /// Whether it is the unit noise of all rows.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// W, in its cheapest form, for a residual of `rows` rows.
+    ///
+    /// # Errors
+    /// Where the noise has another number of rows, or observes none.
+    pub fn whitener(&self, rows: usize) -> Result<Whitener, NoiseError> {
+        let check = |found: usize| match found == rows {
+            true => Ok(()),
+            false => Err(NoiseError::Dimension { expected: rows, found }),
+        };
+        match &self.model {
+            Model::Diagonal(s) => check(s.len())?,
+            Model::Covariance(m) | Model::Information(m) => check(m.nrows())?,
+            Model::Unit | Model::Isotropic(_) => {}
+        }
+        let Some(observed) = self.observed.as_deref().filter(|o| o.iter().any(|o| !o)) else {
+            if let Some(o) = &self.observed {
+                check(o.len())?;
+            }
+            return self.model.whitener(None);
+        };
+        check(observed.len())?;
+        if observed.iter().all(|o| !o) {
+            return Err(NoiseError::NothingObserved);
+        }
+        self.model.whitener(Some(observed))
+    }
+
+    /// The information matrix Ω for a residual of `rows` rows; zero in rows that are not observed.
+    ///
+    /// # Errors
+    /// As [`Noise::whitener`].
+    pub fn information_matrix(&self, rows: usize) -> Result<DMatrix<f64>, NoiseError> {
+        if let (Model::Information(m), None) = (&self.model, &self.observed)
+            && m.nrows() == rows
+        {
+            return Ok(m.clone());
+        }
+        let w = self.whitener(rows)?.matrix(rows);
+        Ok(w.tr_mul(&w))
+    }
+}
+
+impl From<Model> for Noise {
+    fn from(model: Model) -> Self {
+        Noise { model, observed: None }
+    }
+}
+
+impl Model {
+    fn whitener(&self, observed: Option<&[bool]>) -> Result<Whitener, NoiseError> {
+        let mask = |s: f64, i: usize| if observed.is_none_or(|o| o[i]) { 1.0 / s } else { 0.0 };
+        Ok(match (self, observed) {
+            (Model::Unit, None) => Whitener::Unit,
+            (Model::Unit, Some(o)) => Whitener::Diagonal((0..o.len()).map(|i| mask(1.0, i)).collect()),
+            (Model::Isotropic(s), None) => Whitener::Isotropic(1.0 / s),
+            (Model::Isotropic(s), Some(o)) => Whitener::Diagonal((0..o.len()).map(|i| mask(*s, i)).collect()),
+            (Model::Diagonal(s), _) => {
+                Whitener::Diagonal(s.iter().enumerate().map(|(i, s)| mask(*s, i)).collect())
+            }
+            (Model::Information(m), None) => Whitener::Full(cholesky(m)?.l().transpose()),
+            (Model::Covariance(m), None) => Whitener::Full(inverse_root(m)?),
+            (Model::Information(m), Some(o)) => Whitener::Full(marginal_root(&cholesky(m)?.inverse(), o)?),
+            (Model::Covariance(m), Some(o)) => Whitener::Full(marginal_root(m, o)?),
+        })
+    }
+}
+
+fn cholesky(m: &DMatrix<f64>) -> Result<Cholesky<f64, nalgebra::Dyn>, NoiseError> {
+    Cholesky::new(m.clone())
+        .ok_or_else(|| NoiseError::NotPositiveDefinite { smallest: m.clone().symmetric_eigenvalues().min() })
+}
+
+/// Upper triangular W with WᵀW = m⁻¹: m = U Uᵀ by a Cholesky from the last row up, W = U⁻¹.
+fn inverse_root(m: &DMatrix<f64>) -> Result<DMatrix<f64>, NoiseError> {
+    let n = m.nrows();
+    let flip = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |r, c| m[(n - 1 - r, n - 1 - c)]);
+    let u = flip(&cholesky(&flip(m))?.l());
+    let w = u.solve_upper_triangular(&DMatrix::identity(n, n));
+    w.ok_or(NoiseError::NotPositiveDefinite { smallest: 0.0 })
+}
+
+/// W of the observed rows of a covariance; zero elsewhere.
+fn marginal_root(covariance: &DMatrix<f64>, observed: &[bool]) -> Result<DMatrix<f64>, NoiseError> {
+    let rows: Vec<usize> = (0..observed.len()).filter(|i| observed[*i]).collect();
+    let small = DMatrix::from_fn(rows.len(), rows.len(), |r, c| covariance[(rows[r], rows[c])]);
+    let root = inverse_root(&small)?;
+    let mut w = DMatrix::zeros(observed.len(), observed.len());
+    for (r, &row) in rows.iter().enumerate() {
+        for (c, &column) in rows.iter().enumerate() {
+            w[(row, column)] = root[(r, c)];
+        }
+    }
+    Ok(w)
+}
+
+impl TryFrom<Spec> for Noise {
+    type Error = NoiseError;
+    fn try_from(spec: Spec) -> Result<Self, NoiseError> {
+        let given: Vec<&str> = [
+            ("sigma", spec.sigma.is_some()),
+            ("sigmas", spec.sigmas.is_some()),
+            ("covariance", spec.covariance.is_some()),
+            ("information", spec.information.is_some()),
+        ]
+        .into_iter()
+        .filter_map(|(name, given)| given.then_some(name))
+        .collect();
+        if given.len() > 1 {
+            return Err(NoiseError::Ambiguous(given.join(" and ")));
+        }
+        let noise = match (spec.sigma, spec.sigmas, spec.covariance, spec.information) {
+            (Some(s), ..) => Noise::sigma(s)?,
+            (_, Some(s), ..) => Noise::sigmas(&s)?,
+            (_, _, Some(m), _) => Noise::covariance(matrix(&m)?)?,
+            (_, _, _, Some(m)) => Noise::information(matrix(&m)?)?,
+            _ => Noise::unit(),
+        };
+        Ok(Noise { observed: spec.observed, ..noise })
+    }
+}
+
+impl From<Noise> for Spec {
+    fn from(noise: Noise) -> Spec {
+        let rows = |m: DMatrix<f64>| m.row_iter().map(|r| r.iter().copied().collect()).collect();
+        let mut spec = Spec { observed: noise.observed, ..Spec::default() };
+        match noise.model {
+            Model::Unit => {}
+            Model::Isotropic(s) => spec.sigma = Some(s),
+            Model::Diagonal(s) => spec.sigmas = Some(s),
+            Model::Covariance(m) => spec.covariance = Some(rows(m)),
+            Model::Information(m) => spec.information = Some(rows(m)),
+        }
+        spec
+    }
+}
+
+fn matrix(rows: &[Vec<f64>]) -> Result<DMatrix<f64>, NoiseError> {
+    let n = rows.len();
+    match rows.iter().position(|r| r.len() != n) {
+        Some(row) => Err(NoiseError::NotSquare { rows: n, row, columns: rows[row].len() }),
+        None => Ok(DMatrix::from_fn(n, n, |r, c| rows[r][c])),
+    }
+}
+
+/// W of one factor.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Whitener {
+    /// The identity.
+    Unit,
+    /// A multiple of the identity.
+    Isotropic(f64),
+    /// The diagonal; zero where a row is not observed.
+    Diagonal(Vec<f64>),
+    /// Upper triangular.
+    Full(DMatrix<f64>),
+}
+
+impl Whitener {
+    /// As a matrix of that many rows.
+    pub fn matrix(&self, rows: usize) -> DMatrix<f64> {
+        match self {
+            Whitener::Unit => DMatrix::identity(rows, rows),
+            Whitener::Isotropic(w) => DMatrix::identity(rows, rows) * *w,
+            Whitener::Diagonal(w) => DMatrix::from_diagonal(&w.clone().into()),
+            Whitener::Full(w) => w.clone(),
+        }
+    }
+}
+
+/// The W's of a batch, all of one kind.
+#[derive(Debug, Clone)]
+pub(crate) enum Whiteners<D: Dimension> {
+    Unit,
+    Isotropic(Vec<f64>),
+    Diagonal(Vec<Vector<D>>),
+    Full(Vec<Matrix<D, D>>),
+}
+
+impl<D: Dimension> Whiteners<D> {
+    pub(crate) fn like(one: &Whitener) -> Self {
+        match one {
+            Whitener::Unit => Self::Unit,
+            Whitener::Isotropic(_) => Self::Isotropic(vec![]),
+            Whitener::Diagonal(_) => Self::Diagonal(vec![]),
+            Whitener::Full(_) => Self::Full(vec![]),
+        }
+    }
+    pub(crate) fn fits(&self, one: &Whitener) -> bool {
+        matches!(
+            (self, one),
+            (Self::Unit, Whitener::Unit)
+                | (Self::Isotropic(_), Whitener::Isotropic(_))
+                | (Self::Diagonal(_), Whitener::Diagonal(_))
+                | (Self::Full(_), Whitener::Full(_))
+        )
+    }
+    pub(crate) fn push(&mut self, one: &Whitener) {
+        match (self, one) {
+            (Self::Isotropic(all), Whitener::Isotropic(w)) => all.push(*w),
+            (Self::Diagonal(all), Whitener::Diagonal(w)) => all.push(D::vector(|i| w[i])),
+            (Self::Full(all), Whitener::Full(w)) => {
+                let mut block = <Matrix<D, D> as Block>::zeros();
+                block.as_mut_slice().copy_from_slice(w.as_slice());
+                all.push(block);
+            }
+            _ => {}
+        }
+    }
+    /// x ← W x for each column of `x`, in place; whatever stands in rows not observed, zero comes out.
+    #[inline(always)]
+    pub(crate) fn whiten(&self, i: usize, x: &mut [f64]) {
+        match self {
+            Self::Unit => {}
+            Self::Isotropic(w) => x.iter_mut().for_each(|x| *x *= w[i]),
+            Self::Diagonal(w) => {
+                let w = w[i].as_ref();
+                for column in x.chunks_exact_mut(D::N) {
+                    for r in 0..D::N {
+                        column[r] = if w[r] == 0.0 { 0.0 } else { column[r] * w[r] };
+                    }
+                }
+            }
+            Self::Full(w) => {
+                let w = w[i].as_slice();
+                for column in x.chunks_exact_mut(D::N) {
+                    for r in 0..D::N {
+                        // upper triangular: row r needs entries r.. only, so the order is safe
+                        let mut sum = 0.0;
+                        for k in r..D::N {
+                            let w = w[r + k * D::N];
+                            sum += if w == 0.0 { 0.0 } else { w * column[k] };
+                        }
+                        column[r] = sum;
+                    }
+                }
+            }
+        }
+    }
+}

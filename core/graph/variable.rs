@@ -1,0 +1,78 @@
+//! Values in a graph: points of any registered manifold.
+use crate::catalogue::Kind;
+use crate::column::{Column, Plain};
+use crate::dimension::Dimension;
+use crate::manifold::Manifold;
+use std::any::{Any, TypeId};
+use std::fmt::Debug;
+
+/// A point of a registered manifold. Implemented by [`register_manifold!`](crate::register_manifold).
+#[typetag::serde(tag = "type")]
+pub trait Variable: Debug + Send + Sync {
+    /// Everything else.
+    fn erased(&self) -> &dyn ErasedManifold;
+}
+
+impl Kind for dyn Variable {
+    const NAME: &'static str = "variable";
+}
+
+impl Clone for Box<dyn Variable> {
+    fn clone(&self) -> Self {
+        self.erased().clone_box()
+    }
+}
+
+/// The object-safe face of [`Manifold`], implemented once for all of them.
+pub trait ErasedManifold {
+    /// For a downcast to the concrete type.
+    fn as_any(&self) -> &dyn Any;
+    /// The concrete type.
+    fn type_id(&self) -> TypeId;
+    /// Dimension of the tangent space.
+    fn dim(&self) -> usize;
+    /// Names of the tangent directions.
+    fn tangent(&self) -> &'static [&'static str];
+    /// The point that `delta` leads to; `None` where its length is not the dimension.
+    fn retract(&self, delta: &[f64]) -> Option<Box<dyn Variable>>;
+    /// The tangent vector to `other`; `None` where that has another type.
+    fn local(&self, other: &dyn Variable) -> Option<Vec<f64>>;
+    /// Whether every coordinate is finite.
+    fn is_finite(&self) -> bool;
+    /// The same point again.
+    fn clone_box(&self) -> Box<dyn Variable>;
+    /// An empty column of this type.
+    fn new_column(&self) -> Box<dyn Column>;
+}
+
+impl<M: Manifold + Variable> ErasedManifold for M {
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+    fn type_id(&self) -> TypeId {
+        TypeId::of::<M>()
+    }
+    fn dim(&self) -> usize {
+        M::Dim::N
+    }
+    fn tangent(&self) -> &'static [&'static str] {
+        M::TANGENT
+    }
+    fn retract(&self, delta: &[f64]) -> Option<Box<dyn Variable>> {
+        (delta.len() == M::Dim::N)
+            .then(|| Box::new(Manifold::retract(self, &M::Dim::vector(|i| delta[i]))) as Box<dyn Variable>)
+    }
+    fn local(&self, other: &dyn Variable) -> Option<Vec<f64>> {
+        let other = other.erased().as_any().downcast_ref::<M>()?;
+        Some(Manifold::local(self, other).as_ref().to_vec())
+    }
+    fn is_finite(&self) -> bool {
+        Manifold::is_finite(self)
+    }
+    fn clone_box(&self) -> Box<dyn Variable> {
+        Box::new(self.clone())
+    }
+    fn new_column(&self) -> Box<dyn Column> {
+        Box::new(Plain::<M>(Vec::new()))
+    }
+}
