@@ -25,7 +25,7 @@ pub(crate) fn problem_of(message: &str, node: Option<&Node>) -> Problem {
         let split = message.strip_prefix(prefix).and_then(|rest| rest.split_once(", expected "));
         if let Some((found, expected)) = split {
             let found = match (prefix, node) {
-                ("invalid length ", _) => format!("{found} of them"),
+                ("invalid length ", _) => format!("{found} elements"),
                 (_, Some(node)) => node.in_words(),
                 (_, None) => found.to_owned(),
             };
@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(say("invalid type: string \"a\", expected f64"), "expected a number, found string \"a\"");
         assert_eq!(
             say("invalid length 2, expected an array of length 3"),
-            "expected an array of 3, found 2 of them"
+            "expected an array of 3, found 2 elements"
         );
         assert_eq!(say("invalid type: map, expected a tuple of size 4"), "expected an array of 4, found map");
         assert_eq!(say("sigma has to be positive\n\n"), "sigma has to be positive");

@@ -1,5 +1,5 @@
 //! Reads a serde type out of a node, with every error at its exact place.
-use crate::diagnostic::{Diagnostic, Errors};
+use crate::diagnostic::Errors;
 use crate::message::problem_of;
 use crate::node::{Node, Value};
 use crate::problem::Problem;
@@ -34,27 +34,21 @@ impl Node {
         let mut meant: Vec<String> = Vec::new();
         loop {
             let (place, problem) = self.explain(&failure);
+            let mut removed = false;
+            if let Problem::UnknownField { field, known } = &problem {
+                meant.extend(nearest(field, known.iter().map(String::as_str)).map(str::to_owned));
+                // a variant that is unknown would leave nothing behind
+                removed = is_unknown_field(&failure) && remove(&mut json, failure.path(), field);
+            }
             match &problem {
-                Problem::UnknownField { field, known } => {
-                    let near = nearest(field, known.iter().map(String::as_str));
-                    meant.extend(near.map(str::to_owned));
-                    let removed = remove(&mut json, failure.path(), field);
-                    errors.report(place, problem);
-                    if !removed {
-                        return None;
-                    }
-                }
                 // the unknown field's message has said what it should be called
-                Problem::MissingField { field } if meant.contains(field) => return None,
-                _ => {
-                    errors.report(place, problem);
-                    return None;
-                }
+                Problem::MissingField { field } if meant.contains(field) => {}
+                _ => errors.report(place, problem),
             }
-            match parse(json.clone()) {
-                Ok(_) => return None,
-                Err(next) => failure = next,
-            }
+            failure = match removed.then(|| parse(json.clone())) {
+                Some(Err(next)) => next,
+                Some(Ok(_)) | None => return None,
+            };
         }
     }
 
@@ -73,38 +67,32 @@ impl Node {
     }
 }
 
+fn is_unknown_field(failure: &ParseError) -> bool {
+    failure.inner().to_string().trim_start().starts_with("unknown field")
+}
+
 /// Takes the field out of the table that the path leads to, with or without the field itself at its end.
 fn remove(json: &mut Json, path: &Path, field: &str) -> bool {
     let mut at = json;
     for segment in path {
         let here = at;
-        at = match segment {
-            Segment::Map { key } | Segment::Enum { variant: key } => {
-                // the last segment may be the field, or not be there
-                match here.get(key).is_some() && key != field {
-                    true => match here.get_mut(key) {
-                        Some(next) => next,
-                        None => return false,
-                    },
-                    false => return take(here, field),
-                }
+        let next = match segment {
+            // the last segment may be the field itself
+            Segment::Map { key } | Segment::Enum { variant: key } if key == field => {
+                return take(here, field);
             }
-            Segment::Seq { index } => match here.get_mut(*index) {
-                Some(next) => next,
-                None => return false,
-            },
-            Segment::Unknown => return take(here, field),
+            Segment::Map { key } | Segment::Enum { variant: key } => here.get_mut(key),
+            Segment::Seq { index } => here.get_mut(*index),
+            Segment::Unknown => None,
         };
+        match next {
+            Some(next) => at = next,
+            None => return false,
+        }
     }
     take(at, field)
 }
 
 fn take(json: &mut Json, field: &str) -> bool {
     json.as_object_mut().is_some_and(|object| object.shift_remove(field).is_some())
-}
-
-/// The same problem at every node that has it: a helper for checks that serde cannot make.
-pub(crate) fn expect_table(node: &Node, errors: &Errors) {
-    let problem = Problem::wrong_type("a table", node.in_words());
-    errors.push(Diagnostic::new(node.place.clone(), problem));
 }

@@ -126,11 +126,6 @@ impl Problem {
             _ => None,
         }
     }
-
-    /// An unknown name among `known`, which are listed in the help.
-    pub(crate) fn unknown(what: &str, name: &str, known: impl IntoIterator<Item = String>) -> Self {
-        Problem::UnknownName { what: what.into(), name: name.into(), known: known.into_iter().collect() }
-    }
 }
 
 /// `` `a`, `b` and `c` ``, for messages that name several things.

@@ -1,7 +1,6 @@
 //! Reading a table field by field, so that everything that is wrong with it is found.
 use crate::diagnostic::Errors;
 use crate::node::{Node, Table, Value};
-use crate::parse::expect_table;
 use crate::problem::Problem;
 use crate::source::Place;
 use crate::suggest::nearest;
@@ -49,7 +48,8 @@ impl<'e> Section<'e> {
             Value::Table(table) => table,
             Value::Null => Table::new(),
             _ => {
-                expect_table(&node, errors);
+                let problem = Problem::wrong_type("a table", node.in_words());
+                errors.report(node.place, problem);
                 return None;
             }
         };
@@ -136,21 +136,37 @@ impl<'e> Section<'e> {
 
     /// The elements of an array; none if it is not there.
     pub fn nodes(&mut self, field: &str) -> Vec<Node> {
-        match self.take(field) {
-            Some(Node { value: Value::Array(items), .. }) => items,
-            Some(node) => {
-                let problem = Problem::wrong_type("an array", node.in_words());
-                self.errors.report(node.place, problem);
-                Vec::new()
-            }
-            None => Vec::new(),
-        }
+        let taken = self.take(field);
+        taken.map(|node| self.elements(node)).unwrap_or_default()
     }
 
     /// The tables of an array, as `[[field]]` writes them; none if it is not there. What is no table is an error.
     pub fn items(&mut self, field: &str) -> Vec<Section<'e>> {
+        let nodes = self.nodes(field);
+        self.sections(nodes)
+    }
+
+    /// The tables of an array that has to be there, empty or not.
+    pub fn required_items(&mut self, field: &str) -> Vec<Section<'e>> {
+        let taken = self.take_required(field);
+        let nodes = taken.map(|node| self.elements(node)).unwrap_or_default();
+        self.sections(nodes)
+    }
+
+    fn elements(&self, node: Node) -> Vec<Node> {
+        match node.value {
+            Value::Array(items) => items,
+            _ => {
+                let problem = Problem::wrong_type("an array", node.in_words());
+                self.errors.report(node.place, problem);
+                Vec::new()
+            }
+        }
+    }
+
+    fn sections(&self, nodes: Vec<Node>) -> Vec<Section<'e>> {
         let errors = self.errors;
-        self.nodes(field).into_iter().filter_map(|node| Section::new(node, errors)).collect()
+        nodes.into_iter().filter_map(|node| Section::new(node, errors)).collect()
     }
 
     /// All fields that are left, as one serde type that denies unknown fields.

@@ -92,9 +92,11 @@ impl Place {
     }
 
     /// The part on the first line, so that a message about a long table does not show all of it.
-    pub fn first_line(&self) -> Place {
+    #[must_use]
+    pub fn first_line(mut self) -> Place {
         let length = self.text().find(['\n', '\r']).unwrap_or(self.span.len());
-        Place { source: self.source.clone(), span: self.span.start..self.span.start + length }
+        self.span.end = self.span.start + length;
+        self
     }
 
     /// What is written there.

@@ -83,7 +83,7 @@ impl Reader<'_> {
         match i64::from_str_radix(integer.as_str(), integer.radix()) {
             Ok(value) => Value::Integer(value),
             Err(_) => {
-                let message = format!("the whole number {} does not fit into 64 bits", place.text());
+                let message = format!("the whole number {integer} does not fit into 64 bits");
                 self.errors.push(syntax(place.clone(), &message));
                 Value::Null
             }

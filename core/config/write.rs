@@ -1,6 +1,7 @@
 //! Documents written. What is written reads back as the same bits.
 use crate::format::Format;
 use ::toml::Value;
+use manifactor_graph::Key;
 use serde::Serialize;
 
 /// Why a value could not be written as a document.
@@ -14,6 +15,12 @@ pub enum WriteError {
         path: String,
         /// The number.
         value: f64,
+    },
+    /// A graph that holds a variable which has no value.
+    #[error("the graph holds `{key}` fixed, but there is no value for it")]
+    FixedWithoutValue {
+        /// The variable.
+        key: Key,
     },
     /// Something that not all formats can say: null in an array, whole numbers past 64 bits, keys that are not texts.
     #[error("cannot be written as {format}: {message}")]
