@@ -1,1 +1,58 @@
 //! Compiled problems, sparse linear algebra and solvers.
+//!
+//! [`Problem::compile`] turns a [`Graph`] and its [`Values`] into columns of variables, batches of
+//! factors and the structure of their normal equations, once. An [`Optimizer`] moves the problem's
+//! estimate; an [`Observer`] watches. [`solve`] does it all.
+mod compile;
+mod diagnose;
+mod dogleg;
+mod gauss_newton;
+mod layout;
+mod levenberg_marquardt;
+mod linear;
+mod observer;
+mod optimizer;
+mod outcome;
+mod problem;
+mod system;
+mod termination;
+
+pub use compile::CompileError;
+pub use dogleg::Dogleg;
+pub use gauss_newton::GaussNewton;
+pub use levenberg_marquardt::LevenbergMarquardt;
+pub use observer::{All, Interrupt, Observer, Silent};
+pub use optimizer::{Optimizer, Stopping};
+pub use outcome::{IterationRecord, Outcome, Times};
+pub use problem::Problem;
+pub use termination::{Stall, Termination, Tolerance, Undetermined};
+
+use manifactor_graph::batch::FactorState;
+use manifactor_graph::{Graph, Values};
+
+/// An estimate, and how it came about.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// The estimate: the best found, however the solve ended.
+    pub values: Values,
+    /// What the solver has to tell.
+    pub outcome: Outcome,
+    /// Each factor at the estimate, in the order of the graph.
+    pub factors: Vec<FactorState>,
+}
+
+/// Compiles and solves.
+///
+/// # Errors
+/// Where graph and values do not fit each other. Numerical trouble is no error: see
+/// [`Outcome::termination`].
+pub fn solve(
+    graph: &Graph,
+    values: &Values,
+    optimizer: &dyn Optimizer,
+    observer: &mut dyn Observer,
+) -> Result<Solution, CompileError> {
+    let mut problem = Problem::compile(graph, values)?;
+    let outcome = optimizer.solve(&mut problem, observer);
+    Ok(Solution { values: problem.values(), factors: problem.inspect(), outcome })
+}

@@ -1,0 +1,187 @@
+//! From the dynamic view of a graph to the columnar one.
+use crate::layout::Layout;
+use crate::linear::Cholesky;
+use crate::outcome::Times;
+use crate::problem::{Place, Problem};
+use manifactor_graph::batch::{Batch, Member};
+use manifactor_graph::column::{Columns, FIXED};
+use manifactor_graph::normal_equations::Slot;
+use manifactor_graph::{Fixed, Graph, GraphError, Key, Values};
+use std::any::TypeId;
+use std::collections::HashMap;
+use std::time::Instant;
+
+/// Why a graph cannot be compiled.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompileError {
+    /// Factors, values and what is held do not fit each other: everything that is wrong.
+    #[error("the graph does not fit its values:{}", list(.0))]
+    Graph(Vec<GraphError>),
+    /// There is nothing to solve for.
+    #[error("there is no variable to solve for: {0}")]
+    Empty(&'static str),
+    /// The linear system does not fit into memory.
+    #[error("no memory for a linear system of {unknowns} unknowns")]
+    OutOfMemory {
+        /// Its size.
+        unknowns: usize,
+    },
+}
+
+fn list(errors: &[GraphError]) -> String {
+    const SHOWN: usize = 20;
+    let mut text: String = errors.iter().take(SHOWN).map(|e| format!("\n  {e}")).collect();
+    if errors.len() > SHOWN {
+        text += &format!("\n  and {} more", errors.len() - SHOWN);
+    }
+    text
+}
+
+pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, CompileError> {
+    let clock = Instant::now();
+    let errors = graph.check(values);
+    if !errors.is_empty() {
+        return Err(CompileError::Graph(errors));
+    }
+    let (mut variables, columns) = columns(graph, values);
+    let ids: HashMap<&str, usize> = values.iter().enumerate().map(|(i, (k, _))| (k.as_str(), i)).collect();
+    // checked above: every key has a value
+    let factor_ids: Vec<Vec<usize>> = graph
+        .factors()
+        .iter()
+        .map(|f| f.keys.iter().filter_map(|k| ids.get(k.as_str()).copied()).collect())
+        .collect();
+
+    // the free variables are the blocks of the linear system
+    let is_free = |place: &Place| place.held.count_ones() < place.tangent.len() as u32;
+    let free: Vec<usize> = (0..variables.len()).filter(|i| is_free(&variables[*i])).collect();
+    if free.is_empty() {
+        let why = if variables.is_empty() { "there are no values" } else { "all are held fixed" };
+        return Err(CompileError::Empty(why));
+    }
+    let mut block = vec![None; variables.len()];
+    free.iter().enumerate().for_each(|(b, v)| block[*v] = Some(b));
+    let dims: Vec<usize> = free.iter().map(|v| variables[*v].tangent.len()).collect();
+    let unknowns = dims.iter().sum();
+    let mut pairs = vec![];
+    for ids in &factor_ids {
+        let blocks: Vec<u32> = ids.iter().filter_map(|i| block[*i].map(|b| b as u32)).collect();
+        for (n, &a) in blocks.iter().enumerate() {
+            pairs.extend(blocks[..n].iter().map(|&b| (a, b)));
+        }
+    }
+    let out_of_memory = CompileError::OutOfMemory { unknowns };
+    let layout = Layout::new(&dims, pairs).ok_or(out_of_memory.clone())?;
+    for (variable, block) in variables.iter_mut().zip(&block) {
+        variable.start = block.map(|b| layout.start[b] as usize);
+    }
+    let mut starts: Vec<Vec<u32>> = vec![vec![]; columns.len()];
+    let mut held = vec![];
+    for place in &variables {
+        starts[place.column].push(place.start.map_or(FIXED, |s| s as u32));
+        if let Some(start) = place.start {
+            held.extend((0..place.tangent.len()).filter(|d| place.held >> d & 1 == 1).map(|d| start + d));
+        }
+    }
+    let batches = batches(graph, &factor_ids, &variables, &block, &layout)?;
+    let cholesky = Cholesky::analyze(&layout.col_ptr, &layout.row_idx).ok_or(out_of_memory)?;
+    let (h, g) = (vec![0.0; layout.row_idx.len()], vec![0.0; unknowns]);
+    let factor_keys = graph.factors().iter().map(|f| f.keys.clone()).collect();
+    let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };
+    let trial = columns.clone();
+    Ok(Problem {
+        variables,
+        factor_keys,
+        columns,
+        trial,
+        starts,
+        batches,
+        layout,
+        h,
+        g,
+        held,
+        cholesky,
+        times,
+    })
+}
+
+/// Values into columns, by type.
+fn columns(graph: &Graph, values: &Values) -> (Vec<Place>, Columns) {
+    let mut columns = Columns::default();
+    let mut sizes: Vec<usize> = vec![];
+    let place = |(key, value): (&Key, &dyn manifactor_graph::Variable)| {
+        let erased = value.erased();
+        let id = erased.type_id();
+        let column = columns.position(id).unwrap_or_else(|| {
+            sizes.push(0);
+            columns.add(id, erased.new_column())
+        });
+        columns.column_mut(column).push(value);
+        sizes[column] += 1;
+        let tangent = erased.tangent();
+        let held = graph.fixed().get(key).map_or(0, |f| held_bits(f, tangent));
+        Place { key: key.clone(), column, index: sizes[column] - 1, tangent, start: None, held }
+    };
+    let variables = values.iter().map(place).collect();
+    (variables, columns)
+}
+
+fn held_bits(fixed: &Fixed, tangent: &[&str]) -> u32 {
+    let bit = |name: &str| tangent.iter().position(|t| *t == name).map_or(0, |i| 1 << i);
+    match fixed {
+        Fixed::Whole(true) => u32::MAX.checked_shr(32 - tangent.len().min(32) as u32).unwrap_or(0),
+        Fixed::Whole(false) => 0,
+        Fixed::Directions(names) => names.iter().fold(0, |bits, name| bits | bit(name)),
+    }
+}
+
+/// Factors into batches, by residual type, kind of noise and type of loss.
+fn batches(
+    graph: &Graph,
+    factor_ids: &[Vec<usize>],
+    variables: &[Place],
+    block: &[Option<usize>],
+    layout: &Layout,
+) -> Result<Vec<Box<dyn Batch>>, CompileError> {
+    let mut batches: Vec<Box<dyn Batch>> = vec![];
+    let mut of_type: HashMap<TypeId, Vec<usize>> = HashMap::new();
+    let (mut index, mut starts, mut held, mut slots) = (vec![], vec![], vec![], vec![]);
+    for (entry, (factor, ids)) in graph.factors().iter().zip(factor_ids).enumerate() {
+        let erased = factor.factor.erased();
+        let rows = erased.signature().rows.unwrap_or(0);
+        let whitener = factor.noise.whitener(rows).map_err(|source| {
+            let name = factor.factor.typetag_name();
+            CompileError::Graph(vec![GraphError::Noise { factor: entry, name, source }])
+        })?;
+        let loss = factor.loss.as_deref();
+        let candidates = of_type.entry(erased.type_id()).or_default();
+        let found = candidates.iter().copied().find(|b| batches[*b].fits(&whitener, loss));
+        let batch = found.unwrap_or_else(|| {
+            batches.push(erased.new_batch(&whitener, loss));
+            candidates.push(batches.len() - 1);
+            batches.len() - 1
+        });
+        (index.clear(), starts.clear(), held.clear(), slots.clear());
+        for (n, &a) in ids.iter().enumerate() {
+            index.push(variables[a].index as u32);
+            starts.push(variables[a].start.map_or(FIXED, |s| s as u32));
+            held.push(if variables[a].start.is_some() { variables[a].held } else { 0 });
+            for &b in &ids[..=n] {
+                let both = block[a].zip(block[b]);
+                slots.push(both.and_then(|(a, b)| layout.slot(a, b)).unwrap_or(Slot::default()));
+            }
+        }
+        batches[batch].push(&Member {
+            entry,
+            factor: erased.as_any(),
+            index: &index,
+            starts: &starts,
+            held: &held,
+            slots: &slots,
+            whitener: &whitener,
+            loss,
+        });
+    }
+    Ok(batches)
+}

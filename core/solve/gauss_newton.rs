@@ -1,0 +1,90 @@
+//! Gauss-Newton: full steps.
+use crate::diagnose::undetermined;
+use crate::observer::Observer;
+use crate::optimizer::{Best, Optimizer, Session, Step, Stopping, Tried};
+use crate::outcome::Outcome;
+use crate::problem::Problem;
+use crate::system::{dot, norm};
+use crate::termination::{Stall, Termination};
+use manifactor_graph::register;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Full steps to the minimum of the linearized cost: H δ = -g.
+///
+/// The fastest where the start is good. A step may raise the cost; one that leaves the domain of a
+/// factor is halved until it does not. Five rises in a row end the solve, with the best estimate so
+/// far. A system that something leaves open ends it with the direction that is open.
+///
+/// ```toml
+/// solver = { type = "gauss_newton", stop = { max_iterations = 50 } }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct GaussNewton {
+    /// When to stop.
+    pub stop: Stopping,
+}
+
+/// Rises of the cost in a row that end a solve.
+const RISES: usize = 5;
+/// Halvings of one step.
+const HALVINGS: usize = 30;
+
+#[typetag::serde(name = "gauss_newton")]
+impl Optimizer for GaussNewton {
+    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        let mut session = match Session::begin(problem, &self.stop, observer) {
+            Ok(session) => session,
+            Err(outcome) => return *outcome,
+        };
+        let mut best = Best::new(&session);
+        let termination = iterate(&mut session, &mut best);
+        best.restore(&mut session);
+        session.end(termination, None)
+    }
+}
+register!(dyn Optimizer, "gauss_newton", GaussNewton);
+
+fn iterate(session: &mut Session<'_>, best: &mut Best) -> Termination {
+    let mut delta = vec![];
+    let mut rises = 0;
+    loop {
+        if let Some(termination) = session.finished() {
+            return termination;
+        }
+        session.iterations += 1;
+        let factorized = session.problem.factorize(None);
+        if let Some(direction) = undetermined(session.problem, factorized.is_err(), 0.0) {
+            return Termination::Indeterminate(direction);
+        }
+        if factorized.is_err() {
+            return Termination::Stalled { reason: Stall::Damping };
+        }
+        session.problem.newton_step(&mut delta);
+        let mut step =
+            Step { predicted: -0.5 * dot(&delta, &session.problem.g), norm: norm(&delta), control: 1.0 };
+        let mut halvings = 0;
+        while let Tried::Undefined = session.attempt(&delta, &step) {
+            session.record(&step, false);
+            halvings += 1;
+            if session.interrupted() {
+                return Termination::Interrupted;
+            }
+            if halvings > HALVINGS {
+                return Termination::Stalled { reason: Stall::Domain };
+            }
+            delta.iter_mut().for_each(|d| *d *= 0.5);
+            step = Step { norm: 0.5 * step.norm, control: 0.5 * step.control, ..step };
+        }
+        rises = if session.trial.cost > session.at.cost && !session.settled(&step) { rises + 1 } else { 0 };
+        session.record(&step, true);
+        if let Some(termination) = session.take(&step) {
+            return termination;
+        }
+        best.update(session);
+        if rises >= RISES {
+            return Termination::Stalled { reason: Stall::Diverging };
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Levenberg-Marquardt: steps damped along the diagonal of H.
+use crate::diagnose::undetermined;
+use crate::observer::Observer;
+use crate::optimizer::{Optimizer, Session, Step, Stopping, Tried};
+use crate::outcome::Outcome;
+use crate::problem::Problem;
+use crate::system::{dot, norm};
+use crate::termination::{Stall, Termination, Tolerance, Undetermined};
+use manifactor_graph::register;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Damped steps, each of which lowers the cost: (H + λ diag H) δ = -g.
+///
+/// λ falls by up to `decrease` after a step that does what the model predicts, and rises after one that
+/// does not (Nielsen's rule). A refused step costs a factorization, not a linearization. Nothing but
+/// damping may hold a direction: the outcome then names it as undetermined.
+///
+/// ```toml
+/// solver = { type = "levenberg_marquardt", initial_lambda = 1e-5, stop = { relative_cost = 1e-6 } }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LevenbergMarquardt {
+    /// Damping of the first step, as a share of the diagonal.
+    pub initial_lambda: f64,
+    /// Least damping.
+    pub min_lambda: f64,
+    /// Damping at which a solve gives up.
+    pub max_lambda: f64,
+    /// Largest factor by which one good step lowers the damping.
+    pub decrease: f64,
+    /// Least and largest entry of the diagonal that is used for damping.
+    pub diagonal: [f64; 2],
+    /// When to stop.
+    pub stop: Stopping,
+}
+
+impl Default for LevenbergMarquardt {
+    fn default() -> Self {
+        Self {
+            initial_lambda: 1e-5,
+            min_lambda: 1e-15,
+            max_lambda: 1e15,
+            decrease: 10.0,
+            diagonal: [1e-6, 1e32],
+            stop: Stopping::default(),
+        }
+    }
+}
+
+/// Least share of the predicted decrease that makes a step good enough to take.
+const GAIN: f64 = 1e-4;
+
+#[typetag::serde(name = "levenberg_marquardt")]
+impl Optimizer for LevenbergMarquardt {
+    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        let mut session = match Session::begin(problem, &self.stop, observer) {
+            Ok(session) => session,
+            Err(outcome) => return *outcome,
+        };
+        let mut open = None;
+        let termination = self.iterate(&mut session, &mut open);
+        session.end(termination, open)
+    }
+}
+register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
+
+impl LevenbergMarquardt {
+    fn iterate(&self, session: &mut Session<'_>, open: &mut Option<Undetermined>) -> Termination {
+        let (mut lambda, mut rise) = (self.initial_lambda, 2.0);
+        let (mut delta, mut added) = (vec![], vec![]);
+        'linearized: loop {
+            if let Some(termination) = session.finished() {
+                return termination;
+            }
+            session.iterations += 1;
+            loop {
+                session.problem.diagonal(&mut added);
+                let [least, most] = self.diagonal;
+                added.iter_mut().for_each(|d| *d = lambda * d.clamp(least, most));
+                let factorized = session.problem.factorize(Some(&added));
+                if session.iterations == 1 && lambda == self.initial_lambda {
+                    *open = undetermined(session.problem, factorized.is_err(), lambda);
+                    if open.is_some() {
+                        // the search for the direction has taken the factorization's place
+                        _ = session.problem.factorize(Some(&added));
+                    }
+                }
+                if factorized.is_ok() {
+                    session.problem.newton_step(&mut delta);
+                    let damping = delta.iter().zip(&added).map(|(d, a)| a * d * d).sum::<f64>();
+                    let predicted = 0.5 * (damping - dot(&delta, &session.problem.g));
+                    let step = Step { predicted, norm: norm(&delta), control: lambda };
+                    let tried = session.attempt(&delta, &step);
+                    let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
+                    session.record(&step, accepted);
+                    if let (true, Tried::Lower { gain }) = (accepted, &tried) {
+                        let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(1.0 / self.decrease, 1.0);
+                        (lambda, rise) = ((lambda * fall).max(self.min_lambda), 2.0);
+                        match session.take(&step) {
+                            Some(termination) => return termination,
+                            None => continue 'linearized,
+                        }
+                    }
+                    if !matches!(tried, Tried::Undefined) && session.settled(&step) {
+                        return Termination::Converged { reason: Tolerance::RelativeCost };
+                    }
+                    if step.norm <= session.stop.step {
+                        return Termination::Converged { reason: Tolerance::Step };
+                    }
+                    if session.interrupted() {
+                        return Termination::Interrupted;
+                    }
+                }
+                (lambda, rise) = (lambda * rise, rise * 2.0);
+                if lambda > self.max_lambda {
+                    let reason = if session.trial.left > 0 { Stall::Domain } else { Stall::Damping };
+                    return Termination::Stalled { reason };
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! Sparse linear algebra; knows no manifold.
+mod cholesky;
+pub(crate) use cholesky::{Cholesky, NotPositiveDefinite};

@@ -1,0 +1,59 @@
+//! Watching a solve, and stopping it.
+use crate::outcome::IterationRecord;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Sees each step that a solver tries. `Break` ends the solve with the best values so far.
+pub trait Observer {
+    /// After a step was tried.
+    fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()>;
+}
+
+/// Sees nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silent;
+
+impl Observer for Silent {
+    fn iteration(&mut self, _: &IterationRecord) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+/// Stops the solve once a flag is raised: by Ctrl-C, by another thread.
+#[derive(Debug, Clone, Default)]
+pub struct Interrupt(pub Arc<AtomicBool>);
+
+impl Observer for Interrupt {
+    fn iteration(&mut self, _: &IterationRecord) -> ControlFlow<()> {
+        if self.0.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// A closure over the record, which may end the solve.
+impl<F: FnMut(&IterationRecord) -> ControlFlow<()>> Observer for F {
+    fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
+        self(record)
+    }
+}
+
+/// Several observers, in order; each of them sees each record.
+pub struct All<'a>(pub Vec<&'a mut dyn Observer>);
+
+impl Observer for All<'_> {
+    fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
+        let mut flow = ControlFlow::Continue(());
+        for observer in &mut self.0 {
+            if observer.iteration(record).is_break() {
+                flow = ControlFlow::Break(());
+            }
+        }
+        flow
+    }
+}
+
+impl std::fmt::Debug for All<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} observers", self.0.len())
+    }
+}

@@ -1,0 +1,236 @@
+//! What solvers have in common: the trait, when to stop, and the account of a solve.
+use crate::observer::Observer;
+use crate::outcome::{IterationRecord, Outcome};
+use crate::problem::Problem;
+use crate::termination::{Termination, Tolerance, Undetermined};
+use manifactor_graph::batch::Evaluation;
+use manifactor_graph::catalogue::Kind;
+use manifactor_graph::column::Columns;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
+use std::time::Instant;
+
+/// A strategy that lowers the cost of a problem. Chosen by name.
+#[typetag::serde(tag = "type")]
+pub trait Optimizer: Debug + Send + Sync {
+    /// Moves the problem's estimate to a minimum of its cost, or as far as it gets. The estimate is
+    /// the best found, however the solve ends.
+    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome;
+}
+
+impl Kind for dyn Optimizer {
+    const NAME: &'static str = "solver";
+}
+
+/// When to stop.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Stopping {
+    /// Most linearizations.
+    pub max_iterations: usize,
+    /// Stop once a step changes the cost by less than this share of it.
+    pub relative_cost: f64,
+    /// Stop once the cost is below this.
+    pub absolute_cost: f64,
+    /// Stop once no entry of the gradient is larger than this.
+    pub gradient: f64,
+    /// Stop once the Euclidean norm of a step is below this.
+    pub step: f64,
+}
+
+impl Default for Stopping {
+    fn default() -> Self {
+        Self { max_iterations: 100, relative_cost: 1e-8, absolute_cost: 1e-20, gradient: 1e-12, step: 1e-12 }
+    }
+}
+
+/// A step to be tried, and what is expected of it.
+pub(crate) struct Step {
+    /// ½ρ less by the quadratic model.
+    pub predicted: f64,
+    pub norm: f64,
+    pub control: f64,
+}
+
+/// What became of a step.
+pub(crate) enum Tried {
+    /// It lowered the cost by this share of what the model predicts; not yet taken.
+    Lower { gain: f64 },
+    /// It raised the cost, or lowered it by nothing.
+    Higher,
+    /// It left the domain of a factor, or its cost is not finite.
+    Undefined,
+}
+
+/// A solve under way: the problem, its costs and its records.
+pub(crate) struct Session<'a> {
+    pub problem: &'a mut Problem,
+    pub stop: &'a Stopping,
+    /// At the last linearization.
+    pub at: Evaluation,
+    /// Of the last step tried.
+    pub trial: Evaluation,
+    pub iterations: usize,
+    observer: &'a mut dyn Observer,
+    initial_cost: f64,
+    clock: Instant,
+    compile: f64,
+    history: Vec<IterationRecord>,
+    interrupted: bool,
+}
+
+impl<'a> Session<'a> {
+    /// Linearizes at the initial estimate.
+    pub(crate) fn begin(
+        problem: &'a mut Problem,
+        stop: &'a Stopping,
+        observer: &'a mut dyn Observer,
+    ) -> Result<Self, Box<Outcome>> {
+        let clock = Instant::now();
+        let compile = problem.times.compile;
+        problem.times = crate::outcome::Times { compile, ..Default::default() };
+        let at = problem.linearize();
+        let mut session = Self {
+            problem,
+            stop,
+            at,
+            trial: at,
+            iterations: 0,
+            observer,
+            initial_cost: at.cost,
+            clock,
+            compile,
+            history: vec![],
+            interrupted: false,
+        };
+        match at.not_finite {
+            None => Ok(session),
+            Some(factor) => {
+                let keys = session.problem.factor_keys[factor].clone();
+                Err(Box::new(session.end(Termination::NonFinite { factor, keys }, None)))
+            }
+        }
+    }
+
+    /// A reason to stop before another step, if there is one.
+    pub(crate) fn finished(&self) -> Option<Termination> {
+        let gradient = self.gradient();
+        if self.interrupted {
+            Some(Termination::Interrupted)
+        } else if self.at.cost <= self.stop.absolute_cost {
+            Some(Termination::Converged { reason: Tolerance::AbsoluteCost })
+        } else if gradient <= self.stop.gradient {
+            Some(Termination::Converged { reason: Tolerance::Gradient })
+        } else if self.iterations >= self.stop.max_iterations {
+            Some(Termination::MaxIterations)
+        } else {
+            None
+        }
+    }
+
+    pub(crate) fn interrupted(&self) -> bool {
+        self.interrupted
+    }
+
+    fn gradient(&self) -> f64 {
+        self.problem.g.iter().fold(0.0, |m, g| f64::max(m, g.abs()))
+    }
+
+    /// Evaluates a step.
+    pub(crate) fn attempt(&mut self, delta: &[f64], step: &Step) -> Tried {
+        self.trial = self.problem.try_step(delta);
+        let trial = &self.trial;
+        if trial.left > 0 || trial.not_finite.is_some() || !trial.cost.is_finite() {
+            return Tried::Undefined;
+        }
+        let gain = (self.at.cost - trial.cost) / step.predicted;
+        if trial.cost < self.at.cost && gain > 0.0 { Tried::Lower { gain } } else { Tried::Higher }
+    }
+
+    /// Whether the last trial and its model both say that there is nothing left to gain.
+    pub(crate) fn settled(&self, step: &Step) -> bool {
+        let small = self.stop.relative_cost * self.at.cost.abs();
+        (self.at.cost - self.trial.cost).abs() <= small && step.predicted.abs() <= small
+    }
+
+    /// Takes the trial as the estimate and linearizes there; a reason to stop, if it brings one.
+    pub(crate) fn take(&mut self, step: &Step) -> Option<Termination> {
+        self.problem.accept();
+        let (before, after) = (self.at.cost, self.trial.cost);
+        let inactive = self.at.inactive;
+        self.at = self.problem.linearize();
+        // factors that come back into their domain change the cost: go on with them
+        if self.at.inactive != inactive {
+            return None;
+        }
+        if (before - after).abs() <= self.stop.relative_cost * before.abs() {
+            Some(Termination::Converged { reason: Tolerance::RelativeCost })
+        } else if step.norm <= self.stop.step {
+            Some(Termination::Converged { reason: Tolerance::Step })
+        } else {
+            None
+        }
+    }
+
+    /// Keeps a record of the last trial, and shows it to the observer.
+    pub(crate) fn record(&mut self, step: &Step, accepted: bool) {
+        let defined = self.trial.left == 0 && self.trial.cost.is_finite();
+        let record = IterationRecord {
+            iteration: self.iterations,
+            cost: self.at.cost,
+            trial_cost: defined.then_some(self.trial.cost),
+            gradient: self.gradient(),
+            step: step.norm,
+            control: step.control,
+            accepted,
+            inactive: self.at.inactive,
+            seconds: self.clock.elapsed().as_secs_f64(),
+        };
+        self.interrupted |= self.observer.iteration(&record).is_break();
+        self.history.push(record);
+    }
+
+    /// The account of the solve.
+    pub(crate) fn end(&mut self, termination: Termination, undetermined: Option<Undetermined>) -> Outcome {
+        let mut times = self.problem.times;
+        let solve = self.clock.elapsed().as_secs_f64();
+        times.total = solve + self.compile;
+        times.other = (solve - times.linearize - times.factorize - times.solve).max(0.0);
+        Outcome {
+            initial_cost: self.initial_cost,
+            final_cost: self.at.cost,
+            iterations: self.iterations,
+            termination,
+            undetermined,
+            factors: self.problem.factors(),
+            inactive: self.at.inactive,
+            times,
+            history: std::mem::take(&mut self.history),
+        }
+    }
+}
+
+/// The best estimate so far, for solvers whose steps may raise the cost.
+pub(crate) struct Best {
+    cost: f64,
+    columns: Columns,
+}
+
+impl Best {
+    pub(crate) fn new(session: &Session<'_>) -> Self {
+        Self { cost: session.at.cost, columns: session.problem.columns.clone() }
+    }
+    pub(crate) fn update(&mut self, session: &Session<'_>) {
+        if session.at.cost < self.cost {
+            *self = Self::new(session);
+        }
+    }
+    /// Goes back to the best estimate, where that is not the last.
+    pub(crate) fn restore(self, session: &mut Session<'_>) {
+        if self.cost < session.at.cost || !session.at.cost.is_finite() {
+            session.problem.columns = self.columns;
+            session.at = session.problem.linearize();
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! What a solve has to tell.
+use crate::termination::{Termination, Undetermined};
+use serde::Serialize;
+
+/// What a solve did and how it ended.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    /// ½ Σ ρ at the values that the solve began with.
+    pub initial_cost: f64,
+    /// ½ Σ ρ at the values that it leaves.
+    pub final_cost: f64,
+    /// Linearizations that were followed by a step.
+    pub iterations: usize,
+    /// How it ended.
+    pub termination: Termination,
+    /// A direction that nothing but damping constrains.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub undetermined: Option<Undetermined>,
+    /// Factors in the problem.
+    pub factors: usize,
+    /// Factors that are not defined at the final values, and take no part in the cost.
+    pub inactive: usize,
+    /// Where the time went.
+    pub times: Times,
+    /// A record for each step tried.
+    pub history: Vec<IterationRecord>,
+}
+
+/// Seconds by stage.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Times {
+    /// From graph to problem: columns, batches, ordering, symbolic factorization.
+    pub compile: f64,
+    /// Residuals, Jacobians and normal equations.
+    pub linearize: f64,
+    /// Numeric Cholesky.
+    pub factorize: f64,
+    /// Triangular solves.
+    pub solve: f64,
+    /// Retractions and costs of trial steps, and all else.
+    pub other: f64,
+    /// All of it, compilation included.
+    pub total: f64,
+}
+
+/// One step that was tried.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IterationRecord {
+    /// From 1; a refused step keeps the number of the linearization that it came from.
+    pub iteration: usize,
+    /// Cost at the linearization.
+    pub cost: f64,
+    /// Cost after the step; `None` where it left the domain of a factor or was not finite.
+    pub trial_cost: Option<f64>,
+    /// Largest entry of the gradient.
+    pub gradient: f64,
+    /// Euclidean norm of the step.
+    pub step: f64,
+    /// λ of Levenberg-Marquardt, radius of Dogleg, length factor of Gauss-Newton.
+    pub control: f64,
+    /// Whether the step was taken.
+    pub accepted: bool,
+    /// Factors that take no part.
+    pub inactive: usize,
+    /// Seconds since the solve began.
+    pub seconds: f64,
+}

@@ -1,0 +1,68 @@
+//! Linear steps of a linearized problem: damped, undamped, and along the gradient.
+use crate::linear::NotPositiveDefinite;
+use crate::problem::Problem;
+use std::time::Instant;
+
+impl Problem {
+    /// Factorizes H + diag(added), in place of H for the time of the call.
+    pub(crate) fn factorize(&mut self, added: Option<&[f64]>) -> Result<(), NotPositiveDefinite> {
+        let clock = Instant::now();
+        let shift = |h: &mut [f64], diagonal: &[usize], values: &[f64]| {
+            diagonal.iter().zip(values).for_each(|(i, x)| h[*i] = *x);
+        };
+        let saved: Vec<f64> = match added {
+            Some(_) => self.layout.diagonal().iter().map(|i| self.h[*i]).collect(),
+            None => vec![],
+        };
+        if let Some(added) = added {
+            let damped: Vec<f64> = saved.iter().zip(added).map(|(h, x)| h + x).collect();
+            shift(&mut self.h, self.layout.diagonal(), &damped);
+        }
+        let done = self.cholesky.factorize(&self.layout.col_ptr, &self.layout.row_idx, &self.h);
+        if added.is_some() {
+            shift(&mut self.h, self.layout.diagonal(), &saved);
+        }
+        self.times.factorize += clock.elapsed().as_secs_f64();
+        done
+    }
+
+    /// -H⁻¹ g of the last factorization, into `step`.
+    pub(crate) fn newton_step(&mut self, step: &mut Vec<f64>) {
+        let clock = Instant::now();
+        step.clear();
+        step.extend(self.g.iter().map(|g| -g));
+        self.cholesky.solve(step);
+        self.times.solve += clock.elapsed().as_secs_f64();
+    }
+
+    /// The diagonal of H, into `out`.
+    pub(crate) fn diagonal(&self, out: &mut Vec<f64>) {
+        out.clear();
+        out.extend(self.layout.diagonal().iter().map(|i| self.h[*i]));
+    }
+
+    /// H x.
+    pub(crate) fn multiply(&self, x: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; x.len()];
+        for c in 0..x.len() {
+            let range = self.layout.col_ptr[c]..self.layout.col_ptr[c + 1];
+            let mut sum = 0.0;
+            for (r, h) in self.layout.row_idx[range.clone()].iter().zip(&self.h[range]) {
+                sum += h * x[*r];
+                if *r != c {
+                    y[*r] += h * x[c];
+                }
+            }
+            y[c] += sum;
+        }
+        y
+    }
+}
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+pub(crate) fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
