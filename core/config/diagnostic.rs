@@ -65,33 +65,46 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
+/// Of so many diagnostics each is told; of more, how many more.
+const TOLD: usize = 200;
+
 /// Everything that is wrong with a document, sorted by place. Never empty.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Diagnostics(Vec<Diagnostic>);
+pub struct Diagnostics {
+    list: Vec<Diagnostic>,
+    omitted: usize,
+}
 
 impl Diagnostics {
-    /// Sorted by place, each once; none if there are none.
+    /// Sorted by place, each once; none if there are none. After the first 200, the others are only counted.
     pub fn from_list(mut list: Vec<Diagnostic>) -> Option<Self> {
         list.sort_by(|a, b| a.order().cmp(&b.order()));
         list.dedup();
-        (!list.is_empty()).then_some(Diagnostics(list))
+        let omitted = list.len().saturating_sub(TOLD);
+        list.truncate(TOLD);
+        (!list.is_empty()).then_some(Diagnostics { list, omitted })
     }
 
     /// In order of place.
     pub fn iter(&self) -> std::slice::Iter<'_, Diagnostic> {
-        self.0.iter()
+        self.list.iter()
     }
 
-    /// How many: at least one.
+    /// How many are listed: at least one.
     #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.list.len()
+    }
+
+    /// How many more there were than are listed.
+    pub fn omitted(&self) -> usize {
+        self.omitted
     }
 }
 
 impl From<Diagnostic> for Diagnostics {
     fn from(one: Diagnostic) -> Self {
-        Diagnostics(vec![one])
+        Diagnostics { list: vec![one], omitted: 0 }
     }
 }
 
@@ -99,7 +112,7 @@ impl IntoIterator for Diagnostics {
     type Item = Diagnostic;
     type IntoIter = std::vec::IntoIter<Diagnostic>;
     fn into_iter(self) -> Self::IntoIter {
-        self.0.into_iter()
+        self.list.into_iter()
     }
 }
 
@@ -116,7 +129,10 @@ impl fmt::Display for Diagnostics {
         for (i, diagnostic) in self.iter().enumerate() {
             write!(f, "{}{diagnostic}", if i > 0 { "\n" } else { "" })?;
         }
-        Ok(())
+        match self.omitted {
+            0 => Ok(()),
+            more => write!(f, "\nand {more} more"),
+        }
     }
 }
 
@@ -190,6 +206,15 @@ mod tests {
              a.toml:2:1: key `x` is given twice; first given here: a.toml:1:1 (remove or rename one of them)"
         );
         assert_eq!(list.len(), 3);
+    }
+
+    #[test]
+    fn a_long_list_is_cut_and_counted() {
+        let source = Source::new("a", "x".repeat(300));
+        let at = |i| Diagnostic::new(source.place(i..i + 1), Problem::invalid("odd"));
+        let list = Diagnostics::from_list((0..300).map(at).collect()).unwrap();
+        assert_eq!((list.len(), list.omitted()), (200, 100));
+        assert!(list.to_string().ends_with("a:1:200: odd\nand 100 more"));
     }
 
     #[test]

@@ -1,4 +1,9 @@
 //! Documents in TOML, JSON and YAML, and errors that point at the line.
+//!
+//! A [`Document`] is a tree of [`Node`]s that know their [`Place`]s, the same for all formats. A [`Section`] reads a
+//! table of it field by field, serde types and registered trait objects alike, and collects in [`Errors`] everything
+//! that is wrong; [`Diagnostics`] is that list, each entry with its place and what to do about it.
+//! [`read_graph`] and [`write_graph`] are the two ways of a literal graph, [`graph_schema`] describes it to editors.
 mod diagnostic;
 mod document;
 mod format;
@@ -11,6 +16,7 @@ mod overrides;
 mod parse;
 mod problem;
 mod registered;
+mod schema;
 mod section;
 mod source;
 mod suggest;
@@ -25,6 +31,7 @@ pub use graph_document::{read_graph, read_graph_section, write_graph};
 pub use merge::merge;
 pub use node::{Field, Found, MAX_DEPTH, Node, Table, Value};
 pub use problem::{Problem, quoted_list};
+pub use schema::{Definitions, graph_schema};
 pub use section::Section;
 pub use source::{Place, Source};
 pub use suggest::nearest;

@@ -25,6 +25,7 @@ pub(crate) fn problem_of(message: &str, node: Option<&Node>) -> Problem {
         let split = message.strip_prefix(prefix).and_then(|rest| rest.split_once(", expected "));
         if let Some((found, expected)) = split {
             let found = match (prefix, node) {
+                ("invalid length ", _) if found == "1" => "1 element".to_owned(),
                 ("invalid length ", _) => format!("{found} elements"),
                 (_, Some(node)) => node.in_words(),
                 (_, None) => found.to_owned(),

@@ -3,6 +3,7 @@ use crate::diagnostic::Diagnostic;
 use crate::problem::Problem;
 use crate::source::Place;
 use indexmap::IndexMap;
+use serde::{Serialize, Serializer};
 use serde_path_to_error::{Path, Segment};
 
 /// Tables and arrays may be nested this deep.
@@ -116,6 +117,25 @@ impl Node {
             Value::String(value) => format!("the text {:?}", cut(value)),
             Value::Array(_) => "an array".into(),
             Value::Table(_) => "a table".into(),
+        }
+    }
+}
+
+/// As it was read, without places; what is null is left out of tables. [`Format::write`](crate::Format::write) writes a
+/// document so after overrides.
+impl Serialize for Node {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match &self.value {
+            Value::Null => serializer.serialize_unit(),
+            Value::Bool(value) => serializer.serialize_bool(*value),
+            Value::Integer(value) => serializer.serialize_i64(*value),
+            Value::Float(value) => serializer.serialize_f64(*value),
+            Value::String(value) => serializer.serialize_str(value),
+            Value::Array(items) => serializer.collect_seq(items),
+            Value::Table(table) => {
+                let present = table.iter().filter(|(_, field)| field.node.value != Value::Null);
+                serializer.collect_map(present.map(|(key, field)| (key, &field.node)))
+            }
         }
     }
 }

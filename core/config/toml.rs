@@ -8,12 +8,15 @@ use ::toml::Spanned;
 use ::toml::de::{DeInteger, DeTable, DeValue};
 use std::ops::Range;
 
+/// One mistake can make a hundred: no more than these are told.
+const MAX_ERRORS: usize = 50;
+
 /// Parses a document.
 pub(crate) fn parse(source: &Source) -> Result<Node, Diagnostics> {
     let (document, errors) = DeTable::parse_recoverable(source.text());
     let mut reader = Reader { source, errors: Vec::new() };
     let root = reader.table(document.get_ref(), 0);
-    for error in errors {
+    for error in errors.into_iter().take(MAX_ERRORS) {
         let span = error.span().unwrap_or(0..0);
         let place = source.place(span.clone());
         reader.errors.push(match first_of_two(source, document.get_ref(), &span) {

@@ -11,7 +11,22 @@ use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Values, Variable};
 use std::sync::Arc;
 
-/// Reads a document that is a graph.
+/// Reads a document that is a graph: every variable and every factor by key.
+///
+/// ```toml
+/// [[variables]]
+/// key = "x0"
+/// value = { type = "se2", x = 0.0, y = 0.0, theta = 0.0 }
+/// fixed = true                                   # or the names of some directions of its tangent space
+///
+/// [[factors]]
+/// keys = ["x0", "x1"]
+/// factor = { type = "between_se2", x = 1.0, y = 0.0, theta = 0.1 }
+/// noise = { sigmas = [0.1, 0.1, 0.02] }          # unit, where it is left out
+/// loss = { type = "huber", scale = 1.345 }       # none, where it is left out
+/// ```
+///
+/// What [`write_graph`](crate::write_graph) writes, this reads back to the last bit.
 ///
 /// # Errors
 /// Everything that is wrong with it, at once: unknown types and fields, wrong types of fields, variables given twice,

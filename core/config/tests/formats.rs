@@ -1,4 +1,6 @@
 //! The same document in three formats, and what is said of those that are none.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
+
 use manifactor_config::{Document, Format, MAX_DEPTH, Node, Value};
 
 fn parse(format: Format, text: &str) -> Node {

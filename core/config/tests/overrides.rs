@@ -1,5 +1,7 @@
 //! `--set` and variants.
-use manifactor_config::{Document, Errors, Format};
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
+
+use manifactor_config::{Document, Errors, Format, to_toml};
 use serde_json::json;
 
 const RUN: &str = "
@@ -110,4 +112,12 @@ fn another_type_replaces_the_whole_table() {
     let patch = "[solver]\ntype = 'dogleg'\nradius = 1.0\n";
     document.merge(Document::parse("variant.toml", patch, Format::Toml).unwrap());
     assert_eq!(document.root().to_json().unwrap()["solver"], json!({"type": "dogleg", "radius": 1.0}));
+}
+
+#[test]
+fn a_document_is_written_as_it_stands_after_overrides() {
+    let mut document =
+        Document::parse("run.yaml", "a: ~\nsolver: {steps: 3, scale: 0.1}\n", Format::Yaml).unwrap();
+    document.set(&["solver.steps=4", "name='x'"]).unwrap();
+    assert_eq!(to_toml(document.root()).unwrap(), "name = \"x\"\n\n[solver]\nsteps = 4\nscale = 0.1\n");
 }

@@ -1,4 +1,6 @@
 //! No text makes the parsers panic, and what is written reads back to the last bit.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
+
 use manifactor_config::{Document, Errors, Format, Node, Value};
 use proptest::prelude::*;
 use serde_json::Value as Json;

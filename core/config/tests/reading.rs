@@ -1,4 +1,6 @@
 //! What is said of documents that are well formed and wrong, in full.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
+
 use manifactor_config::{Document, Errors, Format, Problem, Section};
 use manifactor_graph::catalogue::Kind;
 use manifactor_graph::register;
@@ -188,6 +190,29 @@ fn what_is_misspelled_is_not_missing_as_well() {
         "file:1:1: unknown field `sigam` (did you mean `sigma`? there are `scale` and `sigma`)"
     );
     assert_eq!(said(Format::Toml, "sigma = 1\n", two), "file:1:1: missing field `scale`");
+}
+
+#[test]
+fn parts_may_be_left_out_and_the_rest_read_as_one() {
+    let parts = |section: &mut Section<'_>| {
+        let shape = section.optional_registered::<dyn Shape>("shape").map(|s| s.area());
+        let mut sheet = section.optional_section("sheet")?;
+        let tags: Vec<String> = sheet.or_default("tags");
+        let sheet: Option<Sheet> = sheet.rest();
+        Some((shape, tags.len(), format!("{:?}", sheet?)))
+    };
+    let sheet = "Sheet { width: 1.0, height: 2, name: None }".to_owned();
+    assert_eq!(
+        read(Format::Toml, "sheet = { width = 1, tags = ['a'], height = 2 }", parts),
+        Ok((None, 1, sheet.clone()))
+    );
+    let shape = "[sheet]\nwidth = 1\nheight = 2\n[shape]\ntype = 'disc'\nradius = 1\n";
+    assert_eq!(read(Format::Toml, shape, parts), Ok((Some(3.0), 0, sheet)));
+    assert_eq!(
+        said(Format::Toml, "[sheet]\nwidth = 1\nheight = 2\ncolour = 'red'\ntags = 3\n", parts),
+        "file:4:1: unknown field `colour` (there are `width`, `height` and `name`)\n\
+         file:5:8: expected an array, found the number 3"
+    );
 }
 
 #[test]
