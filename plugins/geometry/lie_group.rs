@@ -1,0 +1,19 @@
+//! What prior and between need of a manifold: that it is a Lie group with x ⊞ δ = x·Exp(δ).
+use manifactor_graph::{Manifold, Matrix, Scalar, Tangent, Vector};
+
+/// A manifold that is a group, with the chart x ⊞ δ = x·Exp(δ), y ⊟ x = Log(x⁻¹y).
+pub trait LieGroup: Manifold {
+    /// Its name in documents.
+    const NAME: &'static str;
+    /// A point, as TOML writes it inside of a factor; for the catalogue.
+    const EXAMPLE: &'static str;
+
+    /// x⁻¹y: the second in the frame of the first.
+    fn between<T: Scalar>(x: &Self::Of<T>, y: &Self::Of<T>) -> Self::Of<T>;
+    /// The tangent vector at the identity that leads to `x`.
+    fn log<T: Scalar>(x: &Self::Of<T>) -> Vector<Self::Dim, T>;
+    /// Jᵣ⁻¹(ξ): the derivative of Log(Exp(ξ)·Exp(δ)) by δ at zero.
+    fn inverse_right_jacobian(xi: &Tangent<Self>) -> Matrix<Self::Dim, Self::Dim>;
+    /// Ad(x⁻¹): x⁻¹·Exp(δ)·x = Exp(Ad(x⁻¹)δ).
+    fn adjoint_of_inverse(x: &Self::Of<f64>) -> Matrix<Self::Dim, Self::Dim>;
+}

@@ -1,0 +1,86 @@
+//! Functions of θ² that the exponential and logarithmic maps are made of, right at and near zero.
+//!
+//! As functions of θ² they are smooth at zero, where θ itself has no derivative.
+use manifactor_graph::Scalar;
+
+/// Below this θ² the closed forms lose digits to cancellation, and five terms of the series leave
+/// out less than 1e-16.
+const SMALL: f64 = 1e-2;
+
+/// c₀ + c₁x + c₂x² + …
+fn series<T: Scalar>(x: T, c: [f64; 5]) -> T {
+    c.iter().rev().fold(T::zero(), |sum, c| sum * x + T::from(*c))
+}
+
+/// What exp needs.
+pub(crate) struct Exponential<T> {
+    /// cos(θ/2)
+    pub(crate) cos_half: T,
+    /// sin(θ/2) / θ
+    pub(crate) sin_half: T,
+    /// (1 - cos θ) / θ²
+    pub(crate) a: T,
+    /// (θ - sin θ) / θ³
+    pub(crate) b: T,
+}
+
+pub(crate) fn exponential<T: Scalar>(theta2: T) -> Exponential<T> {
+    let (cos_half, sin_half, b) = if theta2 < T::from(SMALL) {
+        (
+            series(theta2, [1.0, -1.0 / 8.0, 1.0 / 384.0, -1.0 / 46080.0, 1.0 / 10321920.0]),
+            series(theta2, [0.5, -1.0 / 48.0, 1.0 / 3840.0, -1.0 / 645120.0, 1.0 / 185794560.0]),
+            series(theta2, [1.0 / 6.0, -1.0 / 120.0, 1.0 / 5040.0, -1.0 / 362880.0, 1.0 / 39916800.0]),
+        )
+    } else {
+        let theta = theta2.sqrt();
+        let (s, c) = (theta * 0.5).sin_cos();
+        (c, s / theta, (theta - s * c * 2.0) / (theta2 * theta))
+    };
+    Exponential { cos_half, sin_half, a: sin_half * sin_half * 2.0, b }
+}
+
+/// k = (1 - (θ/2) cot(θ/2)) / θ², what log needs; `half_cot` is (θ/2) cot(θ/2), asked for away from zero.
+pub(crate) fn k<T: Scalar>(theta2: T, half_cot: impl FnOnce() -> T) -> T {
+    if theta2 < T::from(SMALL) {
+        series(theta2, [1.0 / 12.0, 1.0 / 720.0, 1.0 / 30240.0, 1.0 / 1209600.0, 1.0 / 47900160.0])
+    } else {
+        (T::one() - half_cot()) / theta2
+    }
+}
+
+/// k and k'(θ) / θ, what the inverse right Jacobians need.
+pub(crate) fn k_and_slope(theta2: f64) -> (f64, f64) {
+    let theta = theta2.sqrt();
+    let (s, c) = (0.5 * theta).sin_cos();
+    let half_cot = 0.5 * theta * c / s;
+    let slope = if theta2 < SMALL {
+        series(theta2, [1.0 / 360.0, 1.0 / 7560.0, 1.0 / 201600.0, 1.0 / 5987520.0, 691.0 / 130767436800.0])
+    } else {
+        (half_cot + theta2 / (4.0 * s * s) - 2.0) / (theta2 * theta2)
+    };
+    (k(theta2, || half_cot), slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn series_and_closed_forms_meet() {
+        // on either side of the switch, and as far apart as the function itself goes there
+        let (below, above) = (SMALL * (1.0 - 1e-12), SMALL * (1.0 + 1e-12));
+        let (x, y) = (exponential(below), exponential(above));
+        for (x, y) in [(x.cos_half, y.cos_half), (x.sin_half, y.sin_half), (x.a, y.a), (x.b, y.b)] {
+            assert!((x - y).abs() < 1e-13, "{x} {y}");
+        }
+        let (x, y) = (k_and_slope(below), k_and_slope(above));
+        assert!((x.0 - y.0).abs() < 1e-13 && (x.1 - y.1).abs() < 1e-11, "{x:?} {y:?}");
+    }
+
+    #[test]
+    fn values_at_zero_are_the_limits() {
+        let x = exponential(0.0);
+        assert_eq!((x.cos_half, x.sin_half, x.a, x.b), (1.0, 0.5, 0.5, 1.0 / 6.0));
+        assert_eq!(k_and_slope(0.0), (1.0 / 12.0, 1.0 / 360.0));
+    }
+}

@@ -1,0 +1,148 @@
+//! SO(2): rotations in the plane, by their angle.
+use crate::lie_group::LieGroup;
+use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
+use nalgebra::{Matrix1, Matrix2, U1, Vector1, Vector2};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
+
+/// A rotation in the plane: tangent (theta), in radians, counter-clockwise.
+///
+/// The angle is kept within -π..π. The logarithm is that angle: it jumps from one end to the other.
+///
+/// ```toml
+/// [values]
+/// r0 = { type = "so2", angle = 0.5 }
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(from = "Document", into = "Document")]
+#[serde(bound(serialize = "Self: Into<Document>", deserialize = "Self: From<Document>"))]
+#[schemars(with = "Document", bound = "")]
+pub struct So2<T: Scalar = f64>(T);
+
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    /// In radians, counter-clockwise.
+    angle: Angle,
+}
+
+/// An angle in radians, finite and wrapped when it is read.
+#[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "f64", into = "f64")]
+#[schemars(with = "f64")]
+pub(crate) struct Angle(pub(crate) So2);
+
+/// An angle that is infinite or not a number.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("expected a finite angle in radians, got {0}")]
+pub struct NotAnAngle(pub f64);
+
+/// The same angle within -π..π; one that is there already stays as it is, bit for bit.
+pub fn wrap<T: Scalar>(angle: T) -> T {
+    let turns = (angle.re() / TAU).round();
+    // rounding puts an angle of exactly ±π on either side: leave what is in range
+    if angle.re().abs() <= PI { angle } else { angle - T::from(turns * TAU) }
+}
+
+impl<T: Scalar> So2<T> {
+    /// The rotation by an angle in radians.
+    pub fn exp(angle: T) -> Self {
+        Self(wrap(angle))
+    }
+    /// No rotation.
+    pub fn identity() -> Self {
+        Self(T::zero())
+    }
+    /// The angle in radians, within -π..π.
+    pub fn angle(&self) -> T {
+        self.0
+    }
+    /// The angle, as a tangent vector.
+    pub fn log(&self) -> Vector1<T> {
+        Vector1::new(self.0)
+    }
+    /// self · other
+    pub fn compose(&self, other: &Self) -> Self {
+        Self::exp(self.0 + other.0)
+    }
+    /// self⁻¹
+    pub fn inverse(&self) -> Self {
+        Self(-self.0)
+    }
+    /// self⁻¹ · other
+    pub fn between(&self, other: &Self) -> Self {
+        Self::exp(other.0 - self.0)
+    }
+    /// R v
+    pub fn act(&self, v: &Vector2<T>) -> Vector2<T> {
+        self.matrix() * v
+    }
+    /// R
+    pub fn matrix(&self) -> Matrix2<T> {
+        let (s, c) = self.0.sin_cos();
+        Matrix2::new(c, -s, s, c)
+    }
+}
+
+impl Manifold for So2 {
+    type Dim = U1;
+    type Of<T: Scalar> = So2<T>;
+    const TANGENT: &'static [&'static str] = &["theta"];
+
+    fn lift<T: Scalar>(&self) -> So2<T> {
+        So2(self.0.lift())
+    }
+    fn seed(&self) -> So2<JetOf<U1>> {
+        So2(Jet::with_gradient(self.0, &[1.0]))
+    }
+    fn retract(&self, delta: &Vector1<f64>) -> Self {
+        Self::exp(self.0 + delta.x)
+    }
+    fn local(&self, other: &Self) -> Vector1<f64> {
+        self.between(other).log()
+    }
+    fn is_finite(&self) -> bool {
+        self.0.is_finite()
+    }
+}
+register_manifold!("so2", So2);
+
+impl LieGroup for So2 {
+    const NAME: &'static str = "so2";
+    const EXAMPLE: &'static str = "{ angle = 0.5 }";
+    fn between<T: Scalar>(x: &So2<T>, y: &So2<T>) -> So2<T> {
+        x.between(y)
+    }
+    fn log<T: Scalar>(x: &So2<T>) -> Vector1<T> {
+        x.log()
+    }
+    fn inverse_right_jacobian(_: &Vector1<f64>) -> Matrix1<f64> {
+        Matrix1::identity()
+    }
+    fn adjoint_of_inverse(_: &So2) -> Matrix1<f64> {
+        Matrix1::identity()
+    }
+}
+
+impl TryFrom<f64> for Angle {
+    type Error = NotAnAngle;
+    fn try_from(angle: f64) -> Result<Self, NotAnAngle> {
+        if angle.is_finite() { Ok(Self(So2::exp(angle))) } else { Err(NotAnAngle(angle)) }
+    }
+}
+impl From<Angle> for f64 {
+    fn from(angle: Angle) -> f64 {
+        angle.0.0
+    }
+}
+impl From<Document> for So2 {
+    fn from(document: Document) -> Self {
+        document.angle.0
+    }
+}
+impl From<So2> for Document {
+    fn from(x: So2) -> Self {
+        Self { angle: Angle(x) }
+    }
+}
