@@ -1,1 +1,2 @@
 //! Object SLAM: data sources, simulator, semantics, pipeline, metrics.
+pub mod sequence;

@@ -1,0 +1,122 @@
+//! What a data source hands to the pipeline: camera, odometry, detections, and the truth where it is known.
+//!
+//! Real data and simulated data have the same form. Frames read right to left in names:
+//! `world_from_camera` maps a point in the camera's frame to the world's; the camera looks along +z,
+//! x is right and y down in the image.
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
+use manifactor_graph::Direction;
+use manifactor_quadric::{BoundingBox, Box3, Camera};
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// A recording of one camera that moves among objects.
+#[derive(Debug, Clone)]
+pub struct Sequence {
+    /// The camera; the same for all frames.
+    pub camera: Camera,
+    /// By time, strictly increasing.
+    pub frames: Vec<Frame>,
+    /// By frame.
+    pub detections: Vec<Detection>,
+    /// Up in the frame of the odometry, where the source knows it.
+    pub up: Option<Direction>,
+    /// Readings of an accelerometer, where there is one.
+    pub accelerometer: Vec<Acceleration>,
+    /// What the estimate can be compared with.
+    pub ground_truth: Option<GroundTruth>,
+}
+
+/// One image, with a pose by odometry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Seconds.
+    pub timestamp: f64,
+    /// The dead-reckoned pose, in a world frame of the odometry's own choice; what is measured is the
+    /// relative pose of consecutive frames.
+    pub world_from_camera: Se3,
+}
+
+/// One box that a detector drew, associated with an object or not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// Place in [`Sequence::frames`].
+    pub frame: usize,
+    /// The object that it shows, where that is known.
+    pub object: Option<ObjectId>,
+    /// What the detector takes it for.
+    pub scores: ClassScores,
+    /// Where it is in the image, in pixels.
+    pub bounding_box: BoundingBox,
+}
+
+/// A number for an object, the same in detections and in the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct ObjectId(pub u32);
+
+impl fmt::Display for ObjectId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// A detector's scores by class, each from 0 to 1; classes that are not listed score 0.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ClassScores(Vec<(String, f64)>);
+
+impl ClassScores {
+    /// All that is known is the best class and its score.
+    pub fn single(class: impl Into<String>, score: f64) -> Self {
+        Self(vec![(class.into(), score)])
+    }
+    /// The classes and their scores, in the order given.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.0.iter().map(|(class, score)| (class.as_str(), *score))
+    }
+    /// The class with the highest score, the first of equals; `None` where no class is listed.
+    pub fn best(&self) -> Option<(&str, f64)> {
+        self.iter().reduce(|best, next| if next.1 > best.1 { next } else { best })
+    }
+}
+
+impl FromIterator<(String, f64)> for ClassScores {
+    fn from_iter<I: IntoIterator<Item = (String, f64)>>(scores: I) -> Self {
+        Self(scores.into_iter().collect())
+    }
+}
+
+/// A reading of an accelerometer at rest points up, with length 9.8 m/s².
+#[derive(Debug, Clone, PartialEq)]
+pub struct Acceleration {
+    /// Seconds.
+    pub timestamp: f64,
+    /// m/s², in the sensor's frame.
+    pub acceleration: Vector3<f64>,
+}
+
+/// The truth, in a world frame of its own: that of the odometry for simulated data, another for real data.
+#[derive(Debug, Clone, Default)]
+pub struct GroundTruth {
+    /// `world_from_camera` by time; its time stamps need not be those of the frames.
+    pub trajectory: Vec<StampedPose>,
+    /// The objects; empty, where nobody measured them.
+    pub objects: Vec<TrueObject>,
+}
+
+/// An object as it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueObject {
+    /// Its number.
+    pub id: ObjectId,
+    /// Its class.
+    pub class: String,
+    /// Pose of the cuboid that encloses it, centre and axes.
+    pub world_from_object: Se3,
+    /// Half the extents of that cuboid along its own axes, in metres.
+    pub half_extents: Vector3<f64>,
+    /// The axis-aligned box around the solid itself, in the world's frame.
+    pub bounding_box: Box3,
+}
