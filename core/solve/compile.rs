@@ -5,7 +5,6 @@ use crate::outcome::Times;
 use crate::problem::{Place, Problem};
 use manifactor_graph::batch::{Batch, Member};
 use manifactor_graph::column::{Columns, FIXED};
-use manifactor_graph::normal_equations::Slot;
 use manifactor_graph::{Fixed, Graph, GraphError, Key, Values};
 use std::any::TypeId;
 use std::collections::HashMap;
@@ -162,14 +161,17 @@ fn batches(
             candidates.push(batches.len() - 1);
             batches.len() - 1
         });
-        (index.clear(), starts.clear(), held.clear(), slots.clear());
+        index.clear();
+        starts.clear();
+        held.clear();
+        slots.clear();
         for (n, &a) in ids.iter().enumerate() {
             index.push(variables[a].index as u32);
             starts.push(variables[a].start.map_or(FIXED, |s| s as u32));
             held.push(if variables[a].start.is_some() { variables[a].held } else { 0 });
             for &b in &ids[..=n] {
                 let both = block[a].zip(block[b]);
-                slots.push(both.and_then(|(a, b)| layout.slot(a, b)).unwrap_or(Slot::default()));
+                slots.push(both.and_then(|(a, b)| layout.slot(a, b)).unwrap_or_default());
             }
         }
         batches[batch].push(&Member {

@@ -13,7 +13,8 @@ const SHIFT: f64 = 1e-10;
 const NAMED: usize = 3;
 
 /// Looks for an open direction of the linearized problem, where its last factorization failed or has
-/// pivots that little but rounding and `damping` (a share of the diagonal) keeps from zero.
+/// pivots that little but rounding and `damping` keeps from zero: a share of the diagonal, times the
+/// number of unknowns that it may have added up over.
 ///
 /// Overwrites the factorization if it looks closer.
 pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
@@ -23,9 +24,10 @@ pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) ->
         let mut suspicious = false;
         let share = PIVOT.max(10.0 * damping);
         problem.cholesky.pivots(&mut |i, pivot| {
-            suspicious |= pivot.partial_cmp(&(share * diagonal[i])).is_none_or(|o| o.is_lt())
+            // a pivot that is not a number is suspicious too
+            suspicious |= pivot.is_nan() || pivot < share * diagonal[i];
         });
-        suspicious |= diagonal.iter().any(|d| *d == 0.0);
+        suspicious |= diagonal.contains(&0.0);
         if !suspicious {
             return None;
         }

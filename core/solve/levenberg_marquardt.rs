@@ -5,7 +5,7 @@ use crate::optimizer::{Optimizer, Session, Step, Stopping, Tried};
 use crate::outcome::Outcome;
 use crate::problem::Problem;
 use crate::system::{dot, norm};
-use crate::termination::{Stall, Termination, Tolerance, Undetermined};
+use crate::termination::{Stall, Termination, Tolerance};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,16 +59,22 @@ impl Optimizer for LevenbergMarquardt {
             Ok(session) => session,
             Err(outcome) => return *outcome,
         };
-        let mut open = None;
-        let termination = self.iterate(&mut session, &mut open);
+        let mut lambda = self.initial_lambda;
+        let termination = self.iterate(&mut session, &mut lambda);
+        // damping hides what nothing else holds; by now there is little left of it
+        let open = match termination {
+            Termination::Interrupted => None,
+            _ if session.iterations == 0 => None,
+            _ => undetermined(session.problem, false, lambda * session.problem.dim() as f64),
+        };
         session.end(termination, open)
     }
 }
 register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
 
 impl LevenbergMarquardt {
-    fn iterate(&self, session: &mut Session<'_>, open: &mut Option<Undetermined>) -> Termination {
-        let (mut lambda, mut rise) = (self.initial_lambda, 2.0);
+    fn iterate(&self, session: &mut Session<'_>, lambda: &mut f64) -> Termination {
+        let mut rise = 2.0;
         let (mut delta, mut added) = (vec![], vec![]);
         'linearized: loop {
             if let Some(termination) = session.finished() {
@@ -78,26 +84,19 @@ impl LevenbergMarquardt {
             loop {
                 session.problem.diagonal(&mut added);
                 let [least, most] = self.diagonal;
-                added.iter_mut().for_each(|d| *d = lambda * d.clamp(least, most));
+                added.iter_mut().for_each(|d| *d = *lambda * d.clamp(least, most));
                 let factorized = session.problem.factorize(Some(&added));
-                if session.iterations == 1 && lambda == self.initial_lambda {
-                    *open = undetermined(session.problem, factorized.is_err(), lambda);
-                    if open.is_some() {
-                        // the search for the direction has taken the factorization's place
-                        _ = session.problem.factorize(Some(&added));
-                    }
-                }
                 if factorized.is_ok() {
                     session.problem.newton_step(&mut delta);
                     let damping = delta.iter().zip(&added).map(|(d, a)| a * d * d).sum::<f64>();
                     let predicted = 0.5 * (damping - dot(&delta, &session.problem.g));
-                    let step = Step { predicted, norm: norm(&delta), control: lambda };
+                    let step = Step { predicted, norm: norm(&delta), control: *lambda };
                     let tried = session.attempt(&delta, &step);
                     let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
                     session.record(&step, accepted);
                     if let (true, Tried::Lower { gain }) = (accepted, &tried) {
                         let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(1.0 / self.decrease, 1.0);
-                        (lambda, rise) = ((lambda * fall).max(self.min_lambda), 2.0);
+                        (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
                         match session.take(&step) {
                             Some(termination) => return termination,
                             None => continue 'linearized,
@@ -113,8 +112,8 @@ impl LevenbergMarquardt {
                         return Termination::Interrupted;
                     }
                 }
-                (lambda, rise) = (lambda * rise, rise * 2.0);
-                if lambda > self.max_lambda {
+                (*lambda, rise) = (*lambda * rise, rise * 2.0);
+                if *lambda > self.max_lambda {
                     let reason = if session.trial.left > 0 { Stall::Domain } else { Stall::Damping };
                     return Termination::Stalled { reason };
                 }

@@ -108,8 +108,9 @@ loss! {
     /// ```
     Tukey, "tukey", 4.685, |s, k| {
         let k2 = k * k;
-        let u = 1.0 - s / k2;
-        if u > 0.0 { (k2 / 3.0 * (1.0 - u * u * u), u * u) } else { (k2 / 3.0, 0.0) }
+        let x = s / k2;
+        // s (1 - x + x²/3) is the same, and keeps its digits where x is small
+        if x < 1.0 { (s * (1.0 - x + x * x / 3.0), (1.0 - x) * (1.0 - x)) } else { (k2 / 3.0, 0.0) }
     }
 }
 
@@ -153,21 +154,18 @@ loss! {
 }
 
 loss! {
-    /// Dynamic covariance scaling: squares up to s = k, then each factor is scaled down by 2k/(k + s).
+    /// Dynamic covariance scaling: squares up to s = k, weight (2k/(k + s))² beyond.
     ///
-    /// Unlike the others its scale Φ = k is that of s itself, as in the paper (Agarwal et al., ICRA
-    /// 2013, eq. 15): ρ = min over z in \[0, 1\] of z² s + Φ (1 - z)².
+    /// Unlike the others its scale Φ = k is that of s itself (Agarwal et al., ICRA 2013, eq. 15). The cost
+    /// is the integral of the weight, ρ = k (3s - k)/(k + s) beyond k, and saturates at 3k: the paper gives
+    /// a weight only.
     ///
     /// ```toml
     /// loss = { type = "dcs", scale = 1.0 }
     /// ```
     Dcs, "dcs", 1.0, |s, k| {
-        if s <= k {
-            (s, 1.0)
-        } else {
-            let z = 2.0 * k / (k + s);
-            (z * z * s + k * (1.0 - z) * (1.0 - z), z * z)
-        }
+        let z = 2.0 * k / (k + s);
+        if s <= k { (s, 1.0) } else { (k * (3.0 - 2.0 * z), z * z) }
     }
 }
 
