@@ -1,1 +1,13 @@
-//! Plots of a run.
+//! Plots of a run: trajectories and objects, seen from above or from the side, as SVG.
+//!
+//! A [`Scene`] says what there is to see; [`plot`] draws it from a [`View`].
+mod color;
+mod outline;
+mod plot;
+mod scene;
+mod view;
+
+pub use outline::Shape;
+pub use plot::plot;
+pub use scene::{Object, Scene, Track, TrackKind};
+pub use view::View;

@@ -1,0 +1,87 @@
+use crate::{Object, Scene, Shape, Track, TrackKind, View, plot};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+fn ellipsoid(centroid: [f64; 3], semi_axes: [f64; 3], yaw: f64) -> Shape {
+    let rotation = Rotation3::from_euler_angles(0.0, 0.0, yaw).into_inner();
+    Shape::Ellipsoid {
+        centroid: centroid.into(),
+        axes: rotation * Matrix3::from_diagonal(&Vector3::from(semi_axes)),
+    }
+}
+
+/// A camera on a circle around a table with four objects.
+fn desk() -> Scene {
+    let circle = |radius: f64, drift: f64| -> Vec<Vector3<f64>> {
+        let angle = |k: usize| std::f64::consts::TAU * 0.9 * k as f64 / 100.0;
+        let point = |k: usize| {
+            let (sin, cos) = angle(k).sin_cos();
+            Vector3::new(radius * cos + drift * k as f64, radius * sin, 1.2 + 0.1 * (3.0 * angle(k)).sin())
+        };
+        (0..100).map(point).collect()
+    };
+    let track = |kind, name: &str, positions| Track { kind, name: name.into(), positions };
+    let places = [
+        ("cup", [0.4, 0.3]),
+        ("keyboard", [-0.2, -0.4]),
+        ("bottle", [-0.5, 0.4]),
+        ("tv & book", [0.3, -0.5]),
+    ];
+    let object = |(k, (class, [x, y])): (usize, (&str, [f64; 2]))| Object {
+        class: class.into(),
+        truth: Some(ellipsoid([x, y, 0.8], [0.22, 0.1, 0.08], k as f64)),
+        estimate: Some(ellipsoid([x + 0.02, y - 0.03, 0.82], [0.2, 0.12, 0.07], k as f64 + 0.1)),
+    };
+    Scene {
+        title: "desk".into(),
+        tracks: vec![
+            track(TrackKind::Truth, "true", circle(1.5, 0.0)),
+            track(TrackKind::Odometry, "odometry", circle(1.5, 0.004)),
+            track(TrackKind::Estimate, "estimated", circle(1.5, 0.0005)),
+        ],
+        objects: places.into_iter().enumerate().map(object).collect(),
+        ..Scene::default()
+    }
+}
+
+#[test]
+fn every_class_and_trajectory_is_in_the_legend() {
+    for view in [View::Top, View::Side] {
+        let svg = plot(&desk(), view);
+        assert!(svg.starts_with("<svg") || svg.starts_with("<?xml"), "{}", &svg[..40]);
+        for text in ["true", "odometry", "estimated", "cup", "keyboard", "bottle", "tv &amp; book", "(m)"] {
+            assert!(svg.contains(text), "{text} is missing");
+        }
+        if let Ok(folder) = std::env::var("MANIFACTOR_PLOTS") {
+            std::fs::write(format!("{folder}/desk_{view:?}.svg"), svg).unwrap();
+        }
+    }
+}
+
+#[test]
+fn an_estimate_far_away_does_not_shrink_the_rest() {
+    let mut scene = desk();
+    scene.objects[0].estimate = Some(ellipsoid([1e5, 0.0, 0.0], [1.0, 1.0, 1.0], 0.0));
+    let svg = plot(&scene, View::Top);
+    assert!(svg.contains("1 of 4 objects outside the picture"));
+    // the ticks are those of a frame of three metres
+    assert!(svg.contains(">0.5<") && !svg.contains(">100000<"));
+}
+
+#[test]
+fn what_is_not_finite_is_left_out() {
+    let mut scene = desk();
+    scene.tracks[2].positions[3] = Vector3::new(f64::NAN, 0.0, f64::INFINITY);
+    scene.objects[1].estimate = Some(ellipsoid([f64::NAN; 3], [1.0; 3], 0.0));
+    assert!(!plot(&scene, View::Top).contains("NaN"));
+}
+
+#[test]
+fn an_empty_scene_is_an_empty_picture() {
+    for tracks in [
+        vec![],
+        vec![Track { kind: TrackKind::Truth, name: "one".into(), positions: vec![Vector3::zeros()] }],
+    ] {
+        let svg = plot(&Scene { tracks, ..Scene::default() }, View::Top);
+        assert!(svg.contains("</svg>"));
+    }
+}

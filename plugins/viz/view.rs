@@ -1,0 +1,89 @@
+//! Where a picture is taken from.
+use manifactor_graph::Direction;
+use nalgebra::{Point2, Vector3};
+
+/// Where a picture is taken from: always from far away, without perspective.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum View {
+    /// From above.
+    Top,
+    /// From the side, up being up.
+    Side,
+}
+
+/// The plane of a picture: two unit vectors at a right angle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plane {
+    right: Vector3<f64>,
+    upward: Vector3<f64>,
+    /// Names of the two axes, where they are axes of the frame.
+    pub(crate) labels: [&'static str; 2],
+}
+
+impl View {
+    /// The plane of the picture where `up` is up. With z up, a top view shows x to the right and y upward.
+    pub(crate) fn plane(self, up: &Direction) -> Plane {
+        let up: Vector3<f64> = **up;
+        // the axis of the frame that is least along `up`; x, where x and y are alike
+        let right = match up.x.abs() <= up.y.abs() + 1e-9 {
+            true => Vector3::x(),
+            false => Vector3::y(),
+        };
+        let right = (right - up * right.dot(&up)).normalize();
+        let ahead = up.cross(&right);
+        match self {
+            View::Top => Plane { right, upward: ahead, labels: [name(&right), name(&ahead)] },
+            View::Side => Plane { right, upward: up, labels: [name(&right), "up"] },
+        }
+    }
+}
+
+impl Plane {
+    /// The point that is drawn for `p`.
+    pub(crate) fn project(&self, p: &Vector3<f64>) -> Point2<f64> {
+        Point2::new(self.right.dot(p), self.upward.dot(p))
+    }
+}
+
+/// The name of an axis of the frame; nothing more than `horizontal` for any other direction.
+fn name(direction: &Vector3<f64>) -> &'static str {
+    let names = [["x", "-x"], ["y", "-y"], ["z", "-z"]];
+    let found = names.iter().zip(direction.iter()).find(|(_, along)| along.abs() > 1.0 - 1e-6);
+    found.map_or("horizontal", |([ahead, behind], along)| if *along > 0.0 { ahead } else { behind })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn with_z_up_x_points_right_and_y_upward() {
+        let plane = View::Top.plane(&Direction::Z);
+        assert_eq!(plane.project(&Vector3::new(1.0, 2.0, 3.0)), Point2::new(1.0, 2.0));
+        assert_eq!(plane.labels, ["x", "y"]);
+        let side = View::Side.plane(&Direction::Z);
+        assert_eq!(side.project(&Vector3::new(1.0, 2.0, 3.0)), Point2::new(1.0, 3.0));
+    }
+
+    #[test]
+    fn in_a_camera_frame_depth_is_upward() {
+        let up = Direction::new(Vector3::new(0.0, -1.0, 0.0)).unwrap();
+        let plane = View::Top.plane(&up);
+        assert_eq!(plane.project(&Vector3::new(1.0, 2.0, 3.0)), Point2::new(1.0, 3.0));
+        assert_eq!(plane.labels, ["x", "z"]);
+    }
+
+    #[test]
+    fn any_up_gives_a_right_angle() {
+        for up in [[1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1e-12], [-1.0, 0.3, 0.0]] {
+            let up = Direction::new(up.into()).unwrap();
+            for view in [View::Top, View::Side] {
+                let plane = view.plane(&up);
+                assert!(plane.right.dot(&plane.upward).abs() < 1e-12);
+                assert!(
+                    (plane.right.norm() - 1.0).abs() < 1e-12 && (plane.upward.norm() - 1.0).abs() < 1e-12
+                );
+            }
+        }
+    }
+}
