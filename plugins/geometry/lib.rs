@@ -13,6 +13,8 @@ mod se3;
 mod small_angle;
 mod so2;
 mod so3;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
 
 pub use between::Between;
 pub use coordinates::{Coordinates, NoCoordinates};

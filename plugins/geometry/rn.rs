@@ -126,3 +126,29 @@ macro_rules! point {
 point!(1, "point1", "{ position = [1.0] }");
 point!(2, "point2", "{ position = [1.0, 0.5] }");
 point!(3, "point3", "{ position = [1.0, 0.5, 0.0] }");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::any_point;
+    use manifactor_testing::manifold_laws;
+    use manifactor_testing::strategies::vector;
+
+    manifold_laws! {
+        numbers_are_a_manifold: (any_point::<1>(), any_point::<1>(), vector::<1>(10.0));
+        the_plane_is_a_manifold: (any_point::<2>(), any_point::<2>(), vector::<2>(10.0));
+        space_is_a_manifold: (any_point::<3>(), any_point::<3>(), vector::<3>(10.0));
+    }
+
+    #[test]
+    fn more_than_three_directions_are_numbered() {
+        assert_eq!(Rn::<2>::TANGENT, ["x", "y"]);
+        assert_eq!(Rn::<4>::TANGENT, ["x0", "x1", "x2", "x3"]);
+    }
+
+    #[test]
+    fn the_number_of_coordinates_is_checked() {
+        let error = serde_json::from_str::<Point3>(r#"{ "position": [1, 2] }"#).unwrap_err();
+        assert!(error.to_string().contains("expected 3 numbers, got 2"), "{error}");
+    }
+}

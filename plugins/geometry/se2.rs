@@ -171,3 +171,57 @@ impl From<Se2> for Document {
         Self { translation: Coordinates::unchecked(x.translation), angle: Angle(x.rotation) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{any_se2, se2_tangent};
+    use manifactor_testing::manifold_laws;
+    use manifactor_testing::strategies::vector;
+    use proptest::prelude::*;
+    use std::f64::consts::{FRAC_2_PI, PI};
+
+    manifold_laws! { retract_and_local_are_inverse: (any_se2(), any_se2(), se2_tangent()) }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(256))]
+
+        #[test]
+        fn exp_is_the_matrix_exponential(xi in se2_tangent()) {
+            let m = Matrix3::new(0.0, -xi.z, xi.x, xi.z, 0.0, xi.y, 0.0, 0.0, 0.0);
+            prop_assert!((Se2::exp(&xi).matrix() - m.exp()).norm() < 1e-11);
+        }
+
+        #[test]
+        fn log_inverts_exp(xi in se2_tangent()) {
+            prop_assert!((Se2::exp(&xi).log() - xi).norm() < 1e-9);
+        }
+
+        #[test]
+        fn acting_is_multiplying_by_the_matrix(x in any_se2(), p in vector::<2>(10.0)) {
+            prop_assert!((x.act(&p).push(1.0) - x.matrix() * p.push(1.0)).norm() < 1e-12);
+            prop_assert!((x.inverse_act(&x.act(&p)) - p).norm() < 1e-12);
+            prop_assert!((x.inverse().act(&p) - x.inverse_act(&p)).norm() < 1e-12);
+        }
+
+        #[test]
+        fn the_adjoint_moves_a_step_to_the_other_side(x in any_se2(), delta in se2_tangent()) {
+            let (left, right) = (x.adjoint() * delta, x.compose(&Se2::exp(&delta)));
+            prop_assert!((Se2::exp(&left).compose(&x).matrix() - right.matrix()).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_turning_frame_moves_on_an_arc() {
+        // forward at 1 m/s, a quarter turn to the left in 1 s: radius 2/π
+        let pose = Se2::exp(&Vector3::new(1.0, 0.0, 1.0 / FRAC_2_PI));
+        assert!((pose.translation - Vector2::new(FRAC_2_PI, FRAC_2_PI)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn half_a_turn_has_a_logarithm() {
+        let xi = Vector3::new(1.0, 2.0, PI);
+        assert!((Se2::exp(&xi).log() - xi).norm() < 1e-12);
+        assert!(Se2::inverse_right_jacobian(&xi).iter().all(|x| x.is_finite()));
+    }
+}

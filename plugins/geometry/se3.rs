@@ -182,3 +182,73 @@ impl From<Se3> for Document {
         Self { translation: Coordinates::unchecked(x.translation), rotation: Xyzw(x.rotation) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{any_se3, se3_tangent};
+    use manifactor_testing::manifold_laws;
+    use manifactor_testing::strategies::vector;
+    use proptest::prelude::*;
+
+    manifold_laws! { retract_and_local_are_inverse: (any_se3(), any_se3(), se3_tangent()) }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(256))]
+
+        #[test]
+        fn exp_is_the_matrix_exponential(xi in se3_tangent()) {
+            let (w, v) = halves(&xi);
+            let mut m = Matrix4::zeros();
+            m.fixed_view_mut::<3, 3>(0, 0).copy_from(&w.cross_matrix());
+            m.fixed_view_mut::<3, 1>(0, 3).copy_from(&v);
+            prop_assert!((Se3::exp(&xi).matrix() - m.exp()).norm() < 1e-11);
+        }
+
+        #[test]
+        fn log_inverts_exp(xi in se3_tangent()) {
+            prop_assert!((Se3::exp(&xi).log() - xi).norm() < 1e-9);
+        }
+
+        #[test]
+        fn acting_is_multiplying_by_the_matrix(x in any_se3(), p in vector::<3>(10.0)) {
+            prop_assert!((x.act(&p).push(1.0) - x.matrix() * p.push(1.0)).norm() < 1e-12);
+            prop_assert!((x.inverse_act(&x.act(&p)) - p).norm() < 1e-12);
+            prop_assert!((x.inverse().act(&p) - x.inverse_act(&p)).norm() < 1e-12);
+        }
+
+        #[test]
+        fn composition_follows_the_matrices(x in any_se3(), y in any_se3()) {
+            prop_assert!((x.compose(&y).matrix() - x.matrix() * y.matrix()).norm() < 1e-11);
+            prop_assert!(x.between(&x.compose(&y)).local(&y).norm() < 1e-9);
+        }
+
+        #[test]
+        fn the_adjoint_moves_a_step_to_the_other_side(x in any_se3(), delta in se3_tangent()) {
+            let (left, right) = (x.adjoint() * delta, x.compose(&Se3::exp(&delta)));
+            prop_assert!((Se3::exp(&left).compose(&x).matrix() - right.matrix()).norm() < 1e-9);
+            let inverse = Se3::adjoint_of_inverse(&x) * x.adjoint();
+            prop_assert!((inverse - Matrix6::identity()).norm() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn a_turning_frame_moves_on_an_arc() {
+        // forward at 1 m/s, a quarter turn to the left in 1 s: radius 2/π
+        let radius = std::f64::consts::FRAC_2_PI;
+        let pose = Se3::exp(&Vector6::new(0.0, 0.0, 1.0 / radius, 1.0, 0.0, 0.0));
+        assert!((pose.translation - Vector3::new(radius, radius, 0.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn documents_are_checked_when_read() {
+        let read = |text: &str| serde_json::from_str::<Se3>(text).map_err(|e| e.to_string());
+        let rotation = r#""rotation": [0, 0, 0, 1]"#;
+        assert_eq!(read(&format!(r#"{{ "translation": [0, 0, 0], {rotation} }}"#)), Ok(Se3::identity()));
+        let error = read(&format!(r#"{{ "translation": [0, 0], {rotation} }}"#)).unwrap_err();
+        assert!(error.contains("expected 3 numbers, got 2"), "{error}");
+        let error = read(&format!(r#"{{ "translation": [0, 0, 0], {rotation}, "x": 1 }}"#)).unwrap_err();
+        assert!(error.contains("unknown field `x`"), "{error}");
+        assert!(read(r#"{ "translation": [0, 0, 0] }"#).unwrap_err().contains("missing field `rotation`"));
+    }
+}

@@ -146,3 +146,43 @@ impl From<So2> for Document {
         Self { angle: Angle(x) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{any_so2, so2_tangent};
+    use manifactor_testing::manifold_laws;
+    use proptest::prelude::*;
+
+    manifold_laws! { retract_and_local_are_inverse: (any_so2(), any_so2(), so2_tangent()) }
+
+    proptest! {
+        #[test]
+        fn wrapping_leaves_the_rotation(angle in -1e3..1e3) {
+            let wrapped: f64 = wrap(angle);
+            prop_assert!(wrapped.abs() <= PI + 1e-12);
+            prop_assert!((wrapped.sin() - angle.sin()).abs() < 1e-12);
+            prop_assert!((wrapped.cos() - angle.cos()).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn angles_in_range_stay_as_they_are() {
+        for angle in [PI, -PI, 3.0, 1e-300, 0.1] {
+            assert_eq!(wrap(angle), angle);
+        }
+    }
+
+    #[test]
+    fn the_way_across_the_half_turn_is_the_short_one() {
+        let way = So2::exp(3.0).local(&So2::exp(-3.0)).x;
+        assert!((way - (TAU - 6.0)).abs() < 1e-12, "{way}");
+    }
+
+    #[test]
+    fn an_angle_that_is_none_is_refused() {
+        assert!(matches!(Angle::try_from(f64::NAN), Err(NotAnAngle(_))));
+        assert!(serde_json::from_str::<So2>(r#"{ "angle": "north" }"#).is_err());
+        assert_eq!(serde_json::from_str::<So2>(r#"{ "angle": 7.0 }"#).unwrap(), So2::exp(7.0));
+    }
+}

@@ -226,3 +226,82 @@ impl From<So3> for Document {
         Self { rotation: Xyzw(x) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::any_so3;
+    use manifactor_testing::manifold_laws;
+    use manifactor_testing::strategies::{rotation_vector, vector};
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    manifold_laws! { retract_and_local_are_inverse: (any_so3(), any_so3(), rotation_vector()) }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(256))]
+
+        #[test]
+        fn exp_is_the_matrix_exponential(omega in rotation_vector()) {
+            let expected = omega.cross_matrix().exp();
+            prop_assert!((So3::exp(&omega).matrix() - expected).norm() < 1e-12);
+        }
+
+        #[test]
+        fn log_inverts_exp(omega in rotation_vector()) {
+            prop_assert!((So3::exp(&omega).log() - omega).norm() < 1e-9);
+        }
+
+        #[test]
+        fn the_right_jacobians_are_inverse(omega in rotation_vector()) {
+            let product = So3::right_jacobian(&omega) * So3::inverse_right_jacobian(&omega);
+            prop_assert!((product - Matrix3::identity()).norm() < 1e-10);
+        }
+
+        #[test]
+        fn a_matrix_gives_its_rotation_back(r in any_so3()) {
+            prop_assert!(r.local(&So3::from_matrix(&r.matrix())).norm() < 1e-7);
+        }
+
+        #[test]
+        fn acting_is_multiplying_by_the_matrix(r in any_so3(), v in vector::<3>(10.0)) {
+            prop_assert!((r.act(&v) - r.matrix() * v).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn half_a_turn_has_a_logarithm() {
+        for axis in [Vector3::x(), Vector3::y(), Vector3::new(0.6, 0.0, -0.8)] {
+            let log = So3::exp(&(axis * PI)).log();
+            assert!((log.norm() - PI).abs() < 1e-12 && log.cross(&axis).norm() < 1e-12, "{log}");
+            assert!(So3::inverse_right_jacobian(&log).iter().all(|x| x.is_finite()));
+        }
+    }
+
+    #[test]
+    fn a_quarter_turn_about_z_takes_x_to_y() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let r = So3::from_quaternion_xyzw([0.0, 0.0, half, half]).unwrap();
+        assert!((r.act(&Vector3::x()) - Vector3::y()).norm() < 1e-15);
+        assert!((r.log() - Vector3::z() * (PI / 2.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn quaternions_are_checked_and_normalized_when_read() {
+        let read = |text: &str| serde_json::from_str::<So3>(text);
+        let r = read(r#"{ "rotation": [0, 0, 0.6005, 0.8] }"#).unwrap();
+        assert!((r.quaternion().norm() - 1.0).abs() < 1e-15);
+        let error = read(r#"{ "rotation": [0, 0, 0.7, 0.8] }"#).unwrap_err().to_string();
+        assert!(error.contains("expected a unit quaternion") && error.contains("1.06"), "{error}");
+        assert!(So3::from_quaternion_xyzw([f64::NAN, 0.0, 0.0, 1.0]).is_err());
+        assert!(So3::from_quaternion_xyzw([0.0; 4]).is_err());
+        assert!(read(r#"{ "rotation": [0, 0, 0, 1], "angle": 1 }"#).is_err());
+    }
+
+    #[test]
+    fn many_small_steps_stay_rotations() {
+        let step = Vector3::new(0.1, -0.2, 0.3);
+        let r = (0..100_000).fold(So3::identity(), |r, _| r.retract(&step));
+        assert!((r.quaternion().norm() - 1.0).abs() < 1e-15);
+    }
+}

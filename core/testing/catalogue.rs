@@ -1,0 +1,118 @@
+//! Laws of whatever is linked, from nothing but its entry in the catalogue.
+//!
+//! A registered type brings an example in its docs. That is a factor to check, or a point around
+//! which others can be drawn, so that no type goes without the laws.
+use crate::error::LawError;
+use crate::jacobian::jacobian_law;
+use crate::manifold::manifold_laws;
+use manifactor_graph::catalogue::{self, Entry, Kind};
+use manifactor_graph::{Factor, Variable};
+use proptest::prelude::RngExt;
+use proptest::test_runner::{RngAlgorithm, TestRng};
+use serde_json::Value;
+use std::any::TypeId;
+
+/// Checks that an entry has a name in snake case, a summary, an object for a schema, and an example
+/// in TOML that mentions it and can be read.
+///
+/// # Errors
+/// The first that it lacks.
+pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
+    let require = |holds: bool, text: &str| if holds { Ok(()) } else { Err(problem(entry, text.into())) };
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '-';
+    require(entry.name.chars().all(plain), "its name is not in snake case")?;
+    require(!entry.summary().is_empty(), "its type has no doc comment")?;
+    let schema = (entry.schema)();
+    require(schema.as_object().is_some(), "its schema is no object")?;
+    (entry.parse)(example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))?;
+    Ok(())
+}
+
+/// The example in the docs of a registered type.
+///
+/// # Errors
+/// Where there is none, or it cannot be read.
+pub fn example<K: Kind + ?Sized>(entry: &'static Entry) -> Result<Box<K>, LawError> {
+    entry.parse::<K>(example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))
+}
+
+/// Checks [`jacobian_law`] for a factor's example, at `cases` random points around the examples of its
+/// variables. Returns at how many of them the factor was defined.
+///
+/// # Errors
+/// The law that is broken, or what the catalogue lacks.
+pub fn factor_law(entry: &'static Entry, cases: usize) -> Result<usize, LawError> {
+    let factor = example::<dyn Factor>(entry)?;
+    let signature = (entry.signature)();
+    let mut types = signature.variables.clone();
+    if signature.many {
+        types.resize(3, types.first().copied().unwrap_or(TypeId::of::<()>()));
+    }
+    let origins: Vec<_> = types.iter().map(|id| example_point(entry, *id)).collect::<Result<_, _>>()?;
+    let mut rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+    let mut defined = 0;
+    for _ in 0..cases {
+        let point: Vec<_> = origins.iter().filter_map(|x| around(&**x, &mut rng)).collect();
+        let point: Vec<&dyn Variable> = point.iter().map(|x| &**x).collect();
+        match jacobian_law(&*factor, &point) {
+            Ok(()) => defined += 1,
+            Err(LawError::NotDefined { .. }) => {}
+            Err(broken) => return Err(broken),
+        }
+    }
+    Ok(defined)
+}
+
+/// Checks [`manifold_laws`] at `cases` random points around a manifold's example.
+///
+/// # Errors
+/// The law that is broken, or what the catalogue lacks.
+pub fn manifold_law(entry: &'static Entry, cases: usize) -> Result<(), LawError> {
+    let origin = example::<dyn Variable>(entry)?;
+    let mut rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
+    for _ in 0..cases {
+        let (Some(x), Some(y)) = (around(&*origin, &mut rng), around(&*origin, &mut rng)) else { continue };
+        let delta: Vec<f64> = (0..x.erased().dim()).map(|_| rng.random_range(-1.0..1.0)).collect();
+        manifold_laws(&*x, &*y, &delta)?;
+    }
+    Ok(())
+}
+
+fn problem(entry: &'static Entry, problem: String) -> LawError {
+    LawError::Entry { kind: entry.kind, name: entry.name, problem }
+}
+
+/// A point at most 1 away in each direction.
+fn around(x: &dyn Variable, rng: &mut TestRng) -> Option<Box<dyn Variable>> {
+    let delta: Vec<f64> = (0..x.erased().dim()).map(|_| rng.random_range(-1.0..1.0)).collect();
+    x.erased().retract(&delta)
+}
+
+fn example_point(of: &'static Entry, id: TypeId) -> Result<Box<dyn Variable>, LawError> {
+    let kind = <dyn Variable as Kind>::NAME;
+    let entry = catalogue::entries(kind).into_iter().find(|e| (e.type_id)() == id);
+    example(entry.ok_or_else(|| problem(of, "one of its variables is of no registered type".into()))?)
+}
+
+/// The fields of the example: the table in it whose `type` is the entry's name.
+fn example_fields(entry: &'static Entry) -> Result<Value, LawError> {
+    let text = entry.example().ok_or_else(|| problem(entry, "its docs have no ```toml example".into()))?;
+    let document: toml::Value =
+        toml::from_str(&text).map_err(|e| problem(entry, format!("its example is no TOML: {e}")))?;
+    let document = serde_json::to_value(document).map_err(|e| problem(entry, e.to_string()))?;
+    let missing = || problem(entry, format!("its example has no table with type = \"{}\"", entry.name));
+    table_of_type(&document, entry.name).ok_or_else(missing)
+}
+
+fn table_of_type(value: &Value, name: &str) -> Option<Value> {
+    match value {
+        Value::Object(table) if table.get("type").and_then(Value::as_str) == Some(name) => {
+            let mut fields = table.clone();
+            fields.shift_remove("type");
+            Some(Value::Object(fields))
+        }
+        Value::Object(table) => table.values().find_map(|v| table_of_type(v, name)),
+        Value::Array(all) => all.iter().find_map(|v| table_of_type(v, name)),
+        _ => None,
+    }
+}

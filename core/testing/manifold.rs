@@ -1,0 +1,80 @@
+//! The laws of a manifold.
+use crate::error::{LawError, json_of};
+use manifactor_graph::Variable;
+use serde_json::Value;
+
+/// How far two points may be apart to be the same, relative to the largest coordinate or to 1.
+const TOLERANCE: f64 = 1e-9;
+
+/// Checks the laws of a manifold at two of its points, and for a tangent vector `delta` at the first
+/// that is inside of the chart (for rotations: shorter than π).
+///
+/// `x ⊞ 0 = x`; `x ⊞ (y ⊟ x) = y`; `(x ⊞ δ) ⊟ x = δ`; everything stays finite; a name for each
+/// direction; a document of x reads back as the very same document.
+///
+/// # Errors
+/// The first law that is broken.
+pub fn manifold_laws(x: &dyn Variable, y: &dyn Variable, delta: &[f64]) -> Result<(), LawError> {
+    let broken =
+        |law, error| LawError::Manifold { law, error, x: json_of(x), y: json_of(y), delta: delta.to_vec() };
+    let (from, to) = (x.erased(), y.erased());
+    let require = |holds: bool, law| if holds { Ok(()) } else { Err(broken(law, f64::INFINITY)) };
+    let dim = from.dim();
+    let mut names = from.tangent().to_vec();
+    names.sort_unstable();
+    names.dedup();
+    require(names.len() == dim, "each tangent direction has a name of its own")?;
+    require((1..=32).contains(&dim), "a tangent space has 1 to 32 dimensions")?;
+    require(delta.len() == dim && from.type_id() == to.type_id(), "x, y and delta are of one manifold")?;
+    require(from.is_finite() && to.is_finite(), "x and y are finite")?;
+    require(from.retract(&vec![0.0; dim + 1]).is_none(), "a tangent vector of another length is refused")?;
+
+    let wrong = |law| move || broken(law, f64::INFINITY);
+    let scale = largest(x).max(largest(y)).max(delta.iter().fold(1.0, |max: f64, d| max.max(d.abs())));
+    let small = |law, error: Option<f64>| match error.ok_or_else(wrong(law))? {
+        e if e <= TOLERANCE * scale => Ok(()),
+        e => Err(broken(law, e)),
+    };
+    let distance = |a: &dyn Variable, b: &dyn Variable| Some(norm(&a.erased().local(b)?));
+
+    let law = "x.retract(0) is x";
+    let same = from.retract(&vec![0.0; dim]).ok_or_else(wrong(law))?;
+    small(law, distance(x, &*same))?;
+
+    let law = "x.retract(x.local(y)) is y";
+    let there = from.retract(&from.local(y).ok_or_else(wrong(law))?).ok_or_else(wrong(law))?;
+    small(law, distance(y, &*there))?;
+
+    let law = "x.local(x.retract(delta)) is delta";
+    let moved = from.retract(delta).ok_or_else(wrong(law))?;
+    require(moved.erased().is_finite(), "x.retract(delta) is finite")?;
+    let back = from.local(&*moved).ok_or_else(wrong(law))?;
+    let difference: Vec<f64> = back.iter().zip(delta).map(|(b, d)| b - d).collect();
+    small(law, Some(norm(&difference)))?;
+
+    let law = "a document reads back as the same document";
+    for variable in [x, &*moved] {
+        let text = json_of(variable);
+        let read = serde_json::from_str::<Box<dyn Variable>>(&text).ok();
+        require(read.is_some_and(|read| json_of(&*read) == text), law)?;
+    }
+    Ok(())
+}
+
+/// Largest absolute entry; infinite where one is not a number.
+fn norm(v: &[f64]) -> f64 {
+    v.iter().fold(0.0, |max: f64, x| if x.is_nan() { f64::INFINITY } else { max.max(x.abs()) })
+}
+
+/// Largest absolute number in the document of a variable.
+fn largest(variable: &dyn Variable) -> f64 {
+    fn of(value: &Value) -> f64 {
+        match value {
+            Value::Number(n) => n.as_f64().map_or(0.0, f64::abs),
+            Value::Array(all) => all.iter().map(of).fold(0.0, f64::max),
+            Value::Object(all) => all.values().map(of).fold(0.0, f64::max),
+            _ => 0.0,
+        }
+    }
+    serde_json::to_value(variable).as_ref().map_or(0.0, of)
+}

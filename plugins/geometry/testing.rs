@@ -1,0 +1,48 @@
+//! Strategies for rotations, poses and points, with the places where formulas tend to break.
+use crate::{Rn, Se2, Se3, So2, So3};
+use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
+use nalgebra::{Vector1, Vector2, Vector3, Vector6};
+use proptest::prelude::*;
+
+/// How far from the origin the points and poses are, in metres.
+const SIZE: f64 = 10.0;
+
+/// Points with coordinates up to 10 m; now and then the origin, or next to it.
+pub fn any_point<const N: usize>() -> impl Strategy<Value = Rn<N>> + Clone {
+    vector(SIZE).prop_map(Rn)
+}
+
+/// Rotations in the plane.
+pub fn any_so2() -> impl Strategy<Value = So2> + Clone {
+    signed_angle().prop_map(So2::exp)
+}
+
+/// Rotations in space: none, tiny ones, any, nearly half a turn.
+pub fn any_so3() -> impl Strategy<Value = So3> + Clone {
+    rotation_vector().prop_map(|omega| So3::exp(&omega))
+}
+
+/// Poses in the plane.
+pub fn any_se2() -> impl Strategy<Value = Se2> + Clone {
+    (any_so2(), vector::<2>(SIZE)).prop_map(|(r, t)| Se2::new(r, t))
+}
+
+/// Poses in space.
+pub fn any_se3() -> impl Strategy<Value = Se3> + Clone {
+    (any_so3(), vector::<3>(SIZE)).prop_map(|(r, t)| Se3::new(r, t))
+}
+
+/// Tangent vectors of SO(2) inside of its chart.
+pub fn so2_tangent() -> impl Strategy<Value = Vector1<f64>> + Clone {
+    signed_angle().prop_map(Vector1::new)
+}
+
+/// Tangent vectors of SE(2) inside of its chart.
+pub fn se2_tangent() -> impl Strategy<Value = Vector3<f64>> + Clone {
+    (vector::<2>(SIZE), signed_angle()).prop_map(|(v, theta): (Vector2<f64>, _)| v.push(theta))
+}
+
+/// Tangent vectors of SE(3) inside of its chart.
+pub fn se3_tangent() -> impl Strategy<Value = Vector6<f64>> + Clone {
+    (rotation_vector(), vector::<3>(SIZE)).prop_map(|(w, v)| Vector6::new(w.x, w.y, w.z, v.x, v.y, v.z))
+}
