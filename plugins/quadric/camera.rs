@@ -1,0 +1,188 @@
+//! Pinhole cameras without distortion.
+use crate::dual_conic::DualConic;
+use crate::ellipse::Ellipse;
+use crate::ellipsoid::Ellipsoid;
+use manifactor_geometry::Se3;
+use manifactor_graph::Scalar;
+use nalgebra::{Matrix3, Matrix3x4, RowVector3, Vector2, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A pinhole camera: u = fx x/z + skew y/z + cx, v = fy y/z + cy. x is right, y down, z forward.
+///
+/// Pixels are counted from the corner of the image: it covers 0 to `width` and 0 to `height`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Document", into = "Document")]
+#[schemars(with = "Document")]
+pub struct Camera {
+    /// Focal length along x, in pixels.
+    pub fx: f64,
+    /// Focal length along y, in pixels.
+    pub fy: f64,
+    /// Principal point, in pixels.
+    pub cx: f64,
+    /// Principal point, in pixels.
+    pub cy: f64,
+    /// How much y/z adds to u, in pixels; 0 for nearly all cameras.
+    pub skew: f64,
+    /// Size of the image, in pixels.
+    pub width: u32,
+    /// Size of the image, in pixels.
+    pub height: u32,
+}
+
+#[derive(Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Camera")]
+struct Document {
+    /// Focal length along x, in pixels.
+    fx: f64,
+    /// Focal length along y, in pixels.
+    fy: f64,
+    /// Principal point, in pixels.
+    cx: f64,
+    /// Principal point, in pixels.
+    cy: f64,
+    /// How much y/z adds to u, in pixels.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    skew: f64,
+    /// Size of the image, in pixels.
+    width: u32,
+    /// Size of the image, in pixels.
+    height: u32,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde asks for a reference
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
+}
+
+/// Numbers that no camera has.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("camera: expected {field} to be {expected}, got {found}")]
+pub struct NotACamera {
+    /// The parameter.
+    pub field: &'static str,
+    /// What it should be.
+    pub expected: &'static str,
+    /// What it is.
+    pub found: f64,
+}
+
+impl Camera {
+    /// A camera without skew.
+    ///
+    /// # Errors
+    /// Where a focal length or a size is not positive, or a number not finite.
+    pub fn new([fx, fy, cx, cy]: [f64; 4], width: u32, height: u32) -> Result<Self, NotACamera> {
+        Self { fx, fy, cx, cy, skew: 0.0, width, height }.checked()
+    }
+
+    fn checked(self) -> Result<Self, NotACamera> {
+        let size = [("width", f64::from(self.width)), ("height", f64::from(self.height))];
+        for (field, found) in [("fx", self.fx), ("fy", self.fy)].into_iter().chain(size) {
+            if !(found > 0.0 && found.is_finite()) {
+                return Err(NotACamera { field, expected: "a finite number above zero", found });
+            }
+        }
+        for (field, found) in [("cx", self.cx), ("cy", self.cy), ("skew", self.skew)] {
+            if !found.is_finite() {
+                return Err(NotACamera { field, expected: "a finite number", found });
+            }
+        }
+        Ok(self)
+    }
+
+    /// K = [fx skew cx; 0 fy cy; 0 0 1]
+    pub fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::new(self.fx, self.skew, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
+    }
+    /// P = K [Rᵀ | -Rᵀc] of a camera at (R, c).
+    pub fn projection(&self, world_from_camera: &Se3) -> Matrix3x4<f64> {
+        let camera_from_world = world_from_camera.inverse().matrix();
+        self.matrix() * camera_from_world.fixed_view::<3, 4>(0, 0)
+    }
+    /// The direction, in the camera's frame, of what is seen at a pixel; its z is 1.
+    pub fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
+        let y = (pixel.y - self.cy) / self.fy;
+        Vector3::new((pixel.x - self.cx - self.skew * y) / self.fx, y, 1.0)
+    }
+    /// Width and height of the image, in pixels.
+    pub fn size(&self) -> Vector2<f64> {
+        Vector2::new(f64::from(self.width), f64::from(self.height))
+    }
+
+    /// C* = P Q* Pᵀ of an ellipsoid anywhere: in front of the camera, behind or around it.
+    pub fn dual_conic(&self, ellipsoid: &Ellipsoid) -> DualConic {
+        let (b, p) = (self.matrix() * ellipsoid.axes, self.matrix() * ellipsoid.centroid);
+        DualConic(b * b.transpose() - p * p.transpose())
+    }
+
+    /// The outline of an ellipsoid that [is in front](Ellipsoid::is_in_front).
+    ///
+    /// With A = BBᵀ the ellipsoid's shape, d = z² - A₃₃, and for each image axis k the row a of KB, the
+    /// coordinate x of Kp (both less the principal point), and w = z a - x b:
+    /// centre = (x z - a·b)/d, shape = (d wᵢ·wⱼ + (wᵢ·b)(wⱼ·b)) / (z d)². The usual C*₁₃² - C*₁₁C*₃₃
+    /// is a difference of nearly equal numbers for a far object; here all terms on the diagonal add up.
+    #[inline]
+    pub fn outline<T: Scalar>(&self, ellipsoid: &Ellipsoid<T>) -> Ellipse<T> {
+        let (p, b): (_, RowVector3<T>) = (&ellipsoid.centroid, ellipsoid.axes.row(2).into_owned());
+        let d = p.z * p.z - b.dot(&b);
+        let row = |i: usize| ellipsoid.axes.row(i).into_owned();
+        let a1 = row(0) * T::from(self.fx) + row(1) * T::from(self.skew);
+        let a2 = row(1) * T::from(self.fy);
+        let (x, y) = (p.x * self.fx + p.y * self.skew, p.y * self.fy);
+        let (w1, w2) = (a1 * p.z - b * x, a2 * p.z - b * y);
+        let (g1, g2) = (w1.dot(&b), w2.dot(&b));
+        let scale = (p.z * d).recip();
+        let scale = scale * scale;
+        let across = w1.cross(&w2).norm_squared() * d + (w2 * g1 - w1 * g2).norm_squared();
+        Ellipse {
+            centre: Vector2::new(
+                (x * p.z - a1.dot(&b)) / d + T::from(self.cx),
+                (y * p.z - a2.dot(&b)) / d + T::from(self.cy),
+            ),
+            xx: (w1.norm_squared() * d + g1 * g1) * scale,
+            xy: (w1.dot(&w2) * d + g1 * g2) * scale,
+            yy: (w2.norm_squared() * d + g2 * g2) * scale,
+            determinant: across * d * scale * scale,
+        }
+    }
+}
+
+impl TryFrom<Document> for Camera {
+    type Error = NotACamera;
+    fn try_from(d: Document) -> Result<Self, NotACamera> {
+        let Document { fx, fy, cx, cy, skew, width, height } = d;
+        Self { fx, fy, cx, cy, skew, width, height }.checked()
+    }
+}
+impl From<Camera> for Document {
+    fn from(c: Camera) -> Self {
+        let Camera { fx, fy, cx, cy, skew, width, height } = c;
+        Self { fx, fy, cx, cy, skew, width, height }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ray_is_what_projects_to_its_pixel() {
+        let camera = Camera { skew: 3.0, ..Camera::new([500.0, 510.0, 320.0, 240.0], 640, 480).unwrap() };
+        let pixel = camera.matrix() * camera.ray(Vector2::new(12.0, 345.0));
+        assert!((pixel - Vector3::new(12.0, 345.0, 1.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_camera_needs_a_focal_length_and_an_image() {
+        let read = |text: &str| serde_json::from_str::<Camera>(text).map_err(|e| e.to_string());
+        let good = r#"{"fx":500.0,"fy":510.0,"cx":320.0,"cy":240.0,"width":640,"height":480}"#;
+        assert_eq!(serde_json::to_string(&read(good).unwrap()).unwrap(), good);
+        let bad = read(&good.replace("510.0", "-1.0")).unwrap_err();
+        assert_eq!(bad, "camera: expected fy to be a finite number above zero, got -1");
+        assert!(read(&good.replace("480", "0")).unwrap_err().contains("height"));
+        assert!(read(&good.replace("\"cx\"", "\"cz\"")).unwrap_err().contains("unknown field"));
+    }
+}
