@@ -1,0 +1,75 @@
+//! Names of classes, and which of them mean the same.
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Spellings that detectors and data sets use, and the names that COCO's own papers print.
+const SHIPPED: [(&str, &str); 12] = [
+    ("tvmonitor", "tv monitor"),
+    ("tv", "tv monitor"),
+    ("monitor", "tv monitor"),
+    ("pottedplant", "potted plant"),
+    ("diningtable", "dining table"),
+    ("couch", "sofa"),
+    ("cellphone", "cell phone"),
+    ("mobile phone", "cell phone"),
+    ("wineglass", "wine glass"),
+    ("teddybear", "teddy bear"),
+    ("aeroplane", "airplane"),
+    ("motorbike", "motorcycle"),
+];
+
+/// Names that stand for other names, besides the usual ones: `{ "desk lamp" = "lamp" }`.
+///
+/// Case, underscores and hyphens make no difference: `Cell_Phone` is `cell phone`. `tvmonitor`, `pottedplant`,
+/// `couch` and their like are known without being listed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct Aliases(pub IndexMap<String, String>);
+
+impl Aliases {
+    /// The one name of a class.
+    pub fn canonical(&self, name: &str) -> String {
+        let name = plain(name);
+        let own = self.0.iter().find(|(alias, _)| plain(alias) == name).map(|(_, class)| plain(class));
+        own.or_else(|| shipped(&name)).unwrap_or(name)
+    }
+}
+
+fn shipped(name: &str) -> Option<String> {
+    SHIPPED.iter().find(|(alias, _)| *alias == name).map(|(_, class)| (*class).to_owned())
+}
+
+fn plain(name: &str) -> String {
+    let spaced = name.to_lowercase().replace(['_', '-'], " ");
+    spaced.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spellings_of_one_class_have_one_name() {
+        let aliases = Aliases::default();
+        for name in ["tvmonitor", "TV", "tv_monitor", "Tv  Monitor"] {
+            assert_eq!(aliases.canonical(name), "tv monitor");
+        }
+        assert_eq!(aliases.canonical("Sports-Ball"), "sports ball");
+    }
+
+    #[test]
+    fn an_alias_of_ones_own_goes_first() {
+        let aliases = Aliases(IndexMap::from([("TV".to_owned(), "Television".to_owned())]));
+        assert_eq!(aliases.canonical("tv"), "television");
+        assert_eq!(aliases.canonical("tvmonitor"), "tv monitor");
+    }
+
+    #[test]
+    fn no_shipped_alias_leads_to_another() {
+        for (alias, class) in SHIPPED {
+            assert_eq!(plain(alias), alias);
+            assert_eq!(shipped(class), None);
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! One class for an object, out of all of its detections.
+use crate::class::Aliases;
+use crate::sequence::ClassScores;
+use indexmap::IndexMap;
+use serde::Serialize;
+
+/// Scores of an object's detections, averaged.
+///
+/// The class is the arg max of the average of the score vectors (Jablonsky et al., section V). Where a detector
+/// reports its best class only, the average is a vote in which each detection counts with its score.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Fusion {
+    sums: IndexMap<String, f64>,
+    detections: usize,
+}
+
+/// The class of an object, and how sure it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FusedClass {
+    /// Its name, after aliases.
+    pub name: String,
+    /// Its score, averaged over the detections.
+    pub score: f64,
+    /// Its part of all scores, from 0 to 1.
+    pub share: f64,
+}
+
+impl Fusion {
+    /// Counts a detection in.
+    pub fn add(&mut self, scores: &ClassScores, aliases: &Aliases) {
+        self.detections += 1;
+        for (class, score) in scores.iter() {
+            *self.sums.entry(aliases.canonical(class)).or_default() += score;
+        }
+    }
+
+    /// The best class, the first seen of equals; `None` where no detection named any.
+    pub fn best(&self) -> Option<FusedClass> {
+        let better = |best: (&String, &f64), next: (&String, &f64)| if next.1 > best.1 { next } else { best };
+        let best = self.sums.iter().map(|(class, sum)| (class, sum)).reduce(|b, n| better(b, n));
+        let total: f64 = self.sums.values().sum();
+        best.map(|(name, sum)| FusedClass {
+            name: name.clone(),
+            score: sum / self.detections.max(1) as f64,
+            share: if total > 0.0 { sum / total } else { 0.0 },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fuse(detections: &[&[(&str, f64)]]) -> FusedClass {
+        let mut fusion = Fusion::default();
+        for scores in detections {
+            let scores = scores.iter().map(|(class, score)| ((*class).to_owned(), *score)).collect();
+            fusion.add(&scores, &Aliases::default());
+        }
+        fusion.best().unwrap()
+    }
+
+    #[test]
+    fn the_average_decides_and_not_the_majority() {
+        let class = fuse(&[&[("cup", 0.4)], &[("cup", 0.3)], &[("bottle", 0.9)]]);
+        assert_eq!(class.name, "bottle");
+        assert!((class.score - 0.3).abs() < 1e-15);
+        assert!((class.share - 0.9 / 1.6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn second_best_classes_count() {
+        let class = fuse(&[&[("cup", 0.5), ("vase", 0.45)], &[("bowl", 0.5), ("vase", 0.45)]]);
+        assert_eq!(class.name, "vase");
+    }
+
+    #[test]
+    fn spellings_are_counted_together() {
+        let class = fuse(&[&[("tvmonitor", 0.4)], &[("laptop", 0.7)], &[("tv", 0.5)]]);
+        assert_eq!(class.name, "tv monitor");
+    }
+
+    #[test]
+    fn no_detection_has_no_class() {
+        assert_eq!(Fusion::default().best(), None);
+    }
+}

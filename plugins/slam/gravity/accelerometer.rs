@@ -1,0 +1,98 @@
+use super::{Gravity, GravityError, MapFrame, first_frame};
+use crate::sequence::Sequence;
+use manifactor_geometry::{NotARotation, So3};
+use manifactor_graph::{Direction, register};
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Up is what an accelerometer feels about the time of the first frame.
+///
+/// Held still, an accelerometer reads 9.8 m/s² upwards. Readings are averaged, since a hand that holds a camera
+/// is never still. The map stays in the frame of the odometry.
+///
+/// ```toml
+/// gravity = { type = "accelerometer", window = 1.0, camera_from_sensor = [0.0, 0.0, 1.0, 0.0] }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Accelerometer {
+    /// Readings this near to the first frame are averaged, in seconds.
+    pub window: f64,
+    /// Rotation from the sensor's frame to the camera's, a unit quaternion (x, y, z, w). The Kinect's of TUM RGB-D
+    /// is half a turn about z, [0, 0, 1, 0].
+    pub camera_from_sensor: Quaternion,
+}
+
+/// A unit quaternion (x, y, z, w).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "[f64; 4]", into = "[f64; 4]")]
+#[schemars(with = "[f64; 4]")]
+pub struct Quaternion(pub So3);
+
+impl TryFrom<[f64; 4]> for Quaternion {
+    type Error = NotARotation;
+    fn try_from(xyzw: [f64; 4]) -> Result<Self, NotARotation> {
+        So3::from_quaternion_xyzw(xyzw).map(Self)
+    }
+}
+impl From<Quaternion> for [f64; 4] {
+    fn from(q: Quaternion) -> [f64; 4] {
+        q.0.quaternion_xyzw()
+    }
+}
+
+impl Default for Accelerometer {
+    fn default() -> Self {
+        Self { window: 1.0, camera_from_sensor: Quaternion(So3::identity()) }
+    }
+}
+
+#[typetag::serde(name = "accelerometer")]
+impl Gravity for Accelerometer {
+    fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
+        let first = first_frame(sequence)?;
+        let near = |timestamp: f64| (timestamp - first.timestamp).abs() <= self.window;
+        let mut near = sequence.accelerometer.iter().filter(|r| near(r.timestamp)).peekable();
+        if near.peek().is_none() {
+            return Err(GravityError::NoReadings { timestamp: first.timestamp, within: self.window });
+        }
+        let sum: Vector3<f64> = near.map(|r| r.acceleration).sum();
+        let up = first.world_from_camera.rotation.act(&self.camera_from_sensor.0.act(&sum));
+        Ok(MapFrame::of_odometry(Some(Direction::new(up)?)))
+    }
+}
+register!(dyn Gravity, "accelerometer", Accelerometer);
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::sequence;
+    use super::*;
+    use crate::sequence::Acceleration;
+
+    fn reading(timestamp: f64, acceleration: [f64; 3]) -> Acceleration {
+        Acceleration { timestamp, acceleration: acceleration.into() }
+    }
+
+    #[test]
+    fn up_is_the_average_of_what_is_felt_at_first() {
+        let accelerometer = vec![
+            reading(9.5, [1.0, 9.0, 0.0]),
+            reading(10.5, [-1.0, 9.0, 0.0]),
+            reading(13.0, [9.0, 0.0, 0.0]),
+        ];
+        let half_turn = Quaternion(So3::from_quaternion_xyzw([0.0, 0.0, 1.0, 0.0]).unwrap());
+        let gravity = Accelerometer { camera_from_sensor: half_turn, ..Accelerometer::default() };
+        let map = gravity.locate(&Sequence { accelerometer, ..sequence() }).unwrap();
+        assert!((*map.up.unwrap() - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn free_fall_and_silence_are_errors() {
+        let fall = vec![reading(10.0, [0.0; 3])];
+        let fall = Accelerometer::default().locate(&Sequence { accelerometer: fall, ..sequence() });
+        assert!(matches!(fall, Err(GravityError::NoDirection(_))));
+        let silence = Accelerometer::default().locate(&sequence());
+        assert!(matches!(silence, Err(GravityError::NoReadings { .. })));
+    }
+}

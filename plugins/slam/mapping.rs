@@ -1,0 +1,188 @@
+//! From a sequence to a graph.
+//!
+//! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
+//! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
+//! its class says of it.
+use crate::fusion::FusedClass;
+use crate::gravity::{GravityError, MapFrame};
+use crate::measurements::{Measured, Measurements, View};
+use crate::semantics::{RuleError, unmatched};
+use crate::sequence::{ObjectId, Sequence};
+use crate::settings::Settings;
+use manifactor_geometry::{Between, Prior, Se3};
+use manifactor_graph::{FactorEntry, Graph, Key, Values};
+use manifactor_quadric::{BoundingBoxFactor, DualQuadric};
+use serde::Serialize;
+use std::sync::Arc;
+
+mod rejection;
+mod warning;
+
+pub use rejection::Rejection;
+pub use warning::Warning;
+
+/// A graph made of a sequence, and how it was made.
+#[derive(Debug, Clone)]
+pub struct Mapping {
+    /// Priors, odometry, boxes and semantics.
+    pub graph: Graph,
+    /// Where a solve begins.
+    pub values: Values,
+    /// The frame of the values, and up in it.
+    pub frame: MapFrame,
+    /// Each object that was detected, mapped or not, by number.
+    pub objects: Vec<MappedObject>,
+    /// What was done with the detections.
+    pub measurements: Measurements,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// An object that was detected.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MappedObject {
+    /// Its number.
+    pub id: ObjectId,
+    /// Its key in the graph, if it is mapped.
+    pub key: Key,
+    /// Its class; `None` where no detection named one.
+    pub class: Option<FusedClass>,
+    /// Detections that are associated with it.
+    pub detections: usize,
+    /// Boxes that passed the filters.
+    pub boxes: usize,
+    /// Why it is not mapped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rejected: Option<Rejection>,
+    /// Factors that its class brought it.
+    pub semantic_factors: Vec<String>,
+}
+
+/// Why a sequence could not be mapped.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MappingError {
+    /// A sequence of nothing.
+    #[error("the sequence has no frames")]
+    NoFrames,
+    /// Nobody knows up.
+    #[error(transparent)]
+    Gravity(#[from] GravityError),
+    /// A semantic rule that cannot be applied.
+    #[error(transparent)]
+    Rule(#[from] RuleError),
+}
+
+/// The key of a pose.
+pub fn pose_key(frame: usize) -> Key {
+    Key::indexed("x", frame)
+}
+
+/// The key of an object.
+pub fn object_key(id: ObjectId) -> Key {
+    Key::indexed("q", id)
+}
+
+impl Mapping {
+    /// Makes the graph of a sequence.
+    ///
+    /// # Errors
+    /// Where there is no frame, or up is not known and a rule needs it.
+    pub fn new(sequence: &Sequence, settings: &Settings) -> Result<Self, MappingError> {
+        let frame = settings.gravity.locate(sequence)?;
+        let measurements = Measurements::gather(sequence, &settings.detections, &settings.aliases);
+        let (graph, values) = (Graph::new(), Values::new());
+        let (objects, warnings) = (vec![], vec![]);
+        let mut mapping = Self { graph, values, frame, objects, measurements, warnings };
+        let poses = mapping.add_poses(sequence, settings)?;
+        for measured in mapping.measurements.objects.clone() {
+            let object = mapping.add_object(&measured, &poses, sequence, settings)?;
+            mapping.objects.push(object);
+        }
+        mapping.warn(settings);
+        Ok(mapping)
+    }
+
+    /// Objects that are in the graph.
+    pub fn mapped(&self) -> impl Iterator<Item = &MappedObject> {
+        self.objects.iter().filter(|object| object.rejected.is_none())
+    }
+
+    fn add_poses(&mut self, sequence: &Sequence, settings: &Settings) -> Result<Vec<Se3>, MappingError> {
+        let odometry = sequence.frames.iter().map(|frame| frame.world_from_camera);
+        let poses: Vec<Se3> = odometry.map(|pose| self.frame.map_from_odometry.compose(&pose)).collect();
+        let first = poses.first().ok_or(MappingError::NoFrames)?;
+        for (i, pose) in poses.iter().enumerate() {
+            self.values.insert(pose_key(i), *pose);
+        }
+        let prior = self.graph.add([pose_key(0)], Prior { value: *first });
+        prior.noise(settings.prior.noise.clone());
+        let pairs = sequence.frames.iter().zip(sequence.frames.iter().skip(1));
+        for (i, (here, next)) in pairs.enumerate() {
+            let relative = here.world_from_camera.between(&next.world_from_camera);
+            let between = self.graph.add([pose_key(i), pose_key(i + 1)], Between { relative });
+            between.noise(settings.odometry.noise.clone());
+            between.loss.clone_from(&settings.odometry.loss);
+        }
+        Ok(poses)
+    }
+
+    fn add_object(
+        &mut self,
+        measured: &Measured,
+        poses: &[Se3],
+        sequence: &Sequence,
+        settings: &Settings,
+    ) -> Result<MappedObject, MappingError> {
+        let key = object_key(measured.id);
+        let (start, rejected) = match rejection::start(measured, poses, sequence, &settings.objects) {
+            Ok(start) => (Some(start), None),
+            Err(rejection) => (None, Some(rejection)),
+        };
+        let mut semantic_factors = vec![];
+        if let Some(quadric) = start {
+            self.values.insert(key.clone(), quadric);
+            for view in &measured.views {
+                self.graph.push(box_entry(view, key.clone(), sequence, settings));
+            }
+            let class = measured.class.as_ref().map(|class| class.name.as_str()).unwrap_or_default();
+            for rule in settings.semantics.iter().filter(|rule| rule.applies(class, &settings.aliases)) {
+                self.graph.push(rule.entry(key.clone(), self.frame.up)?);
+                semantic_factors.push(rule.factor.name().to_owned());
+            }
+        }
+        Ok(MappedObject {
+            id: measured.id,
+            key,
+            class: measured.class.clone(),
+            detections: measured.detections,
+            boxes: measured.views.len(),
+            rejected,
+            semantic_factors,
+        })
+    }
+
+    fn warn(&mut self, settings: &Settings) {
+        let classes = self.objects.iter().filter_map(|object| Some(object.class.as_ref()?.name.clone()));
+        let mut seen: Vec<String> = classes.collect();
+        seen.sort();
+        seen.dedup();
+        for rule in settings.semantics.iter().filter(|rule| !rule.shipped) {
+            for class in unmatched(rule, &seen, &settings.aliases) {
+                let (class, factor) = (class.to_owned(), rule.factor.name().to_owned());
+                self.warnings.push(Warning::ClassWithoutObjects { class, factor, seen: seen.clone() });
+            }
+        }
+        if self.mapped().next().is_none() {
+            self.warnings.push(Warning::NoObjects { detected: self.objects.len() });
+        }
+    }
+}
+
+fn box_entry(view: &View, object: Key, sequence: &Sequence, settings: &Settings) -> FactorEntry {
+    let DetectionSettings { noise, loss, model, .. } = &settings.detections;
+    let factor = BoundingBoxFactor { bounding_box: view.bounding_box, camera: sequence.camera, model: *model };
+    let all = view.observed.iter().all(|observed| *observed);
+    let noise = if all { noise.clone() } else { noise.clone().observing(&view.observed) };
+    FactorEntry { keys: vec![pose_key(view.frame), object], factor: Arc::new(factor), noise, loss: loss.clone() }
+}

@@ -1,0 +1,92 @@
+use manifactor_config::{nearest, quoted_list};
+use serde::{Serialize, Serializer};
+use std::fmt;
+
+/// What a user should know, though nothing failed.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// A class of a semantic rule that no object has.
+    ClassWithoutObjects {
+        /// The class, as the rule has it.
+        class: String,
+        /// The rule's factor.
+        factor: String,
+        /// The classes that objects have.
+        seen: Vec<String>,
+    },
+    /// A map without objects.
+    NoObjects {
+        /// Objects that were detected.
+        detected: usize,
+    },
+    /// Factors that take no part at the end.
+    Inactive {
+        /// How many.
+        inactive: usize,
+        /// Of how many.
+        factors: usize,
+    },
+    /// A solve that ended without a minimum.
+    NotConverged {
+        /// How it ended.
+        termination: String,
+    },
+    /// Directions that nothing but damping holds.
+    Undetermined {
+        /// Which.
+        what: String,
+    },
+    /// An error that grew.
+    WorseThanOdometry {
+        /// The alignment under which it did.
+        alignment: String,
+        /// Of the odometry, in metres.
+        odometry: f64,
+        /// Of the estimate, in metres.
+        estimate: f64,
+    },
+    /// An estimate without the ground truth that it should be compared with.
+    NotEvaluated {
+        /// Why.
+        reason: String,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ClassWithoutObjects { class, factor, seen } => {
+                write!(f, "no object is of class `{class}`, which `{factor}` is configured for")?;
+                match nearest(class, seen.iter().map(String::as_str)) {
+                    Some(near) => write!(f, "; did you mean `{near}`?"),
+                    None if seen.is_empty() => Ok(()),
+                    None => write!(f, "; there are {}", quoted_list(seen)),
+                }
+            }
+            Self::NoObjects { detected: 0 } => f.write_str("no detection is associated with an object"),
+            Self::NoObjects { detected } => {
+                write!(f, "none of {detected} detected objects is mapped; see why in objects.json")
+            }
+            Self::Inactive { inactive, factors } => write!(
+                f,
+                "{inactive} of {factors} factors mean nothing at the estimate and take no part in its cost: \
+                 their objects are not in view"
+            ),
+            Self::NotConverged { termination } => f.write_str(termination),
+            Self::Undetermined { what } => f.write_str(what),
+            Self::WorseThanOdometry { alignment, odometry, estimate } => write!(
+                f,
+                "the trajectory is worse than the odometry that came in: ATE ({alignment}) {odometry:.5} m before, \
+                 {estimate:.5} m after"
+            ),
+            Self::NotEvaluated { reason } => write!(f, "the trajectory is not evaluated: {reason}"),
+        }
+    }
+}
+
+impl Serialize for Warning {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}

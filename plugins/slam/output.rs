@@ -1,0 +1,126 @@
+//! The files that a run leaves.
+//!
+//! `report.json` for the run as a whole, and a folder for each variant with `config.toml` (all settings, ready to be
+//! run again), `trajectory.txt` (TUM's format), `objects.json`, `graph.json` (the literal graph at the estimate),
+//! `iterations.csv` and `metrics.json`. Each file is written whole or not at all.
+use crate::estimate::Estimate;
+use crate::report::{RunReport, VariantReport};
+use crate::run_document::{RunDocument, Variant, slug};
+use manifactor_config::{Format, WriteError, to_json, to_toml, write_graph};
+use manifactor_formats::tum;
+use manifactor_solve::IterationRecord;
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why results could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// A file or folder that cannot be written.
+    #[error("{} cannot be written: {source}", path.display())]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A result that no document can hold.
+    #[error("{}: {source}", path.display())]
+    Document {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: WriteError,
+    },
+}
+
+/// The folder of a variant.
+pub fn variant_folder(output: &Path, variant: &str) -> PathBuf {
+    output.join(slug(variant))
+}
+
+/// Writes a file whole or not at all: under another name first, then renamed.
+///
+/// # Errors
+/// Where the folder or the file cannot be written.
+pub fn write_whole(path: &Path, text: &str) -> Result<(), OutputError> {
+    let fail = |source| OutputError::Io { path: path.to_owned(), source };
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(fail)?;
+    }
+    let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+    let unfinished = path.with_file_name(format!(".{name}.{}", std::process::id()));
+    let written = std::fs::write(&unfinished, text).and_then(|()| std::fs::rename(&unfinished, path));
+    written.map_err(|source| {
+        // nothing better can be done about a leftover than about the failure itself
+        let _ = std::fs::remove_file(&unfinished);
+        fail(source)
+    })
+}
+
+/// Writes the report of a run.
+///
+/// # Errors
+/// Where it cannot be written.
+pub fn write_report(output: &Path, report: &RunReport) -> Result<(), OutputError> {
+    write_document(&output.join("report.json"), to_json(report))
+}
+
+/// Writes all files of a variant into its folder, and returns it.
+///
+/// # Errors
+/// Where one cannot be written; those before it are there.
+pub fn write_variant(
+    run: &RunDocument,
+    variant: &Variant,
+    estimate: &Estimate,
+    report: &VariantReport,
+) -> Result<PathBuf, OutputError> {
+    let folder = variant_folder(&run.output, &variant.name);
+    let file = |name: &str| folder.join(name);
+    write_document(&file("config.toml"), resolved(run, variant))?;
+    write_whole(&file("trajectory.txt"), &tum::format(&estimate.trajectory()))?;
+    write_document(&file("objects.json"), to_json(&report.objects))?;
+    let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);
+    write_document(&file("graph.json"), graph)?;
+    write_whole(&file("iterations.csv"), &iterations(&estimate.solution.outcome.history))?;
+    write_document(&file("metrics.json"), to_json(report))?;
+    Ok(folder)
+}
+
+fn write_document(path: &Path, text: Result<String, WriteError>) -> Result<(), OutputError> {
+    let text = text.map_err(|source| OutputError::Document { path: path.to_owned(), source })?;
+    write_whole(path, &text)
+}
+
+/// The settings of one variant as a document of its own.
+fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> {
+    #[derive(Serialize)]
+    struct Resolved<'a> {
+        title: String,
+        output: &'a Path,
+        #[serde(flatten)]
+        settings: &'a crate::settings::Settings,
+    }
+    let title = format!("{}: {}", run.title, variant.name);
+    let output = variant_folder(&run.output, &variant.name);
+    let text = to_toml(&Resolved { title, output: &output, settings: &variant.settings })?;
+    Ok(format!("# Files are named from {}\n{text}", run.folder.display()))
+}
+
+fn iterations(history: &[IterationRecord]) -> String {
+    let mut text =
+        String::from("iteration,cost,trial_cost,gradient,step,control,accepted,inactive,seconds\n");
+    for r in history {
+        let trial = r.trial_cost.map_or(String::new(), |cost| cost.to_string());
+        // writing to a String does not fail
+        let _ = writeln!(
+            text,
+            "{},{},{trial},{},{},{},{},{},{}",
+            r.iteration, r.cost, r.gradient, r.step, r.control, r.accepted, r.inactive, r.seconds
+        );
+    }
+    text
+}

@@ -1,0 +1,194 @@
+//! What a run has to tell, for scripts and for people.
+use crate::estimate::{Estimate, Landmark};
+use crate::mapping::{MappedObject, Rejection, Warning};
+use crate::settings::Settings;
+use manifactor_graph::Direction;
+use manifactor_quadric::{DualQuadric, LandmarkError};
+use manifactor_solve::{Outcome, Termination, Times};
+use serde::Serialize;
+
+mod landmarks;
+mod table;
+mod trajectory;
+
+pub use landmarks::LandmarkReport;
+pub use table::Row;
+pub use trajectory::TrajectoryReport;
+
+/// A run, variant by variant.
+#[derive(Debug, Clone, Serialize)]
+pub struct RunReport {
+    /// What the run is called.
+    pub title: String,
+    /// In the order of the document.
+    pub variants: Vec<VariantReport>,
+    /// All of it, from reading to the last metric.
+    pub seconds: f64,
+}
+
+/// One variant.
+#[derive(Debug, Clone, Serialize)]
+pub struct VariantReport {
+    /// Its name.
+    pub name: String,
+    /// How much there is of what.
+    pub counts: Counts,
+    /// Up in the map's frame, where it is known.
+    pub up: Option<Direction>,
+    /// How the solve went.
+    pub solve: SolveReport,
+    /// The trajectory against the truth, where there is one: once for each alignment.
+    pub trajectory: Vec<TrajectoryReport>,
+    /// The objects against the truth, where there is one.
+    pub landmarks: Option<LandmarkReport>,
+    /// Each object that was detected, by number.
+    pub objects: Vec<ObjectReport>,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+    /// Reading, mapping, solving and evaluating.
+    pub seconds: f64,
+}
+
+/// How much there is of what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Poses.
+    pub frames: usize,
+    /// Detections in them.
+    pub detections: usize,
+    /// Detections of no object.
+    pub unassociated: usize,
+    /// Detections that score too low.
+    pub low_score: usize,
+    /// Boxes dropped because the border cuts them.
+    pub cut: usize,
+    /// Boxes replaced by a later one of the same object in the same frame.
+    pub duplicates: usize,
+    /// Objects that were detected.
+    pub objects_detected: usize,
+    /// Objects in the map.
+    pub objects: usize,
+    /// Boxes of these objects: factors.
+    pub boxes: usize,
+    /// Semantic factors.
+    pub semantic_factors: usize,
+}
+
+/// How a solve went.
+#[derive(Debug, Clone, Serialize)]
+pub struct SolveReport {
+    /// ½ Σ ρ where it began.
+    pub initial_cost: f64,
+    /// ½ Σ ρ where it ended.
+    pub final_cost: f64,
+    /// Linearizations followed by a step.
+    pub iterations: usize,
+    /// How it ended.
+    pub termination: Termination,
+    /// Factors.
+    pub factors: usize,
+    /// Factors that take no part at the end.
+    pub inactive: usize,
+    /// Their share of all, from 0 to 1.
+    pub inactive_share: f64,
+    /// Where the time went.
+    pub times: Times,
+}
+
+/// One object.
+#[derive(Debug, Clone, Serialize)]
+pub struct ObjectReport {
+    /// What was detected of it, and what was done with it.
+    #[serde(flatten)]
+    pub object: MappedObject,
+    /// The same in words: why it is not mapped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rejected_because: Option<String>,
+    /// What it is estimated to be, in the map's frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimate: Option<DualQuadric>,
+    /// How far that is from the truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<LandmarkError>,
+}
+
+impl VariantReport {
+    /// Compares an estimate with the truth.
+    pub fn new(name: &str, estimate: &Estimate, settings: &Settings, seconds: f64) -> Self {
+        let mapping = &estimate.mapping;
+        let mut warnings = mapping.warnings.clone();
+        let solve = SolveReport::new(&estimate.solution.outcome, &mut warnings);
+        let trajectory = trajectory::compare(estimate, &settings.evaluation, &mut warnings);
+        let after = landmarks::in_truth_frame(estimate, estimate.landmarks());
+        let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
+        let objects = objects(estimate, &after);
+        let landmarks = LandmarkReport::new(&before, &after);
+        let (counts, up) = (Counts::of(estimate), mapping.frame.up);
+        Self {
+            name: name.to_owned(),
+            counts,
+            up,
+            solve,
+            trajectory,
+            landmarks,
+            objects,
+            warnings,
+            seconds,
+        }
+    }
+}
+
+impl Counts {
+    fn of(estimate: &Estimate) -> Self {
+        let Estimate { sequence, mapping, .. } = estimate;
+        let m = &mapping.measurements;
+        Self {
+            frames: sequence.frames.len(),
+            detections: sequence.detections.len(),
+            unassociated: m.unassociated,
+            low_score: m.low_score,
+            cut: m.cut,
+            duplicates: m.duplicates,
+            objects_detected: mapping.objects.len(),
+            objects: mapping.mapped().count(),
+            boxes: mapping.mapped().map(|object| object.boxes).sum(),
+            semantic_factors: mapping.mapped().map(|object| object.semantic_factors.len()).sum(),
+        }
+    }
+}
+
+impl SolveReport {
+    fn new(outcome: &Outcome, warnings: &mut Vec<Warning>) -> Self {
+        let Outcome { inactive, factors, .. } = *outcome;
+        if !outcome.termination.is_converged() {
+            warnings.push(Warning::NotConverged { termination: outcome.termination.to_string() });
+        }
+        if inactive > 0 {
+            warnings.push(Warning::Inactive { inactive, factors });
+        }
+        if let Some(undetermined) = &outcome.undetermined {
+            warnings.push(Warning::Undetermined { what: undetermined.to_string() });
+        }
+        Self {
+            initial_cost: outcome.initial_cost,
+            final_cost: outcome.final_cost,
+            iterations: outcome.iterations,
+            termination: outcome.termination.clone(),
+            factors,
+            inactive,
+            inactive_share: inactive as f64 / factors.max(1) as f64,
+            times: outcome.times,
+        }
+    }
+}
+
+fn objects(estimate: &Estimate, errors: &[(Landmark<'_>, LandmarkError)]) -> Vec<ObjectReport> {
+    let values = &estimate.solution.values;
+    let report = |object: &MappedObject| ObjectReport {
+        object: object.clone(),
+        rejected_because: object.rejected.as_ref().map(Rejection::to_string),
+        estimate: values.get::<DualQuadric>(&object.key).ok().copied(),
+        error: errors.iter().find(|(landmark, _)| landmark.object.id == object.id).map(|(_, e)| *e),
+    };
+    estimate.mapping.objects.iter().map(report).collect()
+}

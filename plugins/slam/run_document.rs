@@ -1,0 +1,150 @@
+//! The document that describes a run.
+//!
+//! ```toml
+//! title = "fr1/desk"
+//! semantics = "table_one"
+//!
+//! [source]
+//! type = "tum"
+//! sequence = "rgbd_dataset_freiburg1_desk"
+//! odometry = "trajectories/dvo_vo.txt"
+//!
+//! [gravity]
+//! type = "ground_truth"
+//!
+//! [[variants]]
+//! name = "without orientation"
+//! set = { semantics = [] }
+//!
+//! [[variants]]
+//! name = "with orientation"
+//! ```
+use crate::settings::Settings;
+use manifactor_config::{
+    Diagnostic, Diagnostics, Document, Errors, Node, Place, Section, Value, merge,
+};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// A run: one set of settings, or several to compare.
+#[derive(Debug, Clone, Serialize)]
+pub struct RunDocument {
+    /// What it is called in reports.
+    pub title: String,
+    /// Where its results go; `out/` and the document's name, where nothing is said.
+    pub output: PathBuf,
+    /// At least one; with the settings that they have in common.
+    pub variants: Vec<Variant>,
+    /// The folder from which its files are named.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+/// One way to do a run.
+#[derive(Debug, Clone, Serialize)]
+pub struct Variant {
+    /// Its name, one of its own.
+    pub name: String,
+    /// Its settings, complete.
+    pub settings: Settings,
+}
+
+/// What a run without variants is called.
+const ONLY: &str = "estimate";
+
+impl RunDocument {
+    /// Reads a run. Files are found from the folder of the document.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it, in all variants, each at its place.
+    pub fn read(document: &Document) -> Result<Self, Diagnostics> {
+        let name = Path::new(document.source().name());
+        let folder = name.parent().unwrap_or(Path::new("")).to_owned();
+        let stem = name.file_stem().map_or_else(|| "run".into(), |s| s.to_string_lossy().into_owned());
+        let errors = Errors::new();
+        let run = document.section(&errors).and_then(|mut section| {
+            let title = section.or_default::<Option<String>>("title").unwrap_or_else(|| stem.clone());
+            let output = section.optional("output").unwrap_or_else(|| Path::new("out").join(&stem));
+            let declared: Vec<_> = section.items("variants").into_iter().filter_map(declared).collect();
+            twice(&declared, &errors);
+            let base = common(document.root());
+            let variants = read_variants(declared, &base, &folder, &errors);
+            // what the settings have read, in each variant, is not unknown here
+            section.ignore_rest();
+            Some(Self { title, output, variants: variants?, folder: folder.clone() })
+        });
+        errors.finish(run)
+    }
+}
+
+/// A variant, as it is written.
+struct Declared {
+    name: String,
+    place: Place,
+    set: Option<Node>,
+}
+
+fn declared(mut section: Section<'_>) -> Option<Declared> {
+    let name = section.required::<String>("name");
+    let place = section.place_of("name");
+    let set = section.take("set");
+    section.finish();
+    Some(Declared { name: name?, place, set })
+}
+
+fn twice(declared: &[Declared], errors: &Errors) {
+    for (i, second) in declared.iter().enumerate() {
+        let earlier = declared.get(..i).unwrap_or_default();
+        // their folders would be one
+        if let Some(first) = earlier.iter().find(|first| slug(&first.name) == slug(&second.name)) {
+            let place = first.place.clone();
+            errors.push(Diagnostic::duplicate("variant", &second.name, second.place.clone(), place));
+        }
+    }
+}
+
+/// The document without what is no setting.
+fn common(root: &Node) -> Node {
+    let mut base = root.clone();
+    if let Value::Table(table) = &mut base.value {
+        for field in ["title", "output", "variants"] {
+            table.shift_remove(field);
+        }
+    }
+    base
+}
+
+fn read_variants(
+    declared: Vec<Declared>,
+    base: &Node,
+    folder: &Path,
+    errors: &Errors,
+) -> Option<Vec<Variant>> {
+    let read = |name: String, node: Node| match Settings::read(node, folder) {
+        Ok(settings) => Some(Variant { name, settings }),
+        Err(diagnostics) => {
+            errors.extend(diagnostics);
+            None
+        }
+    };
+    if declared.is_empty() {
+        return Some(vec![read(ONLY.to_owned(), base.clone())?]);
+    }
+    // all of them are read, so that all errors are told at once
+    let variants = declared.into_iter().map(|variant| {
+        let mut node = base.clone();
+        if let Some(set) = variant.set {
+            merge(&mut node, set);
+        }
+        read(variant.name, node)
+    });
+    let variants: Vec<Option<Variant>> = variants.collect();
+    variants.into_iter().collect()
+}
+
+/// A name as part of a path: letters, digits and hyphens.
+pub fn slug(name: &str) -> String {
+    let plain: String = name.chars().map(|c| if c.is_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
+    let parts: Vec<&str> = plain.split('-').filter(|part| !part.is_empty()).collect();
+    if parts.is_empty() { ONLY.to_owned() } else { parts.join("-") }
+}

@@ -1,0 +1,137 @@
+//! The settings of a run: how a sequence becomes a graph, and how the graph is solved.
+use crate::class::Aliases;
+use crate::gravity::{FromSource, Gravity};
+use crate::semantics::{Rule, read_semantics};
+use crate::source::Source;
+use manifactor_config::{Diagnostics, Errors, Node, Section};
+use manifactor_graph::Noise;
+use manifactor_graph::loss::Loss;
+use manifactor_solve::{LevenbergMarquardt, Optimizer};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+mod detections;
+mod evaluation;
+mod number;
+mod objects;
+
+pub use detections::{CutSides, DetectionSettings};
+pub use evaluation::EvaluationSettings;
+pub use objects::ObjectSettings;
+
+/// Everything that is to be known to make an estimate.
+#[derive(Debug, Clone, Serialize)]
+pub struct Settings {
+    /// Where the sequence comes from.
+    pub source: Arc<dyn Source>,
+    /// Factors between consecutive poses.
+    pub odometry: OdometrySettings,
+    /// The factor that holds the first pose.
+    pub prior: PriorSettings,
+    /// Which boxes are used, and how.
+    pub detections: DetectionSettings,
+    /// Which objects are mapped, and where they begin.
+    pub objects: ObjectSettings,
+    /// Which way is up.
+    pub gravity: Arc<dyn Gravity>,
+    /// Which classes get which factors.
+    pub semantics: Vec<Rule>,
+    /// Names of classes that mean the same, besides the usual ones.
+    #[serde(skip_serializing_if = "no_aliases")]
+    pub aliases: Aliases,
+    /// How the graph is solved.
+    pub solver: Arc<dyn Optimizer>,
+    /// What the estimate is compared with, and how.
+    pub evaluation: EvaluationSettings,
+}
+
+fn no_aliases(aliases: &Aliases) -> bool {
+    aliases.0.is_empty()
+}
+
+/// `[odometry]`: r = Log(Z⁻¹ Xᵢ⁻¹ Xᵢ₊₁), rotation before translation.
+#[derive(Debug, Clone, Serialize)]
+pub struct OdometrySettings {
+    /// Of a relative pose: rad, then m. σ = 0.01, where nothing is said.
+    pub noise: Noise,
+    /// How much of a large error counts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss: Option<Arc<dyn Loss>>,
+}
+
+/// `[prior]`: r = Log(Z⁻¹ X₀).
+#[derive(Debug, Clone, Serialize)]
+pub struct PriorSettings {
+    /// Of the first pose: rad, then m. σ = 0.001, where nothing is said.
+    pub noise: Noise,
+}
+
+impl Settings {
+    /// Reads settings; files are found from `folder`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with them, at its place.
+    pub fn read(node: Node, folder: &Path) -> Result<Self, Diagnostics> {
+        let errors = Errors::new();
+        let settings = Section::new(node, &errors).and_then(|mut section| {
+            let settings = Self::take(&mut section, folder);
+            section.finish();
+            settings
+        });
+        errors.finish(settings)
+    }
+
+    /// Takes all settings out of a document.
+    pub(crate) fn take(section: &mut Section<'_>, folder: &Path) -> Option<Self> {
+        let source = section.registered::<dyn Source>("source");
+        let odometry = OdometrySettings::take(section);
+        let prior = PriorSettings::take(section);
+        let detections = DetectionSettings::take(section);
+        let objects = ObjectSettings::take(section);
+        let gravity = section.optional_registered::<dyn Gravity>("gravity");
+        let semantics = read_semantics(section, folder);
+        let aliases = section.or_default("aliases");
+        let solver = section.optional_registered::<dyn Optimizer>("solver");
+        let evaluation = section.or_default("evaluation");
+        Some(Self {
+            source: Arc::from(source?),
+            odometry: odometry?,
+            prior: prior?,
+            detections: detections?,
+            objects: objects?,
+            gravity: gravity.map_or_else(|| Arc::new(FromSource {}) as Arc<dyn Gravity>, Arc::from),
+            semantics,
+            aliases,
+            solver: solver.map_or_else(default_solver, Arc::from),
+            evaluation,
+        })
+    }
+}
+
+fn default_solver() -> Arc<dyn Optimizer> {
+    Arc::new(LevenbergMarquardt::default())
+}
+
+/// The noise of a section, or one of σ in every row.
+fn noise(section: &mut Section<'_>, sigma: f64) -> Noise {
+    let given = section.optional::<Noise>("noise");
+    // a literal that is positive
+    given.unwrap_or_else(|| Noise::sigma(sigma).unwrap_or_default())
+}
+
+fn loss(section: &mut Section<'_>) -> Option<Arc<dyn Loss>> {
+    section.optional_registered::<dyn Loss>("loss").map(Arc::from)
+}
+
+impl OdometrySettings {
+    fn take(parent: &mut Section<'_>) -> Option<Self> {
+        number::table(parent, "odometry", |section| Self { noise: noise(section, 0.01), loss: loss(section) })
+    }
+}
+
+impl PriorSettings {
+    fn take(parent: &mut Section<'_>) -> Option<Self> {
+        number::table(parent, "prior", |section| Self { noise: noise(section, 0.001) })
+    }
+}

@@ -1,0 +1,66 @@
+use super::number::{table, within};
+use super::{loss, noise};
+use manifactor_config::Section;
+use manifactor_graph::Noise;
+use manifactor_graph::loss::Loss;
+use manifactor_quadric::BoxModel;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// `[detections]`: which boxes are used, and how.
+#[derive(Debug, Clone, Serialize)]
+pub struct DetectionSettings {
+    /// Of a box: xmin, ymin, xmax, ymax, in pixels. σ = 20, where nothing is said.
+    pub noise: Noise,
+    /// How much of a large error counts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub loss: Option<Arc<dyn Loss>>,
+    /// What of an object a box goes around.
+    pub model: BoxModel,
+    /// What becomes of a box with sides at the border.
+    pub cut_sides: CutSides,
+    /// Sides this near to the border count as cut, in pixels.
+    pub border_px: f64,
+    /// Detections whose best class scores less are left out.
+    pub min_score: f64,
+}
+
+/// What becomes of a box that the border of the image cuts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CutSides {
+    /// It is dropped.
+    #[default]
+    Drop,
+    /// It keeps the sides that are not cut.
+    Mask,
+    /// It stays as it is: right with the truncated model.
+    Keep,
+}
+
+impl DetectionSettings {
+    pub(super) fn take(parent: &mut Section<'_>) -> Option<Self> {
+        table(parent, "detections", |section| Self {
+            noise: noise(section, 20.0),
+            loss: loss(section),
+            model: section.or_default("model"),
+            cut_sides: section.or_default("cut_sides"),
+            border_px: within(section, "border_px", 20.0, 0.0..=f64::INFINITY),
+            min_score: within(section, "min_score", 0.0, 0.0..=1.0),
+        })
+    }
+}
+
+impl Default for DetectionSettings {
+    fn default() -> Self {
+        Self {
+            noise: Noise::sigma(20.0).unwrap_or_default(),
+            loss: None,
+            model: BoxModel::Standard,
+            cut_sides: CutSides::Drop,
+            border_px: 20.0,
+            min_score: 0.0,
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Cameras by name.
+use super::SourceError;
+use manifactor_quadric::Camera;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// The cameras of TUM RGB-D, 640 × 480; distortion is ignored, as in the paper.
+const PRESETS: [(&str, [f64; 4]); 3] = [
+    ("freiburg1", [517.3, 516.5, 318.6, 255.3]),
+    ("freiburg2", [520.9, 521.0, 325.1, 249.7]),
+    ("freiburg3", [535.4, 539.2, 320.1, 247.6]),
+];
+
+/// A camera by its numbers or by its name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum CameraChoice {
+    /// `freiburg1`, `freiburg2` or `freiburg3`: those of TUM RGB-D.
+    Named(CameraName),
+    /// Its parameters, in pixels.
+    Camera(Camera),
+}
+
+/// The cameras of TUM RGB-D.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum CameraName {
+    /// fx 517.3, fy 516.5, cx 318.6, cy 255.3
+    Freiburg1,
+    /// fx 520.9, fy 521.0, cx 325.1, cy 249.7
+    Freiburg2,
+    /// fx 535.4, fy 539.2, cx 320.1, cy 247.6
+    Freiburg3,
+}
+
+impl CameraChoice {
+    /// The camera.
+    pub fn camera(&self) -> Camera {
+        match self {
+            Self::Camera(camera) => *camera,
+            Self::Named(name) => preset(PRESETS[*name as usize].1),
+        }
+    }
+}
+
+fn preset([fx, fy, cx, cy]: [f64; 4]) -> Camera {
+    Camera { fx, fy, cx, cy, skew: 0.0, width: 640, height: 480 }
+}
+
+/// The camera that a folder's name tells.
+pub(super) fn by_folder(folder: &Path) -> Result<Camera, SourceError> {
+    let name = folder.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let known = PRESETS.iter().find(|(camera, _)| name.contains(camera));
+    known.map(|(_, numbers)| preset(*numbers)).ok_or_else(|| SourceError::UnknownCamera {
+        folder: folder.to_owned(),
+        known: PRESETS.iter().map(|(camera, _)| *camera).collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_folders_tell_the_same_camera() {
+        let named = CameraChoice::Named(CameraName::Freiburg2).camera();
+        assert_eq!(named.fx, 520.9);
+        assert_eq!(by_folder(Path::new("x/rgbd_dataset_freiburg2_desk")).unwrap(), named);
+        assert!(by_folder(Path::new("x/desk")).unwrap_err().to_string().contains("freiburg1, freiburg2"));
+    }
+}
