@@ -1,1 +1,16 @@
 //! File formats: g2o, TORO, TUM trajectories, detections.
+//!
+//! All readers keep one bargain: nothing in a file is passed over in silence. A malformed line is an
+//! error with file and line; all of a file's errors come at once; what is left out on purpose is
+//! counted in a report. Blank lines, `#` comments, repeated spaces and CRLF are fine everywhere.
+pub mod accelerometer;
+pub mod detections;
+mod error;
+pub mod g2o;
+mod lines;
+pub mod pose_graph;
+pub mod timestamps;
+mod toro;
+pub mod tum;
+
+pub use error::{FormatError, Malformed, Mistake, Problem};

@@ -1,0 +1,217 @@
+//! Boxes that a detector drew in images: CSV with a header, one box a row.
+//!
+//! Columns `timestamp` (s), `class_name`, `score` (0 to 1), `xmin`, `ymin`, `xmax`, `ymax` (px), in any
+//! order; and, where they are known, `frame_idx`, `frame_idx_as_published`, `object_key` (0 where the
+//! box is associated with no object), `class_id`, and `scores`, all classes with a score as
+//! `cup:0.7;bowl:0.2`.
+use crate::error::{FormatError, Mistake, Problems, io_error, read_text};
+use csv::{ReaderBuilder, StringRecord, Trim, Writer};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A row: one box in one image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Detection {
+    /// Number of the image, from 0.
+    #[serde(default)]
+    pub frame_idx: Option<u64>,
+    /// When the image was taken, in seconds.
+    pub timestamp: f64,
+    /// The image's number where the detections were published.
+    #[serde(default)]
+    pub frame_idx_as_published: Option<u64>,
+    /// The object that it shows; 0 for none.
+    #[serde(default)]
+    pub object_key: Option<u32>,
+    /// Number of the class in the detector's list.
+    #[serde(default)]
+    pub class_id: Option<u32>,
+    /// The class with the highest score.
+    pub class_name: String,
+    /// Its score, from 0 to 1.
+    pub score: f64,
+    /// Left side, in pixels.
+    pub xmin: f64,
+    /// Upper side.
+    pub ymin: f64,
+    /// Right side.
+    pub xmax: f64,
+    /// Lower side.
+    pub ymax: f64,
+    /// Scores by class, where more than the best are known: `cup:0.7;bowl:0.2`.
+    #[serde(default)]
+    pub scores: Option<String>,
+}
+
+const REQUIRED: [&str; 7] = ["timestamp", "class_name", "score", "xmin", "ymin", "xmax", "ymax"];
+
+impl Detection {
+    /// The classes and their scores: those of `scores`, or the best alone.
+    ///
+    /// # Errors
+    /// Where `scores` is not written as it should be.
+    pub fn class_scores(&self) -> Result<Vec<(String, f64)>, Mistake> {
+        let Some(scores) = self.scores.as_deref().filter(|s| !s.is_empty()) else {
+            return Ok(vec![(self.class_name.clone(), self.score)]);
+        };
+        let one = |text: &str| {
+            let (class, score) = text.rsplit_once(':')?;
+            let score: f64 = score.parse().ok()?;
+            (0.0..=1.0).contains(&score).then(|| (class.to_owned(), score))
+        };
+        let wrong = |text: &str| Mistake::Field {
+            expected: "`class:score` with a score from 0 to 1, between semicolons",
+            found: text.to_owned(),
+        };
+        scores.split(';').map(|text| one(text).ok_or_else(|| wrong(text))).collect()
+    }
+
+    fn check(self) -> Result<Self, Mistake> {
+        let row = |text: String| Err(Mistake::Row(text));
+        if !self.timestamp.is_finite() {
+            return row(format!("expected a finite time stamp, got {}", self.timestamp));
+        }
+        if !(0.0..=1.0).contains(&self.score) {
+            return row(format!("expected a score from 0 to 1, got {}", self.score));
+        }
+        let sides = [self.xmin, self.ymin, self.xmax, self.ymax];
+        let ordered = self.xmin < self.xmax && self.ymin < self.ymax;
+        if !(ordered && sides.iter().all(|s| s.is_finite())) {
+            return row(format!("expected a box with xmin < xmax and ymin < ymax, got {sides:?}"));
+        }
+        self.class_scores().map(|_| self)
+    }
+}
+
+/// Reads a file of detections, in its order.
+///
+/// # Errors
+/// All malformed rows; a column that is missing.
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<Detection>, FormatError> {
+    let path = path.as_ref();
+    parse(&read_text(path)?, path)
+}
+
+/// As [`read`], of a text; `path` is what errors name.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Detection>, FormatError> {
+    let mut problems = Problems::of(path.as_ref());
+    let mut reader = ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let header = reader.headers().cloned().unwrap_or_default();
+    let missing: Vec<_> = REQUIRED.into_iter().filter(|name| header.iter().all(|h| h != *name)).collect();
+    if !missing.is_empty() {
+        let line = header.position().map_or(1, |p| p.line() as usize);
+        problems.push(line, Mistake::Row(format!("the header has no column {}", missing.join(", "))));
+        return problems.finish().map(|()| vec![]);
+    }
+    let mut rows = vec![];
+    for record in reader.records() {
+        match record {
+            Ok(record) => {
+                let line = record.position().map_or(0, |p| line(text, p));
+                rows.extend(problems.ok(line, row(&record, &header)));
+            }
+            Err(e) => {
+                let line = e.position().map_or(0, |p| line(text, p));
+                problems.push(line, Mistake::Row(reason(&e)));
+            }
+        }
+    }
+    problems.finish().map(|()| rows)
+}
+
+fn row(record: &StringRecord, header: &StringRecord) -> Result<Detection, Mistake> {
+    record.deserialize::<Detection>(Some(header)).map_err(|e| Mistake::Row(reason(&e)))?.check()
+}
+
+/// The line of a record: csv counts the blank lines and comments before it as its own.
+fn line(text: &str, position: &csv::Position) -> usize {
+    let rest = text.get(position.byte() as usize..).unwrap_or_default();
+    let skipped = rest.lines().take_while(|line| line.is_empty() || line.starts_with('#'));
+    position.line() as usize + skipped.count()
+}
+
+/// What is wrong, without csv's own way to say where.
+fn reason(e: &csv::Error) -> String {
+    match e.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("expected {expected_len} fields as in the header, got {len}")
+        }
+        csv::ErrorKind::Deserialize { err, .. } => match err.field() {
+            Some(field) => format!("field {}: {}", field + 1, err.kind()),
+            None => err.kind().to_string(),
+        },
+        _ => e.to_string(),
+    }
+}
+
+/// Writes detections with all columns.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write(path: impl AsRef<Path>, detections: &[Detection]) -> Result<(), FormatError> {
+    let path = path.as_ref();
+    let other = |e: csv::Error| FormatError::Io { path: path.to_owned(), source: e.into() };
+    let mut writer = Writer::from_path(path).map_err(other)?;
+    for detection in detections {
+        writer.serialize(detection).map_err(other)?;
+    }
+    writer.flush().map_err(io_error(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "timestamp,class_name,score,xmin,ymin,xmax,ymax,object_key\n";
+
+    fn errors(rows: &str) -> String {
+        parse(&format!("{HEADER}{rows}"), "d.csv").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn columns_are_found_by_name() {
+        let text = format!("{HEADER}1.5, cell phone ,0.5,1,2,3,4,7\r\n2,cup,1,0,0,1,1,\n");
+        let rows = parse(&text, "d.csv").unwrap();
+        assert_eq!((rows[0].class_name.as_str(), rows[0].object_key), ("cell phone", Some(7)));
+        assert_eq!((rows[1].timestamp, rows[1].object_key, rows[1].class_id), (2.0, None, None));
+    }
+
+    #[test]
+    fn every_malformed_row_is_told_with_its_place() {
+        let text = errors("1,cup,0.5,1,2\n1,cup,x,1,2,3,4,1\n\n1,cup,1.5,1,2,3,4,1\n1,cup,1,3,2,3,4,1\n");
+        assert_eq!(
+            text,
+            "d.csv:2: expected 8 fields as in the header, got 5\n\
+             d.csv:3: field 3: invalid float literal\n\
+             d.csv:5: expected a score from 0 to 1, got 1.5\n\
+             d.csv:6: expected a box with xmin < xmax and ymin < ymax, got [3.0, 2.0, 3.0, 4.0]"
+        );
+    }
+
+    #[test]
+    fn a_missing_column_is_named() {
+        let text = parse("timestamp,score,xmin,ymin,xmax,ymax\n", "d.csv").unwrap_err().to_string();
+        assert_eq!(text, "d.csv:1: the header has no column class_name");
+        assert!(parse("", "d.csv").is_err());
+    }
+
+    #[test]
+    fn an_unknown_column_is_an_error() {
+        let text = format!("colour,{HEADER}red,1,cup,1,0,0,1,1,1");
+        assert!(parse(&text, "d.csv").unwrap_err().to_string().contains("unknown field `colour`"));
+    }
+
+    #[test]
+    fn scores_of_several_classes_are_read() {
+        let header = HEADER.replace("object_key", "scores");
+        let read = |scores| parse(&format!("{header}1,cup,0.7,0,0,1,1,{scores}"), "d.csv");
+        let rows = read("cup:0.7;cell phone:0.25").unwrap();
+        let expected = vec![("cup".to_owned(), 0.7), ("cell phone".to_owned(), 0.25)];
+        assert_eq!(rows[0].class_scores().unwrap(), expected);
+        assert!(read("cup=0.7").unwrap_err().to_string().starts_with("d.csv:2: expected `class:score`"));
+    }
+}

@@ -1,0 +1,131 @@
+//! Pose graphs from g2o and TORO files.
+//!
+//! Poses get the keys `x<id>`, landmarks `l<id>`. Edges become `between_se2`, `between_se3` and landmark
+//! factors with the file's information as noise. What a file leaves open is filled in, and reported:
+//! - vertices without a line get their values along a spanning tree of the edges;
+//! - an `EQUIV a b` line says that two poses are the same place as far as the edge between them says so
+//!   (TORO merges the two by that edge). That edge is there already, so nothing is added; where there is
+//!   none, the two are tied by a relative pose of zero with [`Options::equivalence_sigma`];
+//! - in each connected part of the graph that no `FIX` line holds, the first pose is held, unless
+//!   [`Options::anchor`] says not to.
+use crate::error::{FormatError, Mistake, Problems, read_text};
+use crate::lines::lines;
+use crate::{g2o, toro};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::{Graph, Key, Values};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+mod anchor;
+mod build;
+mod fill;
+mod information;
+pub(crate) mod record;
+
+use record::Record;
+
+/// A graph from a file, with initial values for all of its variables.
+#[derive(Debug, Clone)]
+pub struct PoseGraph {
+    /// The edges; held variables.
+    pub graph: Graph,
+    /// The vertices, in the file's order; then those that only edges name, by number.
+    pub values: Values,
+    /// What the file did not say.
+    pub report: Report,
+}
+
+/// What to do where a file leaves a choice.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// For information matrices that are not positive definite.
+    pub repair: Repair,
+    /// Hold the first pose of each connected part that nothing else holds.
+    pub anchor: bool,
+    /// Standard deviation of an `EQUIV` without an edge, in metres and radians.
+    pub equivalence_sigma: Positive,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { repair: Repair::Error, anchor: true, equivalence_sigma: Positive::literal(1e-3) }
+    }
+}
+
+/// What to do with an information matrix that is not positive definite.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Repair {
+    /// Say so, with its line.
+    #[default]
+    Error,
+    /// Leave its edge out.
+    Reject,
+    /// Raise its eigenvalues to 1e-9 of the largest; leave the edge out where none is above zero.
+    Clamp,
+}
+
+/// What a file did not say, or what had to be done to it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Vertices with a line of their own.
+    pub vertices: usize,
+    /// Edges with a line of their own, those left out among them.
+    pub edges: usize,
+    /// Variables that only edges name; their values come from a spanning tree.
+    pub filled: Vec<Key>,
+    /// Variables that this reader holds, as nothing in the file fixes the gauge.
+    pub anchored: Vec<Key>,
+    /// Tags that are not known, and how many lines have each. Those lines are left out.
+    pub unknown: BTreeMap<String, usize>,
+    /// Lines of edges that were left out, by [`Repair`].
+    pub rejected: Vec<usize>,
+    /// Lines of edges whose information was changed, by [`Repair::Clamp`].
+    pub clamped: Vec<usize>,
+    /// `EQUIV` lines whose two poses have an edge between them.
+    pub equivalences_by_edge: usize,
+    /// `EQUIV` lines for which a factor was added.
+    pub equivalences_added: usize,
+}
+
+/// Reads a g2o or TORO file.
+///
+/// # Errors
+/// All malformed lines; vertices defined twice, used as another type or fixed without being there;
+/// edges of a vertex with itself; information that is not positive definite, unless it is repaired; a
+/// file without any vertex or edge. Unknown tags are no error, but in the report.
+pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, FormatError> {
+    let path = path.as_ref();
+    parse(&read_text(path)?, path, options)
+}
+
+/// As [`read`], of a text; `path` is what errors name.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, FormatError> {
+    let mut problems = Problems::of(path.as_ref());
+    let mut unknown = BTreeMap::<String, usize>::new();
+    let mut records: Vec<(usize, Record)> = vec![];
+    for (line, text) in lines(text) {
+        let (tag, fields) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+        match g2o::parser(tag).or_else(|| toro::parser(tag)) {
+            Some(parse) => {
+                let record = problems.ok(line, parse(fields.trim_start()));
+                records.extend(record.map(|record| (line, record)));
+            }
+            None => *unknown.entry(tag.to_owned()).or_default() += 1,
+        }
+    }
+    let mut built = build::build(&records, options, &mut problems);
+    if records.is_empty() && problems.is_empty() {
+        let unknown = unknown.keys().take(10).cloned().collect();
+        problems.push(0, Mistake::Empty { expected: "vertices or edges of a g2o or TORO file", unknown });
+    }
+    problems.finish()?;
+    built.report.unknown = unknown;
+    Ok(built)
+}

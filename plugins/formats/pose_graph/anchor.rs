@@ -1,0 +1,47 @@
+//! Which variables have to be held so that every connected part of a graph stays where it is.
+use manifactor_graph::{Fixed, Graph, Key, Values};
+
+/// The first pose of each connected part in which nothing is held; of a part without a pose, its first
+/// variable.
+pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> bool) -> Vec<Key> {
+    let mut parts = Parts((0..values.len()).collect());
+    let place = |key: &Key| values.position(key.as_str());
+    let mut held = vec![false; values.len()];
+    for factor in graph.factors() {
+        let places: Vec<usize> = factor.keys.iter().filter_map(place).collect();
+        places.windows(2).for_each(|pair| parts.join(pair[0], pair[1]));
+    }
+    let whole = graph.fixed().iter().filter(|(_, fixed)| **fixed == Fixed::Whole(true));
+    whole.filter_map(|(key, _)| place(key)).for_each(|i| held[i] = true);
+    let mut part_is_held = vec![false; values.len()];
+    for (i, held) in held.into_iter().enumerate() {
+        part_is_held[parts.root(i)] |= held;
+    }
+    let keys: Vec<&Key> = values.iter().map(|(key, _)| key).collect();
+    let (poses, others): (Vec<usize>, Vec<usize>) = (0..keys.len()).partition(|i| is_pose(keys[*i]));
+    let mut anchors = vec![];
+    for i in poses.into_iter().chain(others) {
+        if !std::mem::replace(&mut part_is_held[parts.root(i)], true) {
+            anchors.push(keys[i].clone());
+        }
+    }
+    anchors
+}
+
+/// Disjoint sets, by the parent of each member.
+struct Parts(Vec<usize>);
+
+impl Parts {
+    fn root(&mut self, mut i: usize) -> usize {
+        while self.0[i] != i {
+            // halve the path on the way
+            self.0[i] = self.0[self.0[i]];
+            i = self.0[i];
+        }
+        i
+    }
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+}

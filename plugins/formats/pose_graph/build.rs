@@ -1,0 +1,217 @@
+//! From the lines of a file to a graph and its values.
+use super::anchor::anchors;
+use super::fill::{Link, fill};
+use super::information::{Outcome, noise};
+use super::record::{Edge, Measurement, Record, Vertex, VertexType};
+use super::{Options, PoseGraph, Report};
+use crate::error::{Mistake, Problems};
+use manifactor_geometry::{Between, Coordinates, Landmark, Point3, Se2, Se3};
+use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values};
+use nalgebra::DMatrix;
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+pub(crate) fn build(records: &[(usize, Record)], options: &Options, problems: &mut Problems) -> PoseGraph {
+    let mut builder = Builder::new(options);
+    // vertices first: a file may use them before it defines them
+    for (line, record) in records {
+        let defined = match record {
+            Record::Vertex { id, value } => builder.define(*line, *id, value),
+            Record::Sensor { id, pose } => {
+                builder.sensors.insert(*id, *pose);
+                Ok(())
+            }
+            _ => Ok(()),
+        };
+        problems.ok(*line, defined);
+    }
+    for (line, record) in records {
+        if let Record::Edge(edge) = record {
+            let added = builder.edge(*line, edge);
+            problems.ok(*line, added);
+        }
+    }
+    for (line, record) in records {
+        let added = match record {
+            Record::Fix(ids) => ids.iter().try_for_each(|id| builder.fix(*id)),
+            Record::Equivalent(a, b) => builder.equivalent(*a, *b),
+            _ => Ok(()),
+        };
+        problems.ok(*line, added);
+    }
+    builder.finish()
+}
+
+struct Builder<'a> {
+    options: &'a Options,
+    graph: Graph,
+    report: Report,
+    /// In the file's order.
+    vertices: Vec<(u64, Vertex)>,
+    /// Type of each vertex, and the line that says so.
+    types: HashMap<u64, (usize, VertexType)>,
+    /// Vertices without a line of their own.
+    missing: BTreeMap<u64, VertexType>,
+    sensors: HashMap<u64, Se3>,
+    links: Vec<Link>,
+    /// Pairs with a link between them, the smaller number first.
+    linked: HashSet<(u64, u64)>,
+}
+
+fn key(id: u64, vertex_type: VertexType) -> Key {
+    Key::indexed(if vertex_type.is_pose() { "x" } else { "l" }, id)
+}
+
+impl<'a> Builder<'a> {
+    fn new(options: &'a Options) -> Self {
+        Self {
+            options,
+            graph: Graph::new(),
+            report: Report::default(),
+            vertices: vec![],
+            types: HashMap::new(),
+            missing: BTreeMap::new(),
+            sensors: HashMap::new(),
+            links: vec![],
+            linked: HashSet::new(),
+        }
+    }
+
+    fn define(&mut self, line: usize, id: u64, value: &Vertex) -> Result<(), Mistake> {
+        let vertex_type = value.vertex_type();
+        if let Some((first, _)) = self.types.get(&id) {
+            return Err(Mistake::DuplicateVertex { id, first: *first });
+        }
+        self.types.insert(id, (line, vertex_type));
+        self.vertices.push((id, *value));
+        self.report.vertices += 1;
+        Ok(())
+    }
+
+    /// The key of a vertex that this line takes for one of that type.
+    fn use_as(&mut self, line: usize, id: u64, expected: VertexType) -> Result<Key, Mistake> {
+        let (first, found) = *self.types.entry(id).or_insert_with(|| {
+            self.missing.insert(id, expected);
+            (line, expected)
+        });
+        if found == expected {
+            return Ok(key(id, found));
+        }
+        Err(Mistake::VertexType { id, expected: expected.name(), found: found.name(), first })
+    }
+
+    fn edge(&mut self, line: usize, edge: &Edge) -> Result<(), Mistake> {
+        self.report.edges += 1;
+        let Edge { from, to, .. } = *edge;
+        if from == to {
+            return Err(Mistake::SelfEdge { id: from });
+        }
+        let (measurement, information) = self.in_vehicle_frame(edge)?;
+        let (a, b) = measurement.ends();
+        let keys = [self.use_as(line, from, a)?, self.use_as(line, to, b)?];
+        self.link(from, to, measurement);
+        let noise = match information.map(|m| noise(&m, self.options.repair)).transpose()? {
+            None => Noise::unit(),
+            Some(Outcome::AsWritten(noise)) => noise,
+            Some(Outcome::Clamped(noise)) => {
+                self.report.clamped.push(line);
+                noise
+            }
+            Some(Outcome::Rejected) => {
+                self.report.rejected.push(line);
+                return Ok(());
+            }
+        };
+        self.add(keys, measurement)?.noise(noise);
+        Ok(())
+    }
+
+    /// A point as the vehicle sees it: its error turns with the sensor, and so does the information.
+    fn in_vehicle_frame(&self, edge: &Edge) -> Result<(Measurement, Option<DMatrix<f64>>), Mistake> {
+        let Measurement::Point3 { position, sensor: Some(id) } = edge.measurement else {
+            return Ok((edge.measurement, edge.information.clone()));
+        };
+        let sensor = self.sensors.get(&id).ok_or(Mistake::Unknown { what: "PARAMS_SE3OFFSET", id })?;
+        let position = Point3::new(sensor.act(&position));
+        let r = sensor.rotation.matrix();
+        let turned = |m: &DMatrix<f64>| {
+            let m = r * m * r.transpose();
+            // symmetric up to rounding only
+            DMatrix::from_fn(3, 3, |i, k| if i <= k { m[(i, k)] } else { m[(k, i)] })
+        };
+        let information = edge.information.as_ref().map(turned);
+        Ok((Measurement::Point3 { position, sensor: None }, information))
+    }
+
+    fn add(&mut self, keys: [Key; 2], measurement: Measurement) -> Result<&mut FactorEntry, Mistake> {
+        Ok(match measurement {
+            Measurement::Se2(relative) => self.graph.add(keys, Between { relative }),
+            Measurement::Se3(relative) => self.graph.add(keys, Between { relative }),
+            Measurement::Point2(p) => self.graph.add(keys, Landmark { position: Coordinates::new(p.0)? }),
+            Measurement::Point3 { position: p, .. } => {
+                self.graph.add(keys, Landmark { position: Coordinates::new(p.0)? })
+            }
+        })
+    }
+
+    fn fix(&mut self, id: u64) -> Result<(), Mistake> {
+        let (_, vertex_type) = self.types.get(&id).ok_or(Mistake::Unknown { what: "vertex", id })?;
+        self.graph.fix(key(id, *vertex_type));
+        Ok(())
+    }
+
+    fn equivalent(&mut self, a: u64, b: u64) -> Result<(), Mistake> {
+        if a == b {
+            return Err(Mistake::SelfEdge { id: a });
+        }
+        let ends = |id| self.types.get(&id).copied().ok_or(Mistake::Unknown { what: "vertex", id });
+        let ((_, a_type), (first, b_type)) = (ends(a)?, ends(b)?);
+        let measurement = match a_type {
+            VertexType::Se2 => Measurement::Se2(Se2::identity()),
+            _ => Measurement::Se3(Se3::identity()),
+        };
+        if a_type != b_type || !a_type.is_pose() {
+            let expected = measurement.ends().0.name();
+            return Err(Mistake::VertexType { id: b, expected, found: b_type.name(), first });
+        }
+        if self.linked.contains(&(a.min(b), a.max(b))) {
+            self.report.equivalences_by_edge += 1;
+            return Ok(());
+        }
+        self.report.equivalences_added += 1;
+        self.link(a, b, measurement);
+        let noise = Noise::sigma(self.options.equivalence_sigma.get())?;
+        self.add([key(a, a_type), key(b, b_type)], measurement)?.noise(noise);
+        Ok(())
+    }
+
+    fn link(&mut self, from: u64, to: u64, measurement: Measurement) {
+        self.links.push(Link { from, to, measurement });
+        self.linked.insert((from.min(to), from.max(to)));
+    }
+
+    fn finish(mut self) -> PoseGraph {
+        let filled = fill(&self.vertices, &self.missing, &self.links);
+        let mut values = Values::new();
+        let mut poses = HashSet::new();
+        for (id, vertex) in self.vertices.into_iter().chain(filled) {
+            let key = key(id, vertex.vertex_type());
+            if vertex.vertex_type().is_pose() {
+                poses.insert(key.clone());
+            }
+            if self.missing.contains_key(&id) {
+                self.report.filled.push(key.clone());
+            }
+            match vertex {
+                Vertex::Se2(x) => values.insert(key, x),
+                Vertex::Se3(x) => values.insert(key, x),
+                Vertex::Point2(x) => values.insert(key, x),
+                Vertex::Point3(x) => values.insert(key, x),
+            };
+        }
+        if self.options.anchor {
+            self.report.anchored = anchors(&self.graph, &values, |key| poses.contains(key));
+            self.report.anchored.iter().for_each(|key| self.graph.fix(key));
+        }
+        PoseGraph { graph: self.graph, values, report: self.report }
+    }
+}

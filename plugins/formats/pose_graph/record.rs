@@ -1,0 +1,120 @@
+//! What the lines of a pose graph say, whichever format they are in.
+use crate::error::Mistake;
+use manifactor_geometry::{Point2, Point3, Se2, Se3};
+use nalgebra::DMatrix;
+
+/// One line.
+#[derive(Debug, Clone)]
+pub(crate) enum Record {
+    Vertex {
+        id: u64,
+        value: Vertex,
+    },
+    Edge(Edge),
+    /// These vertices are held at their values.
+    Fix(Vec<u64>),
+    /// Two vertices are the same place.
+    Equivalent(u64, u64),
+    /// Pose of a sensor on the vehicle.
+    Sensor {
+        id: u64,
+        pose: Se3,
+    },
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Vertex {
+    Se2(Se2),
+    Se3(Se3),
+    Point2(Point2),
+    Point3(Point3),
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Edge {
+    pub(crate) from: u64,
+    pub(crate) to: u64,
+    pub(crate) measurement: Measurement,
+    /// In the tangent order of this framework; unit, where the file has none.
+    pub(crate) information: Option<DMatrix<f64>>,
+}
+
+/// The second vertex, seen from the first.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Measurement {
+    Se2(Se2),
+    Se3(Se3),
+    Point2(Point2),
+    /// Seen by the sensor of that number, or from the vehicle's own frame.
+    Point3 {
+        position: Point3,
+        sensor: Option<u64>,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum VertexType {
+    Se2,
+    Se3,
+    Point2,
+    Point3,
+}
+
+impl VertexType {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Se2 => "2D pose",
+            Self::Se3 => "3D pose",
+            Self::Point2 => "2D point",
+            Self::Point3 => "3D point",
+        }
+    }
+    pub(crate) fn is_pose(self) -> bool {
+        matches!(self, Self::Se2 | Self::Se3)
+    }
+}
+
+impl Vertex {
+    pub(crate) fn vertex_type(&self) -> VertexType {
+        match self {
+            Self::Se2(_) => VertexType::Se2,
+            Self::Se3(_) => VertexType::Se3,
+            Self::Point2(_) => VertexType::Point2,
+            Self::Point3(_) => VertexType::Point3,
+        }
+    }
+}
+
+impl Measurement {
+    /// Types of the vertices that it is between.
+    pub(crate) fn ends(&self) -> (VertexType, VertexType) {
+        match self {
+            Self::Se2(_) => (VertexType::Se2, VertexType::Se2),
+            Self::Se3(_) => (VertexType::Se3, VertexType::Se3),
+            Self::Point2(_) => (VertexType::Se2, VertexType::Point2),
+            Self::Point3 { .. } => (VertexType::Se3, VertexType::Point3),
+        }
+    }
+}
+
+/// How a line is read once its tag is known.
+pub(crate) type Parse = fn(&str) -> Result<Record, Mistake>;
+
+/// The symmetric matrix of `n` rows whose upper triangle is given by rows.
+pub(crate) fn upper_triangle(n: usize, numbers: &[f64]) -> DMatrix<f64> {
+    let mut numbers = numbers.iter();
+    let mut m = DMatrix::zeros(n, n);
+    for r in 0..n {
+        for c in r..n {
+            let x = *numbers.next().unwrap_or(&0.0);
+            m[(r, c)] = x;
+            m[(c, r)] = x;
+        }
+    }
+    m
+}
+
+/// Exchanges translation first and rotation first in a 6 × 6 matrix; its own inverse.
+pub(crate) fn exchange_halves(m: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(6, 6, |r, c| m[((r + 3) % 6, (c + 3) % 6)])
+}

@@ -1,0 +1,34 @@
+//! Lists of images as TUM RGB-D writes them: `timestamp filename`, one image a line (`rgb.txt`).
+use crate::error::{FormatError, Problems, read_text};
+use crate::lines::{Fields, lines};
+use crate::tum::increasing;
+use std::path::Path;
+
+/// An image at a time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StampedFile {
+    /// Seconds.
+    pub timestamp: f64,
+    /// As it is written, relative to the list's folder.
+    pub file: String,
+}
+
+/// Reads a list of images.
+///
+/// # Errors
+/// All malformed lines; time that does not increase.
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<StampedFile>, FormatError> {
+    let path = path.as_ref();
+    let (text, mut problems) = (read_text(path)?, Problems::of(path));
+    let mut list: Vec<StampedFile> = vec![];
+    for (line, text) in lines(&text) {
+        let previous = list.last().map(|f| f.timestamp);
+        let file = Fields::of(text, "timestamp filename").and_then(|mut fields| {
+            let timestamp = fields.number()?;
+            increasing(previous, timestamp)?;
+            Ok(StampedFile { timestamp, file: fields.text().to_owned() })
+        });
+        list.extend(problems.ok(line, file));
+    }
+    problems.finish().map(|()| list)
+}
