@@ -3,10 +3,16 @@
 //! Conventions: x ⊞ δ = x·Exp(δ) with the full exponential, y ⊟ x = Log(x⁻¹y). In space the tangent
 //! is rotation first, (ω, v); in the plane it is (x, y, θ). A pose takes points from its own frame to
 //! the outer one.
+mod bearing_range;
+mod bearing_range_3d;
 mod between;
 mod coordinates;
+mod landmark;
 mod lie_group;
+mod located;
+mod position;
 mod prior;
+mod range;
 mod rn;
 mod se2;
 mod se3;
@@ -16,12 +22,18 @@ mod so3;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
+pub use bearing_range::BearingRange2;
+pub use bearing_range_3d::BearingRange3;
 pub use between::Between;
 pub use coordinates::{Coordinates, NoCoordinates};
+pub use landmark::Landmark;
 pub use lie_group::LieGroup;
+pub use located::Located;
+pub use position::Position;
 pub use prior::Prior;
+pub use range::Range;
 pub use rn::{Point1, Point2, Point3, Rn};
 pub use se2::Se2;
 pub use se3::Se3;
-pub use so2::{NotAnAngle, So2, wrap};
+pub use so2::{NotAnAngle, So2, atan2, wrap};
 pub use so3::{NotARotation, So3};

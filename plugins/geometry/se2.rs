@@ -38,7 +38,7 @@ struct Document {
 }
 
 /// v, turned by a quarter.
-fn quarter<T: Scalar>(v: &Vector2<T>) -> Vector2<T> {
+pub(crate) fn quarter<T: Scalar>(v: &Vector2<T>) -> Vector2<T> {
     Vector2::new(-v.y, v.x)
 }
 

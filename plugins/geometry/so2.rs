@@ -4,7 +4,7 @@ use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
 use nalgebra::{Matrix1, Matrix2, U1, Vector1, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// A rotation in the plane: tangent (theta), in radians, counter-clockwise.
 ///
@@ -28,7 +28,7 @@ struct Document {
 }
 
 /// An angle in radians, finite and wrapped when it is read.
-#[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "f64", into = "f64")]
 #[schemars(with = "f64")]
 pub(crate) struct Angle(pub(crate) So2);
@@ -43,6 +43,18 @@ pub fn wrap<T: Scalar>(angle: T) -> T {
     let turns = (angle.re() / TAU).round();
     // rounding puts an angle of exactly ±π on either side: leave what is in range
     if angle.re().abs() <= PI { angle } else { angle - T::from(turns * TAU) }
+}
+
+/// The angle of the vector (x, y) within -π..π, with a derivative at x = 0 too, where num-dual's
+/// `atan2` divides by zero.
+pub fn atan2<T: Scalar>(y: T, x: T) -> T {
+    let (re_y, re_x) = (y.re(), x.re());
+    if re_x.abs() >= re_y.abs() {
+        let turn = if re_x < 0.0 { PI.copysign(re_y) } else { 0.0 };
+        (y / x).atan() + turn
+    } else {
+        -(x / y).atan() + FRAC_PI_2.copysign(re_y)
+    }
 }
 
 impl<T: Scalar> So2<T> {
@@ -163,6 +175,23 @@ mod tests {
             prop_assert!(wrapped.abs() <= PI + 1e-12);
             prop_assert!((wrapped.sin() - angle.sin()).abs() < 1e-12);
             prop_assert!((wrapped.cos() - angle.cos()).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn atan2_is_the_one_of_f64_and_differentiable_on_the_axes() {
+        for (y, x) in
+            [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (3.0, -4.0), (-5.0, -2.0), (-0.0, -1.0)]
+        {
+            assert!((atan2::<f64>(y, x) - y.atan2(x)).abs() < 1e-15, "{y} {x}");
+            let jet = |value, k| {
+                JetOf::<nalgebra::U2>::with_gradient(value, if k == 0 { &[1.0, 0.0] } else { &[0.0, 1.0] })
+            };
+            let angle = atan2(jet(y, 0), jet(x, 1));
+            let n2 = x * x + y * y;
+            let expected = [x / n2, -y / n2];
+            let found = angle.gradient().unwrap();
+            assert!(found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 1e-15), "{found:?} {expected:?}");
         }
     }
 

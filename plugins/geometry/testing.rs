@@ -1,5 +1,5 @@
 //! Strategies for rotations, poses and points, with the places where formulas tend to break.
-use crate::{Rn, Se2, Se3, So2, So3};
+use crate::{Point2, Point3, Rn, Se2, Se3, So2, So3};
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
 use nalgebra::{Vector1, Vector2, Vector3, Vector6};
 use proptest::prelude::*;
@@ -10,6 +10,16 @@ const SIZE: f64 = 10.0;
 /// Points with coordinates up to 10 m; now and then the origin, or next to it.
 pub fn any_point<const N: usize>() -> impl Strategy<Value = Rn<N>> + Clone {
     vector(SIZE).prop_map(Rn)
+}
+
+/// Points in the plane.
+pub fn any_point2() -> impl Strategy<Value = Point2> + Clone {
+    any_point()
+}
+
+/// Points in space.
+pub fn any_point3() -> impl Strategy<Value = Point3> + Clone {
+    any_point()
 }
 
 /// Rotations in the plane.
