@@ -1,1 +1,43 @@
 //! The command line of Manifactor, as a library that an outside plugin can make its own binary with.
+//!
+//! ```no_run
+//! use my_plugin as _; // links it, and with it all that it registers
+//! # mod my_plugin {}
+//!
+//! fn main() -> std::process::ExitCode {
+//!     manifactor_cli::main()
+//! }
+//! ```
+//!
+//! Exit codes are those of [`Status`] and [`Failure`]: 0 done, 1 no convergence, 2 bad input, 3 files, 130 interrupted.
+mod arguments;
+mod commands;
+mod failure;
+mod fields;
+mod graph_file;
+mod interrupt;
+mod output;
+mod report;
+mod solver;
+mod status;
+mod text;
+mod watch;
+
+pub use arguments::Cli;
+pub use failure::Failure;
+pub use status::Status;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Reads the command line, does what it says, and says how it ended.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match cli.run() {
+        Ok(status) => status.into(),
+        Err(failure) => {
+            failure.show(cli.json());
+            failure.exit_code()
+        }
+    }
+}

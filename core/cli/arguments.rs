@@ -1,0 +1,67 @@
+//! The command line.
+use crate::commands::{Explain, List, Schema, Solve};
+use crate::failure::Failure;
+use crate::status::Status;
+use clap::{Parser, Subcommand};
+
+/// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
+///
+/// Exit codes: 0 done; 1 a solve ended without converging (its best values are written); 2 the command line or a
+/// document is wrong; 3 a file could not be read or written; 130 interrupted (the best values so far are written).
+#[derive(Debug, Parser)]
+#[command(name = "manifactor", version, max_term_width = 100)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Threads to compute with; all processors by default. Results are the same for any number.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Solve(Solve),
+    List(List),
+    Explain(Explain),
+    Schema(Schema),
+}
+
+impl Cli {
+    /// Does what the command says.
+    ///
+    /// # Errors
+    /// Whatever keeps the command from doing it.
+    pub fn run(&self) -> Result<Status, Failure> {
+        if let Some(threads) = self.threads {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+            pool.build_global().map_err(Failure::input)?;
+        }
+        match &self.command {
+            Command::Solve(command) => command.run(),
+            Command::List(command) => command.run(),
+            Command::Explain(command) => command.run(),
+            Command::Schema(command) => command.run(),
+        }
+    }
+
+    /// Whether results are to be JSON.
+    pub fn json(&self) -> bool {
+        match &self.command {
+            Command::Solve(command) => command.json,
+            Command::List(command) => command.json,
+            Command::Explain(command) => command.json,
+            Command::Schema(_) => true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+}

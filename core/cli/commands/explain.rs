@@ -1,0 +1,84 @@
+//! `manifactor explain`: what a name in a config means.
+use crate::failure::Failure;
+use crate::fields::fields;
+use crate::output;
+use crate::status::Status;
+use crate::text;
+use clap::Args;
+use manifactor::config::nearest;
+use manifactor::graph::catalogue::{self, Entry};
+use serde_json::json;
+
+/// Explain a name: what it means, its fields and their defaults, an example.
+#[derive(Debug, Args)]
+pub(crate) struct Explain {
+    /// Any name that `manifactor list` prints.
+    name: String,
+    /// Print JSON: its docs and its JSON Schema.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl Explain {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let all = catalogue::all();
+        let found: Vec<_> = all.iter().filter(|e| e.name == self.name).collect();
+        if found.is_empty() {
+            let meant = nearest(&self.name, all.iter().map(|e| e.name));
+            let meant = meant.map(|m| format!("did you mean `{m}`? ")).unwrap_or_default();
+            return Err(Failure::with_help(
+                format!("nothing is called `{}`", self.name),
+                format!("{meant}`manifactor list` prints all names"),
+            ));
+        }
+        if self.json {
+            let entry = |e: &&&'static Entry| {
+                json!({
+                    "kind": e.kind, "name": e.name, "module": e.module, "docs": e.docs(), "schema": (e.schema)(),
+                })
+            };
+            output::json(&found.iter().map(entry).collect::<Vec<_>>());
+        } else {
+            let texts: Vec<_> = found.into_iter().map(|e| explain(e)).collect();
+            output::print(&texts.join("\n"));
+        }
+        Ok(Status::Done)
+    }
+}
+
+fn explain(entry: &Entry) -> String {
+    let mut out = format!("{}: a {}, of {}\n\n{}\n", entry.name, entry.kind, entry.module, prose(&entry.docs()));
+    let signature = (entry.signature)();
+    if let Some(rows) = signature.rows {
+        let names: Vec<_> = signature.variables.iter().map(|id| catalogue::manifold_name(*id)).collect();
+        let many = if signature.many { "any number of " } else { "" };
+        out += &format!("\nVariables: {many}{}. Rows of its residual: {rows}.\n", names.join(", "));
+    }
+    if !signature.tangent.is_empty() {
+        out += &format!("\nTangent directions: {}.\n", signature.tangent.join(", "));
+    }
+    let fields = fields((entry.schema)().as_value());
+    if !fields.is_empty() {
+        let mut table = text::words(&["field", "type", "default", "what it is"]);
+        for field in fields {
+            let default = field.default.unwrap_or_else(|| if field.required { "required" } else { "" }.into());
+            table.add_row([field.name, field.kind, default, field.docs]);
+        }
+        out += &format!("\n{table}\n");
+    }
+    if let Some(example) = entry.example() {
+        out += &format!("\nExample:\n\n{}\n", indent(&example));
+    }
+    out
+}
+
+/// The docs without the blocks of code, which are shown apart, and without their line breaks.
+fn prose(docs: &str) -> String {
+    let outside = docs.split("```").step_by(2).collect::<Vec<_>>().join("\n\n");
+    let paragraphs = outside.split("\n\n").map(str::trim).filter(|p| !p.is_empty());
+    paragraphs.map(text::wrap).collect::<Vec<_>>().join("\n\n")
+}
+
+fn indent(text: &str) -> String {
+    text.lines().map(|l| format!("    {l}")).collect::<Vec<_>>().join("\n")
+}

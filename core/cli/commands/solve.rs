@@ -1,0 +1,80 @@
+//! `manifactor solve`: a graph from a file.
+use crate::failure::Failure;
+use crate::graph_file::{self, GraphFile};
+use crate::solver::SolverArguments;
+use crate::status::Status;
+use crate::watch::Watch;
+use crate::{interrupt, output, report};
+use clap::Args;
+use manifactor::solve::{All, CompileError, Solution, solve};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Solve a graph: a literal graph (.toml, .json, .yaml) or a pose graph (.g2o, TORO).
+#[derive(Debug, Args)]
+pub(crate) struct Solve {
+    /// The graph.
+    graph: PathBuf,
+    #[command(flatten)]
+    solver: SolverArguments,
+    #[command(flatten)]
+    reading: graph_file::Reading,
+    /// Write the solved graph here; the extension tells the format.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print JSON: costs, iterations, termination, seconds by stage; with -v a record for each step.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Show each step.
+    #[arg(long, short)]
+    verbose: bool,
+}
+
+impl Solve {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let input = self.reading.open(&self.graph, &self.solver)?;
+        for warning in &input.warnings {
+            eprintln!("warning: {warning}");
+        }
+        let mut watch = Watch::new(self.verbose, "solving");
+        let mut interrupt = interrupt::on_ctrl_c();
+        let mut observer = All(vec![&mut watch, &mut interrupt]);
+        let solution = solve(&input.graph, &input.values, &*input.optimizer, &mut observer).map_err(misfit)?;
+        drop(watch);
+        if let Some(path) = &self.out {
+            graph_file::write(path, &input.graph, &solution.values)?;
+        }
+        if self.json {
+            output::json(&self.as_json(&input, &solution));
+        } else {
+            output::print(&(graph_file::summary(&input) + &report::outcome(&solution.outcome)));
+        }
+        Ok(Status::from(&solution.outcome.termination))
+    }
+
+    fn as_json(&self, input: &GraphFile, solution: &Solution) -> Value {
+        let outcome = &solution.outcome;
+        let mut json = json!({
+            "graph": self.graph,
+            "variables": input.values.len(),
+            "factors": outcome.factors,
+            "initial_cost": outcome.initial_cost,
+            "final_cost": outcome.final_cost,
+            "iterations": outcome.iterations,
+            "termination": outcome.termination,
+            "undetermined": outcome.undetermined,
+            "inactive": outcome.inactive,
+            "seconds": outcome.times,
+            "warnings": input.warnings,
+        });
+        if self.verbose {
+            json["history"] = json!(outcome.history);
+        }
+        json
+    }
+}
+
+/// What a file's reader did not find: it has no places any more.
+fn misfit(error: CompileError) -> Failure {
+    Failure::input(error)
+}

@@ -1,0 +1,145 @@
+//! What keeps a command from doing what it was asked to do, and how it is shown.
+use crate::output;
+use manifactor::config::{Diagnostic, Diagnostics};
+use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
+use serde_json::{Value, json};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// What keeps a command from doing what it was asked to do.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// Documents that are not as they should be: exit code 2.
+    #[error("{0}")]
+    Documents(Diagnostics),
+    /// Anything else that is wrong with the input, in its own words: exit code 2.
+    #[error("{message}")]
+    Input {
+        /// What is wrong.
+        message: String,
+        /// What to do about it.
+        help: Option<String>,
+    },
+    /// A file that could not be written or read: exit code 3.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+impl Failure {
+    /// Something wrong with the input.
+    pub fn input(error: impl std::fmt::Display) -> Self {
+        Self::Input { message: error.to_string(), help: None }
+    }
+
+    /// Something wrong with the input, and what to do about it.
+    pub fn with_help(error: impl std::fmt::Display, help: impl Into<String>) -> Self {
+        Self::Input { message: error.to_string(), help: Some(help.into()) }
+    }
+
+    /// For `map_err` on what touches a file.
+    pub fn at(path: &Path) -> impl Fn(std::io::Error) -> Self {
+        move |source| Self::File { path: path.to_owned(), source }
+    }
+
+    /// 2 for bad input, 3 for files.
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Documents(_) | Self::Input { .. } => ExitCode::from(2),
+            Self::File { .. } => ExitCode::from(3),
+        }
+    }
+
+    /// Says it on stderr, with the source line under it; and as JSON on stdout, where that was asked for.
+    pub fn show(&self, as_json: bool) {
+        if as_json {
+            output::json(&self.to_json());
+        }
+        for report in self.reports() {
+            eprintln!("{report}");
+        }
+    }
+
+    fn to_json(&self) -> Value {
+        let errors = match self {
+            Self::Documents(list) => list.iter().map(place_as_json).collect(),
+            Self::Input { message, help } => vec![json!({ "message": message, "help": help })],
+            Self::File { path, source } => vec![json!({ "message": source.to_string(), "file": path })],
+        };
+        json!({ "errors": errors })
+    }
+
+    fn reports(&self) -> Vec<String> {
+        match self {
+            Self::Documents(list) => list.iter().map(render).collect(),
+            Self::Input { message, help } => vec![fancy(plain(message, help.as_deref()).into())],
+            Self::File { .. } => vec![fancy(plain(&self.to_string(), None).into())],
+        }
+    }
+}
+
+impl From<Diagnostics> for Failure {
+    fn from(diagnostics: Diagnostics) -> Self {
+        Self::Documents(diagnostics)
+    }
+}
+
+fn place_as_json(diagnostic: &Diagnostic) -> Value {
+    json!({
+        "message": diagnostic.message(),
+        "help": diagnostic.help(),
+        "file": diagnostic.place.source.name(),
+        "line": diagnostic.line(),
+        "column": diagnostic.column(),
+    })
+}
+
+/// A warning that has a place, with its source line.
+pub(crate) fn render(diagnostic: &Diagnostic) -> String {
+    let source = &diagnostic.place.source;
+    let help = diagnostic.help();
+    let message = plain(&diagnostic.message(), help.as_deref());
+    if source.text().is_empty() {
+        // a file that could not be read has no line to show
+        return fancy(plain(&format!("{}: {}", source.name(), diagnostic.message()), help.as_deref()).into());
+    }
+    let mut labels = vec![LabeledSpan::at(diagnostic.place.span.clone(), "here")];
+    let mut message = message;
+    if let Some((place, label)) = &diagnostic.related {
+        if place.source == *source {
+            labels.push(LabeledSpan::at(place.span.clone(), label.clone()));
+        } else {
+            message.message += &format!("; {label}: {place}");
+        }
+    }
+    let report = Report::from(message.with_labels(labels));
+    fancy(report.with_source_code(NamedSource::new(source.name(), source.text().to_owned())))
+}
+
+fn plain(message: &str, help: Option<&str>) -> MietteDiagnostic {
+    let diagnostic = MietteDiagnostic::new(message);
+    match help {
+        Some(help) => diagnostic.with_help(help),
+        None => diagnostic,
+    }
+}
+
+/// Colours where somebody looks; plain text in files and pipes.
+#[expect(clippy::needless_pass_by_value, reason = "it is shown and done with")]
+fn fancy(report: Report) -> String {
+    let theme = match std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none() {
+        true => miette::GraphicalTheme::unicode(),
+        false => miette::GraphicalTheme::unicode_nocolor(),
+    };
+    let handler = miette::GraphicalReportHandler::new_themed(theme).with_width(110);
+    let mut text = String::new();
+    match handler.render_report(&mut text, report.as_ref()) {
+        Ok(()) => text.trim_end().to_owned(),
+        Err(_) => format!("{report}"),
+    }
+}

@@ -1,0 +1,115 @@
+//! The fields of a registered type, out of its JSON Schema.
+use serde_json::Value;
+
+/// A field, in words.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Field {
+    /// Its name; `stop.step` within another.
+    pub name: String,
+    pub kind: String,
+    pub default: Option<String>,
+    pub required: bool,
+    pub docs: String,
+}
+
+/// The fields of an object, those of objects within it included.
+pub(crate) fn fields(schema: &Value) -> Vec<Field> {
+    let mut out = Vec::new();
+    collect(schema, schema, "", &mut out);
+    out
+}
+
+fn collect(root: &Value, schema: &Value, prefix: &str, out: &mut Vec<Field>) {
+    let schema = resolve(root, schema);
+    let Some(properties) = schema.get("properties").and_then(Value::as_object) else { return };
+    let required = |name: &str| {
+        let list = schema.get("required").and_then(Value::as_array);
+        list.is_some_and(|list| list.iter().any(|r| r == name))
+    };
+    for (name, property) in properties {
+        let path = format!("{prefix}{name}");
+        let target = resolve(root, property);
+        let docs = property.get("description").or_else(|| target.get("description"));
+        let docs = docs.and_then(Value::as_str).unwrap_or_default();
+        let docs = docs.split("\n\n").next().unwrap_or_default().replace('\n', " ");
+        let nested = target.get("properties").is_some() && prefix.matches('.').count() < 3;
+        let default = property.get("default").filter(|_| !nested).map(ToString::to_string);
+        let kind = kind(root, property);
+        out.push(Field { name: path.clone(), kind, default, required: required(name), docs });
+        if nested {
+            collect(root, target, &format!("{path}."), out);
+        }
+    }
+}
+
+/// Follows a `$ref` into the definitions.
+fn resolve<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
+    let target = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix('#'));
+    target.and_then(|pointer| root.pointer(pointer)).unwrap_or(schema)
+}
+
+/// The type in words.
+fn kind(root: &Value, schema: &Value) -> String {
+    let schema = resolve(root, schema);
+    let list = |key| schema.get(key).and_then(Value::as_array);
+    if let Some(values) = list("enum") {
+        return values.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ");
+    }
+    if let Some(value) = schema.get("const") {
+        return value.to_string();
+    }
+    if let Some(alternatives) = list("anyOf").or_else(|| list("oneOf")) {
+        let words = alternatives.iter().map(|s| kind(root, s)).filter(|k| k != "null");
+        return words.collect::<Vec<_>>().join(" or ");
+    }
+    match schema.get("type") {
+        Some(Value::String(name)) if name == "array" => {
+            let count = |key| schema.get(key).and_then(Value::as_u64);
+            let items = schema.get("items").map(|items| kind(root, items)).unwrap_or_default();
+            match (count("minItems"), count("maxItems")) {
+                (Some(least), Some(most)) if least == most => format!("{least} × {items}"),
+                _ => format!("list of {items}"),
+            }
+        }
+        Some(Value::String(name)) if name == "object" => "table".into(),
+        Some(Value::String(name)) if name == "string" => "text".into(),
+        Some(Value::String(name)) => name.clone(),
+        Some(Value::Array(names)) => {
+            let names = names.iter().filter_map(Value::as_str).filter(|n| *n != "null");
+            names.collect::<Vec<_>>().join(" or ")
+        }
+        _ => "anything".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn fields_of_fields_have_their_path() {
+        let schema = json!({
+            "properties": {
+                "stop": { "$ref": "#/$defs/Stop", "description": "When to stop." },
+                "scale": { "type": ["number", "null"], "default": null },
+                "up": { "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 },
+            },
+            "required": ["up"],
+            "$defs": { "Stop": { "type": "object", "properties": { "step": { "type": "number", "default": 0.1 } } } },
+        });
+        let found = fields(&schema);
+        let short: Vec<_> = found.iter().map(|f| (f.name.as_str(), f.kind.as_str(), f.required)).collect();
+        assert_eq!(
+            short,
+            [
+                ("stop", "table", false),
+                ("stop.step", "number", false),
+                ("scale", "number", false),
+                ("up", "3 × number", true)
+            ]
+        );
+        assert_eq!(found[1].default.as_deref(), Some("0.1"));
+        assert_eq!(found[0].docs, "When to stop.");
+    }
+}

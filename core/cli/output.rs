@@ -1,0 +1,22 @@
+//! Standard output: results only; everything else goes to stderr.
+use serde::Serialize;
+use std::io::{ErrorKind, Write};
+
+/// Prints text. A reader that has heard enough, such as `head`, is no error.
+pub(crate) fn print(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    if let Err(error) = written
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        eprintln!("cannot write to standard output: {error}");
+    }
+}
+
+/// Prints one JSON document.
+pub(crate) fn json(value: &impl Serialize) {
+    match serde_json::to_string_pretty(value) {
+        Ok(text) => print(&(text + "\n")),
+        Err(error) => eprintln!("cannot write JSON: {error}"),
+    }
+}
