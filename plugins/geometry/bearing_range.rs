@@ -37,6 +37,10 @@ impl BearingRange2 {
     pub fn new(bearing: So2, range: Positive) -> Self {
         Self { bearing: Angle(bearing), range }
     }
+    /// Where the point was measured, in the frame of the pose.
+    pub fn measured(&self) -> Vector2<f64> {
+        self.bearing.0.act(&Vector2::new(self.range.get(), 0.0))
+    }
 }
 
 impl Residual for BearingRange2 {

@@ -35,6 +35,10 @@ pub struct BearingRange3 {
 }
 
 impl BearingRange3 {
+    /// Where the point was measured, in the frame of the pose.
+    pub fn measured(&self) -> Vector3<f64> {
+        *self.direction * self.range.get()
+    }
     /// Two axes perpendicular to the measured direction and to each other.
     fn basis(&self) -> [Vector3<f64>; 2] {
         let z = *self.direction;

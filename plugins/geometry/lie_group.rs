@@ -8,6 +8,12 @@ pub trait LieGroup: Manifold {
     /// A point, as TOML writes it inside of a factor; for the catalogue.
     const EXAMPLE: &'static str;
 
+    /// The element that changes nothing.
+    fn identity() -> Self;
+    /// x·y, normalised, so that long products stay in the group.
+    fn compose(x: &Self, y: &Self) -> Self;
+    /// x⁻¹
+    fn inverse(x: &Self) -> Self;
     /// x⁻¹y: the second in the frame of the first.
     fn between<T: Scalar>(x: &Self::Of<T>, y: &Self::Of<T>) -> Self::Of<T>;
     /// The tangent vector at the identity that leads to `x`.

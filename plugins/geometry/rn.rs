@@ -107,6 +107,15 @@ macro_rules! point {
         impl LieGroup for Rn<$n> {
             const NAME: &'static str = $name;
             const EXAMPLE: &'static str = $example;
+            fn identity() -> Self {
+                Rn(SVector::zeros())
+            }
+            fn compose(x: &Self, y: &Self) -> Self {
+                Rn(x.0 + y.0)
+            }
+            fn inverse(x: &Self) -> Self {
+                Rn(-x.0)
+            }
             fn between<T: Scalar>(x: &SVector<T, $n>, y: &SVector<T, $n>) -> SVector<T, $n> {
                 y - x
             }

@@ -147,6 +147,15 @@ register_manifold!("se2", Se2);
 impl LieGroup for Se2 {
     const NAME: &'static str = "se2";
     const EXAMPLE: &'static str = "{ translation = [1.0, 0.5], angle = 0.5 }";
+    fn identity() -> Se2 {
+        Se2::identity()
+    }
+    fn compose(x: &Se2, y: &Se2) -> Se2 {
+        x.compose(y)
+    }
+    fn inverse(x: &Se2) -> Se2 {
+        x.inverse()
+    }
     fn between<T: Scalar>(x: &Se2<T>, y: &Se2<T>) -> Se2<T> {
         x.between(y)
     }

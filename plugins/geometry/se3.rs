@@ -142,8 +142,7 @@ impl Manifold for Se3 {
         self.seed_in(6, 0)
     }
     fn retract(&self, delta: &Vector6<f64>) -> Self {
-        let step = Se3::exp(delta);
-        Self::new(self.rotation.compose_renormalized(&step.rotation), self.act(&step.translation))
+        LieGroup::compose(self, &Se3::exp(delta))
     }
     fn local(&self, other: &Self) -> Vector6<f64> {
         self.between(other).log()
@@ -157,6 +156,15 @@ register_manifold!("se3", Se3);
 impl LieGroup for Se3 {
     const NAME: &'static str = "se3";
     const EXAMPLE: &'static str = "{ translation = [1.0, 0.0, 0.5], rotation = [0.0, 0.0, 0.6, 0.8] }";
+    fn identity() -> Se3 {
+        Se3::identity()
+    }
+    fn compose(x: &Se3, y: &Se3) -> Se3 {
+        Se3::new(x.rotation.compose_renormalized(&y.rotation), x.act(&y.translation))
+    }
+    fn inverse(x: &Se3) -> Se3 {
+        x.inverse()
+    }
     fn between<T: Scalar>(x: &Se3<T>, y: &Se3<T>) -> Se3<T> {
         x.between(y)
     }

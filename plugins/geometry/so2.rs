@@ -123,6 +123,15 @@ register_manifold!("so2", So2);
 impl LieGroup for So2 {
     const NAME: &'static str = "so2";
     const EXAMPLE: &'static str = "{ angle = 0.5 }";
+    fn identity() -> So2 {
+        So2::identity()
+    }
+    fn compose(x: &So2, y: &So2) -> So2 {
+        x.compose(y)
+    }
+    fn inverse(x: &So2) -> So2 {
+        x.inverse()
+    }
     fn between<T: Scalar>(x: &So2<T>, y: &So2<T>) -> So2<T> {
         x.between(y)
     }

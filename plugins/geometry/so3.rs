@@ -192,6 +192,15 @@ register_manifold!("so3", So3);
 impl LieGroup for So3 {
     const NAME: &'static str = "so3";
     const EXAMPLE: &'static str = "{ rotation = [0.0, 0.0, 0.6, 0.8] }";
+    fn identity() -> So3 {
+        So3::identity()
+    }
+    fn compose(x: &So3, y: &So3) -> So3 {
+        x.compose_renormalized(y)
+    }
+    fn inverse(x: &So3) -> So3 {
+        x.inverse()
+    }
     fn between<T: Scalar>(x: &So3<T>, y: &So3<T>) -> So3<T> {
         x.between(y)
     }
