@@ -36,8 +36,7 @@ impl Fusion {
 
     /// The best class, the first seen of equals; `None` where no detection named any.
     pub fn best(&self) -> Option<FusedClass> {
-        let better = |best: (&String, &f64), next: (&String, &f64)| if next.1 > best.1 { next } else { best };
-        let best = self.sums.iter().map(|(class, sum)| (class, sum)).reduce(|b, n| better(b, n));
+        let best = self.sums.iter().reduce(|best, next| if next.1 > best.1 { next } else { best });
         let total: f64 = self.sums.values().sum();
         best.map(|(name, sum)| FusedClass {
             name: name.clone(),

@@ -8,10 +8,10 @@ use crate::gravity::{GravityError, MapFrame};
 use crate::measurements::{Measured, Measurements, View};
 use crate::semantics::{RuleError, unmatched};
 use crate::sequence::{ObjectId, Sequence};
-use crate::settings::Settings;
+use crate::settings::{DetectionSettings, Settings};
 use manifactor_geometry::{Between, Prior, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_quadric::{BoundingBoxFactor, DualQuadric};
+use manifactor_quadric::BoundingBoxFactor;
 use serde::Serialize;
 use std::sync::Arc;
 

@@ -4,7 +4,7 @@ use crate::sequence::Sequence;
 use crate::settings::ObjectSettings;
 use manifactor_geometry::Se3;
 use manifactor_quadric::DualQuadric;
-use nalgebra::Vector3;
+use manifactor_quadric::initialise::{View, parallax};
 use serde::Serialize;
 use std::fmt;
 
@@ -71,31 +71,17 @@ pub(super) fn start(
     if deviation_px >= settings.max_box_deviation_px {
         return Err(Rejection::BoxDeviation { deviation_px, limit_px: settings.max_box_deviation_px });
     }
-    let quadric = todo_initialise();
-    let parallax_deg = parallax(&centres, &quadric.centroid()).to_degrees();
+    let views: Vec<View> = measured.views.iter().filter_map(|view| seen(view, poses, sequence)).collect();
+    // over all pairs of views, so it is left out where any will do
+    let parallax_deg = if settings.min_parallax_deg > 0.0 { parallax(&views) } else { 0.0 };
     if parallax_deg < settings.min_parallax_deg {
         return Err(Rejection::Parallax { parallax_deg, least_deg: settings.min_parallax_deg });
     }
-    Ok(quadric)
+    let started = settings.initialiser.initialise(&views);
+    started.map_err(|error| Rejection::Initialisation { message: error.to_string() })
 }
 
-/// The largest angle between two of the directions to a point, in radians.
-fn parallax(centres: &[Vector3<f64>], point: &Vector3<f64>) -> f64 {
-    let rays: Vec<Vector3<f64>> = centres.iter().map(|centre| point - centre).collect();
-    let others = |i: usize| rays.iter().skip(i + 1);
-    let angles = rays.iter().enumerate().flat_map(|(i, ray)| others(i).map(|other| ray.angle(other)));
-    angles.fold(0.0, f64::max)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parallax_is_the_widest_angle() {
-        let centres = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.1, 0.0]].map(Vector3::from);
-        let angle = parallax(&centres, &Vector3::zeros()).to_degrees();
-        assert!((angle - 174.3).abs() < 0.1);
-        assert_eq!(parallax(&centres[..1], &Vector3::zeros()), 0.0);
-    }
+fn seen(view: &crate::measurements::View, poses: &[Se3], sequence: &Sequence) -> Option<View> {
+    let pose = *poses.get(view.frame)?;
+    Some(View { observed: view.observed, ..View::new(pose, sequence.camera, view.bounding_box) })
 }

@@ -54,7 +54,7 @@ impl VariantReport {
             final_cost: self.solve.final_cost,
             iterations: self.solve.iterations,
             converged: self.solve.termination.is_converged(),
-            alignment: trajectory.map(|t| t.alignment.to_string()),
+            alignment: trajectory.map(|t| super::trajectory::name(t.alignment)),
             odometry_ate: trajectory.map(|t| t.odometry.ate.rmse),
             ate: trajectory.map(|t| t.estimate.ate.rmse),
             position: landmarks.map(|l| l.rmse.position),

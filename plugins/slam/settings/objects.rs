@@ -1,6 +1,6 @@
 use super::number::{table, within};
 use manifactor_config::Section;
-use manifactor_quadric::{Initialiser, Svd};
+use manifactor_quadric::initialise::{Initialiser, Svd};
 use serde::Serialize;
 use std::sync::Arc;
 

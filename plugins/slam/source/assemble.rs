@@ -1,7 +1,7 @@
 //! Frames and detections put together by time.
 use super::SourceError;
 use crate::sequence::{ClassScores, Detection, Frame, GroundTruth, ObjectId};
-use manifactor_formats::tum::StampedPose;
+use manifactor_formats::tum::{StampedPose, Trajectory};
 use manifactor_formats::{detections, tum};
 use manifactor_quadric::BoundingBox;
 use std::path::Path;
@@ -12,7 +12,7 @@ pub(super) type Matched = (Vec<Frame>, Vec<Detection>);
 /// Reads odometry and detections; each detection goes to the frame nearest in time, if it is near enough. Detections
 /// of images that the odometry does not cover are left out.
 pub(super) fn read_matched(odometry: &Path, file: &Path, within: f64) -> Result<Matched, SourceError> {
-    let frames = tum::read(odometry)?.into_iter();
+    let frames = read_poses(odometry)?.into_iter();
     let frames = frames.map(|StampedPose { timestamp, pose }| Frame { timestamp, world_from_camera: pose });
     let frames: Vec<Frame> = frames.collect();
     let rows = detections::read(file)?;
@@ -29,6 +29,16 @@ pub(super) fn read_matched(odometry: &Path, file: &Path, within: f64) -> Result<
     // stable: the order of a file decides between duplicates
     matched.sort_by_key(|detection| detection.frame);
     Ok((frames, matched))
+}
+
+/// The poses of a file; what had to be repaired is logged.
+fn read_poses(file: &Path) -> Result<Vec<StampedPose>, SourceError> {
+    let Trajectory { poses, moved, dropped } = tum::read(file)?;
+    let (moved, dropped) = (moved.len(), dropped.len());
+    if moved + dropped > 0 {
+        tracing::warn!("{}: {moved} lines out of order, {dropped} time stamps twice", file.display());
+    }
+    Ok(poses)
 }
 
 /// The frame nearest in time, if it is near enough.
@@ -61,7 +71,7 @@ pub(super) fn read_ground_truth(folder: &Path, named: Option<&Path>) -> Result<O
         Some(name) => Some(folder.join(name)),
         None => usual.is_file().then_some(usual),
     };
-    let trajectory = file.map(tum::read).transpose()?;
+    let trajectory = file.map(|file| read_poses(&file)).transpose()?;
     Ok(trajectory.map(|trajectory| GroundTruth { trajectory, objects: vec![] }))
 }
 

@@ -1,0 +1,74 @@
+use crate::estimate::Estimate;
+use crate::mapping::Warning;
+use crate::metrics::{
+    Alignment, MetricsError, Pairing, RelativeError, Statistics, absolute_error, align, associate,
+    relative_error,
+};
+use crate::settings::EvaluationSettings;
+use manifactor_formats::tum::StampedPose;
+use serde::Serialize;
+
+/// The trajectory against the truth, before and after.
+#[derive(Debug, Clone, Serialize)]
+pub struct TrajectoryReport {
+    /// How it was brought into the frame of the truth.
+    pub alignment: Alignment,
+    /// By odometry alone.
+    pub odometry: TrajectoryError,
+    /// As it is estimated.
+    pub estimate: TrajectoryError,
+}
+
+/// How far a trajectory is from the truth.
+#[derive(Debug, Clone, Serialize)]
+pub struct TrajectoryError {
+    /// Absolute error of positions, in metres.
+    pub ate: Statistics,
+    /// Relative pose error over [`EvaluationSettings::relative_over`] frames; `None` for trajectories shorter than that.
+    pub rpe: Option<RelativeError>,
+}
+
+/// One report for each alignment. An error that grew is a warning, and so is a truth that cannot be used.
+pub(super) fn compare(
+    estimate: &Estimate,
+    settings: &EvaluationSettings,
+    warnings: &mut Vec<Warning>,
+) -> Vec<TrajectoryReport> {
+    let Some(truth) = &estimate.sequence.ground_truth else { return vec![] };
+    let (before, after) = (estimate.odometry(), estimate.trajectory());
+    let error = |trajectory: &[StampedPose], alignment| -> Result<TrajectoryError, MetricsError> {
+        let pairs = associate(&truth.trajectory, trajectory, settings.max_time_difference)?;
+        let (_, aligned) = align(&pairs, alignment)?;
+        let rpe = relative_error(&aligned, settings.relative_over, Pairing::All).ok();
+        Ok(TrajectoryError { ate: absolute_error(&aligned)?, rpe })
+    };
+    let report = |alignment: Alignment| -> Result<TrajectoryReport, MetricsError> {
+        Ok(TrajectoryReport {
+            alignment,
+            odometry: error(&before, alignment)?,
+            estimate: error(&after, alignment)?,
+        })
+    };
+    let mut reports = vec![];
+    for alignment in &settings.alignments {
+        match report(*alignment) {
+            Ok(report) => reports.push(report),
+            Err(error) => warnings.push(Warning::NotEvaluated { reason: error.to_string() }),
+        }
+    }
+    warnings.extend(reports.first().and_then(worse));
+    reports
+}
+
+fn worse(report: &TrajectoryReport) -> Option<Warning> {
+    let (odometry, estimate) = (report.odometry.ate.rmse, report.estimate.ate.rmse);
+    // to rounding: a graph without objects leaves the odometry as it is
+    let grew = estimate > odometry * (1.0 + 1e-6);
+    grew.then(|| Warning::WorseThanOdometry { alignment: name(report.alignment), odometry, estimate })
+}
+
+/// As documents write it.
+pub(super) fn name(alignment: Alignment) -> String {
+    let json = serde_json::to_value(alignment).unwrap_or_default();
+    json.as_str().unwrap_or_default().to_owned()
+}
