@@ -1,0 +1,65 @@
+//! Absolute and relative errors of poses that are paired.
+use super::{MetricsError, PosePair, Statistics};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Absolute trajectory error: distances between positions, in metres. Align the pairs first.
+///
+/// # Errors
+/// Where there is no pair.
+pub fn absolute_error(pairs: &[PosePair]) -> Result<Statistics, MetricsError> {
+    let errors: Vec<f64> =
+        pairs.iter().map(|p| (p.truth.translation - p.estimate.translation).norm()).collect();
+    let what = "the absolute trajectory error";
+    Statistics::of(&errors).ok_or(MetricsError::TooFew { what, needed: 1, found: 0 })
+}
+
+/// Which pairs of poses a relative error is over.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Pairing {
+    /// (0, Δ), (Δ, 2Δ), …
+    #[default]
+    Consecutive,
+    /// (0, Δ), (1, 1 + Δ), …
+    All,
+}
+
+/// Relative pose error: how far motions over Δ frames are from the true ones.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RelativeError {
+    /// Metres.
+    pub translation: Statistics,
+    /// Radians.
+    pub rotation: Statistics,
+}
+
+/// The relative pose error over `delta` matched poses: E = (Qᵢ⁻¹Qⱼ)⁻¹ (Pᵢ⁻¹Pⱼ), Q true and P estimated.
+/// The same in any frame, but not at any scale.
+///
+/// # Errors
+/// Where there are not more pairs than `delta`, or that is 0.
+pub fn relative_error(
+    pairs: &[PosePair],
+    delta: usize,
+    pairing: Pairing,
+) -> Result<RelativeError, MetricsError> {
+    let too_few = MetricsError::TooFew {
+        what: "the relative pose error (over at least one frame)",
+        needed: delta.max(1).saturating_add(1),
+        found: pairs.len(),
+    };
+    if delta == 0 {
+        return Err(too_few);
+    }
+    let step = if pairing == Pairing::All { 1 } else { delta };
+    let ends = pairs.iter().zip(pairs.iter().skip(delta)).step_by(step);
+    let errors = ends.map(|(i, j)| {
+        let (truth, estimate) = (i.truth.between(&j.truth), i.estimate.between(&j.estimate));
+        let error = truth.between(&estimate);
+        (error.translation.norm(), error.rotation.log().norm())
+    });
+    let (translation, rotation): (Vec<f64>, Vec<f64>) = errors.unzip();
+    let both = Statistics::of(&translation).zip(Statistics::of(&rotation));
+    both.map(|(translation, rotation)| RelativeError { translation, rotation }).ok_or(too_few)
+}
