@@ -5,7 +5,7 @@
 //! (see [`catalogue`]).
 //!
 //! A plugin's test is a line. The strategy yields a factor and its variables:
-//! ```ignore
+//! ```text
 //! jacobian_laws! { agrees_with_differences: (any_factor(), any_se3(), any_se3()) }
 //! ```
 pub mod catalogue;

@@ -21,7 +21,7 @@ pub enum Tree {
     #[default]
     Chain,
     /// By as few factors as possible from the root, so that errors add up less. Often a far better
-    /// start: on the Manhattan world of 3500 poses at 4 % of the cost.
+    /// start: on the Manhattan world of 3500 poses at 2 % of the cost.
     Shallow,
 }
 

@@ -1,0 +1,88 @@
+//! Each flaw of a factor breaks the Jacobian law, with a message that leads to it.
+use crate::toy::*;
+use manifactor_graph::catalogue::find;
+use manifactor_testing::catalogue::{documentation_law, factor_law, manifold_law};
+use manifactor_testing::strategies::vector;
+use manifactor_testing::{Each, LawError, invariance_law, jacobian_law, jacobian_laws};
+use proptest::prelude::*;
+
+fn spot() -> impl Strategy<Value = Spot> {
+    vector::<2>(10.0).prop_map(Spot)
+}
+fn area() -> impl Strategy<Value = Area> {
+    (-5.0..5.0).prop_map(|area| Area { area })
+}
+
+jacobian_laws! {
+    a_sound_factor_keeps_the_law: (area(), spot(), spot());
+    a_factor_of_any_number_of_variables_keeps_the_law:
+        proptest::collection::vec(spot(), 1..12).prop_map(|spots| (Spread {}, Each(spots)));
+}
+
+fn spots<const S: u8>() -> (Spot<S>, Spot<S>) {
+    (Spot([1.0, 2.0].into()), Spot([3.0, 4.0].into()))
+}
+
+#[test]
+fn a_wrong_entry_is_named_by_variable_and_direction() {
+    let (a, b) = spots::<SOUND>();
+    let error = jacobian_law(&Area::<WRONG_SIGN> { area: 0.5 }, &[&a, &b]).unwrap_err();
+    let expected = "analytic against automatic Jacobian: row 0 by `y` of variable 1 is -1 and should be 1\n  \
+                    factor {\"type\":\"area_of_wrong_sign\",\"area\":0.5}\n  \
+                    at [{\"type\":\"spot\",\"x\":1.0,\"y\":2.0}, {\"type\":\"spot\",\"x\":3.0,\"y\":4.0}]";
+    assert_eq!(error.to_string(), expected);
+}
+
+#[test]
+fn a_block_that_is_not_written_is_found() {
+    let (a, b) = spots::<SOUND>();
+    let error = jacobian_law(&Area::<UNWRITTEN_BLOCK> { area: 0.5 }, &[&a, &b]).unwrap_err();
+    assert!(matches!(error, LawError::Jacobian { variable: 1, found, .. } if found.is_nan()), "{error}");
+}
+
+#[test]
+fn a_wrong_seed_is_found_by_differences() {
+    let (a, b) = spots::<DOUBLED_SEED>();
+    // the analytic Jacobian is right, the automatic one is not
+    let error = jacobian_law(&Area::<SOUND, DOUBLED_SEED> { area: 0.5 }, &[&a, &b]).unwrap_err();
+    assert!(matches!(error, LawError::Jacobian { direction: "y", .. }), "{error}");
+}
+
+#[test]
+fn another_residual_beside_the_jacobian_is_found() {
+    let (a, b) = spots::<SOUND>();
+    let error = jacobian_law(&Area::<OTHER_RESIDUAL> { area: 0.5 }, &[&a, &b]).unwrap_err();
+    assert!(matches!(error, LawError::Residual { law: "residual of linearize", .. }), "{error}");
+}
+
+#[test]
+fn nothing_to_check_is_said() {
+    let (a, b) = spots::<SOUND>();
+    let error = jacobian_law(&Area::<NEVER_DEFINED> { area: 0.5 }, &[&a, &b]).unwrap_err();
+    assert!(matches!(error, LawError::NotDefined { .. }), "{error}");
+    let error = jacobian_law(&Area::<SOUND> { area: 0.5 }, &[&a]).unwrap_err();
+    assert!(matches!(error, LawError::WrongVariables { .. }), "{error}");
+}
+
+#[test]
+fn what_changes_the_residual_is_no_invariance() {
+    let ((a, b), factor) = (spots::<SOUND>(), Area::<SOUND> { area: 0.5 });
+    // shearing b along a leaves the area
+    let sheared = Spot::<SOUND>(b.0 + a.0 * 3.0);
+    assert_eq!(invariance_law(&factor, &[&a, &b], &[&a, &sheared]), Ok(()));
+    let error = invariance_law(&factor, &[&a, &b], &[&a, &Spot::<SOUND>([3.0, 4.1].into())]).unwrap_err();
+    assert!(matches!(error, LawError::Residual { row: 0, .. }), "{error}");
+}
+
+#[test]
+fn the_catalogue_is_enough_to_check_a_type() {
+    let factor = |name| find("factor", name).unwrap();
+    assert_eq!(factor_law(factor("area"), 32), Ok(32));
+    assert_eq!(factor_law(factor("spread"), 32), Ok(32));
+    manifold_law(find("variable", "spot").unwrap(), 32).unwrap();
+    documentation_law(factor("area")).unwrap();
+    // the flawed ones share a doc comment, whose example names another
+    let error = documentation_law(factor("area_of_wrong_sign")).unwrap_err().to_string();
+    let expected = "factor `area_of_wrong_sign`: its example has no table with type = \"area_of_wrong_sign\"";
+    assert_eq!(error, expected);
+}
