@@ -1,0 +1,213 @@
+//! The true shapes of objects: solids with flat faces, of which an ellipsoid is only a model.
+use manifactor_geometry::Se3;
+use manifactor_quadric::{BoundingBox, Camera};
+use nalgebra::{Vector2, Vector3};
+use std::f64::consts::TAU;
+
+/// Nearer than this nothing is seen, in metres.
+const NEAR: f64 = 0.05;
+
+/// Convex faces in space, corner after corner. The frame's origin is the centre of the box around it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solid {
+    faces: Vec<Vec<Vector3<f64>>>,
+}
+
+impl Solid {
+    /// A box of these extents, in metres.
+    pub fn cuboid(extents: [f64; 3]) -> Self {
+        let [x, y, z] = extents.map(|e| e / 2.0);
+        let rectangle = |a: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
+            [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(s, t)| a + u * s + v * t).to_vec()
+        };
+        let axes = [Vector3::x() * x, Vector3::y() * y, Vector3::z() * z];
+        let sides = (0..3).flat_map(|i| [1.0, -1.0].map(|s| (i, s)));
+        Self {
+            faces: sides.map(|(i, s)| rectangle(axes[i] * s, axes[(i + 1) % 3], axes[(i + 2) % 3])).collect(),
+        }
+    }
+
+    /// A round body along z: radii at the bottom and the top, and the height, in metres.
+    pub fn frustum(bottom: f64, top: f64, height: f64) -> Self {
+        Self::turned(&[(bottom, -height / 2.0), (top, height / 2.0)])
+    }
+
+    /// A ball, in metres.
+    pub fn ball(radius: f64) -> Self {
+        const RINGS: usize = 8;
+        let ring = |i: usize| {
+            let latitude = (i as f64 / RINGS as f64 - 0.5) * TAU / 2.0;
+            (radius * latitude.cos(), radius * latitude.sin())
+        };
+        Self::turned(&(0..=RINGS).map(ring).collect::<Vec<_>>())
+    }
+
+    /// An outline of (radius, z), turned about z.
+    fn turned(outline: &[(f64, f64)]) -> Self {
+        const SIDES: usize = 24;
+        let at = |(radius, z): (f64, f64), i: usize| {
+            let angle = i as f64 / SIDES as f64 * TAU;
+            Vector3::new(radius * angle.cos(), radius * angle.sin(), z)
+        };
+        let ends = [outline.first(), outline.last()];
+        let caps = ends.into_iter().flatten().map(|end| (0..SIDES).map(|i| at(*end, i)).collect());
+        let bands = outline.windows(2).flat_map(|w| {
+            (0..SIDES).map(move |i| vec![at(w[0], i), at(w[0], i + 1), at(w[1], i + 1), at(w[1], i)])
+        });
+        Self { faces: caps.chain(bands).collect() }
+    }
+
+    /// A flat part with an upright part along its far edge, as a chair or an open laptop: width, depth,
+    /// height and the thickness of both parts, in metres.
+    pub fn folded([width, depth, height]: [f64; 3], thickness: f64) -> Self {
+        let flat = Self::cuboid([width, depth, thickness]).moved(Vector3::z() * (thickness - height) / 2.0);
+        let back = Self::cuboid([width, thickness, height]).moved(Vector3::y() * (depth - thickness) / 2.0);
+        Self { faces: flat.faces.into_iter().chain(back.faces).collect() }
+    }
+
+    fn moved(mut self, by: Vector3<f64>) -> Self {
+        self.faces.iter_mut().flatten().for_each(|corner| *corner += by);
+        self
+    }
+
+    /// The same shape, larger by a factor.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        self.faces.iter_mut().flatten().for_each(|corner| *corner *= factor);
+        self
+    }
+
+    /// All corners; those of several faces several times.
+    pub fn corners(&self) -> impl Iterator<Item = &Vector3<f64>> {
+        self.faces.iter().flatten()
+    }
+
+    /// Half the extents along its own axes.
+    pub fn half_extents(&self) -> Vector3<f64> {
+        self.corners().fold(Vector3::zeros(), |most, corner| most.sup(&corner.abs()))
+    }
+
+    /// The box around what a camera sees of it, without and with the image's border; `None` where
+    /// nothing is in front, or nothing in the image.
+    pub fn boxes(&self, world_from_object: &Se3, camera: &Camera, world_from_camera: &Se3) -> Option<Boxes> {
+        let camera_from_object = world_from_camera.between(world_from_object);
+        let (mut whole, mut inside) = (Extent::default(), Extent::default());
+        for face in &self.faces {
+            let seen: Vec<_> = face.iter().map(|corner| camera_from_object.act(corner)).collect();
+            let front = clip(&seen, |p| p.z - NEAR);
+            let mut image: Vec<_> = front.iter().map(|p| project(camera, p)).collect();
+            image.iter().for_each(|p| whole.add(p));
+            let size = camera.size();
+            for axis in 0..2 {
+                image = clip(&image, |p| p[axis]);
+                image = clip(&image, |p| size[axis] - p[axis]);
+            }
+            image.iter().for_each(|p| inside.add(p));
+        }
+        Some(Boxes { whole: whole.bounding_box()?, inside: inside.bounding_box()? })
+    }
+}
+
+/// The boxes around an object's image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Boxes {
+    /// Around all of it, as if the image had no border.
+    pub whole: BoundingBox,
+    /// Around what is inside of the image.
+    pub inside: BoundingBox,
+}
+
+fn project(camera: &Camera, p: &Vector3<f64>) -> Vector2<f64> {
+    let (x, y) = (p.x / p.z, p.y / p.z);
+    Vector2::new(camera.fx * x + camera.skew * y + camera.cx, camera.fy * y + camera.cy)
+}
+
+/// The part of a polygon where `distance` is not negative (Sutherland and Hodgman).
+fn clip<const D: usize>(
+    polygon: &[nalgebra::SVector<f64, D>],
+    distance: impl Fn(&nalgebra::SVector<f64, D>) -> f64,
+) -> Vec<nalgebra::SVector<f64, D>> {
+    let mut part = Vec::with_capacity(polygon.len() + 2);
+    let next = polygon.iter().cycle().skip(1);
+    for (a, b) in polygon.iter().zip(next) {
+        let (from, to) = (distance(a), distance(b));
+        if from >= 0.0 {
+            part.push(*a);
+        }
+        if (from >= 0.0) != (to >= 0.0) {
+            part.push(a + (b - a) * (from / (from - to)));
+        }
+    }
+    part
+}
+
+/// Bounds of points, as they come.
+#[derive(Default)]
+struct Extent(Option<(Vector2<f64>, Vector2<f64>)>);
+
+impl Extent {
+    fn add(&mut self, p: &Vector2<f64>) {
+        self.0 = Some(self.0.map_or((*p, *p), |(min, max)| (min.inf(p), max.sup(p))));
+    }
+    fn bounding_box(self) -> Option<BoundingBox> {
+        let (min, max) = self.0?;
+        BoundingBox::new([min.x, min.y, max.x, max.y]).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_geometry::So3;
+    use manifactor_quadric::Box3;
+
+    const CAMERA: Camera =
+        Camera { fx: 320.0, fy: 320.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
+
+    fn at(x: f64, y: f64, z: f64) -> Se3 {
+        Se3::new(So3::identity(), Vector3::new(x, y, z))
+    }
+
+    #[test]
+    fn the_box_of_a_cuboid_is_that_of_its_near_corners() {
+        let boxes =
+            Solid::cuboid([0.2, 0.4, 1.0]).boxes(&at(0.0, 0.0, 4.5), &CAMERA, &Se3::identity()).unwrap();
+        // the near face is at 4 m
+        let expected = [320.0 - 8.0, 240.0 - 16.0, 320.0 + 8.0, 240.0 + 16.0];
+        let found = boxes.whole.bounds();
+        assert!(expected.iter().zip(found).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+        assert_eq!(boxes.whole, boxes.inside);
+    }
+
+    #[test]
+    fn what_the_border_cuts_ends_at_the_border() {
+        let boxes =
+            Solid::cuboid([1.0, 0.2, 0.2]).boxes(&at(-2.0, 0.0, 2.0), &CAMERA, &Se3::identity()).unwrap();
+        assert!(boxes.whole.xmin < 0.0 && boxes.inside.xmin == 0.0 && boxes.inside.xmax == boxes.whole.xmax);
+        assert!(Solid::ball(0.1).boxes(&at(-9.0, 0.0, 2.0), &CAMERA, &Se3::identity()).is_none());
+    }
+
+    #[test]
+    fn what_is_partly_behind_the_camera_is_seen_in_part() {
+        let wall = Solid::cuboid([0.1, 0.1, 4.0]);
+        let boxes = wall.boxes(&at(0.3, 0.0, 0.5), &CAMERA, &Se3::identity()).unwrap();
+        assert!(boxes.inside.bounds().iter().all(|x| x.is_finite()) && boxes.inside.xmax == 640.0);
+        assert!(wall.boxes(&at(0.3, 0.0, -3.0), &CAMERA, &Se3::identity()).is_none());
+    }
+
+    #[test]
+    fn solids_are_centred_and_of_their_size() {
+        for (solid, half) in [
+            (Solid::cuboid([0.2, 0.4, 0.6]), [0.1, 0.2, 0.3]),
+            (Solid::frustum(0.1, 0.2, 0.5), [0.2, 0.2, 0.25]),
+            (Solid::ball(0.3), [0.3, 0.3, 0.3]),
+            (Solid::folded([0.3, 0.2, 0.25], 0.02), [0.15, 0.1, 0.125]),
+        ] {
+            let around = Box3::enclosing(solid.corners().copied()).unwrap();
+            for i in 0..3 {
+                assert!((around.max[i] - half[i]).abs() < 1e-12 && (around.min[i] + half[i]).abs() < 1e-12);
+                assert!((solid.half_extents()[i] - half[i]).abs() < 1e-12);
+            }
+        }
+    }
+}
