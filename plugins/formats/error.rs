@@ -1,5 +1,6 @@
 //! What can be wrong with a file, and where.
 use manifactor_geometry::{NoCoordinates, NotARotation};
+use manifactor_graph::ValueError;
 use manifactor_graph::noise::NoiseError;
 use std::fmt;
 use std::io;
@@ -73,6 +74,9 @@ pub enum Mistake {
     /// A point that is none.
     #[error(transparent)]
     Coordinates(#[from] NoCoordinates),
+    /// A value of another type than an edge takes it for.
+    #[error(transparent)]
+    Value(#[from] ValueError),
     /// A noise that is none.
     #[error("information matrix: {0}; to go on without it, choose the repair `reject` or `clamp`")]
     Noise(#[from] NoiseError),

@@ -15,7 +15,7 @@
 //!
 //! g2o's own residual of `EDGE_SE3:QUAT` is (translation, vector part of the quaternion); ours is the
 //! full logarithm, rotation first. The information is permuted and else used as it is written.
-//! Read with [`pose_graph::read`](crate::pose_graph::read), write with [`write`].
+//! Read with [`pose_graph::read`](crate::pose_graph::read), write with [`write()`].
 use crate::error::Mistake;
 use crate::lines::{Fields, id};
 use crate::pose_graph::record::{Edge, Measurement, Parse, Record, Vertex, exchange_halves, upper_triangle};

@@ -2,7 +2,7 @@
 //!
 //! Poses get the keys `x<id>`, landmarks `l<id>`. Edges become `between_se2`, `between_se3` and landmark
 //! factors with the file's information as noise. What a file leaves open is filled in, and reported:
-//! - vertices without a line get their values along a spanning tree of the edges;
+//! - vertices without a line get their values along a spanning tree of the edges, of [`Options::tree`]'s kind;
 //! - an `EQUIV a b` line says that two poses are the same place as far as the edge between them says so
 //!   (TORO merges the two by that edge). That edge is there already, so nothing is added; where there is
 //!   none, the two are tied by a relative pose of zero with [`Options::equivalence_sigma`];
@@ -11,6 +11,7 @@
 use crate::error::{FormatError, Mistake, Problems, read_text};
 use crate::lines::lines;
 use crate::{g2o, toro};
+use manifactor_geometry::Tree;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Key, Values};
 use schemars::JsonSchema;
@@ -20,14 +21,13 @@ use std::path::Path;
 
 mod anchor;
 mod build;
-mod fill;
 mod information;
 pub(crate) mod record;
 
 use record::Record;
 
 /// A graph from a file, with initial values for all of its variables.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct PoseGraph {
     /// The edges; held variables.
     pub graph: Graph,
@@ -45,13 +45,20 @@ pub struct Options {
     pub repair: Repair,
     /// Hold the first pose of each connected part that nothing else holds.
     pub anchor: bool,
+    /// For vertices that only edges name.
+    pub tree: Tree,
     /// Standard deviation of an `EQUIV` without an edge, in metres and radians.
     pub equivalence_sigma: Positive,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { repair: Repair::Error, anchor: true, equivalence_sigma: Positive::literal(1e-3) }
+        Self {
+            repair: Repair::Error,
+            anchor: true,
+            tree: Tree::Chain,
+            equivalence_sigma: Positive::literal(1e-3),
+        }
     }
 }
 
@@ -120,12 +127,13 @@ pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<Po
             None => *unknown.entry(tag.to_owned()).or_default() += 1,
         }
     }
-    let mut built = build::build(&records, options, &mut problems);
     if records.is_empty() && problems.is_empty() {
         let unknown = unknown.keys().take(10).cloned().collect();
         problems.push(0, Mistake::Empty { expected: "vertices or edges of a g2o or TORO file", unknown });
     }
+    let built = build::build(&records, options, &mut problems);
     problems.finish()?;
+    let mut built = built.unwrap_or_default();
     built.report.unknown = unknown;
     Ok(built)
 }

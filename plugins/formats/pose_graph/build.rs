@@ -1,16 +1,21 @@
 //! From the lines of a file to a graph and its values.
 use super::anchor::anchors;
-use super::fill::{Link, fill};
 use super::information::{Outcome, noise};
 use super::record::{Edge, Measurement, Record, Vertex, VertexType};
 use super::{Options, PoseGraph, Report};
 use crate::error::{Mistake, Problems};
-use manifactor_geometry::{Between, Coordinates, Landmark, Point3, Se2, Se3};
-use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values};
+use manifactor_geometry::{Between, Coordinates, Landmark, Point3, Se2, Se3, spanning_tree};
+use manifactor_graph::{Factor, FactorEntry, Graph, Key, Noise, ValueError, Values};
 use nalgebra::DMatrix;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
 
-pub(crate) fn build(records: &[(usize, Record)], options: &Options, problems: &mut Problems) -> PoseGraph {
+/// Notes all problems; there are none where there is a graph.
+pub(crate) fn build(
+    records: &[(usize, Record)],
+    options: &Options,
+    problems: &mut Problems,
+) -> Option<PoseGraph> {
     let mut builder = Builder::new(options);
     // vertices first: a file may use them before it defines them
     for (line, record) in records {
@@ -38,22 +43,26 @@ pub(crate) fn build(records: &[(usize, Record)], options: &Options, problems: &m
         };
         problems.ok(*line, added);
     }
-    builder.finish()
+    if !problems.is_empty() {
+        return None;
+    }
+    problems.ok(0, builder.finish().map_err(Mistake::from))
 }
 
 struct Builder<'a> {
     options: &'a Options,
     graph: Graph,
+    /// All edges, those that were left out among them: what they measured still places vertices.
+    measured: Graph,
+    /// Vertices with a line of their own.
+    values: Values,
     report: Report,
-    /// In the file's order.
-    vertices: Vec<(u64, Vertex)>,
     /// Type of each vertex, and the line that says so.
     types: HashMap<u64, (usize, VertexType)>,
     /// Vertices without a line of their own.
     missing: BTreeMap<u64, VertexType>,
     sensors: HashMap<u64, Se3>,
-    links: Vec<Link>,
-    /// Pairs with a link between them, the smaller number first.
+    /// Pairs with an edge between them, the smaller number first.
     linked: HashSet<(u64, u64)>,
 }
 
@@ -66,12 +75,12 @@ impl<'a> Builder<'a> {
         Self {
             options,
             graph: Graph::new(),
+            measured: Graph::new(),
+            values: Values::new(),
             report: Report::default(),
-            vertices: vec![],
             types: HashMap::new(),
             missing: BTreeMap::new(),
             sensors: HashMap::new(),
-            links: vec![],
             linked: HashSet::new(),
         }
     }
@@ -82,7 +91,13 @@ impl<'a> Builder<'a> {
             return Err(Mistake::DuplicateVertex { id, first: *first });
         }
         self.types.insert(id, (line, vertex_type));
-        self.vertices.push((id, *value));
+        let key = key(id, vertex_type);
+        match *value {
+            Vertex::Se2(x) => self.values.insert(key, x),
+            Vertex::Se3(x) => self.values.insert(key, x),
+            Vertex::Point2(x) => self.values.insert(key, x),
+            Vertex::Point3(x) => self.values.insert(key, x),
+        };
         self.report.vertices += 1;
         Ok(())
     }
@@ -108,20 +123,22 @@ impl<'a> Builder<'a> {
         let (measurement, information) = self.in_vehicle_frame(edge)?;
         let (a, b) = measurement.ends();
         let keys = [self.use_as(line, from, a)?, self.use_as(line, to, b)?];
-        self.link(from, to, measurement);
-        let noise = match information.map(|m| noise(&m, self.options.repair)).transpose()? {
-            None => Noise::unit(),
-            Some(Outcome::AsWritten(noise)) => noise,
+        let mut entry = entry(keys, measurement)?;
+        self.measured.push(entry.clone());
+        self.linked.insert((from.min(to), from.max(to)));
+        match information.map(|m| noise(&m, self.options.repair)).transpose()? {
+            None => {}
+            Some(Outcome::AsWritten(noise)) => entry.noise = noise,
             Some(Outcome::Clamped(noise)) => {
                 self.report.clamped.push(line);
-                noise
+                entry.noise = noise;
             }
             Some(Outcome::Rejected) => {
                 self.report.rejected.push(line);
                 return Ok(());
             }
-        };
-        self.add(keys, measurement)?.noise(noise);
+        }
+        self.graph.push(entry);
         Ok(())
     }
 
@@ -140,17 +157,6 @@ impl<'a> Builder<'a> {
         };
         let information = edge.information.as_ref().map(turned);
         Ok((Measurement::Point3 { position, sensor: None }, information))
-    }
-
-    fn add(&mut self, keys: [Key; 2], measurement: Measurement) -> Result<&mut FactorEntry, Mistake> {
-        Ok(match measurement {
-            Measurement::Se2(relative) => self.graph.add(keys, Between { relative }),
-            Measurement::Se3(relative) => self.graph.add(keys, Between { relative }),
-            Measurement::Point2(p) => self.graph.add(keys, Landmark { position: Coordinates::new(p.0)? }),
-            Measurement::Point3 { position: p, .. } => {
-                self.graph.add(keys, Landmark { position: Coordinates::new(p.0)? })
-            }
-        })
     }
 
     fn fix(&mut self, id: u64) -> Result<(), Mistake> {
@@ -178,40 +184,58 @@ impl<'a> Builder<'a> {
             return Ok(());
         }
         self.report.equivalences_added += 1;
-        self.link(a, b, measurement);
-        let noise = Noise::sigma(self.options.equivalence_sigma.get())?;
-        self.add([key(a, a_type), key(b, b_type)], measurement)?.noise(noise);
+        let mut entry = entry([key(a, a_type), key(b, b_type)], measurement)?;
+        entry.noise = Noise::sigma(self.options.equivalence_sigma.get())?;
+        self.measured.push(entry.clone());
+        self.graph.push(entry);
         Ok(())
     }
 
-    fn link(&mut self, from: u64, to: u64, measurement: Measurement) {
-        self.links.push(Link { from, to, measurement });
-        self.linked.insert((from.min(to), from.max(to)));
+    /// Values of the missing vertices.
+    fn fill(&mut self) -> Result<(), ValueError> {
+        if self.missing.is_empty() {
+            return Ok(());
+        }
+        let mut all = spanning_tree(&self.measured, &self.values, self.options.tree)?;
+        let poses = self.missing.iter().filter(|(_, t)| t.is_pose()).map(|(id, t)| (key(*id, *t), *t));
+        let alone: Vec<_> = poses.filter(|(key, _)| !all.contains(key.as_str())).collect();
+        if !alone.is_empty() {
+            // poses that only see points: nothing says where they are
+            for (key, vertex_type) in alone {
+                match vertex_type {
+                    VertexType::Se2 => all.insert(key, Se2::identity()),
+                    _ => all.insert(key, Se3::identity()),
+                };
+            }
+            all = spanning_tree(&self.measured, &all, self.options.tree)?;
+        }
+        for (id, vertex_type) in &self.missing {
+            let key = key(*id, *vertex_type);
+            if let Some(value) = all.variable(key.as_str()) {
+                self.report.filled.push(key.clone());
+                self.values.insert_boxed(key, value.erased().clone_box());
+            }
+        }
+        Ok(())
     }
 
-    fn finish(mut self) -> PoseGraph {
-        let filled = fill(&self.vertices, &self.missing, &self.links);
-        let mut values = Values::new();
-        let mut poses = HashSet::new();
-        for (id, vertex) in self.vertices.into_iter().chain(filled) {
-            let key = key(id, vertex.vertex_type());
-            if vertex.vertex_type().is_pose() {
-                poses.insert(key.clone());
-            }
-            if self.missing.contains_key(&id) {
-                self.report.filled.push(key.clone());
-            }
-            match vertex {
-                Vertex::Se2(x) => values.insert(key, x),
-                Vertex::Se3(x) => values.insert(key, x),
-                Vertex::Point2(x) => values.insert(key, x),
-                Vertex::Point3(x) => values.insert(key, x),
-            };
-        }
+    fn finish(mut self) -> Result<PoseGraph, ValueError> {
+        self.fill()?;
         if self.options.anchor {
-            self.report.anchored = anchors(&self.graph, &values, |key| poses.contains(key));
+            let is_pose = |key: &Key| key.as_str().starts_with('x');
+            self.report.anchored = anchors(&self.graph, &self.values, is_pose);
             self.report.anchored.iter().for_each(|key| self.graph.fix(key));
         }
-        PoseGraph { graph: self.graph, values, report: self.report }
+        Ok(PoseGraph { graph: self.graph, values: self.values, report: self.report })
     }
+}
+
+fn entry(keys: [Key; 2], measurement: Measurement) -> Result<FactorEntry, Mistake> {
+    let factor: Arc<dyn Factor> = match measurement {
+        Measurement::Se2(relative) => Arc::new(Between { relative }),
+        Measurement::Se3(relative) => Arc::new(Between { relative }),
+        Measurement::Point2(p) => Arc::new(Landmark { position: Coordinates::new(p.0)? }),
+        Measurement::Point3 { position: p, .. } => Arc::new(Landmark { position: Coordinates::new(p.0)? }),
+    };
+    Ok(FactorEntry { keys: keys.into(), factor, noise: Noise::unit(), loss: None })
 }

@@ -1,7 +1,7 @@
 //! What the pose-graph reader makes of good and of bad lines.
 #![allow(clippy::unwrap_used)]
 use manifactor_formats::pose_graph::{Options, PoseGraph, Repair, parse};
-use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3};
+use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3, Tree};
 use manifactor_graph::{Factor, Fixed, Key};
 use nalgebra::{DMatrix, Vector3, dmatrix};
 use std::any::Any;
@@ -141,6 +141,24 @@ fn missing_vertices_are_filled_along_the_edges_in_both_directions() {
     assert_eq!((x("x4"), x("x6")), (9.0, 12.0));
     assert_eq!(loaded.values.get::<Point2>("l9").unwrap().0, nalgebra::Vector2::new(12.0, 3.0));
     assert_eq!(loaded.report.filled, keys(&["x4", "x6", "l9"]));
+}
+
+#[test]
+fn a_pose_that_only_sees_points_starts_at_the_origin() {
+    let loaded = read("EDGE_SE2_XY 4 9 1 2 1 0 1\nEDGE_SE2_XY 5 9 0 2 1 0 1\n");
+    assert_eq!(*loaded.values.get::<Se2>("x5").unwrap(), Se2::identity());
+    assert_eq!(loaded.values.get::<Point2>("l9").unwrap().0, nalgebra::Vector2::new(1.0, 2.0));
+    assert_eq!(loaded.graph.check(&loaded.values), []);
+}
+
+#[test]
+fn the_spanning_tree_is_chosen_by_an_option() {
+    let text = format!("{EDGE}EDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\nEDGE_SE2 0 2 3 0 0 1 0 0 1 0 1\n");
+    let x2 = |tree| {
+        let loaded = parse(&text, "g", &Options { tree, ..Options::default() }).unwrap();
+        loaded.values.get::<Se2>("x2").unwrap().translation.x
+    };
+    assert_eq!((x2(Tree::Chain), x2(Tree::Shallow)), (2.0, 3.0));
 }
 
 #[test]
