@@ -2,7 +2,9 @@
 //! the figures.
 #![allow(clippy::unwrap_used)]
 use manifactor_formats::tum;
-use manifactor_slam::metrics::{Alignment, Pairing, Statistics, absolute_error, align, associate, relative_error};
+use manifactor_slam::metrics::{
+    Alignment, Pairing, Statistics, absolute_error, align, associate, relative_error,
+};
 use std::path::PathBuf;
 
 const FIGURES: &str = include_str!("evo/figures.csv");
