@@ -6,6 +6,7 @@ use manifactor_graph::{Factor, Manifold};
 use manifactor_testing::{JacobianLaw, LawError, check, invariance_law};
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
+use std::f64::consts::FRAC_PI_2;
 
 fn factor(camera: Camera, model: BoxModel) -> BoundingBoxFactor {
     let bounding_box = BoundingBox::new([100.0, 80.0, 300.0, 200.0]).unwrap();
@@ -63,7 +64,7 @@ fn the_box_holds_the_projected_points_and_no_more() {
         let [mut low, mut high] = [Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY)];
         for i in 0..=60 {
             for j in 0..120 {
-                let (lat, lon) = (f64::from(i) * 0.05236 - 1.5708, f64::from(j) * 0.05236);
+                let (lat, lon) = (f64::from(i) * 0.05236 - FRAC_PI_2, f64::from(j) * 0.05236);
                 let u = Vector3::new(lat.cos() * lon.cos(), lat.cos() * lon.sin(), lat.sin());
                 let point = pose.inverse_act(&quadric.pose.act(&u.component_mul(&quadric.semi_axes)));
                 let pixel = camera.matrix() * point;

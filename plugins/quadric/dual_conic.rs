@@ -36,8 +36,8 @@ impl DualConic {
     /// Whether it is less than a conic: a point or two, to within rounding.
     pub fn is_degenerate(&self) -> bool {
         let scale: f64 = self.0.row_iter().map(|row| row.norm()).product();
-        // so written that NaN is degenerate
-        !(self.0.determinant().abs() > f64::EPSILON * scale)
+        let determinant = self.0.determinant().abs();
+        determinant <= f64::EPSILON * scale || !determinant.is_finite()
     }
     /// The box around the ellipse; `None` where it is none.
     pub fn bounds(&self) -> Option<BoundingBox> {

@@ -43,7 +43,7 @@ struct Document {
 
 /// Three finite numbers.
 #[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "Coordinates<3>", into = "[f64; 3]")]
+#[serde(from = "Coordinates<3>", into = "[f64; 3]")]
 #[schemars(with = "[f64; 3]")]
 struct Centre(Vector3<f64>);
 
@@ -131,10 +131,9 @@ impl Manifold for DualQuadric {
 }
 register_manifold!("dual_quadric", DualQuadric);
 
-impl TryFrom<Coordinates<3>> for Centre {
-    type Error = std::convert::Infallible;
-    fn try_from(x: Coordinates<3>) -> Result<Self, Self::Error> {
-        Ok(Self(x.vector()))
+impl From<Coordinates<3>> for Centre {
+    fn from(x: Coordinates<3>) -> Self {
+        Self(x.vector())
     }
 }
 impl From<Centre> for [f64; 3] {

@@ -9,6 +9,7 @@ mod ellipse;
 mod ellipsoid;
 mod from_matrix;
 mod horizontal_orientation;
+pub mod initialise;
 mod landmark;
 mod quadric_prior;
 mod semi_axes;

@@ -1,0 +1,64 @@
+//! A box and how far away its middle is: one view is enough.
+use super::{InitialiseError, Initialiser, View, check_views, check_visible, shape};
+use crate::dual_quadric::DualQuadric;
+use manifactor_graph::register;
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// An ellipsoid behind the surface that was measured in the middle of the box, with axes along the
+/// world's.
+///
+/// A depth is that of the surface; the centre lies deeper by `thickness` times the mean of half the
+/// width and half the height. Several views are averaged. The semi-axes follow from the sides of the
+/// boxes as for `rays`; a single view says nothing of the depth of the object, which becomes that of a
+/// ball. Views without a depth count for the sides only. It is rejected unless all of it is in front of
+/// every camera.
+///
+/// ```toml
+/// initialiser = { type = "depth", thickness = 1.0 }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Depth {
+    /// How deep objects are, relative to their width and height: 1 for a ball, 0 where the depth is
+    /// that of the centre.
+    pub thickness: f64,
+}
+
+impl Default for Depth {
+    fn default() -> Self {
+        Self { thickness: 1.0 }
+    }
+}
+
+impl Depth {
+    /// The centre, in the world's frame.
+    fn centroid(&self, view: &View) -> Option<Vector3<f64>> {
+        let depth = view.depth.filter(|depth| *depth > 0.0)?;
+        let (b, camera) = (&view.bounding_box, &view.camera);
+        // half the size at depth 1; the box may be so large that no such object is behind the surface
+        let half = (b.width() / camera.fx + b.height() / camera.fy) / 4.0;
+        let z = depth / (1.0 - (self.thickness * half).clamp(0.0, 0.5));
+        Some(view.world_from_camera.act(&(camera.ray(b.centre()) * z)))
+    }
+}
+
+#[typetag::serde(name = "depth")]
+impl Initialiser for Depth {
+    fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
+        check_views(views, 1)?;
+        let (mut sum, mut count) = (Vector3::zeros(), 0);
+        for centroid in views.iter().filter_map(|view| self.centroid(view)) {
+            sum += centroid;
+            count += 1;
+        }
+        if count == 0 {
+            return Err(InitialiseError::NoDepth);
+        }
+        let quadric = shape::ellipsoid(views, sum / f64::from(count))?;
+        check_visible(&quadric, views)?;
+        Ok(quadric)
+    }
+}
+register!(dyn Initialiser, "depth", Depth);

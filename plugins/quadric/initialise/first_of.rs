@@ -1,0 +1,40 @@
+//! One way after the other.
+use super::{InitialiseError, Initialiser, View};
+use crate::dual_quadric::DualQuadric;
+use manifactor_graph::register;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+
+/// The first of several initialisers that succeeds.
+///
+/// If none does, the error names what each of them ran into.
+///
+/// ```toml
+/// initialiser = { type = "first_of", initialisers = [{ type = "svd" }, { type = "rays" }] }
+/// ```
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FirstOf {
+    /// What to try, in this order.
+    #[schemars(schema_with = "list")]
+    pub initialisers: Vec<Box<dyn Initialiser>>,
+}
+
+fn list(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "array", "items": { "type": "object", "required": ["type"] }, "minItems": 1 })
+}
+
+#[typetag::serde(name = "first_of")]
+impl Initialiser for FirstOf {
+    fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
+        let mut errors = vec![];
+        for initialiser in &self.initialisers {
+            match initialiser.initialise(views) {
+                Ok(quadric) => return Ok(quadric),
+                Err(error) => errors.push((initialiser.typetag_name(), error)),
+            }
+        }
+        Err(InitialiseError::All(errors))
+    }
+}
+register!(dyn Initialiser, "first_of", FirstOf);
