@@ -25,7 +25,9 @@ const SHIPPED: [(&str, &str); 12] = [
 /// `couch` and their like are known without being listed.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
-pub struct Aliases(#[schemars(with = "std::collections::HashMap<String, String>")] pub IndexMap<String, String>);
+pub struct Aliases(
+    #[schemars(with = "std::collections::HashMap<String, String>")] pub IndexMap<String, String>,
+);
 
 impl Aliases {
     /// The one name of a class.

@@ -15,6 +15,7 @@ use manifactor_quadric::BoundingBoxFactor;
 use serde::Serialize;
 use std::sync::Arc;
 
+mod refine;
 mod rejection;
 mod warning;
 
@@ -140,16 +141,20 @@ impl Mapping {
             Err(rejection) => (None, Some(rejection)),
         };
         let mut semantic_factors = vec![];
-        if let Some(quadric) = start {
-            self.values.insert(key.clone(), quadric);
-            for view in &measured.views {
-                self.graph.push(box_entry(view, key.clone(), sequence, settings));
-            }
+        if let Some(start) = start {
+            let boxes = measured.views.iter();
+            let boxes = boxes.map(|view| box_entry(view, key.clone(), sequence, &settings.detections));
+            let mut entries: Vec<FactorEntry> = boxes.collect();
             let class = measured.class.as_ref().map(|class| class.name.as_str()).unwrap_or_default();
             for rule in settings.semantics.iter().filter(|rule| rule.applies(class, &settings.aliases)) {
-                self.graph.push(rule.entry(key.clone(), self.frame.up)?);
+                entries.push(rule.entry(key.clone(), self.frame.up)?);
                 semantic_factors.push(rule.factor.name().to_owned());
             }
+            let refine = settings.objects.refine;
+            let start =
+                if refine { refine::refine(&key, start, &entries, &self.values, self.frame.up) } else { start };
+            self.values.insert(key.clone(), start);
+            self.graph.factors_mut().extend(entries);
         }
         Ok(MappedObject {
             id: measured.id,
@@ -179,10 +184,12 @@ impl Mapping {
     }
 }
 
-fn box_entry(view: &View, object: Key, sequence: &Sequence, settings: &Settings) -> FactorEntry {
-    let DetectionSettings { noise, loss, model, .. } = &settings.detections;
-    let factor = BoundingBoxFactor { bounding_box: view.bounding_box, camera: sequence.camera, model: *model };
-    let all = view.observed.iter().all(|observed| *observed);
-    let noise = if all { noise.clone() } else { noise.clone().observing(&view.observed) };
-    FactorEntry { keys: vec![pose_key(view.frame), object], factor: Arc::new(factor), noise, loss: loss.clone() }
+fn box_entry(view: &View, object: Key, sequence: &Sequence, settings: &DetectionSettings) -> FactorEntry {
+    let (bounding_box, camera, model) = (view.bounding_box, sequence.camera, settings.model);
+    FactorEntry {
+        keys: vec![pose_key(view.frame), object],
+        factor: Arc::new(BoundingBoxFactor { bounding_box, camera, model }),
+        noise: settings.noise_of(view.inside),
+        loss: settings.loss.clone(),
+    }
 }

@@ -5,7 +5,7 @@
 use crate::class::Aliases;
 use crate::fusion::{FusedClass, Fusion};
 use crate::sequence::{ObjectId, Sequence};
-use crate::settings::{CutSides, DetectionSettings};
+use crate::settings::DetectionSettings;
 use manifactor_quadric::BoundingBox;
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ pub struct View {
     /// The box, in pixels.
     pub bounding_box: BoundingBox,
     /// Which of its sides are the object's own, and not the border's: xmin, ymin, xmax, ymax.
-    pub observed: [bool; 4],
+    pub inside: [bool; 4],
 }
 
 /// One object.
@@ -72,11 +72,13 @@ impl Measurements {
             let object = objects.entry(id).or_default();
             object.detections += 1;
             object.fusion.add(&detection.scores, aliases);
-            let Some(observed) = observed(&detection.bounding_box, sequence, settings) else {
+            let (bounding_box, camera) = (detection.bounding_box, &sequence.camera);
+            let inside = bounding_box.sides_inside(camera.width, camera.height, settings.border_px);
+            if !settings.cut_sides.accepts(inside) {
                 all.cut += 1;
                 continue;
-            };
-            let view = View { frame: detection.frame, bounding_box: detection.bounding_box, observed };
+            }
+            let view = View { frame: detection.frame, bounding_box, inside };
             all.duplicates += usize::from(object.views.insert(view.frame, view).is_some());
         }
         all.objects = objects.into_iter().map(|(id, object)| object.measured(id)).collect();
@@ -93,16 +95,6 @@ impl Gathered {
     fn measured(self, id: ObjectId) -> Measured {
         let views = self.views.into_values().collect();
         Measured { id, class: self.fusion.best(), detections: self.detections, views }
-    }
-}
-
-/// Which sides of a box tell of the object; `None` where the box is to be dropped.
-fn observed(b: &BoundingBox, sequence: &Sequence, settings: &DetectionSettings) -> Option<[bool; 4]> {
-    let inside = b.sides_inside(sequence.camera.width, sequence.camera.height, settings.border_px);
-    match settings.cut_sides {
-        CutSides::Keep => Some([true; 4]),
-        CutSides::Drop => inside.iter().all(|inside| *inside).then_some(inside),
-        CutSides::Mask => inside.iter().any(|inside| *inside).then_some(inside),
     }
 }
 
@@ -124,6 +116,7 @@ mod tests {
     use super::*;
     use crate::gravity::tests::sequence;
     use crate::sequence::{ClassScores, Detection};
+    use crate::settings::CutSides;
 
     fn detection(frame: usize, object: u32, class: &str, score: f64, bounds: [f64; 4]) -> Detection {
         Detection {
@@ -170,9 +163,9 @@ mod tests {
     #[test]
     fn cut_sides_are_masked_or_kept_if_asked_for() {
         let mask = gather(vec![detection(0, 1, "cup", 0.5, CUT)], &with(CutSides::Mask));
-        assert_eq!(mask.objects[0].views[0].observed, [false, true, true, true]);
+        assert_eq!(mask.objects[0].views[0].inside, [false, true, true, true]);
         let keep = gather(vec![detection(0, 1, "cup", 0.5, CUT)], &with(CutSides::Keep));
-        assert_eq!(keep.objects[0].views[0].observed, [true; 4]);
+        assert_eq!(keep.boxes(), 1);
         let whole = [0.0, 0.0, 640.0, 480.0];
         let nothing = gather(vec![detection(0, 1, "cup", 0.5, whole)], &with(CutSides::Mask));
         assert_eq!((nothing.cut, nothing.boxes()), (1, 0));
@@ -181,10 +174,8 @@ mod tests {
     #[test]
     fn strangers_and_doubtful_boxes_are_counted() {
         let settings = DetectionSettings { min_score: 0.3, ..with(CutSides::Drop) };
-        let all = gather(
-            vec![detection(0, 0, "cup", 0.9, INSIDE), detection(0, 2, "cup", 0.2, INSIDE)],
-            &settings,
-        );
+        let all =
+            gather(vec![detection(0, 0, "cup", 0.9, INSIDE), detection(0, 2, "cup", 0.2, INSIDE)], &settings);
         assert_eq!((all.unassociated, all.low_score, all.objects.len()), (1, 1, 0));
     }
 

@@ -124,17 +124,7 @@ impl VariantReport {
         let objects = objects(estimate, &after);
         let landmarks = LandmarkReport::new(&before, &after);
         let (counts, up) = (Counts::of(estimate), mapping.frame.up);
-        Self {
-            name: name.to_owned(),
-            counts,
-            up,
-            solve,
-            trajectory,
-            landmarks,
-            objects,
-            warnings,
-            seconds,
-        }
+        Self { name: name.to_owned(), counts, up, solve, trajectory, landmarks, objects, warnings, seconds }
     }
 }
 

@@ -51,7 +51,8 @@ impl<'a> Run<'a> {
         let source = &variant.settings.source;
         // what is written alike is the same source
         let name = serde_json::to_string(source).unwrap_or_default();
-        if let Some((_, sequence)) = self.loaded.iter().find(|(known, _)| *known == name && !name.is_empty()) {
+        if let Some((_, sequence)) = self.loaded.iter().find(|(known, _)| *known == name && !name.is_empty())
+        {
             return Ok(sequence.clone());
         }
         let sequence = Arc::new(source.load(&self.folders)?);

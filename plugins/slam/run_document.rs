@@ -20,9 +20,7 @@
 //! name = "with orientation"
 //! ```
 use crate::settings::Settings;
-use manifactor_config::{
-    Diagnostic, Diagnostics, Document, Errors, Node, Place, Section, Value, merge,
-};
+use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Node, Place, Section, Value, merge};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -144,7 +142,8 @@ fn read_variants(
 
 /// A name as part of a path: letters, digits and hyphens.
 pub fn slug(name: &str) -> String {
-    let plain: String = name.chars().map(|c| if c.is_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
+    let plain: String =
+        name.chars().map(|c| if c.is_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
     let parts: Vec<&str> = plain.split('-').filter(|part| !part.is_empty()).collect();
     if parts.is_empty() { ONLY.to_owned() } else { parts.join("-") }
 }

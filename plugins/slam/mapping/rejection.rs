@@ -46,7 +46,10 @@ impl fmt::Display for Rejection {
         match self {
             Self::Views { views, least } => write!(f, "{views} boxes, at least {least} are needed"),
             Self::BoxDeviation { deviation_px, limit_px } => {
-                write!(f, "its boxes' size deviates by {deviation_px:.1} px, allowed are less than {limit_px} px")
+                write!(
+                    f,
+                    "its boxes' size deviates by {deviation_px:.1} px, allowed are less than {limit_px} px"
+                )
             }
             Self::Parallax { parallax_deg, least_deg } => {
                 write!(f, "seen under {parallax_deg:.1}°, at least {least_deg}° are needed")
@@ -83,5 +86,5 @@ pub(super) fn start(
 
 fn seen(view: &crate::measurements::View, poses: &[Se3], sequence: &Sequence) -> Option<View> {
     let pose = *poses.get(view.frame)?;
-    Some(View { observed: view.observed, ..View::new(pose, sequence.camera, view.bounding_box) })
+    Some(View { observed: view.inside, ..View::new(pose, sequence.camera, view.bounding_box) })
 }

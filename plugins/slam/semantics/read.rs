@@ -14,8 +14,10 @@ pub(crate) fn read_semantics(section: &mut Section<'_>, folder: &Path) -> Vec<Ru
             Ok(rules) => rules,
             Err(Unread::Unknown) => {
                 let known: Vec<String> = SHIPPED.iter().map(|s| (*s).to_owned()).collect();
-                let meant = nearest(&name, SHIPPED).map_or(String::new(), |n| format!("did you mean `{n}`? "));
-                let help = format!("{meant}there is {}, or give the path of a .toml file", quoted_list(&known));
+                let meant =
+                    nearest(&name, SHIPPED).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+                let help =
+                    format!("{meant}there is {}, or give the path of a .toml file", quoted_list(&known));
                 errors.report(place, Problem::with_help(format!("unknown semantics `{name}`"), help));
                 Vec::new()
             }

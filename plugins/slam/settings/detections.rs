@@ -39,7 +39,26 @@ pub enum CutSides {
     Keep,
 }
 
+impl CutSides {
+    /// Whether a box with these of its sides inside of the image is used.
+    pub fn accepts(self, inside: [bool; 4]) -> bool {
+        match self {
+            Self::Drop => inside.iter().all(|inside| *inside),
+            Self::Mask => inside.iter().any(|inside| *inside),
+            Self::Keep => true,
+        }
+    }
+}
+
 impl DetectionSettings {
+    /// The noise of a box with these of its sides inside of the image.
+    pub fn noise_of(&self, inside: [bool; 4]) -> Noise {
+        match self.cut_sides {
+            CutSides::Mask if inside.contains(&false) => self.noise.clone().observing(&inside),
+            _ => self.noise.clone(),
+        }
+    }
+
     pub(super) fn take(parent: &mut Section<'_>) -> Option<Self> {
         table(parent, "detections", |section| Self {
             noise: noise(section, 20.0),

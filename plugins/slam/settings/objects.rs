@@ -17,6 +17,8 @@ pub struct ObjectSettings {
     pub min_parallax_deg: f64,
     /// How an object's first estimate is made of its boxes.
     pub initialiser: Arc<dyn Initialiser>,
+    /// Whether each object is fitted alone to its own factors first, from several places, with the poses held.
+    pub refine: bool,
 }
 
 impl ObjectSettings {
@@ -29,6 +31,7 @@ impl ObjectSettings {
                 max_box_deviation_px: within(section, "max_box_deviation_px", 50.0, 0.0..=f64::INFINITY),
                 min_parallax_deg: within(section, "min_parallax_deg", 0.0, 0.0..=180.0),
                 initialiser: initialiser.map_or_else(|| Arc::new(Svd::default()) as Arc<_>, Arc::from),
+                refine: section.optional("refine").unwrap_or(true),
             }
         })
     }

@@ -65,7 +65,10 @@ fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, Sou
 }
 
 /// The ground truth that is named, or the one that lies there.
-pub(super) fn read_ground_truth(folder: &Path, named: Option<&Path>) -> Result<Option<GroundTruth>, SourceError> {
+pub(super) fn read_ground_truth(
+    folder: &Path,
+    named: Option<&Path>,
+) -> Result<Option<GroundTruth>, SourceError> {
     let usual = folder.join("groundtruth.txt");
     let file = match named {
         Some(name) => Some(folder.join(name)),
