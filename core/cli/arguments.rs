@@ -1,5 +1,5 @@
 //! The command line.
-use crate::commands::{Explain, List, Schema, Solve};
+use crate::commands::{Check, Evaluate, Explain, List, Run, Schema, Simulate, Solve};
 use crate::failure::Failure;
 use crate::status::Status;
 use clap::{Parser, Subcommand};
@@ -20,9 +20,13 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Run(Run),
     Solve(Solve),
+    Check(Check),
     List(List),
     Explain(Explain),
+    Evaluate(Evaluate),
+    Simulate(Simulate),
     Schema(Schema),
 }
 
@@ -37,9 +41,13 @@ impl Cli {
             pool.build_global().map_err(Failure::input)?;
         }
         match &self.command {
+            Command::Run(command) => command.run(),
             Command::Solve(command) => command.run(),
+            Command::Check(command) => command.run(),
             Command::List(command) => command.run(),
             Command::Explain(command) => command.run(),
+            Command::Evaluate(command) => command.run(),
+            Command::Simulate(command) => command.run(),
             Command::Schema(command) => command.run(),
         }
     }
@@ -47,9 +55,13 @@ impl Cli {
     /// Whether results are to be JSON.
     pub fn json(&self) -> bool {
         match &self.command {
+            Command::Run(command) => command.json,
             Command::Solve(command) => command.json,
+            Command::Check(command) => command.json,
             Command::List(command) => command.json,
             Command::Explain(command) => command.json,
+            Command::Evaluate(command) => command.json,
+            Command::Simulate(_) => false,
             Command::Schema(_) => true,
         }
     }

@@ -1,10 +1,18 @@
 //! The commands, a file each: what it takes, and what it does.
+mod check;
+mod evaluate;
 mod explain;
 mod list;
+mod run;
 mod schema;
+mod simulate;
 mod solve;
 
+pub(crate) use check::Check;
+pub(crate) use evaluate::Evaluate;
 pub(crate) use explain::Explain;
 pub(crate) use list::List;
+pub(crate) use run::Run;
 pub(crate) use schema::Schema;
+pub(crate) use simulate::Simulate;
 pub(crate) use solve::Solve;

@@ -1,6 +1,10 @@
 //! What keeps a command from doing what it was asked to do, and how it is shown.
 use crate::output;
-use manifactor::config::{Diagnostic, Diagnostics};
+use manifactor::config::{Diagnostic, Diagnostics, Problem, Source};
+use manifactor::formats::{FormatError, Malformed};
+use manifactor::slam::output::OutputError;
+use manifactor::slam::run::RunError;
+use manifactor::slam::source::SourceError;
 use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use serde_json::{Value, json};
 use std::io::IsTerminal;
@@ -89,6 +93,68 @@ impl From<Diagnostics> for Failure {
     }
 }
 
+impl From<SourceError> for Failure {
+    fn from(error: SourceError) -> Self {
+        match error {
+            SourceError::Format(error) => error.into(),
+            other => Self::input(other),
+        }
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Source(error) => error.into(),
+            other => Self::input(other),
+        }
+    }
+}
+
+impl From<OutputError> for Failure {
+    fn from(error: OutputError) -> Self {
+        match error {
+            OutputError::Io { path, source } => Self::File { path, source },
+            other => Self::input(other),
+        }
+    }
+}
+
+impl From<FormatError> for Failure {
+    fn from(error: FormatError) -> Self {
+        match error {
+            FormatError::Io { path, source } => Self::File { path, source },
+            FormatError::Malformed(malformed) => Self::Documents(places(&malformed)),
+            other => Self::input(other),
+        }
+    }
+}
+
+/// The lines of a file that are wrong, with what is written there.
+fn places(malformed: &Malformed) -> Diagnostics {
+    let text = std::fs::read_to_string(&malformed.path).unwrap_or_default();
+    let source = Source::new(malformed.path.display().to_string(), text.clone());
+    let mut list: Vec<_> = malformed
+        .problems
+        .iter()
+        .map(|problem| {
+            // the first word is enough to mark a line; line 0 is the file as a whole
+            let before = text.split_inclusive('\n').take(problem.line.saturating_sub(1)).map(str::len).sum();
+            let rest = text.get(before..).unwrap_or_default();
+            let indent = rest.len() - rest.trim_start_matches([' ', '\t']).len();
+            let word = rest.split_whitespace().next().unwrap_or_default().len();
+            let place = source.place(before + indent..before + indent + word);
+            Diagnostic::new(place, Problem::invalid(problem.mistake.to_string()))
+        })
+        .collect();
+    if malformed.more > 0 {
+        let more = format!("and {} more lines are wrong", malformed.more);
+        list.push(Diagnostic::new(source.place(text.len()..text.len()), Problem::invalid(more)));
+    }
+    let nothing = || Diagnostic::new(source.place(0..0), Problem::invalid(malformed.to_string()));
+    Diagnostics::from_list(list).unwrap_or_else(|| nothing().into())
+}
+
 fn place_as_json(diagnostic: &Diagnostic) -> Value {
     json!({
         "message": diagnostic.message(),
@@ -108,7 +174,7 @@ pub(crate) fn render(diagnostic: &Diagnostic) -> String {
         // a file that could not be read has no line to show
         return fancy(plain(&format!("{}: {}", source.name(), diagnostic.message()), help.as_deref()).into());
     }
-    let mut labels = vec![LabeledSpan::at(diagnostic.place.span.clone(), "here")];
+    let mut labels = vec![LabeledSpan::underline(diagnostic.place.span.clone())];
     let mut message = message;
     if let Some((place, label)) = &diagnostic.related {
         if place.source == *source {

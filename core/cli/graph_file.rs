@@ -1,30 +1,71 @@
 //! Graphs in files, by extension.
 use crate::failure::Failure;
 use crate::solver::SolverArguments;
-use crate::text::count;
-use clap::Args;
+use crate::text::{count, list};
+use clap::{Args, ValueEnum};
 use manifactor::config::{Document, Errors, Format, read_graph_section, write_graph};
+use manifactor::formats::pose_graph::{self, Options, Repair, Report};
+use manifactor::formats::{FormatError, g2o};
 use manifactor::graph::{Graph, Values};
 use manifactor::solve::Optimizer;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// How a graph is read.
+/// How a pose graph is read.
 #[derive(Debug, Args)]
-pub(crate) struct Reading {}
+pub(crate) struct Reading {
+    /// What to do with information matrices of a pose graph that are not positive definite.
+    #[arg(long, value_enum, default_value = "error")]
+    repair: RepairChoice,
+    /// Do not hold the first pose where nothing in a pose graph fixes it.
+    #[arg(long)]
+    no_anchor: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum RepairChoice {
+    /// Say so, with the line, and stop.
+    Error,
+    /// Leave the edge out.
+    Reject,
+    /// Raise its eigenvalues to 1e-9 of the largest.
+    Clamp,
+}
 
 /// What a file says.
 pub(crate) struct GraphFile {
     pub graph: Graph,
     pub values: Values,
     pub optimizer: Box<dyn Optimizer>,
-    pub warnings: Vec<String>,
+    /// What the reader had to decide.
+    pub notes: Vec<String>,
 }
 
 impl Reading {
     /// Reads a graph, and the solver that file and command line ask for.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
-        literal(path, solver)
+        if Format::of_path(path).is_some() { literal(path, solver) } else { self.pose_graph(path, solver) }
+    }
+
+    /// g2o or TORO: the solver is all that `--set` can set.
+    fn pose_graph(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
+        let mut settings = Document::parse("settings", "", Format::Toml)?;
+        solver.apply(&mut settings)?;
+        let errors = Errors::new();
+        let optimizer = settings.section(&errors).and_then(|mut section| {
+            let optimizer = solver.take(&mut section, settings.source());
+            section.finish();
+            optimizer
+        });
+        let optimizer = errors.finish(optimizer)?;
+        let repair = match self.repair {
+            RepairChoice::Error => Repair::Error,
+            RepairChoice::Reject => Repair::Reject,
+            RepairChoice::Clamp => Repair::Clamp,
+        };
+        let options = Options { repair, anchor: !self.no_anchor, ..Options::default() };
+        let read = pose_graph::read(path, &options).map_err(Failure::from)?;
+        Ok(GraphFile { graph: read.graph, values: read.values, optimizer, notes: notes(&read.report) })
     }
 }
 
@@ -37,21 +78,89 @@ fn literal(path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> 
         let (graph, values) = read_graph_section(&mut section);
         let optimizer = solver.take(&mut section, document.source());
         section.finish();
-        Some(GraphFile { graph, values, optimizer: optimizer?, warnings: Vec::new() })
+        Some(GraphFile { graph, values, optimizer: optimizer?, notes: Vec::new() })
     });
     Ok(errors.finish(read.flatten())?)
 }
 
-/// Writes a graph with these values.
-pub(crate) fn write(path: &Path, graph: &Graph, values: &Values) -> Result<(), Failure> {
-    let format = Format::of_path(path).ok_or_else(|| {
-        Failure::with_help(
+/// What a pose graph's file left open, and how it was filled in.
+fn notes(report: &Report) -> Vec<String> {
+    let mut notes = Vec::new();
+    let keys = |keys: &[manifactor::graph::Key]| list(keys.iter().map(ToString::to_string));
+    let lines = |lines: &[usize]| list(lines.iter().map(ToString::to_string));
+    for (tag, n) in &report.unknown {
+        notes.push(format!("unknown tag `{tag}`: {} left out", count(*n, "line")));
+    }
+    if !report.filled.is_empty() {
+        let filled = count(report.filled.len(), "variable");
+        notes.push(format!(
+            "{filled} have no vertex line; their values come from a spanning tree of the edges"
+        ));
+    }
+    if !report.anchored.is_empty() {
+        notes
+            .push(format!("nothing fixes the gauge: held {} (--no-anchor does not)", keys(&report.anchored)));
+    }
+    if !report.rejected.is_empty() {
+        notes.push(format!(
+            "edges left out, as their information is not positive definite: lines {}",
+            lines(&report.rejected)
+        ));
+    }
+    if !report.clamped.is_empty() {
+        notes.push(format!("information made positive definite: lines {}", lines(&report.clamped)));
+    }
+    if report.equivalences_added > 0 {
+        notes.push(format!(
+            "{} without an edge: tied by a factor",
+            count(report.equivalences_added, "EQUIV line")
+        ));
+    }
+    notes
+}
+
+/// Writes a graph with these values; returns what the format has no word for.
+pub(crate) fn write(path: &Path, graph: &Graph, values: &Values) -> Result<Vec<String>, Failure> {
+    let is_g2o = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("g2o"));
+    match Format::of_path(path) {
+        Some(format) => {
+            let text = write_graph(graph, values, format).map_err(Failure::input)?;
+            std::fs::write(path, text).map_err(Failure::at(path))?;
+            Ok(Vec::new())
+        }
+        None if is_g2o => {
+            Ok(omitted(&g2o::write(path, graph, values).map_err(|e: FormatError| Failure::from(e))?))
+        }
+        None => Err(Failure::with_help(
             format!("{}: the extension names no format that graphs are written in", path.display()),
             "use .toml, .json, .yaml or .g2o",
-        )
-    })?;
-    let text = write_graph(graph, values, format).map_err(Failure::input)?;
-    std::fs::write(path, text).map_err(Failure::at(path))
+        )),
+    }
+}
+
+fn omitted(omitted: &g2o::Omitted) -> Vec<String> {
+    let mut notes: Vec<String> = Vec::new();
+    let counts = omitted
+        .variables
+        .iter()
+        .map(|c| (c, "variable"))
+        .chain(omitted.factors.iter().map(|c| (c, "factor")));
+    for ((name, n), what) in counts {
+        notes.push(format!("g2o has no word for {} of type {name}: left out", count(*n, what)));
+    }
+    if omitted.losses > 0 {
+        notes.push(format!("g2o has no word for robust losses: {} left out", omitted.losses));
+    }
+    if !omitted.partly_fixed.is_empty() {
+        notes.push(format!(
+            "g2o has no word for directions that are held: {} left out",
+            omitted.partly_fixed.len()
+        ));
+    }
+    if !omitted.renamed.is_empty() {
+        notes.push(format!("{} renamed: g2o has numbers only", count(omitted.renamed.len(), "variable")));
+    }
+    notes
 }
 
 /// What is in a graph, in a few lines.

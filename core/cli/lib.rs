@@ -18,8 +18,10 @@ mod graph_file;
 mod interrupt;
 mod output;
 mod report;
+mod run_file;
 mod solver;
 mod status;
+mod table;
 mod text;
 mod watch;
 

@@ -16,6 +16,11 @@ pub(crate) struct SolverArguments {
 }
 
 impl SolverArguments {
+    /// `--set` alone.
+    pub(crate) fn set_only(set: &[String]) -> Self {
+        Self { solver: None, set: set.to_vec() }
+    }
+
     /// Puts what `--set` says into the document.
     pub(crate) fn apply(&self, document: &mut Document) -> Result<(), Failure> {
         Ok(document.set(&self.set)?)

@@ -52,6 +52,14 @@ pub(crate) fn count(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
+/// The first few of a list, and how many more there are.
+pub(crate) fn list(items: impl ExactSizeIterator<Item = String>) -> String {
+    const SHOWN: usize = 8;
+    let more = items.len().saturating_sub(SHOWN);
+    let text = items.take(SHOWN).collect::<Vec<_>>().join(", ");
+    if more > 0 { format!("{text} and {more} more") } else { text }
+}
+
 /// Seconds, with three digits that say something.
 pub(crate) fn seconds(s: f64) -> String {
     match s {

@@ -39,7 +39,9 @@ impl Observer for Watch {
     fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
         match self {
             Self::Nothing => {}
-            Self::Bar(bar) => bar.set_message(format!("iteration {}, cost {:.6e}", record.iteration, record.cost)),
+            Self::Bar(bar) => {
+                bar.set_message(format!("iteration {}, cost {:.6e}", record.iteration, record.cost));
+            }
             Self::Lines { begun } => {
                 if !std::mem::replace(begun, true) {
                     eprintln!("{HEADER}");
@@ -59,7 +61,8 @@ impl Drop for Watch {
     }
 }
 
-const HEADER: &str = "iteration          cost         trial   gradient       step    control  inactive      time";
+const HEADER: &str =
+    "iteration          cost         trial   gradient       step    control  inactive      time";
 
 fn line(r: &IterationRecord) -> String {
     let trial = r.trial_cost.map_or("undefined".into(), |c| format!("{c:.6e}"));

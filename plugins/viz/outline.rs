@@ -1,19 +1,14 @@
-//! Outlines of solids, seen from far away.
+//! Outlines of ellipsoids, seen from far away.
 use crate::view::Plane;
 use nalgebra::{Matrix2x3, Matrix3, Point2, Vector3};
 
-/// A solid.
+/// An ellipsoid: what objects are drawn as.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Shape {
-    /// An ellipsoid.
-    Ellipsoid {
-        /// Where it is, metres.
-        centroid: Vector3<f64>,
-        /// A semi-axis in each column, metres: R diag(s).
-        axes: Matrix3<f64>,
-    },
-    /// The convex hull of these points: the corners of a box, the vertices of a mesh.
-    Hull(Vec<Vector3<f64>>),
+pub struct Shape {
+    /// Where it is, metres.
+    pub centroid: Vector3<f64>,
+    /// A semi-axis in each column, metres: R diag(s).
+    pub axes: Matrix3<f64>,
 }
 
 /// Corners of the polygon that an ellipse is drawn as.
@@ -22,13 +17,9 @@ const CORNERS: usize = 64;
 impl Shape {
     /// The closed outline, its first point repeated at the end. None, where there is nothing finite to draw.
     pub(crate) fn outline(&self, plane: &Plane) -> Option<Vec<Point2<f64>>> {
-        let mut outline = match self {
-            Shape::Ellipsoid { centroid, axes } => ellipse(plane, centroid, axes),
-            Shape::Hull(points) => hull(points.iter().map(|p| plane.project(p)).collect()),
-        };
+        let mut outline = ellipse(plane, &self.centroid, &self.axes);
         outline.extend(outline.first().copied());
-        let finite = outline.iter().all(|p| p.iter().all(|x| x.is_finite()));
-        (finite && !outline.is_empty()).then_some(outline)
+        outline.iter().all(|p| p.iter().all(|x| x.is_finite())).then_some(outline)
     }
 }
 
@@ -50,31 +41,6 @@ fn ellipse(plane: &Plane, centroid: &Vector3<f64>, axes: &Matrix3<f64>) -> Vec<P
     (0..CORNERS).map(point).collect()
 }
 
-/// The convex hull of points in the plane, counterclockwise (Andrew's monotone chain).
-fn hull(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
-    points.sort_by(|p, q| p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)));
-    points.dedup();
-    if points.len() < 3 {
-        return points;
-    }
-    let half = |points: &mut dyn Iterator<Item = Point2<f64>>| {
-        let mut chain: Vec<Point2<f64>> = Vec::new();
-        for p in points {
-            while let [.., a, b] = chain.as_slice()
-                && (b - a).perp(&(p - b)) <= 0.0
-            {
-                chain.pop();
-            }
-            chain.push(p);
-        }
-        chain.pop();
-        chain
-    };
-    let mut lower = half(&mut points.iter().copied());
-    lower.extend(half(&mut points.iter().rev().copied()));
-    lower
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,7 +55,7 @@ mod tests {
     fn an_ellipse_touches_the_bounds_of_its_ellipsoid() {
         let axes = nalgebra::Rotation3::from_euler_angles(0.4, -0.3, 1.1).into_inner()
             * Matrix3::from_diagonal(&Vector3::new(0.5, 0.2, 0.1));
-        let shape = Shape::Ellipsoid { centroid: Vector3::new(1.0, 2.0, 3.0), axes };
+        let shape = Shape { centroid: Vector3::new(1.0, 2.0, 3.0), axes };
         let outline = shape.outline(&top()).unwrap();
         let widest = outline.iter().map(|p| p.x - 1.0).fold(0.0, f64::max);
         // the half width of an ellipsoid along x is the norm of that row of R diag(s)
@@ -100,22 +66,11 @@ mod tests {
     }
 
     #[test]
-    fn a_box_from_above_is_a_rectangle() {
-        let corner = |k: usize| Vector3::from_fn(|i, _| if k >> i & 1 == 1 { 1.0 } else { -1.0 });
-        let mut points: Vec<_> = (0..8).map(corner).collect();
-        points.push(Vector3::zeros());
-        let outline = Shape::Hull(points).outline(&top()).unwrap();
-        assert_eq!(outline.len(), 5);
-        assert!(outline.iter().all(|p| p.x.abs() == 1.0 && p.y.abs() == 1.0));
-    }
-
-    #[test]
     fn flat_and_broken_shapes_do_no_harm() {
         let flat = Matrix3::from_diagonal(&Vector3::new(0.0, 1.0, 0.0));
-        let flat = Shape::Ellipsoid { centroid: Vector3::zeros(), axes: flat };
+        let flat = Shape { centroid: Vector3::zeros(), axes: flat };
         assert!(flat.outline(&top()).is_some());
-        let broken = Shape::Ellipsoid { centroid: Vector3::repeat(f64::NAN), axes: Matrix3::identity() };
+        let broken = Shape { centroid: Vector3::repeat(f64::NAN), axes: Matrix3::identity() };
         assert_eq!(broken.outline(&top()), None);
-        assert_eq!(Shape::Hull(vec![]).outline(&top()), None);
     }
 }

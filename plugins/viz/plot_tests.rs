@@ -3,10 +3,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 fn ellipsoid(centroid: [f64; 3], semi_axes: [f64; 3], yaw: f64) -> Shape {
     let rotation = Rotation3::from_euler_angles(0.0, 0.0, yaw).into_inner();
-    Shape::Ellipsoid {
-        centroid: centroid.into(),
-        axes: rotation * Matrix3::from_diagonal(&Vector3::from(semi_axes)),
-    }
+    Shape { centroid: centroid.into(), axes: rotation * Matrix3::from_diagonal(&Vector3::from(semi_axes)) }
 }
 
 /// A camera on a circle around a table with four objects.

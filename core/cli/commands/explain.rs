@@ -47,7 +47,8 @@ impl Explain {
 }
 
 fn explain(entry: &Entry) -> String {
-    let mut out = format!("{}: a {}, of {}\n\n{}\n", entry.name, entry.kind, entry.module, prose(&entry.docs()));
+    let mut out =
+        format!("{}: a {}, of {}\n\n{}\n", entry.name, entry.kind, entry.module, prose(&entry.docs()));
     let signature = (entry.signature)();
     if let Some(rows) = signature.rows {
         let names: Vec<_> = signature.variables.iter().map(|id| catalogue::manifold_name(*id)).collect();
@@ -61,7 +62,8 @@ fn explain(entry: &Entry) -> String {
     if !fields.is_empty() {
         let mut table = text::words(&["field", "type", "default", "what it is"]);
         for field in fields {
-            let default = field.default.unwrap_or_else(|| if field.required { "required" } else { "" }.into());
+            let default =
+                field.default.unwrap_or_else(|| if field.required { "required" } else { "" }.into());
             table.add_row([field.name, field.kind, default, field.docs]);
         }
         out += &format!("\n{table}\n");

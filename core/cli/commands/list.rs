@@ -25,7 +25,8 @@ impl List {
             Some(kind) => catalogue::entries(known(kind)?),
         };
         if self.json {
-            let rows = entries.iter().map(|e| json!({ "kind": e.kind, "name": e.name, "summary": e.summary() }));
+            let rows =
+                entries.iter().map(|e| json!({ "kind": e.kind, "name": e.name, "summary": e.summary() }));
             output::json(&rows.collect::<Vec<_>>());
             return Ok(Status::Done);
         }
@@ -50,7 +51,8 @@ fn known(kind: &str) -> Result<&'static str, Failure> {
     if let Some(found) = kinds.iter().find(|k| singular.contains(&Some(**k))) {
         return Ok(found);
     }
-    let meant = nearest(kind, kinds.iter().copied()).map(|k| format!("did you mean `{k}`? ")).unwrap_or_default();
+    let meant =
+        nearest(kind, kinds.iter().copied()).map(|k| format!("did you mean `{k}`? ")).unwrap_or_default();
     Err(Failure::with_help(
         format!("there is no kind of things called `{kind}`"),
         format!("{meant}there are {}", kinds.join(", ")),

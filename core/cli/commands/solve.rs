@@ -6,7 +6,7 @@ use crate::status::Status;
 use crate::watch::Watch;
 use crate::{interrupt, output, report};
 use clap::Args;
-use manifactor::solve::{All, CompileError, Solution, solve};
+use manifactor::solve::{All, Solution, solve};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -33,16 +33,19 @@ pub(crate) struct Solve {
 impl Solve {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         let input = self.reading.open(&self.graph, &self.solver)?;
-        for warning in &input.warnings {
-            eprintln!("warning: {warning}");
+        for note in &input.notes {
+            eprintln!("note: {note}");
         }
         let mut watch = Watch::new(self.verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();
         let mut observer = All(vec![&mut watch, &mut interrupt]);
-        let solution = solve(&input.graph, &input.values, &*input.optimizer, &mut observer).map_err(misfit)?;
+        let solution = solve(&input.graph, &input.values, &*input.optimizer, &mut observer);
+        let solution = solution.map_err(Failure::input)?;
         drop(watch);
         if let Some(path) = &self.out {
-            graph_file::write(path, &input.graph, &solution.values)?;
+            for note in graph_file::write(path, &input.graph, &solution.values)? {
+                eprintln!("note: {note}");
+            }
         }
         if self.json {
             output::json(&self.as_json(&input, &solution));
@@ -65,16 +68,11 @@ impl Solve {
             "undetermined": outcome.undetermined,
             "inactive": outcome.inactive,
             "seconds": outcome.times,
-            "warnings": input.warnings,
+            "notes": input.notes,
         });
         if self.verbose {
             json["history"] = json!(outcome.history);
         }
         json
     }
-}
-
-/// What a file's reader did not find: it has no places any more.
-fn misfit(error: CompileError) -> Failure {
-    Failure::input(error)
 }

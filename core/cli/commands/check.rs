@@ -1,0 +1,79 @@
+//! `manifactor check`: a document, without solving anything.
+use crate::failure::Failure;
+use crate::graph_file::{self, Reading};
+use crate::output;
+use crate::run_file::RunArguments;
+use crate::solver::SolverArguments;
+use crate::status::Status;
+use crate::text::count;
+use clap::Args;
+use manifactor::config::{Document, Format, Value};
+use manifactor::slam::mapping::Mapping;
+use manifactor::slam::run::Run as Running;
+use serde_json::json;
+
+/// Check a run or a graph without solving it: everything that is wrong, each at its line.
+#[derive(Debug, Args)]
+pub(crate) struct Check {
+    #[command(flatten)]
+    run: RunArguments,
+    /// Load the data of a run and build its graphs too.
+    #[arg(long)]
+    load: bool,
+    #[command(flatten)]
+    reading: Reading,
+    /// Print JSON: what is wrong, or that nothing is.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl Check {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let path = &self.run.config;
+        let found = if Format::of_path(path).is_some() {
+            let document = Document::open(path)?;
+            let is_graph = matches!(&document.root().value, Value::Table(t) if t.contains_key("variables"));
+            if is_graph { self.graph()? } else { self.document(document)? }
+        } else {
+            self.graph()?
+        };
+        if self.json {
+            output::json(&json!({ "errors": [], "found": found }));
+        } else {
+            output::print(&format!("{}: nothing wrong.\n{found}\n", path.display()));
+        }
+        Ok(Status::Done)
+    }
+
+    fn graph(&self) -> Result<String, Failure> {
+        let input = self.reading.open(&self.run.config, &SolverArguments::set_only(&self.run.set))?;
+        for note in &input.notes {
+            eprintln!("note: {note}");
+        }
+        Ok(graph_file::summary(&input).trim_end().to_owned())
+    }
+
+    fn document(&self, document: Document) -> Result<String, Failure> {
+        let document = self.run.read(document)?;
+        let mut lines = vec![format!("A run of {}.", count(document.variants.len(), "variant"))];
+        let mut run = Running::new(&document, self.run.data());
+        for variant in document.variants.iter().filter(|_| self.load) {
+            let sequence = run.sequence(variant)?;
+            let mapping = Mapping::new(&sequence, &variant.settings).map_err(Failure::input)?;
+            for warning in &mapping.warnings {
+                eprintln!("warning: {}: {warning}", variant.name);
+            }
+            lines.push(format!(
+                "{}: {}, {}, {}, {} of which {} mapped, {}",
+                variant.name,
+                count(sequence.frames.len(), "frame"),
+                count(sequence.detections.len(), "detection"),
+                count(mapping.values.len(), "variable"),
+                count(mapping.objects.len(), "object"),
+                mapping.mapped().count(),
+                count(mapping.graph.factors().len(), "factor"),
+            ));
+        }
+        Ok(lines.join("\n"))
+    }
+}

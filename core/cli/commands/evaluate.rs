@@ -1,0 +1,91 @@
+//! `manifactor evaluate`: a trajectory against the truth.
+use crate::failure::Failure;
+use crate::status::Status;
+use crate::{output, text};
+use clap::{Args, ValueEnum};
+use manifactor::formats::tum;
+use manifactor::slam::metrics::{
+    Alignment, MetricsError, Pairing, Statistics, absolute_error, align, associate, relative_error,
+};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Compare two trajectories in TUM's format (timestamp tx ty tz qx qy qz qw): ATE and RPE.
+#[derive(Debug, Args)]
+pub(crate) struct Evaluate {
+    /// The true trajectory.
+    truth: PathBuf,
+    /// The estimated one.
+    estimate: PathBuf,
+    /// How the estimate is brought into the frame of the truth.
+    #[arg(long, value_enum, default_value = "se3")]
+    align: Align,
+    /// How far apart in time two poses of one pair may be, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
+    within: f64,
+    /// Poses between the two ends of a relative error.
+    #[arg(long, value_name = "POSES", default_value_t = 1)]
+    delta: usize,
+    /// Relative errors from each pose on, not from each end to the next.
+    #[arg(long)]
+    all_pairs: bool,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Align {
+    /// The rotation and translation that bring the positions closest.
+    Se3,
+    /// And a scale.
+    Sim3,
+    /// So that the first poses agree.
+    First,
+    /// Not at all.
+    None,
+}
+
+impl From<Align> for Alignment {
+    fn from(align: Align) -> Self {
+        match align {
+            Align::Se3 => Self::Se3,
+            Align::Sim3 => Self::Sim3,
+            Align::First => Self::FirstPose,
+            Align::None => Self::None,
+        }
+    }
+}
+
+impl Evaluate {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let (truth, estimate) = (tum::read(&self.truth)?, tum::read(&self.estimate)?);
+        let pairing = if self.all_pairs { Pairing::All } else { Pairing::Consecutive };
+        let measure = || -> Result<_, MetricsError> {
+            let pairs = associate(&truth.poses, &estimate.poses, self.within)?;
+            let (similarity, pairs) = align(&pairs, self.align.into())?;
+            let (ate, rpe) = (absolute_error(&pairs)?, relative_error(&pairs, self.delta, pairing)?);
+            Ok((similarity.scale, pairs.len(), ate, rpe))
+        };
+        let (scale, pairs, ate, rpe) = measure().map_err(Failure::input)?;
+        if self.json {
+            output::json(&json!({
+                "pairs": pairs, "scale": scale, "ate": ate,
+                "rpe": { "translation": rpe.translation, "rotation": rpe.rotation },
+            }));
+            return Ok(Status::Done);
+        }
+        let mut table = text::table(&["error", "rmse", "mean", "median", "std", "min", "max"]);
+        table.add_row(row("ATE, m", &ate));
+        table.add_row(row("RPE translation, m", &rpe.translation));
+        table.add_row(row("RPE rotation, rad", &rpe.rotation));
+        output::print(&format!("{}, scale {scale:.6}\n{table}\n", text::count(pairs, "matched pose")));
+        Ok(Status::Done)
+    }
+}
+
+fn row(name: &str, s: &Statistics) -> [String; 7] {
+    let [rmse, mean, median, std, min, max] =
+        [s.rmse, s.mean, s.median, s.std, s.min, s.max].map(|x| format!("{x:.6}"));
+    [name.to_owned(), rmse, mean, median, std, min, max]
+}

@@ -1,0 +1,74 @@
+//! `manifactor run`: a run from its document to its files.
+use crate::failure::Failure;
+use crate::run_file::RunArguments;
+use crate::status::Status;
+use crate::watch::Watch;
+use crate::{interrupt, output, table};
+use clap::Args;
+use manifactor::slam::output::{variant_folder, write_report, write_variant, write_whole};
+use manifactor::slam::run::Run as Running;
+use manifactor::solve::All;
+use manifactor::viz::{Scene, View, plot};
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Build, solve, evaluate and write what a document describes.
+///
+/// Each variant of the run gets a folder with its settings, trajectory, objects, graph, iterations, metrics and
+/// pictures (map_top.svg, map_side.svg).
+#[derive(Debug, Args)]
+pub(crate) struct Run {
+    #[command(flatten)]
+    run: RunArguments,
+    /// The folder for the results; that of the document, where nothing is said.
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print JSON: the report that is also written.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Show each step of each solve.
+    #[arg(long, short)]
+    verbose: bool,
+}
+
+impl Run {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let mut document = self.run.open()?;
+        if let Some(out) = &self.out {
+            document.output.clone_from(out);
+        }
+        let mut interrupt = interrupt::on_ctrl_c();
+        let mut status = Status::Done;
+        let mut run = Running::new(&document, self.run.data());
+        for variant in &document.variants {
+            if self.verbose {
+                eprintln!("{}", variant.name);
+            }
+            let mut watch = Watch::new(self.verbose, &variant.name);
+            let mut observer = All(vec![&mut watch, &mut interrupt]);
+            let (estimate, report) = run.variant(variant, &mut observer)?;
+            drop(watch);
+            status = status.and(Status::from(&report.solve.termination));
+            let folder = write_variant(&document, variant, &estimate, &report)?;
+            let title = format!("{}: {}", document.title, variant.name);
+            let scene = Scene::of_estimate(title, &estimate, variant.settings.evaluation.max_time_difference);
+            write_whole(&folder.join("map_top.svg"), &plot(&scene, View::Top))?;
+            write_whole(&folder.join("map_side.svg"), &plot(&scene, View::Side))?;
+            if interrupt.0.load(Ordering::Relaxed) {
+                status = Status::Interrupted;
+                break;
+            }
+        }
+        let report = run.finish();
+        write_report(&document.output, &report)?;
+        if self.json {
+            output::json(&report);
+        } else {
+            output::print(&table::of_run(&report));
+            let folder = document.variants.first().map(|v| variant_folder(&document.output, &v.name));
+            let picture = folder.map(|f| f.join("map_top.svg").display().to_string()).unwrap_or_default();
+            output::print(&format!("\nWritten to {}; a picture is {picture}.\n", document.output.display()));
+        }
+        Ok(status)
+    }
+}

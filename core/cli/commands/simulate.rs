@@ -1,0 +1,45 @@
+//! `manifactor simulate`: a sequence, as files.
+use crate::failure::Failure;
+use crate::output;
+use crate::run_file::RunArguments;
+use crate::status::Status;
+use crate::text::count;
+use clap::Args;
+use manifactor::config::{Diagnostic, Problem, Source};
+use manifactor::slam::recording;
+use manifactor::slam::run::Run as Running;
+use std::path::PathBuf;
+
+/// Write the sequence of a run's source as files, which the source `recorded` reads.
+///
+/// They are odometry.txt and groundtruth.txt (TUM's format), detections.csv and objects.json.
+#[derive(Debug, Args)]
+pub(crate) struct Simulate {
+    #[command(flatten)]
+    run: RunArguments,
+    /// The folder for the files.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl Simulate {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let document = self.run.open()?;
+        let Some(variant) = document.variants.first() else {
+            let source = Source::new(self.run.config.display().to_string(), "");
+            let problem = Problem::invalid("there is no variant to simulate");
+            return Err(Failure::Documents(Diagnostic::new(source.place(0..0), problem).into()));
+        };
+        let sequence = Running::new(&document, self.run.data()).sequence(variant)?;
+        recording::write(&sequence, &self.out)?;
+        let objects = sequence.ground_truth.as_ref().map_or(0, |truth| truth.objects.len());
+        output::print(&format!(
+            "{}, {}, {} written to {}\n",
+            count(sequence.frames.len(), "frame"),
+            count(sequence.detections.len(), "detection"),
+            count(objects, "true object"),
+            self.out.display()
+        ));
+        Ok(Status::Done)
+    }
+}

@@ -1,0 +1,116 @@
+//! Which way things depend on one another: the arrows of the design, as `cargo metadata` sees them.
+use cargo_metadata::{MetadataCommand, Package};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// From the bottom up: a plugin may build on those before it.
+const PLUGINS: [&str; 5] = ["geometry", "quadric", "formats", "slam", "viz"];
+/// What a plugin may take from the core.
+const FOR_PLUGINS: [&str; 4] = ["graph", "solve", "config", "testing"];
+
+fn packages() -> Vec<Package> {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
+    MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap().packages
+}
+
+/// `solve` for `manifactor-solve`, `manifactor` for the facade; `None` for what is not ours.
+fn short(name: &str) -> Option<&str> {
+    name.strip_prefix("manifactor-").or((name == "manifactor").then_some(name))
+}
+
+/// By package of the workspace, the packages of the workspace that it depends on, for tests or not.
+fn arrows() -> BTreeMap<String, Vec<String>> {
+    let ours = |p: &Package| {
+        let deps = p.dependencies.iter().filter_map(|d| short(&d.name)).map(str::to_owned);
+        // a package's own tests may ask for another feature of itself
+        deps.filter(|d| Some(d.as_str()) != short(&p.name)).collect()
+    };
+    packages().iter().filter_map(|p| Some((short(&p.name)?.to_owned(), ours(p)))).collect()
+}
+
+/// Fails for the first arrow that is not among those allowed.
+fn only(from: &str, allowed: &[&str]) {
+    for to in &arrows()[from] {
+        assert!(allowed.contains(&to.as_str()), "{from} must not depend on {to}, only on {allowed:?}");
+    }
+}
+
+fn users_of(package: &str) -> Vec<String> {
+    let uses = |p: &&Package| p.dependencies.iter().any(|d| d.name == package);
+    packages().iter().filter(uses).map(|p| p.name.to_string()).collect()
+}
+
+#[test]
+fn the_graph_knows_nothing_of_ours() {
+    only("graph", &[]);
+}
+
+#[test]
+fn solve_config_and_testing_know_the_graph_and_not_each_other() {
+    for part in ["solve", "config", "testing"] {
+        only(part, &["graph"]);
+    }
+}
+
+#[test]
+fn plugins_build_on_core_and_on_the_plugins_below() {
+    for (i, plugin) in PLUGINS.iter().enumerate() {
+        let allowed: Vec<_> = FOR_PLUGINS.iter().chain(&PLUGINS[..i]).copied().collect();
+        only(plugin, &allowed);
+    }
+}
+
+#[test]
+fn the_command_line_knows_the_facade_alone() {
+    only("cli", &["manifactor"]);
+    let allowed: Vec<_> = FOR_PLUGINS.iter().chain(&PLUGINS).copied().collect();
+    only("manifactor", &allowed);
+}
+
+#[test]
+fn every_package_has_its_place() {
+    let known: Vec<_> = FOR_PLUGINS.iter().chain(&PLUGINS).chain(&["cli", "manifactor"]).copied().collect();
+    for (package, _) in arrows() {
+        assert!(known.contains(&package.as_str()), "{package} is new: say in this test where it stands");
+    }
+}
+
+#[test]
+fn faer_stays_in_solve_and_num_dual_in_graph() {
+    assert_eq!(users_of("faer"), ["manifactor-solve"]);
+    assert_eq!(users_of("num-dual"), ["manifactor-graph"]);
+}
+
+#[test]
+fn every_dependency_is_in_the_one_table() {
+    for package in packages() {
+        let manifest = std::fs::read_to_string(&package.manifest_path).unwrap();
+        let tables = manifest.split("\n[").filter(|t| {
+            let header = t.split(']').next().unwrap_or_default();
+            header.ends_with("dependencies") && !header.starts_with("workspace")
+        });
+        for line in tables.flat_map(str::lines).filter(|l| l.contains('=') && !l.starts_with('#')) {
+            assert!(line.contains("workspace = true"), "{}: {line}", package.name);
+        }
+    }
+}
+
+#[test]
+fn no_file_of_source_is_longer_than_500_lines() {
+    fn walk(folder: &Path, check: &mut dyn FnMut(&Path)) {
+        for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
+            if entry.is_dir() {
+                walk(&entry, check);
+            } else if entry.extension().is_some_and(|e| e == "rs") {
+                check(&entry);
+            }
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for folder in ["core", "plugins", "tests", "examples"] {
+        walk(&root.join(folder), &mut |file| {
+            let lines = std::fs::read_to_string(file).unwrap().lines().count();
+            assert!(lines <= 500, "{} has {lines} lines", file.display());
+        });
+    }
+}

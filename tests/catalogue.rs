@@ -1,0 +1,179 @@
+//! What every registered type has to have, checked by walking the catalogue.
+use manifactor::config::{Document, Format, Node, Value};
+use manifactor::graph::catalogue::{Entry, Kind, all, entries};
+use manifactor::graph::loss::Loss;
+use manifactor::graph::{Factor, Noise, Variable};
+use manifactor::quadric::initialise::Initialiser;
+use manifactor::slam::gravity::Gravity;
+use manifactor::slam::source::Source;
+use manifactor::solve::Optimizer;
+use manifactor_testing::catalogue::{documentation_law, factor_law, manifold_law};
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::{Value as Json, json};
+use std::collections::BTreeSet;
+
+/// `geometry.between_se3` and the like, for messages.
+fn id(entry: &Entry) -> String {
+    format!("{} `{}` of {}", entry.kind, entry.name, entry.module)
+}
+
+#[test]
+fn names_are_unique_within_a_kind() {
+    for pair in all().windows(2) {
+        assert_ne!(
+            (pair[0].kind, pair[0].name),
+            (pair[1].kind, pair[1].name),
+            "{} is registered twice",
+            id(pair[1])
+        );
+    }
+}
+
+#[test]
+fn the_plugins_are_linked() {
+    for (kind, name) in [
+        ("factor", "between_se3"),
+        ("factor", "vertical_orientation"),
+        ("variable", "dual_quadric"),
+        ("solver", "levenberg_marquardt"),
+        ("source", "simulated"),
+        ("loss", "cauchy"),
+    ] {
+        assert!(entries(kind).iter().any(|e| e.name == name), "no {kind} `{name}`");
+    }
+}
+
+#[test]
+fn every_type_has_docs_and_an_example_and_documented_fields() {
+    for entry in all() {
+        documentation_law(entry).unwrap_or_else(|e| panic!("{e}"));
+        let summary = entry.summary();
+        assert!((10..=200).contains(&summary.len()), "summary of {}: {summary:?}", id(entry));
+        let schema = (entry.schema)();
+        for (field, of) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
+            let described = of.get("description").is_some() || of.get("$ref").is_some();
+            assert!(described, "field `{field}` of {} has no docs", id(entry));
+        }
+    }
+}
+
+#[test]
+fn every_factor_agrees_with_its_derivatives() {
+    for entry in entries("factor") {
+        let defined = factor_law(entry, 256).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
+        assert!(defined > 0, "{} is defined nowhere around its example", id(entry));
+    }
+}
+
+#[test]
+fn every_manifold_keeps_the_laws() {
+    for entry in entries("variable") {
+        manifold_law(entry, 256).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
+    }
+}
+
+#[test]
+fn every_example_reads_and_writes_the_same_type_again() {
+    for entry in all() {
+        let example = example(entry);
+        let tables = tables_of_type(example.root(), entry.name);
+        assert!(
+            !tables.is_empty(),
+            "the example of {} does not show it:\n{}",
+            id(entry),
+            example.source().text()
+        );
+        for table in tables {
+            let tagged = table.to_json().unwrap();
+            round_trip(entry, &tagged);
+        }
+    }
+}
+
+#[test]
+fn noise_in_the_examples_of_factors_fits_their_rows() {
+    for entry in entries("factor") {
+        let example = example(entry);
+        let Value::Table(root) = &example.root().value else { continue };
+        let Some(Value::Array(factors)) = root.get("factors").map(|f| &f.node.value) else { continue };
+        for factor in factors {
+            let factor = factor.to_json().unwrap();
+            let noise: Noise = factor
+                .get("noise")
+                .map_or_else(Noise::default, |n| serde_json::from_value(n.clone()).unwrap());
+            let rows = (entry.signature)().rows.unwrap();
+            assert!(
+                noise.whitener(rows).is_ok(),
+                "{} has {rows} rows, its example's noise has not",
+                id(entry)
+            );
+            let keys = factor["keys"].as_array().unwrap().len();
+            let signature = (entry.signature)();
+            assert!(signature.many || keys == signature.variables.len(), "{}: {keys} keys", id(entry));
+        }
+    }
+}
+
+#[test]
+fn typetag_and_catalogue_know_the_same_names() {
+    let mut kinds: Vec<_> = all().iter().map(|e| e.kind).collect();
+    kinds.dedup();
+    for kind in kinds {
+        let catalogue: BTreeSet<String> = entries(kind).iter().map(|e| e.name.to_owned()).collect();
+        assert_eq!(typetag_names(kind), catalogue, "{kind}");
+    }
+}
+
+fn example(entry: &Entry) -> Document {
+    let text = entry.example().unwrap_or_else(|| panic!("{} has no example", id(entry)));
+    Document::parse(id(entry), text, Format::Toml).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// All tables in a document whose `type` is that name.
+fn tables_of_type<'a>(node: &'a Node, name: &str) -> Vec<&'a Node> {
+    match &node.value {
+        Value::Table(table) => {
+            let is_it = table.get("type").is_some_and(|f| f.node.value == Value::String(name.into()));
+            let inner = table.values().flat_map(|field| tables_of_type(&field.node, name));
+            is_it.then_some(node).into_iter().chain(inner).collect()
+        }
+        Value::Array(items) => items.iter().flat_map(|item| tables_of_type(item, name)).collect(),
+        _ => vec![],
+    }
+}
+
+/// One arm for each kind: a new kind has to be added here.
+macro_rules! for_kind {
+    ($kind:expr, $call:ident($($argument:expr),*)) => {
+        match $kind {
+            k if k == <dyn Factor as Kind>::NAME => $call::<Box<dyn Factor>>($($argument),*),
+            k if k == <dyn Variable as Kind>::NAME => $call::<Box<dyn Variable>>($($argument),*),
+            k if k == <dyn Loss as Kind>::NAME => $call::<Box<dyn Loss>>($($argument),*),
+            k if k == <dyn Optimizer as Kind>::NAME => $call::<Box<dyn Optimizer>>($($argument),*),
+            k if k == <dyn Source as Kind>::NAME => $call::<Box<dyn Source>>($($argument),*),
+            k if k == <dyn Gravity as Kind>::NAME => $call::<Box<dyn Gravity>>($($argument),*),
+            k if k == <dyn Initialiser as Kind>::NAME => $call::<Box<dyn Initialiser>>($($argument),*),
+            other => panic!("the kind `{other}` is new: add it to this test"),
+        }
+    };
+}
+
+fn round_trip(entry: &Entry, tagged: &Json) {
+    fn again<T: Serialize + DeserializeOwned>(tagged: &Json) -> Result<Json, serde_json::Error> {
+        serde_json::to_value(serde_json::from_value::<T>(tagged.clone())?)
+    }
+    let written = for_kind!(entry.kind, again(tagged)).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
+    assert_eq!(written["type"], entry.name);
+    let twice = for_kind!(entry.kind, again(&written)).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
+    assert_eq!(written, twice, "{}", id(entry));
+}
+
+/// serde names all variants where it meets an unknown one.
+fn typetag_names(kind: &str) -> BTreeSet<String> {
+    fn error<T: DeserializeOwned>() -> String {
+        serde_json::from_value::<T>(json!({ "type": "no such name" })).err().unwrap().to_string()
+    }
+    let error = for_kind!(kind, error());
+    let (_, expected) = error.split_once("expected").unwrap_or_else(|| panic!("{error}"));
+    expected.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
