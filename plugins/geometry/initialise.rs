@@ -1,8 +1,8 @@
 //! Initial values from relative measurements, for graphs that come without.
 //!
 //! Variables are placed along a spanning tree of the between factors. A component of the graph that
-//! has a variable with a value grows from there; else from its first prior; else from the first
-//! variable that a factor names, at the identity.
+//! has a variable with a value grows from there; else from its first prior; else from its first
+//! fixed variable, or the first that a between factor names, at the identity.
 use crate::lie_group::LieGroup;
 use crate::{BearingRange2, BearingRange3, Point1, Point2, Point3, Se2, Se3, So2, So3};
 use crate::{Between, Landmark, Prior};
@@ -25,7 +25,7 @@ pub enum Tree {
     Shallow,
 }
 
-/// A value for every variable that between factors lead to, beside the given ones.
+/// A value for every variable that has a prior or that between factors lead to, beside the given ones.
 ///
 /// Points that are still without a value are placed from the first landmark or bearing-range factor
 /// of a pose that has one. Variables that nothing leads to stay without, for [`Graph::check`] to name.
@@ -63,7 +63,8 @@ struct Forest<'a, G> {
     edges: Vec<(usize, usize, &'a G)>,
     /// Edges of each variable.
     joining: Vec<Vec<usize>>,
-    priors: Vec<(usize, &'a G)>,
+    /// Where to begin in a part without values, best first.
+    roots: Vec<(usize, G)>,
 }
 
 impl<'a, G: LieGroup + Variable> Forest<'a, G>
@@ -73,7 +74,7 @@ where
 {
     fn of(graph: &'a Graph, values: &Values) -> Result<Self, ValueError> {
         let mut forest =
-            Forest { keys: vec![], places: vec![], edges: vec![], joining: vec![], priors: vec![] };
+            Forest { keys: vec![], places: vec![], edges: vec![], joining: vec![], roots: vec![] };
         let mut index = HashMap::new();
         for entry in graph.factors() {
             let Some((between, [a, b])) = as_factor::<Between<G>, 2>(entry) else { continue };
@@ -84,8 +85,14 @@ where
             forest.joining[a].push(edge);
             forest.joining[b].push(edge);
         }
-        let priors = graph.factors().iter().filter_map(as_factor::<Prior<G>, 1>);
-        forest.priors = priors.filter_map(|(prior, [x])| Some((*index.get(x)?, &prior.value))).collect();
+        for entry in graph.factors() {
+            let Some((prior, [x])) = as_factor::<Prior<G>, 1>(entry) else { continue };
+            let x = forest.variable(x, values, &mut index)?;
+            forest.roots.push((x, prior.value.clone()));
+        }
+        let fixed = graph.fixed().keys().filter_map(|x| index.get(x).copied());
+        let others = fixed.chain(0..forest.keys.len()).map(|i| (i, G::identity()));
+        forest.roots.extend(others);
         Ok(forest)
     }
 
@@ -138,9 +145,7 @@ where
     let mut forest = Forest::<G>::of(graph, values)?;
     let given: Vec<usize> = (0..forest.keys.len()).filter(|i| forest.places[*i].is_some()).collect();
     forest.grow(&given, tree);
-    let priors: Vec<_> = forest.priors.iter().map(|(i, value)| (*i, (*value).clone())).collect();
-    let first = (0..forest.keys.len()).map(|i| (i, G::identity()));
-    for (root, place) in priors.into_iter().chain(first) {
+    for (root, place) in std::mem::take(&mut forest.roots) {
         if forest.places[root].is_none() {
             forest.places[root] = Some(place);
             forest.grow(&[root], tree);
@@ -230,8 +235,11 @@ mod tests {
         graph.add(["a0", "a1"], step(1.0, 0.0));
         graph.add(["b0", "b1"], step(1.0, 0.0));
         graph.add(["b1"], Prior { value: Se2::exp(&Vector3::new(5.0, 0.0, 0.0)) });
+        graph.add(["c0", "c1"], step(1.0, 0.0));
+        graph.fix("c1");
         let values = spanning_tree(&graph, &Values::new(), Tree::Chain).unwrap();
-        assert_eq!((place(&values, "a0").x, place(&values, "b0").x, place(&values, "b1").x), (0.0, 4.0, 5.0));
+        let x = |key| place(&values, key).x;
+        assert_eq!((x("a0"), x("b0"), x("b1"), x("c0"), x("c1")), (0.0, 4.0, 5.0, -1.0, 0.0));
     }
 
     #[test]

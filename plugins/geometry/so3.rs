@@ -263,6 +263,13 @@ mod tests {
         }
 
         #[test]
+        fn a_quaternion_and_its_opposite_are_one_rotation(omega in rotation_vector()) {
+            let opposite = So3::exp(&omega).quaternion_xyzw().map(|x| -x);
+            let log = So3::from_quaternion_xyzw(opposite).unwrap().log();
+            prop_assert!((log - omega).norm() < 1e-9, "the shortest rotation vector: {log}");
+        }
+
+        #[test]
         fn the_right_jacobians_are_inverse(omega in rotation_vector()) {
             let product = So3::right_jacobian(&omega) * So3::inverse_right_jacobian(&omega);
             prop_assert!((product - Matrix3::identity()).norm() < 1e-10);
