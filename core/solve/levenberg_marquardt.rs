@@ -51,6 +51,8 @@ impl Default for LevenbergMarquardt {
 
 /// Least share of the predicted decrease that makes a step good enough to take.
 const GAIN: f64 = 1e-4;
+/// Damping above which a small step is no sign of a minimum, as a share of the diagonal.
+const TRUSTED: f64 = 1.0;
 
 #[typetag::serde(name = "levenberg_marquardt")]
 impl Optimizer for LevenbergMarquardt {
@@ -98,14 +100,19 @@ impl LevenbergMarquardt {
                         let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(1.0 / self.decrease, 1.0);
                         (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
                         match session.take(&step) {
+                            // a step that damping has made small says nothing of the cost around
+                            Some(Termination::Converged { .. }) if step.control > TRUSTED => {
+                                continue 'linearized;
+                            }
                             Some(termination) => return termination,
                             None => continue 'linearized,
                         }
                     }
-                    if !matches!(tried, Tried::Undefined) && session.settled(&step) {
+                    if !matches!(tried, Tried::Undefined) && step.control <= TRUSTED && session.settled(&step)
+                    {
                         return Termination::Converged { reason: Tolerance::RelativeCost };
                     }
-                    if step.norm <= session.stop.step {
+                    if step.control <= TRUSTED && step.norm <= session.stop.step {
                         return Termination::Converged { reason: Tolerance::Step };
                     }
                     if session.interrupted() {
