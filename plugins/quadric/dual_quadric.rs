@@ -83,7 +83,7 @@ impl DualQuadric {
         let half = Vector3::from_fn(|i, _| axes.row(i).norm());
         Box3 { min: self.centroid() - half, max: self.centroid() + half }
     }
-    /// Whether all of it is in front of a camera, see [`Ellipsoid::is_in_front`].
+    /// Whether all of it is in front of a camera, see [`Ellipsoid::is_in_front`](crate::Ellipsoid::is_in_front).
     #[inline]
     pub fn is_in_front_of(&self, world_from_camera: &Se3) -> bool {
         // along the camera's axis alone, which is all that counts and half the work

@@ -131,13 +131,12 @@ fn sides_at_the_border_are_left_out() {
 fn rays_meet_at_the_object_whatever_the_noise() {
     check((any_object(), 0.0..3.0f64), |(truth, noise)| {
         let found = Rays::default().initialise(&views(&truth, &arc(10, 3.0, 2.0), noise)).unwrap();
-        let (size, off) = (truth.semi_axes.max(), (found.centroid() - truth.centroid()).norm());
+        let (size, truth_norm) = (truth.semi_axes.max(), truth.semi_axes.norm());
+        let off = (found.centroid() - truth.centroid()).norm();
         assert!(off < 0.1 * size + 0.02, "{off}");
-        let [found, truth] = [found, truth].map(|q| q.axes_aligned_box().dimensions());
-        assert!(
-            found.component_div(&truth).iter().all(|ratio| (0.5..2.0).contains(ratio)),
-            "{found} {truth}"
-        );
+        // axes along the world's cannot follow a stick that leans, but they say how large it is
+        let ratio = found.semi_axes.norm() / truth_norm;
+        assert!((0.7..1.4).contains(&ratio), "{ratio}");
         Ok(())
     });
 }

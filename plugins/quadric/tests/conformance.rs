@@ -390,7 +390,7 @@ fn not_to_be_matched(case: &Node<'_>, kind: &str) -> Checked {
 
 #[test]
 fn every_case_comes_out_as_expected() {
-    let Some(path) = std::env::var_os("MANIFACTOR_CONFORMANCE") else {
+    let Some(path) = std::env::var_os("MANIFACTOR_CONFORMANCE").filter(|path| !path.is_empty()) else {
         println!("skipped: MANIFACTOR_CONFORMANCE names no file with cases");
         return;
     };
