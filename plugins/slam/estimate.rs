@@ -1,13 +1,17 @@
 //! A sequence mapped and solved.
 use crate::mapping::{MappedObject, Mapping, pose_key};
+use crate::refine::Refiner;
 use crate::sequence::{Sequence, TrueObject};
 use crate::settings::Settings;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_graph::Values;
+use manifactor_graph::{Graph, Values};
 use manifactor_quadric::DualQuadric;
-use manifactor_solve::{CompileError, Observer, Solution, solve};
+use manifactor_solve::{
+    CompileError, IterationRecord, Observer, Outcome, Problem, Solution, Termination, Times, solve,
+};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// A map and a trajectory, with all that they were made of.
 #[derive(Debug, Clone)]
@@ -16,8 +20,83 @@ pub struct Estimate {
     pub sequence: Arc<Sequence>,
     /// The graph, and where the solve began.
     pub mapping: Mapping,
-    /// What the solver made of it.
+    /// What the solver made of it: its outcome covers all rounds.
     pub solution: Solution,
+    /// Time spent on objects alone.
+    pub refinement_seconds: f64,
+}
+
+/// The graph with the shapes of all objects held that have an orientation to keep; `None` where no object has.
+fn with_shapes_held(mapping: &Mapping) -> Option<Graph> {
+    let mut graph = mapping.graph.clone();
+    let mut oriented = mapping.mapped().filter(|object| !object.semantic_factors.is_empty()).peekable();
+    oriented.peek()?;
+    for object in oriented {
+        graph.fix_directions(object.key.clone(), &["log_a", "log_b", "log_c"]);
+    }
+    Some(graph)
+}
+
+/// Several solves, told as one.
+#[derive(Debug, Default)]
+struct Rounds {
+    iterations: usize,
+    times: Times,
+    history: Vec<IterationRecord>,
+    refinement_seconds: f64,
+    /// Joint solves so far, and the cost after the last.
+    joint: usize,
+    cost: Option<f64>,
+}
+
+impl Rounds {
+    fn refine(&mut self, refiner: &Refiner<'_>, values: &mut Values) {
+        let clock = Instant::now();
+        refiner.refine(values);
+        self.refinement_seconds += clock.elapsed().as_secs_f64();
+    }
+
+    fn solve(
+        &mut self,
+        graph: &Graph,
+        values: &Values,
+        settings: &Settings,
+        observer: &mut dyn Observer,
+    ) -> Result<Solution, CompileError> {
+        let solution = solve(graph, values, &*settings.solver, observer)?;
+        let outcome = &solution.outcome;
+        let later = |record: &IterationRecord| IterationRecord {
+            iteration: record.iteration + self.iterations,
+            seconds: record.seconds + self.times.total + self.refinement_seconds,
+            ..record.clone()
+        };
+        self.history.extend(outcome.history.iter().map(later));
+        self.iterations += outcome.iterations;
+        let (sum, times) = (&mut self.times, &outcome.times);
+        sum.compile += times.compile;
+        sum.linearize += times.linearize;
+        sum.factorize += times.factorize;
+        sum.solve += times.solve;
+        sum.other += times.other;
+        sum.total += times.total;
+        Ok(solution)
+    }
+
+    /// After a joint solve: whether another round would be in vain.
+    fn settled(&mut self, outcome: &Outcome) -> bool {
+        self.joint += 1;
+        let cost = outcome.final_cost;
+        let before = self.cost.replace(cost).unwrap_or(f64::INFINITY);
+        // not a number settles as well
+        let falls = before - cost > SETTLED * before || before == f64::INFINITY;
+        outcome.termination == Termination::Interrupted || !(falls && cost.is_finite())
+    }
+
+    fn sum_into(self, outcome: &mut Outcome) {
+        outcome.iterations = self.iterations;
+        outcome.times = self.times;
+        outcome.history = self.history;
+    }
 }
 
 /// One object of the map.
@@ -31,8 +110,16 @@ pub struct Landmark<'a> {
     pub truth: Option<&'a TrueObject>,
 }
 
+/// A round that lowers the cost by less than this share of it is the last.
+const SETTLED: f64 = 1e-3;
+
 impl Estimate {
     /// Solves a graph that was made of a sequence.
+    ///
+    /// Objects are [refined](Refiner) alone before the joint solve. That may leave one on the edge of a valley of its
+    /// orientation factor, where no joint step is possible: so poses are solved with the shapes of such objects held,
+    /// objects are refined again where the poses now are, and all is solved again, as often as the cost falls by it.
+    /// Each of these steps lowers the cost or does nothing.
     ///
     /// # Errors
     /// Where graph and values do not fit each other.
@@ -42,8 +129,25 @@ impl Estimate {
         settings: &Settings,
         observer: &mut dyn Observer,
     ) -> Result<Self, CompileError> {
-        let solution = solve(&mapping.graph, &mapping.values, &*settings.solver, observer)?;
-        Ok(Self { sequence, mapping, solution })
+        let most = settings.objects.refinements;
+        let (refiner, held) = (Refiner::new(&mapping), with_shapes_held(&mapping));
+        let initial_cost = Problem::compile(&mapping.graph, &mapping.values)?.linearize().cost;
+        let (mut values, mut rounds) = (mapping.values.clone(), Rounds::default());
+        loop {
+            if most > 0 {
+                rounds.refine(&refiner, &mut values);
+            }
+            let mut joint = rounds.solve(&mapping.graph, &values, settings, observer)?;
+            let settled = rounds.settled(&joint.outcome) || rounds.joint >= most;
+            if let Some(held) = held.as_ref().filter(|_| !settled) {
+                values = rounds.solve(held, &joint.values, settings, observer)?.values;
+                continue;
+            }
+            let refinement_seconds = rounds.refinement_seconds;
+            rounds.sum_into(&mut joint.outcome);
+            joint.outcome.initial_cost = initial_cost;
+            return Ok(Self { sequence, mapping, solution: joint, refinement_seconds });
+        }
     }
 
     /// The estimated trajectory, in the map's frame.

@@ -12,6 +12,7 @@ pub mod measurements;
 pub mod metrics;
 pub mod output;
 pub mod recording;
+pub mod refine;
 pub mod report;
 pub mod run;
 pub mod run_document;

@@ -15,7 +15,6 @@ use manifactor_quadric::BoundingBoxFactor;
 use serde::Serialize;
 use std::sync::Arc;
 
-mod refine;
 mod rejection;
 mod warning;
 
@@ -150,9 +149,6 @@ impl Mapping {
                 entries.push(rule.entry(key.clone(), self.frame.up)?);
                 semantic_factors.push(rule.factor.name().to_owned());
             }
-            let refine = settings.objects.refine;
-            let start =
-                if refine { refine::refine(&key, start, &entries, &self.values, self.frame.up) } else { start };
             self.values.insert(key.clone(), start);
             self.graph.factors_mut().extend(entries);
         }

@@ -91,8 +91,10 @@ pub struct SolveReport {
     pub inactive: usize,
     /// Their share of all, from 0 to 1.
     pub inactive_share: f64,
-    /// Where the time went.
+    /// Where the time of the solver went.
     pub times: Times,
+    /// Time spent on objects alone.
+    pub refinement_seconds: f64,
 }
 
 /// One object.
@@ -117,7 +119,7 @@ impl VariantReport {
     pub fn new(name: &str, estimate: &Estimate, settings: &Settings, seconds: f64) -> Self {
         let mapping = &estimate.mapping;
         let mut warnings = mapping.warnings.clone();
-        let solve = SolveReport::new(&estimate.solution.outcome, &mut warnings);
+        let solve = SolveReport::new(estimate, &mut warnings);
         let trajectory = trajectory::compare(estimate, &settings.evaluation, &mut warnings);
         let after = landmarks::in_truth_frame(estimate, estimate.landmarks());
         let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
@@ -148,7 +150,8 @@ impl Counts {
 }
 
 impl SolveReport {
-    fn new(outcome: &Outcome, warnings: &mut Vec<Warning>) -> Self {
+    fn new(estimate: &Estimate, warnings: &mut Vec<Warning>) -> Self {
+        let outcome = &estimate.solution.outcome;
         let Outcome { inactive, factors, .. } = *outcome;
         if !outcome.termination.is_converged() {
             warnings.push(Warning::NotConverged { termination: outcome.termination.to_string() });
@@ -168,6 +171,7 @@ impl SolveReport {
             inactive,
             inactive_share: inactive as f64 / factors.max(1) as f64,
             times: outcome.times,
+            refinement_seconds: estimate.refinement_seconds,
         }
     }
 }

@@ -109,8 +109,10 @@ impl Settings {
     }
 }
 
+/// Damping of one size for all directions: in proportion to the diagonal of H, a semi-axis that has all but vanished
+/// would go for good, since next to nothing is left of its derivative.
 fn default_solver() -> Arc<dyn Optimizer> {
-    Arc::new(LevenbergMarquardt::default())
+    Arc::new(LevenbergMarquardt { diagonal: [1.0, 1.0], ..LevenbergMarquardt::default() })
 }
 
 /// The noise of a section, or one of σ in every row.

@@ -17,8 +17,9 @@ pub struct ObjectSettings {
     pub min_parallax_deg: f64,
     /// How an object's first estimate is made of its boxes.
     pub initialiser: Arc<dyn Initialiser>,
-    /// Whether each object is fitted alone to its own factors first, from several places, with the poses held.
-    pub refine: bool,
+    /// How many times, at most, each object is fitted alone to its own factors, from several places, before all is
+    /// solved jointly; 0 for one joint solve and nothing else.
+    pub refinements: usize,
 }
 
 impl ObjectSettings {
@@ -31,7 +32,7 @@ impl ObjectSettings {
                 max_box_deviation_px: within(section, "max_box_deviation_px", 50.0, 0.0..=f64::INFINITY),
                 min_parallax_deg: within(section, "min_parallax_deg", 0.0, 0.0..=180.0),
                 initialiser: initialiser.map_or_else(|| Arc::new(Svd::default()) as Arc<_>, Arc::from),
-                refine: section.optional("refine").unwrap_or(true),
+                refinements: section.optional("refinements").unwrap_or(5),
             }
         })
     }

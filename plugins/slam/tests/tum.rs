@@ -1,6 +1,7 @@
 //! The TUM RGB-D sequences of the paper, read where `MANIFACTOR_DATA` says that they lie.
 //!
 //! Settings and reference: gtsam-quadrics 0.3.0 with GTSAM's Levenberg-Marquardt on the same input.
+#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_config::Document;
 use manifactor_graph::loss::Loss;
 use manifactor_quadric as _;

@@ -1,0 +1,125 @@
+//! Each object fitted alone to its own factors, from several places, with the poses held.
+//!
+//! An orientation factor looks at the longest axis only. Where two axes are equally long its cost jumps: there is a
+//! valley for each axis that might be the longest, and the floor of a valley often lies on its edge. A joint solve
+//! stays in the valley where it begins, and one object on an edge stops all others, since each step that crosses the
+//! edge raises the cost. One object alone is nine numbers: all its valleys can be tried.
+use crate::mapping::Mapping;
+use manifactor_geometry::{Se3, So3};
+use manifactor_graph::{Direction, FactorEntry, Graph, Key, Values};
+use manifactor_quadric::{DualQuadric, SHORTEST};
+use manifactor_solve::{LevenbergMarquardt, Optimizer, Problem, Silent, Stopping};
+use nalgebra::{Rotation3, Vector3};
+
+/// How much longer than the others the longest axis of a start is.
+const ELONGATION: f64 = 1.5;
+
+/// The objects of a map, each with its factors.
+#[derive(Debug)]
+pub struct Refiner<'a> {
+    objects: Vec<(Key, Vec<&'a FactorEntry>)>,
+    /// Axes like the world's, one of them up.
+    upright: So3,
+}
+
+impl<'a> Refiner<'a> {
+    /// Sorts the factors of a map by object.
+    pub fn new(mapping: &'a Mapping) -> Self {
+        let mapped = mapping.mapped().map(|object| (object.key.clone(), vec![]));
+        let mut objects: Vec<(Key, Vec<&FactorEntry>)> = mapped.collect();
+        let mut current = 0;
+        // a map has the factors of one object together
+        for entry in mapping.graph.factors() {
+            let of = |(key, _): &(Key, Vec<_>)| entry.keys.contains(key);
+            if !objects.get(current).is_some_and(of) {
+                match objects.iter().position(of) {
+                    Some(place) => current = place,
+                    None => continue,
+                }
+            }
+            if let Some((_, entries)) = objects.get_mut(current) {
+                entries.push(entry);
+            }
+        }
+        Self { objects, upright: upright(mapping.frame.up) }
+    }
+
+    /// Puts each object where it costs the least, as far as any of the starts leads there.
+    pub fn refine(&self, values: &mut Values) {
+        for (key, entries) in &self.objects {
+            if let Ok(start) = values.get::<DualQuadric>(key).copied() {
+                let better = self.better(key, start, entries, values);
+                values.insert(key.clone(), better);
+            }
+        }
+    }
+
+    /// The quadric among those that the starts lead to that leaves the fewest factors undefined, and then costs the
+    /// least; `start` itself, where none is better.
+    fn better(&self, key: &Key, start: DualQuadric, entries: &[&FactorEntry], poses: &Values) -> DualQuadric {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        for entry in entries {
+            for pose in entry.keys.iter().filter(|pose| *pose != key) {
+                if let (false, Some(value)) = (values.contains(pose.as_str()), poses.variable(pose.as_str()))
+                {
+                    values.insert_boxed(pose.clone(), value.erased().clone_box());
+                    graph.fix(pose.clone());
+                }
+            }
+            graph.push((*entry).clone());
+        }
+        values.insert(key.clone(), start);
+        // what cannot be compiled is reported by the joint solve
+        let Ok(mut problem) = Problem::compile(&graph, &values) else { return start };
+        let mut best = (rank(&problem), start);
+        for candidate in self.starts(&start) {
+            values.insert(key.clone(), candidate);
+            problem.set_values(&values);
+            solver().solve(&mut problem, &mut Silent);
+            let found = problem.values().get::<DualQuadric>(key).copied();
+            if let (Ok(found), rank) = (found, rank(&problem))
+                && rank < best.0
+            {
+                best = (rank, found);
+            }
+        }
+        best.1
+    }
+
+    /// The start itself; a ball; and ellipsoids that are longest along each axis of the world.
+    fn starts(&self, start: &DualQuadric) -> Vec<DualQuadric> {
+        let s = start.semi_axes;
+        // the middle one is the least likely to be far off
+        let radius = (s.sum() - s.min() - s.max()).max(SHORTEST);
+        let pose = Se3::new(self.upright, start.centroid());
+        let along_world = |semi_axes| DualQuadric { pose, semi_axes };
+        let mut starts = vec![*start, along_world(Vector3::repeat(radius))];
+        for longest in 0..3 {
+            let mut semi_axes = Vector3::repeat(radius);
+            semi_axes[longest] *= ELONGATION;
+            starts.push(along_world(semi_axes));
+        }
+        starts
+    }
+}
+
+fn upright(up: Option<Direction>) -> So3 {
+    let rotation = Rotation3::rotation_between(&Vector3::z(), &up.unwrap_or_default());
+    // there is none for exactly upside down, which is as good as upright
+    rotation.map_or_else(So3::identity, |rotation| So3::from_matrix(rotation.matrix()))
+}
+
+/// Factors that are not defined, then the cost: a lost factor lowers the cost, and is no gain.
+fn rank(problem: &Problem) -> (usize, f64) {
+    let factors = problem.inspect();
+    let cost: f64 = factors.iter().map(|factor| factor.cost).sum();
+    let lost = factors.iter().filter(|factor| !factor.defined).count();
+    (lost, if cost.is_finite() { cost } else { f64::INFINITY })
+}
+
+fn solver() -> LevenbergMarquardt {
+    let stop = Stopping { max_iterations: 30, relative_cost: 1e-5, ..Stopping::default() };
+    // damping of one size for all directions: a semi-axis that has all but vanished has next to no derivative, and
+    // damping in proportion to that would let it go
+    LevenbergMarquardt { diagonal: [1.0, 1.0], initial_lambda: 1e-3, stop, ..LevenbergMarquardt::default() }
+}
