@@ -41,6 +41,9 @@ pub use manifactor_viz as viz;
 
 pub use manifactor_graph::{register, register_factor, register_loss, register_manifold};
 
+/// For traits that [`register!`] enters: `#[manifactor::typetag::serde(name = "…")]` on the `impl`.
+pub use manifactor_graph::__private::typetag;
+
 /// The names that most programs and most plugins need.
 pub mod prelude {
     pub use manifactor_graph::checked::Positive;

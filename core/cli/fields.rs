@@ -33,12 +33,20 @@ fn collect(root: &Value, schema: &Value, prefix: &str, out: &mut Vec<Field>) {
         let docs = docs.and_then(Value::as_str).unwrap_or_default();
         let docs = docs.split("\n\n").next().unwrap_or_default().replace('\n', " ");
         let nested = target.get("properties").is_some() && prefix.matches('.').count() < 3;
-        let default = property.get("default").filter(|_| !nested).map(ToString::to_string);
+        let default = property.get("default").filter(|_| !nested).map(value);
         let kind = kind(root, property);
         out.push(Field { name: path.clone(), kind, default, required: required(name), docs });
         if nested {
             collect(root, target, &format!("{path}."), out);
         }
+    }
+}
+
+/// A default as people write it: `1e15`, not a one and fifteen zeros.
+fn value(default: &Value) -> String {
+    match default.as_f64() {
+        Some(x) if x != 0.0 && !(1e-3..1e6).contains(&x.abs()) => format!("{x:e}"),
+        _ => default.to_string(),
     }
 }
 

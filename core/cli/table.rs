@@ -5,7 +5,7 @@ use manifactor::slam::report::{RunReport, VariantReport};
 /// What a run came to, in a table and a few lines.
 pub(crate) fn of_run(report: &RunReport) -> String {
     let header =
-        ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "steps", "time"];
+        ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
     let mut table = text::table(&header);
     if let Some(first) = report.variants.first() {
         table.add_row(before(first));
@@ -13,7 +13,7 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     for variant in &report.variants {
         table.add_row(after(variant));
     }
-    let mut out = format!("{}\n{table}\n", report.title);
+    let mut out = format!("{}\n{}\n", report.title, table.trim_fmt());
     if let Some(alignment) = report.variants.iter().find_map(|v| v.row().alignment) {
         out += &format!("ATE: RMSE of the camera's positions, aligned by {alignment}.\n");
     }

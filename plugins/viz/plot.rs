@@ -82,7 +82,8 @@ pub fn plot(scene: &Scene, view: View) -> String {
         }
     }
     let above = 0.008 * frame.size();
-    for (class, top) in labels {
+    // seen from the side, what stands on one table stands on one line
+    for (class, top) in labels.into_iter().filter(|_| view == View::Top) {
         let label = TextAnnotation::new(text(class), top.x, top.y + above);
         layout = layout.with_annotation(label.with_font_size(10).with_color(color(class)));
     }

@@ -79,7 +79,8 @@ impl Evaluate {
         table.add_row(row("ATE, m", &ate));
         table.add_row(row("RPE translation, m", &rpe.translation));
         table.add_row(row("RPE rotation, rad", &rpe.rotation));
-        output::print(&format!("{}, scale {scale:.6}\n{table}\n", text::count(pairs, "matched pose")));
+        let pairs = text::count(pairs, "matched pose");
+        output::print(&format!("{pairs}, scale {scale:.6}\n{}\n", table.trim_fmt()));
         Ok(Status::Done)
     }
 }

@@ -66,7 +66,7 @@ fn explain(entry: &Entry) -> String {
                 field.default.unwrap_or_else(|| if field.required { "required" } else { "" }.into());
             table.add_row([field.name, field.kind, default, field.docs]);
         }
-        out += &format!("\n{table}\n");
+        out += &format!("\n{}\n", table.trim_fmt());
     }
     if let Some(example) = entry.example() {
         out += &format!("\nExample:\n\n{}\n", indent(&example));

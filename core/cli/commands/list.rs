@@ -36,7 +36,7 @@ impl List {
             for entry in of_kind {
                 table.add_row([entry.name, &entry.summary()]);
             }
-            out += &format!("{table}\n\n");
+            out += &format!("{}\n\n", table.trim_fmt());
         }
         output::print(&(out + "`manifactor explain NAME` says more.\n"));
         Ok(Status::Done)

@@ -3,14 +3,10 @@
 //! Settings and reference: gtsam-quadrics 0.3.0 with GTSAM's Levenberg-Marquardt on the same input.
 #![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_config::Document;
-use manifactor_graph::loss::Loss;
 use manifactor_quadric as _;
-use manifactor_slam::estimate::Estimate;
 use manifactor_slam::mapping::Mapping;
-use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
-use manifactor_solve::Silent;
 use std::path::{Path, PathBuf};
 
 /// Where the data lie; `None`, said aloud, where nobody said.

@@ -1,0 +1,11 @@
+//! A factor of one's own, and a command line that knows it.
+//!
+//! ```sh
+//! cargo run --release --example 01_new_factor -- explain rests_on
+//! cargo run --release --example 01_new_factor -- run examples/01_new_factor/desk.toml
+//! ```
+mod rests_on;
+
+fn main() -> std::process::ExitCode {
+    manifactor_cli::main()
+}

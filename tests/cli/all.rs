@@ -1,0 +1,66 @@
+//! The command line, end to end: the binary, its files and its exit codes.
+#![allow(missing_docs, clippy::unwrap_used)]
+mod documents;
+mod evaluate;
+mod names;
+mod run;
+mod solve;
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What the binary printed, and how it ended.
+struct Ran {
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+/// Runs the binary in the root of the repository. Words are split at spaces.
+fn manifactor(arguments: &str) -> Ran {
+    run(arguments.split_whitespace(), &[])
+}
+
+fn run<'a>(arguments: impl IntoIterator<Item = &'a str>, variables: &[(&str, &str)]) -> Ran {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_manifactor"));
+    command.current_dir(root()).args(arguments).env("NO_COLOR", "1").env_remove("MANIFACTOR_DATA");
+    let output = command.envs(variables.iter().copied()).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+impl Ran {
+    #[track_caller]
+    fn ended(self, code: i32) -> Self {
+        assert_eq!(self.code, code, "stdout:\n{}\nstderr:\n{}", self.stdout, self.stderr);
+        self
+    }
+    #[track_caller]
+    fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).unwrap_or_else(|e| panic!("{e}:\n{}", self.stdout))
+    }
+    #[track_caller]
+    fn complains(&self, text: &str) {
+        // lines are broken to the width of the terminal
+        let words = |s: &str| s.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+        assert!(words(&self.stderr).contains(text), "no `{text}` in:\n{}", self.stderr);
+    }
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A folder with these files.
+fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+fn path(folder: &tempfile::TempDir, name: &str) -> String {
+    folder.path().join(name).display().to_string()
+}

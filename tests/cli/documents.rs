@@ -1,0 +1,54 @@
+use crate::{folder, manifactor, path};
+
+const BROKEN: &str = r#"
+[[variables]]
+key = "x0"
+value = { type = "se2", translation = [0.0, 0.0], angle = 0.0 }
+
+[[factors]]
+keys = ["x0", "x1"]
+factor = { type = "betwen_se2", relative = { translation = [1.0, 0.0], angle = 0.0 } }
+noise = { sigma = -1.0 }
+"#;
+
+#[test]
+fn every_mistake_is_shown_with_its_line() {
+    let folder = folder(&[("graph.toml", BROKEN)]);
+    let ran = manifactor(&format!("check {} --json", path(&folder, "graph.toml"))).ended(2);
+    ran.complains("did you mean `between_se2`?");
+    // the line itself, under the message
+    ran.complains("factor = { type = \"betwen_se2\"");
+    let errors = ran.json()["errors"].as_array().unwrap().clone();
+    let lines: Vec<_> = errors.iter().map(|e| e["line"].as_u64().unwrap()).collect();
+    assert_eq!(lines, [7, 8, 9], "{errors:?}");
+}
+
+#[test]
+fn the_examples_have_no_mistakes() {
+    let ran = manifactor("check examples/desk/desk.toml --load").ended(0);
+    assert!(ran.stdout.contains("nothing wrong") && ran.stdout.contains("2 variants"), "{}", ran.stdout);
+    for file in std::fs::read_dir(crate::root().join("examples/tum")).unwrap() {
+        manifactor(&format!("check examples/tum/{}", file.unwrap().file_name().display())).ended(0);
+    }
+}
+
+#[test]
+fn a_run_with_a_mistake_is_not_run() {
+    let folder = folder(&[("run.toml", "title = \"t\"\n[source]\ntype = \"simulated\"\nsed = 1\n[sover]\n")]);
+    let out = path(&folder, "out");
+    let ran = manifactor(&format!("run {} --out {out}", path(&folder, "run.toml"))).ended(2);
+    ran.complains("did you mean `seed`?");
+    ran.complains("did you mean `solver`?");
+    assert!(!std::path::Path::new(&out).exists());
+}
+
+#[test]
+fn data_that_are_not_there_are_looked_for_by_name() {
+    let ran = manifactor("run examples/tum/fr1_desk.toml").ended(2);
+    ran.complains("MANIFACTOR_DATA");
+}
+
+#[test]
+fn an_override_that_fits_nothing_is_shown() {
+    manifactor("check examples/desk/desk.toml --set source.scene.objets=3").ended(2).complains("objects");
+}

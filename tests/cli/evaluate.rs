@@ -1,0 +1,43 @@
+use crate::{folder, manifactor, path};
+
+const TRUTH: &str = "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 1 1 0 0 0 0 1\n3 0 1 0.5 0 0 0 1\n";
+
+#[test]
+fn a_moved_trajectory_has_no_error_once_it_is_aligned() {
+    // half a turn about z, and 5 m away
+    let moved = "0 5 0 0 0 0 1 0\n1 4 0 0 0 0 1 0\n2 4 -1 0 0 0 1 0\n3 5 -1 0.5 0 0 1 0\n";
+    let folder = folder(&[("truth.txt", TRUTH), ("moved.txt", moved)]);
+    let files = format!("{} {}", path(&folder, "truth.txt"), path(&folder, "moved.txt"));
+    let ate = |options: &str| {
+        let json = manifactor(&format!("evaluate {files} {options} --json")).ended(0).json();
+        (json["ate"]["rmse"].as_f64().unwrap(), json["rpe"]["translation"]["rmse"].as_f64().unwrap())
+    };
+    assert!(ate("").0 < 1e-12 && ate("--align first").0 < 1e-12 && ate("--align sim3").0 < 1e-12);
+    let (unaligned, relative) = ate("--align none");
+    assert!(unaligned > 3.0 && relative < 1e-12);
+}
+
+#[test]
+fn the_table_names_its_units() {
+    let folder = folder(&[("truth.txt", TRUTH)]);
+    let file = path(&folder, "truth.txt");
+    let text = manifactor(&format!("evaluate {file} {file}")).ended(0).stdout;
+    assert!(
+        text.contains("4 matched poses") && text.contains("ATE, m") && text.contains("RPE rotation, rad"),
+        "{text}"
+    );
+}
+
+#[test]
+fn clocks_that_do_not_meet_are_an_error() {
+    let folder = folder(&[("truth.txt", TRUTH), ("late.txt", "100 0 0 0 0 0 0 1\n")]);
+    let ran = manifactor(&format!("evaluate {} {}", path(&folder, "truth.txt"), path(&folder, "late.txt")));
+    ran.ended(2).complains("do the two share a clock?");
+}
+
+#[test]
+fn a_malformed_trajectory_is_shown_with_its_line() {
+    let folder = folder(&[("truth.txt", TRUTH), ("bad.txt", "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 7\n")]);
+    let ran = manifactor(&format!("evaluate {} {}", path(&folder, "truth.txt"), path(&folder, "bad.txt")));
+    ran.ended(2).complains("bad.txt:2:1");
+}

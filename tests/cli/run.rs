@@ -1,0 +1,73 @@
+use crate::{folder, manifactor, path};
+use serde_json::Value;
+use std::path::Path;
+
+/// The desk, with fewer frames and objects.
+const SMALL: &str = "--set source.trajectory.frames=40 --set source.scene.objects=5";
+
+#[test]
+fn a_run_leaves_its_files() {
+    let folder = folder(&[]);
+    let out = path(&folder, "desk");
+    let ran = manifactor(&format!("run examples/desk/desk.toml --out {out} {SMALL}"));
+    assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
+    for text in ["ATE", "position", "shape", "quality", "QuadricSLAM", "before the solve"] {
+        assert!(ran.stdout.contains(text), "{text} is missing:\n{}", ran.stdout);
+    }
+    let out = Path::new(&out);
+    assert!(out.join("report.json").is_file());
+    for file in
+        ["config.toml", "trajectory.txt", "objects.json", "graph.json", "iterations.csv", "metrics.json"]
+    {
+        assert!(out.join("quadricslam").join(file).is_file(), "{file}");
+    }
+    for view in ["map_top.svg", "map_side.svg"] {
+        let picture = std::fs::read_to_string(out.join("quadricslam").join(view)).unwrap();
+        assert!(picture.contains("</svg>") && picture.contains("odometry"), "{view}");
+    }
+}
+
+#[test]
+fn a_run_is_reproduced_by_the_config_it_wrote() {
+    let folder = folder(&[]);
+    let (first, second) = (path(&folder, "a"), path(&folder, "b"));
+    let report = |ran: crate::Ran| {
+        let report: Value = ran.json();
+        let variant = &report["variants"][0];
+        (variant["solve"]["final_cost"].clone(), variant["trajectory"].clone(), variant["landmarks"].clone())
+    };
+    let a =
+        report(manifactor(&format!("run examples/desk/desk.toml --json --out {first} {SMALL} --threads 2")));
+    let config = format!("{first}/quadricslam/config.toml");
+    let b = report(manifactor(&format!("run {config} --json --out {second} --threads 1")));
+    assert_eq!(a, b);
+    let trajectory =
+        |out: &str, variant: &str| std::fs::read(format!("{out}/{variant}/trajectory.txt")).unwrap();
+    assert!(trajectory(&first, "quadricslam") == trajectory(&second, "estimate"));
+}
+
+#[test]
+fn the_graph_that_a_run_wrote_is_at_its_minimum() {
+    let folder = folder(&[]);
+    let out = path(&folder, "desk");
+    let report = manifactor(&format!("run examples/desk/desk.toml --json --out {out} {SMALL}")).json();
+    let cost = report["variants"][0]["solve"]["final_cost"].as_f64().unwrap();
+    let solved = manifactor(&format!("solve {out}/quadricslam/graph.json --json")).json();
+    let initial = solved["initial_cost"].as_f64().unwrap();
+    assert!((initial - cost).abs() <= 1e-9 * cost, "{initial} {cost}");
+}
+
+#[test]
+fn a_simulated_sequence_is_written_as_files() {
+    let folder = folder(&[]);
+    let out = path(&folder, "recording");
+    let ran = manifactor(&format!("simulate examples/desk/desk.toml --out {out} {SMALL}")).ended(0);
+    assert!(ran.stdout.contains("40 frames") && ran.stdout.contains("5 true objects"), "{}", ran.stdout);
+    for file in ["odometry.txt", "detections.csv", "groundtruth.txt", "objects.json"] {
+        assert!(Path::new(&out).join(file).is_file(), "{file}");
+    }
+    // and the odometry of a simulation can be evaluated like any other
+    let json =
+        manifactor(&format!("evaluate {out}/groundtruth.txt {out}/odometry.txt --json")).ended(0).json();
+    assert_eq!(json["pairs"], 40);
+}

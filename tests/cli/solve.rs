@@ -1,0 +1,130 @@
+use crate::{folder, manifactor, path, run};
+
+/// Two poses a metre apart; the second begins elsewhere.
+const GRAPH: &str = r#"
+[[variables]]
+key = "x0"
+value = { type = "se2", translation = [0.0, 0.0], angle = 0.0 }
+fixed = true
+
+[[variables]]
+key = "x1"
+value = { type = "se2", translation = [3.0, 1.0], angle = 0.4 }
+
+[[factors]]
+keys = ["x0", "x1"]
+factor = { type = "between_se2", relative = { translation = [1.0, 0.0], angle = 0.0 } }
+noise = { sigma = 0.1 }
+"#;
+
+const G2O: &str = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1.1 0 0\nEDGE_SE2 0 1 1 0 0 100 0 0 100 0 100\n";
+
+#[test]
+fn a_literal_graph_is_solved_and_written() {
+    let folder = folder(&[("graph.toml", GRAPH)]);
+    let solved = path(&folder, "solved.json");
+    let ran = manifactor(&format!("solve {} --out {solved} --json", path(&folder, "graph.toml"))).ended(0);
+    let json = ran.json();
+    assert!(json["initial_cost"].as_f64().unwrap() > 100.0);
+    assert!(json["final_cost"].as_f64().unwrap() < 1e-12);
+    assert!(json["iterations"].as_u64().unwrap() > 0);
+    assert_eq!(json["termination"]["status"], "converged");
+    for stage in ["compile", "linearize", "factorize", "solve", "other", "total"] {
+        assert!(json["seconds"][stage].as_f64().unwrap() >= 0.0, "{stage}");
+    }
+    // what was written is a solved graph
+    let again = manifactor(&format!("solve {solved} --json")).ended(0).json();
+    assert!(again["initial_cost"].as_f64().unwrap() < 1e-12);
+}
+
+#[test]
+fn a_pose_graph_is_solved_and_its_gauge_is_said_to_be_held() {
+    let folder = folder(&[("graph.g2o", G2O)]);
+    let ran = manifactor(&format!("solve {}", path(&folder, "graph.g2o"))).ended(0);
+    assert!(ran.stdout.contains("2 variables (2 se2)") && ran.stdout.contains("converged"), "{}", ran.stdout);
+    ran.complains("nothing fixes the gauge: held x0");
+}
+
+#[test]
+fn solver_and_settings_come_from_the_command_line() {
+    let folder =
+        folder(&[("graph.g2o", G2O), ("graph.toml", &format!("{GRAPH}\n[solver]\ntype = \"dogleg\"\n"))]);
+    for file in ["graph.g2o", "graph.toml"] {
+        let file = path(&folder, file);
+        let ran = manifactor(&format!(
+            "solve {file} --solver gauss_newton --set solver.stop.max_iterations=0 --json"
+        ));
+        let json = ran.ended(1).json();
+        assert_eq!(
+            (&json["termination"]["status"], &json["iterations"]),
+            (&"max_iterations".into(), &0.into())
+        );
+        let ran = manifactor(&format!("solve {file} --solver gaus_newton")).ended(2);
+        ran.complains("did you mean `gauss_newton`?");
+        let ran = manifactor(&format!("solve {file} --set solver.stop.max_iteration=3")).ended(2);
+        ran.complains("did you mean `max_iterations`?");
+    }
+}
+
+#[test]
+fn what_nothing_constrains_is_named() {
+    let folder = folder(&[("graph.toml", &GRAPH.replace("fixed = true", ""))]);
+    let file = path(&folder, "graph.toml");
+    let json = manifactor(&format!("solve {file} --solver gauss_newton --json")).ended(1).json();
+    assert_eq!(json["termination"]["status"], "indeterminate");
+    assert!(!json["termination"]["keys"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn results_are_the_same_for_any_number_of_threads() {
+    // more factors than one thread is given
+    let mut text = String::new();
+    for i in 0..400 {
+        let (x, y) = (f64::from(i) * 0.1, f64::from(i * i % 7) * 0.01);
+        text += &format!("VERTEX_SE2 {i} {x} {y} 0.01\n");
+        if i > 0 {
+            text += &format!("EDGE_SE2 {} {i} 0.1 0.001 0.002 100 0 0 100 0 100\n", i - 1);
+        }
+        if i > 20 {
+            text += &format!("EDGE_SE2 {} {i} 2.0 0.02 0.03 50 0 0 50 0 50\n", i - 20);
+        }
+    }
+    let folder = folder(&[("graph.g2o", &text)]);
+    let solved = [1, 2, 3].map(|threads| {
+        let out = path(&folder, &format!("{threads}.json"));
+        let graph = path(&folder, "graph.g2o");
+        run(["solve", &graph, "--threads", &threads.to_string(), "--out", &out], &[]).ended(0);
+        std::fs::read_to_string(out).unwrap()
+    });
+    assert!(solved[0] == solved[1] && solved[1] == solved[2]);
+}
+
+#[test]
+fn every_malformed_line_is_shown() {
+    let folder = folder(&[("graph.g2o", "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 zero 0\nEDGE_SE2 0 1 1 0\n")]);
+    let ran = manifactor(&format!("solve {} --json", path(&folder, "graph.g2o"))).ended(2);
+    ran.complains("expected a finite number, got `zero`");
+    let errors = ran.json()["errors"].as_array().unwrap().clone();
+    let lines: Vec<_> = errors.iter().map(|e| e["line"].as_u64().unwrap()).collect();
+    assert_eq!(lines, [2, 3]);
+}
+
+#[test]
+fn information_that_is_not_positive_definite_is_repaired_on_request() {
+    let text = G2O.replace("100 0 0 100 0 100", "100 0 0 -1 0 100");
+    let folder = folder(&[("graph.g2o", &text)]);
+    let file = path(&folder, "graph.g2o");
+    manifactor(&format!("solve {file}")).ended(2).complains("positive definite");
+    manifactor(&format!("solve {file} --repair clamp"))
+        .ended(0)
+        .complains("information made positive definite");
+}
+
+#[test]
+fn files_that_are_not_there_are_named() {
+    manifactor("solve nowhere.g2o").ended(3).complains("nowhere.g2o");
+    manifactor("solve nowhere.toml").ended(2).complains("nowhere.toml");
+    let folder = folder(&[("graph.toml", GRAPH)]);
+    let ran = manifactor(&format!("solve {} --out {}", path(&folder, "graph.toml"), path(&folder, "a.txt")));
+    ran.ended(2).complains("use .toml, .json, .yaml or .g2o");
+}

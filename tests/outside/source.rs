@@ -1,0 +1,46 @@
+//! A data source: a camera that stands still and sees nothing.
+use manifactor::config::{Document, Format};
+use manifactor::geometry::Se3;
+use manifactor::prelude::*;
+use manifactor::quadric::Camera;
+use manifactor::slam::run::Run;
+use manifactor::slam::run_document::RunDocument;
+use manifactor::slam::sequence::{Frame, Sequence};
+use manifactor::slam::source::{Folders, Source, SourceError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// So many frames of nothing.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Nothing {
+    /// How many.
+    frames: usize,
+}
+
+#[manifactor::typetag::serde(name = "test_nothing")]
+impl Source for Nothing {
+    fn load(&self, _folders: &Folders) -> Result<Sequence, SourceError> {
+        let frame = |i: usize| Frame { timestamp: i as f64, world_from_camera: Se3::identity() };
+        Ok(Sequence {
+            camera: Camera { fx: 320.0, fy: 320.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 },
+            frames: (0..self.frames).map(frame).collect(),
+            detections: vec![],
+            up: Some(Direction::Z),
+            accelerometer: vec![],
+            ground_truth: None,
+        })
+    }
+}
+register!(dyn Source, "test_nothing", Nothing);
+
+#[test]
+fn a_run_names_it() {
+    let text = "source = { type = \"test_nothing\", frames = 4 }";
+    let document = Document::parse("run.toml", text, Format::Toml).unwrap();
+    let document = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
+    let mut run = Run::new(&document, None);
+    let (estimate, report) = run.variant(&document.variants[0], &mut Silent).unwrap();
+    assert_eq!((report.counts.frames, report.counts.objects), (4, 0));
+    assert_eq!(estimate.trajectory().len(), 4);
+}
