@@ -18,12 +18,12 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct RestsOn {
+pub(crate) struct RestsOn {
     /// The plane's height along `up`, in metres.
-    pub height: f64,
+    pub(crate) height: f64,
     /// The world's up, of any length but zero; z, where nothing is said.
     #[serde(default)]
-    pub up: Direction,
+    pub(crate) up: Direction,
 }
 
 impl Residual for RestsOn {
