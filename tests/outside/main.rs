@@ -1,6 +1,6 @@
 //! Types that are written outside the workspace's crates, through the facade alone: one file per extension point.
-#[path = "../../examples/01_new_factor/rests_on.rs"]
 #![allow(missing_docs, clippy::unwrap_used)]
+#[path = "../../examples/01_new_factor/rests_on.rs"]
 mod rests_on;
 
 mod factor;
