@@ -41,11 +41,12 @@ pub use manifactor_viz as viz;
 
 pub use manifactor_graph::{register, register_factor, register_loss, register_manifold};
 
-/// For traits that [`register!`] enters: `#[manifactor::typetag::serde(name = "…")]` on the `impl`.
+/// For traits that [`register!`] enters: `use manifactor::typetag;`, then `#[typetag::serde(name = "…")]` on the `impl`.
 pub use manifactor_graph::__private::typetag;
 
 /// The names that most programs and most plugins need.
 pub mod prelude {
+    pub use manifactor_graph::__private::typetag;
     pub use manifactor_graph::checked::Positive;
     pub use manifactor_graph::loss::{Loss, RobustLoss};
     pub use manifactor_graph::{
