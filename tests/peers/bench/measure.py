@@ -1,0 +1,128 @@
+"""Methods run in turn, on one core, each in its own process."""
+
+import json
+import os
+import statistics
+import subprocess
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Stop:
+    """The rule for all: a step that changes the cost by less than this share of it, or so many iterations."""
+
+    max_iterations: int = 100
+    relative_cost: float = 1e-6
+
+
+@dataclass
+class Result:
+    """Of one method on one problem; seconds of each run, stages and the rest of the median run."""
+
+    method: str
+    ours: bool
+    status: str = ""
+    seconds: list[float] = field(default_factory=list)
+    stages: dict[str, float] = field(default_factory=dict)
+    iterations: int = 0
+    memory_mib: float = 0.0
+    cost: float | None = None
+    disturbed: int = 0  # runs that had the core for less than 95 % of their time
+
+    @property
+    def time(self):
+        """Median seconds; None where there is no run that ended by itself."""
+        return statistics.median(self.seconds) if self.seconds else None
+
+
+def peak_kib(pid):
+    """Peak resident memory of a process that still runs. wait4 would count what its parent held at the fork."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")), 0)
+
+
+def watched(command, core, patience, log):
+    """Runs a command on one core; exit status, peak KiB, share of its time that it had the core."""
+    began = time.perf_counter()
+    with open(log, "w") as out, open(f"{log}.err", "w") as err:
+        process = subprocess.Popen(
+            [str(word) for word in command], stdout=out, stderr=err, preexec_fn=lambda: os.sched_setaffinity(0, {core})
+        )
+        peak = 0
+        while True:
+            pid, status, usage = os.wait4(process.pid, os.WNOHANG)
+            if pid:
+                break
+            peak = max(peak, peak_kib(process.pid))
+            if time.perf_counter() - began > patience:
+                process.kill()
+            time.sleep(0.002)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    elapsed = time.perf_counter() - began
+    return process.returncode, peak, (usage.ru_utime + usage.ru_stime) / elapsed
+
+
+def report(log):
+    """What an adapter printed; None where it did not get so far."""
+    try:
+        told = json.loads(Path(log).read_text())
+    except ValueError:
+        return None
+    if isinstance(told["seconds"], dict):  # our own command line
+        told["stages"] = {k: v for k, v in told["seconds"].items() if k != "total"}
+        told["seconds"] = told["seconds"]["total"]
+        end = told["termination"]
+        told["status"] = end.get("reason") or end["status"]
+    return told
+
+
+def run_once(method, problem_input, folder, stop, core, patience):
+    """One run; its report with peak memory, or a text that says how it failed."""
+    output, log = folder / "estimate.g2o", folder / "report.json"
+    output.unlink(missing_ok=True)
+    code, peak, share = watched(method.command(problem_input, output, stop), core, patience, log)
+    told = report(log)
+    if told is None:
+        killed = f"stopped after {patience:.0f} s" if code == -9 else f"exit status {code}"
+        errors = Path(f"{log}.err").read_text().strip().splitlines()
+        return f"{killed}: {errors[-1]}" if errors and code != -9 else killed
+    told["memory_mib"] = (peak - told.get("held_kib", 0)) / 1024.0
+    told["disturbed"] = share < 0.95
+    return told
+
+
+def measure(methods, problem_input, folder, stop, core, repeat, patience):
+    """Results by method. Rounds go through all methods, so that a disturbance meets all alike."""
+    runs = {method: [] for method in methods}
+    results = {method: Result(method.name, method.ours) for method in methods}
+    for round in range(repeat):
+        for method in methods:
+            result = results[method]
+            # long runs are stable, and failures stay failures
+            if round and (not runs[method] or result.seconds[0] > patience / 6.0):
+                continue
+            place = folder / method.name.replace(" ", "_")
+            place.mkdir(parents=True, exist_ok=True)
+            told = run_once(method, problem_input, place, stop, core, patience)
+            if isinstance(told, str):
+                result.status = told
+                continue
+            runs[method].append(told)
+            result.seconds.append(told["seconds"])
+            result.disturbed += told["disturbed"]
+    for method, result in results.items():
+        if runs[method]:
+            middle = sorted(runs[method], key=lambda told: told["seconds"])[(len(runs[method]) - 1) // 2]
+            result.status, result.iterations = middle["status"], middle["iterations"]
+            result.stages = middle.get("stages", {})
+            result.memory_mib = max(0.0, max(told["memory_mib"] for told in runs[method]))
+    return results
+
+
+def as_json(result):
+    return asdict(result) | {"time": result.time}

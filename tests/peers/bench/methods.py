@@ -1,0 +1,46 @@
+"""Who is compared: each method of each peer, and ours."""
+
+import json
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench import pose_graph
+
+POSE_GRAPHS = ("se2", "se3")
+
+
+@dataclass(frozen=True)
+class Method:
+    """A solver with settings: `adapter METHOD INPUT OUTPUT MAX_ITERATIONS RELATIVE_COST`."""
+
+    peer: str
+    method: str
+    adapter: tuple[str, ...]
+    kinds: tuple[str, ...] = POSE_GRAPHS
+    ours: bool = False
+
+    @property
+    def name(self):
+        return f"{self.peer} {self.method}"
+
+    def command(self, source, output, stop):
+        return [*self.adapter, self.method, source, output, stop.max_iterations, stop.relative_cost]
+
+
+class Ours:
+    """The release binary of this repository."""
+
+    def __init__(self, binary):
+        self.binary = str(binary)
+
+    def solvers(self):
+        listed = subprocess.run([self.binary, "list", "solvers", "--json"], capture_output=True, check=True)
+        return [entry["name"] for entry in json.loads(listed.stdout)]
+
+    def start(self, source, output):
+        """Vertices for a file that has edges only: spanning trees of odometry."""
+        solve = [self.binary, "solve", source, "--out", output, "--json", "--solver", "gauss_newton"]
+        nothing = ["--set", "solver.stop.max_iterations=0"]
+        subprocess.run([*solve, *nothing], capture_output=True, check=False)
+        return pose_graph.read(Path(output)).vertices
