@@ -7,7 +7,7 @@ use manifactor::graph::{Factor, Noise, Variable};
 use manifactor::quadric::initialise::Initialiser;
 use manifactor::slam::gravity::Gravity;
 use manifactor::slam::source::Source;
-use manifactor::solve::Optimizer;
+use manifactor::solve::{Optimizer, Start};
 use manifactor_testing::catalogue::{documentation_law, factor_law, manifold_law};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value as Json, json};
@@ -151,6 +151,7 @@ macro_rules! for_kind {
             k if k == <dyn Variable as Kind>::NAME => $call::<Box<dyn Variable>>($($argument),*),
             k if k == <dyn Loss as Kind>::NAME => $call::<Box<dyn Loss>>($($argument),*),
             k if k == <dyn Optimizer as Kind>::NAME => $call::<Box<dyn Optimizer>>($($argument),*),
+            k if k == <dyn Start as Kind>::NAME => $call::<Box<dyn Start>>($($argument),*),
             k if k == <dyn Source as Kind>::NAME => $call::<Box<dyn Source>>($($argument),*),
             k if k == <dyn Gravity as Kind>::NAME => $call::<Box<dyn Gravity>>($($argument),*),
             k if k == <dyn Initialiser as Kind>::NAME => $call::<Box<dyn Initialiser>>($($argument),*),

@@ -3,6 +3,7 @@
 //! [`Problem::compile`] turns a [`Graph`] and its [`Values`] into columns of variables, batches of
 //! factors and the structure of their normal equations, once. An [`Optimizer`] moves the problem's
 //! estimate; an [`Observer`] watches. [`solve`] does it all.
+mod block_system;
 mod compile;
 mod diagnose;
 mod dogleg;
@@ -14,9 +15,11 @@ mod observer;
 mod optimizer;
 mod outcome;
 mod problem;
+mod start;
 mod system;
 mod termination;
 
+pub use block_system::{BlockSystem, BlockSystemError};
 pub use compile::CompileError;
 pub use dogleg::Dogleg;
 pub use gauss_newton::GaussNewton;
@@ -25,6 +28,7 @@ pub use observer::{All, Interrupt, Observer, Silent};
 pub use optimizer::{Optimizer, Stopping};
 pub use outcome::{IterationRecord, Outcome, Times};
 pub use problem::Problem;
+pub use start::{Given, Start, StartError};
 pub use termination::{Stall, Termination, Tolerance, Undetermined};
 
 use manifactor_graph::batch::FactorState;

@@ -27,7 +27,7 @@ pub use bearing_range::BearingRange2;
 pub use bearing_range_3d::BearingRange3;
 pub use between::Between;
 pub use coordinates::{Coordinates, NoCoordinates};
-pub use initialise::{Tree, spanning_tree};
+pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
 pub use landmark::Landmark;
 pub use lie_group::LieGroup;
 pub use located::Located;

@@ -1,0 +1,44 @@
+//! Pose graphs from different starts: what the start costs, how long it takes, and where a solve gets from it.
+//!
+//! `cargo run --release -p manifactor-formats --example starts -- FILE...`
+#![allow(missing_docs, clippy::unwrap_used)]
+use manifactor_formats::pose_graph::{self, Options};
+use manifactor_geometry::{Chordal, SpanningTree, Tree};
+use manifactor_solve::{GaussNewton, Given, LevenbergMarquardt, Optimizer, Silent, Start, solve};
+use std::time::Instant;
+
+fn main() {
+    let starts: [(&str, Box<dyn Start>); 4] = [
+        ("given", Box::new(Given {})),
+        ("chain", Box::new(SpanningTree { tree: Tree::Chain })),
+        ("shallow", Box::new(SpanningTree { tree: Tree::Shallow })),
+        ("chordal", Box::new(Chordal {})),
+    ];
+    let optimizers: [(&str, Box<dyn Optimizer>); 2] =
+        [("lm", Box::new(LevenbergMarquardt::default())), ("gn", Box::new(GaussNewton::default()))];
+    for path in std::env::args().skip(1) {
+        let loaded = pose_graph::read(&path, &Options::default()).unwrap();
+        let name = std::path::Path::new(&path).file_stem().unwrap().to_string_lossy().into_owned();
+        for (start, strategy) in &starts {
+            let mut best = f64::INFINITY;
+            let mut values = loaded.values.clone();
+            for _ in 0..5 {
+                let clock = Instant::now();
+                values = strategy.start(&loaded.graph, &loaded.values).unwrap();
+                best = best.min(clock.elapsed().as_secs_f64());
+            }
+            for (solver, optimizer) in &optimizers {
+                let solved = solve(&loaded.graph, &values, &**optimizer, &mut Silent).unwrap().outcome;
+                println!(
+                    "{name:18} {start:8} {:8.2} ms  {solver} cost {:20.9} -> {:20.9} in {:3} iterations, {:7.1} ms: {}",
+                    best * 1e3,
+                    solved.initial_cost,
+                    solved.final_cost,
+                    solved.iterations,
+                    solved.times.total * 1e3,
+                    solved.termination
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Chordal initialisation of pose graphs: rotations by a linear relaxation, then positions.
+//!
+//! 1. Rotations: min Σ κ ‖R_b - R_a Z‖² over all 3×3 (2×2) matrices. The rows of R are independent, so one
+//!    factorization of a sparse matrix with 3×3 blocks serves three right-hand sides.
+//! 2. Each is replaced by the closest rotation, by its singular value decomposition.
+//! 3. Positions: the whole cost ½ Σ rᵀΩr, rotations held; it is quadratic, as the logarithm of a pose is
+//!    linear in its translation. One more factorization.
+//!
+//! Martinec and Pajdla, *Robust rotation and translation estimation in multiview reconstruction*, CVPR 2007;
+//! Carlone, Tron, Daniilidis and Dellaert, *Initialization techniques for 3D SLAM*, ICRA 2015.
+use super::network::{Edge, Information, Network};
+use super::pose::Pose;
+use super::relaxation::{Relaxation, Term};
+use super::start::reseat;
+use super::{Tree, spanning_tree};
+use crate::{Between, Prior, Se2, Se3, So2, So3};
+use manifactor_graph::{Factor, Graph, Key, Values, register};
+use manifactor_solve::{BlockSystemError, Start, StartError};
+use nalgebra::{Matrix3, SMatrix, SVector};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Rotations from a linear relaxation of all relative measurements at once, then positions.
+///
+/// Takes between factors and priors of rotations and poses, with any noise; robust losses are not looked at.
+/// A measurement's rotation weighs by the mean variance of its three angles, whatever the translation; then
+/// positions minimise the full cost, rotations held. Held variables keep their values; a connected part
+/// without any, and without a prior, keeps its first pose. Points are placed from where they were first seen,
+/// anything else stays. Close to the best estimate where rotations are measured well, whatever the values
+/// that came with the graph.
+///
+/// ```toml
+/// start = { type = "chordal" }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Chordal {}
+
+const NAME: &str = "chordal";
+
+#[typetag::serde(name = "chordal")]
+impl Start for Chordal {
+    fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError> {
+        let missing = |key: &Key| !values.contains(key.as_str());
+        let filled = match graph.factors().iter().any(|f| f.keys.iter().any(missing)) {
+            true => Some(spanning_tree(graph, values, Tree::Shallow)?),
+            false => None,
+        };
+        let values = filled.as_ref().unwrap_or(values);
+        let mut started = values.clone();
+        let found = [
+            relax::<So2, 2>(graph, values, &mut started)?,
+            relax::<So3, 3>(graph, values, &mut started)?,
+            relax::<Se2, 2>(graph, values, &mut started)?,
+            relax::<Se3, 3>(graph, values, &mut started)?,
+        ];
+        if !found.contains(&true) {
+            return Err(StartError::NotApplicable {
+                start: NAME,
+                needs: "between factors of rotations or poses (so2, so3, se2, se3)",
+            });
+        }
+        reseat(graph, &mut started);
+        Ok(started)
+    }
+}
+register!(dyn Start, "chordal", Chordal);
+
+/// Puts the poses of one type to where the measurements between them say; false, where there are none.
+fn relax<P: Pose<D>, const D: usize>(
+    graph: &Graph,
+    values: &Values,
+    started: &mut Values,
+) -> Result<bool, StartError>
+where
+    Between<P>: Factor,
+    Prior<P>: Factor,
+{
+    let Some(net) = Network::<P, D>::of(graph, values)? else { return Ok(false) };
+    let failed = |what| {
+        let variables = net.keys.len();
+        let key = net.keys.first().cloned().unwrap_or_else(|| "".into());
+        move |error| match error {
+            BlockSystemError::NotPositiveDefinite => {
+                StartError::Open { start: NAME, what, key, variables: variables }
+            }
+            other => StartError::System(other),
+        }
+    };
+    let anchored = net.anchored(|e| weight(&e.information) > 0.0);
+    let mut relaxation = Relaxation::new(&net.edges, anchored)?;
+    let rotations = rotations(&net, &mut relaxation).map_err(failed("rotations"))?;
+    let mut translations: Vec<_> = net.poses.iter().map(Pose::translation).collect();
+    if P::MOVE.is_some() {
+        let anchored = net.anchored(|e| e.information.shift.iter().any(|x| *x != 0.0));
+        if !relaxation.fits(&anchored) {
+            relaxation = Relaxation::new(&net.edges, anchored)?;
+        }
+        relaxation
+            .minimize(&net.edges, &mut translations, |e| position_term::<P, D>(e, &rotations))
+            .map_err(failed("positions"))?;
+    }
+    for (i, key) in net.keys.iter().enumerate().filter(|(i, _)| !net.held[*i]) {
+        started.insert(key.clone(), P::assemble(&rotations[i], &translations[i]));
+    }
+    Ok(true)
+}
+
+/// κ: half of the inverse of the mean variance about the axes, marginal over the translation. For a small
+/// angle θ, ‖R - I‖² is 2θ².
+fn weight<const D: usize>(information: &Information<D>) -> f64 {
+    let Information { turn, cross, shift } = information;
+    let marginal = match shift.try_inverse() {
+        Some(inverse) if cross.iter().any(|x| *x != 0.0) => turn - cross.tr_mul(&(inverse * cross)),
+        _ => *turn,
+    };
+    let variance = if D == 2 {
+        1.0 / marginal[(2, 2)]
+    } else {
+        marginal.try_inverse().map_or(f64::INFINITY, |m: Matrix3<f64>| m.trace() / 3.0)
+    };
+    let weight = 0.5 / variance;
+    if weight.is_finite() { weight.max(0.0) } else { 0.0 }
+}
+
+fn rotations<P: Pose<D>, const D: usize>(
+    net: &Network<P, D>,
+    relaxation: &mut Relaxation<D>,
+) -> Result<Vec<SMatrix<f64, D, D>>, BlockSystemError> {
+    // the rows of R are the columns of x
+    let mut x: Vec<SMatrix<f64, D, D>> = net.poses.iter().map(|p| p.rotation().transpose()).collect();
+    relaxation.minimize(&net.edges, &mut x, |e| {
+        let kappa = weight(&e.information);
+        let w = SMatrix::identity() * kappa;
+        (kappa > 0.0).then(|| Term { a: e.rotation, w, g: SMatrix::zeros() })
+    })?;
+    // where measurements leave nothing of a rotation, it stays
+    let nearest =
+        |(x, pose): (&SMatrix<f64, D, D>, &P)| P::nearest(&x.transpose()).unwrap_or_else(|| pose.rotation());
+    Ok(x.iter().zip(&net.poses).map(nearest).collect())
+}
+
+/// ½ rᵀΩr as a function of positions: the translational rows of r are B (t_b - t_a - R_a z) with
+/// B = V⁻¹(ω) Zᵀ R_aᵀ, the rotational ones ω = Log(Zᵀ R_aᵀ R_b).
+fn position_term<P: Pose<D>, const D: usize>(
+    edge: &Edge<D>,
+    rotations: &[SMatrix<f64, D, D>],
+) -> Option<Term<D, 1>> {
+    let Information { cross, shift, .. } = &edge.information;
+    if shift.iter().all(|x| *x == 0.0) {
+        return None;
+    }
+    let outer_from_b = rotations[edge.a] * edge.rotation;
+    let (omega, v_inverse) = P::logarithm(&outer_from_b.tr_mul(&rotations[edge.b]));
+    let b = v_inverse * outer_from_b.transpose();
+    let w = b.tr_mul(&(shift * b));
+    let g: SVector<f64, D> = w * (rotations[edge.a] * edge.translation) - b.tr_mul(&(cross * omega));
+    Some(Term { a: SMatrix::identity(), w, g })
+}

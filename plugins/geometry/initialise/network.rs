@@ -1,0 +1,119 @@
+//! Poses of one type and the relative measurements between them, as linear methods take them.
+use super::as_factor;
+use super::parts::Parts;
+use super::pose::Pose;
+use crate::{Between, Prior};
+use manifactor_graph::{Factor, Fixed, Graph, Key, Values};
+use manifactor_solve::StartError;
+use nalgebra::{DMatrix, Matrix3, SMatrix, SVector};
+
+/// Nodes are poses by their place among the values of their type; the last is the outer frame, which priors
+/// are measured from. It is held, as are fixed poses, and one pose of each connected part without any of
+/// these.
+pub(crate) struct Network<P, const D: usize> {
+    pub poses: Vec<P>,
+    /// Of each node but the outer frame.
+    pub keys: Vec<Key>,
+    /// Held by the graph, wholly or in part; and the outer frame.
+    pub held: Vec<bool>,
+    pub edges: Vec<Edge<D>>,
+}
+
+/// Pose `b`, as it was seen from pose `a`.
+pub(crate) struct Edge<const D: usize> {
+    pub a: usize,
+    pub b: usize,
+    pub rotation: SMatrix<f64, D, D>,
+    pub translation: SVector<f64, D>,
+    pub information: Information<D>,
+}
+
+/// Blocks of Ω. Rotations are about x, y and z; in the plane, zero but for z.
+pub(crate) struct Information<const D: usize> {
+    pub turn: Matrix3<f64>,
+    pub cross: SMatrix<f64, D, 3>,
+    pub shift: SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> Information<D> {
+    fn of<P: Pose<D>>(m: &DMatrix<f64>) -> Self {
+        let entry = |r: Option<usize>, c: Option<usize>| r.zip(c).map_or(0.0, |at| m[at]);
+        let shift = |k: usize| P::MOVE.map(|first| first + k);
+        Self {
+            turn: Matrix3::from_fn(|r, c| entry(P::TURN[r], P::TURN[c])),
+            cross: SMatrix::from_fn(|r, c| entry(shift(r), P::TURN[c])),
+            shift: SMatrix::from_fn(|r, c| entry(shift(r), shift(c))),
+        }
+    }
+}
+
+impl<P: Pose<D>, const D: usize> Network<P, D>
+where
+    Between<P>: Factor,
+    Prior<P>: Factor,
+{
+    /// `None` where the graph has no between factor of this type.
+    pub(crate) fn of(graph: &Graph, values: &Values) -> Result<Option<Self>, StartError> {
+        if !graph.factors().iter().any(|entry| as_factor::<Between<P>, 2>(entry).is_some()) {
+            return Ok(None);
+        }
+        let mut net = Self { poses: vec![], keys: vec![], held: vec![], edges: vec![] };
+        // node of each place in the values
+        let mut nodes = vec![usize::MAX; values.len()];
+        for (place, (key, value)) in values.iter().enumerate() {
+            if let Some(pose) = value.erased().as_any().downcast_ref::<P>() {
+                nodes[place] = net.poses.len();
+                net.poses.push(*pose);
+                net.keys.push(key.clone());
+            }
+        }
+        let outer = net.poses.len();
+        net.poses.push(P::identity());
+        net.held = vec![false; outer + 1];
+        net.held[outer] = true;
+        let node = |key: &Key| match values.position(key.as_str()).map(|place| nodes[place]) {
+            Some(node) if node != usize::MAX => Ok(node),
+            // says what is wrong with it
+            _ => values.get::<P>(key).map(|_| usize::MAX).map_err(StartError::from),
+        };
+        for (key, fixed) in graph.fixed() {
+            if let (Ok(node), true) = (node(key), *fixed != Fixed::Whole(false)) {
+                net.held[node] = true;
+            }
+        }
+        for (i, entry) in graph.factors().iter().enumerate() {
+            let (a, b, relative) = if let Some((between, [a, b])) = as_factor::<Between<P>, 2>(entry) {
+                (node(a)?, node(b)?, &between.relative)
+            } else if let Some((prior, [x])) = as_factor::<Prior<P>, 1>(entry) {
+                (outer, node(x)?, &prior.value)
+            } else {
+                continue;
+            };
+            let rows = P::TANGENT.len();
+            let information = entry.noise.information_matrix(rows);
+            let information = information.map_err(|source| StartError::Noise { factor: i, source })?;
+            net.edges.push(Edge {
+                a,
+                b,
+                rotation: relative.rotation(),
+                translation: relative.translation(),
+                information: Information::of::<P>(&information),
+            });
+        }
+        Ok(Some(net))
+    }
+
+    /// Which nodes stay where they are, if only these edges count: the held ones, and the first of each
+    /// part without any.
+    pub(crate) fn anchored(&self, counts: impl Fn(&Edge<D>) -> bool) -> Vec<bool> {
+        let n = self.poses.len();
+        let mut parts = Parts::new(n);
+        self.edges.iter().filter(|e| counts(e)).for_each(|e| parts.join(e.a, e.b));
+        let mut part_is_held = vec![false; n];
+        (0..n).filter(|i| self.held[*i]).for_each(|i| part_is_held[parts.root(i)] = true);
+        let mut anchored = self.held.clone();
+        // a root is the first of its part
+        (0..n).filter(|i| parts.root(*i) == *i && !part_is_held[*i]).for_each(|i| anchored[i] = true);
+        anchored
+    }
+}
