@@ -131,8 +131,7 @@ impl Dogleg {
                     return Termination::Converged { reason: Tolerance::RelativeCost };
                 }
                 if step.norm <= session.stop.step {
-                    let reason = if session.trial.left > 0 { Stall::Domain } else { Stall::TrustRegion };
-                    return Termination::Stalled { reason };
+                    return Termination::Stalled { reason: session.stall(Stall::TrustRegion) };
                 }
                 if session.interrupted() {
                     return Termination::Interrupted;

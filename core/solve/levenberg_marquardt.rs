@@ -41,7 +41,7 @@ impl Default for LevenbergMarquardt {
         Self {
             initial_lambda: 1e-5,
             min_lambda: 1e-15,
-            max_lambda: 1e15,
+            max_lambda: 1e12,
             decrease: 10.0,
             diagonal: [1e-6, 1e32],
             stop: Stopping::default(),
@@ -121,8 +121,7 @@ impl LevenbergMarquardt {
                 }
                 (*lambda, rise) = (*lambda * rise, rise * 2.0);
                 if *lambda > self.max_lambda {
-                    let reason = if session.trial.left > 0 { Stall::Domain } else { Stall::Damping };
-                    return Termination::Stalled { reason };
+                    return Termination::Stalled { reason: session.stall(Stall::Damping) };
                 }
             }
         }

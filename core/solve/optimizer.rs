@@ -2,7 +2,7 @@
 use crate::observer::Observer;
 use crate::outcome::{IterationRecord, Outcome};
 use crate::problem::Problem;
-use crate::termination::{Termination, Tolerance, Undetermined};
+use crate::termination::{Stall, Termination, Tolerance, Undetermined};
 use manifactor_graph::batch::Evaluation;
 use manifactor_graph::catalogue::Kind;
 use manifactor_graph::column::Columns;
@@ -152,6 +152,18 @@ impl<'a> Session<'a> {
     pub(crate) fn settled(&self, step: &Step) -> bool {
         let small = self.stop.relative_cost * self.at.cost.abs();
         (self.at.cost - self.trial.cost).abs() <= small && step.predicted.abs() <= small
+    }
+
+    /// Why no step is good enough, as the last one shows, which is next to nothing; else `other`.
+    pub(crate) fn stall(&self, other: Stall) -> Stall {
+        const ROUNDING: f64 = 1e-10;
+        if self.trial.left > 0 {
+            Stall::Domain
+        } else if self.trial.cost - self.at.cost > ROUNDING * self.at.cost.abs() {
+            Stall::Jump
+        } else {
+            other
+        }
     }
 
     /// Takes the trial as the estimate and linearizes there; a reason to stop, if it brings one.

@@ -53,6 +53,9 @@ pub enum Tolerance {
 pub enum Stall {
     /// Damping has reached its bound, and still no step lowers the cost.
     Damping,
+    /// The cost rises by more than rounding however short the step is: it has a jump or a kink there, and
+    /// is least beside it.
+    Jump,
     /// The trust region has shrunk to nothing.
     TrustRegion,
     /// Each step leaves the domain of a factor, however short.
@@ -107,6 +110,7 @@ impl fmt::Display for Termination {
             Self::MaxIterations => f.write_str("stopped after the allowed number of iterations"),
             Self::Stalled { reason } => f.write_str(match reason {
                 Stall::Damping => "stalled: no step lowers the cost, however damped",
+                Stall::Jump => "stalled: the cost has a jump or a kink here, and is least beside it",
                 Stall::TrustRegion => "stalled: no step lowers the cost, however small the trust region",
                 Stall::Domain => "stalled: each step leaves the domain of a factor",
                 Stall::Diverging => "stalled: the steps raise the cost; use levenberg_marquardt",

@@ -1,23 +1,25 @@
 use super::{Gravity, GravityError, MapFrame, first_frame};
-use crate::sequence::Sequence;
+use crate::sequence::{Frame, Sequence};
 use manifactor_geometry::{NotARotation, So3};
 use manifactor_graph::{Direction, register};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Up is what an accelerometer feels about the time of the first frame.
+/// Up is what an accelerometer feels.
 ///
-/// Held still, an accelerometer reads 9.8 m/s² upwards. Readings are averaged, since a hand that holds a camera
-/// is never still. The map stays in the frame of the odometry.
+/// Held still, an accelerometer reads 9.8 m/s² upwards. A hand that holds a camera is never still: readings are turned
+/// into the frame of the odometry by the frame nearest in time, and averaged there, where pushes to and fro cancel
+/// out. The map stays in that frame.
 ///
 /// ```toml
-/// gravity = { type = "accelerometer", window = 1.0, camera_from_sensor = [0.0, 0.0, 1.0, 0.0] }
+/// gravity = { type = "accelerometer", window = 10.0, camera_from_sensor = [0.0, 0.0, 1.0, 0.0] }
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Accelerometer {
-    /// Readings this near to the first frame are averaged, in seconds.
+    /// Readings this near in time to the first frame are averaged, in seconds: the longer, the less the pushes count, and
+    /// the more the drift of the odometry.
     pub window: f64,
     /// Rotation from the sensor's frame to the camera's, a unit quaternion (x, y, z, w). The Kinect's of TUM RGB-D
     /// is half a turn about z, [0, 0, 1, 0].
@@ -44,7 +46,7 @@ impl From<Quaternion> for [f64; 4] {
 
 impl Default for Accelerometer {
     fn default() -> Self {
-        Self { window: 1.0, camera_from_sensor: Quaternion(So3::identity()) }
+        Self { window: 10.0, camera_from_sensor: Quaternion(So3::identity()) }
     }
 }
 
@@ -57,12 +59,28 @@ impl Gravity for Accelerometer {
         if near.peek().is_none() {
             return Err(GravityError::NoReadings { timestamp: first.timestamp, within: self.window });
         }
-        let sum: Vector3<f64> = near.map(|r| r.acceleration).sum();
-        let up = first.world_from_camera.rotation.act(&self.camera_from_sensor.0.act(&sum));
+        let up: Vector3<f64> = near
+            .map(|reading| {
+                let felt = self.camera_from_sensor.0.act(&reading.acceleration);
+                frame_at(&sequence.frames, reading.timestamp)
+                    .unwrap_or(first)
+                    .world_from_camera
+                    .rotation
+                    .act(&felt)
+            })
+            .sum();
         Ok(MapFrame::of_odometry(Some(Direction::new(up)?)))
     }
 }
 register!(dyn Gravity, "accelerometer", Accelerometer);
+
+/// The frame nearest in time.
+fn frame_at(frames: &[Frame], timestamp: f64) -> Option<&Frame> {
+    let after = frames.partition_point(|frame| frame.timestamp < timestamp);
+    let around = frames.get(after.saturating_sub(1)..frames.len().min(after + 1)).unwrap_or_default();
+    let away = |frame: &Frame| (frame.timestamp - timestamp).abs();
+    around.iter().min_by(|a, b| away(a).total_cmp(&away(b)))
+}
 
 #[cfg(test)]
 mod tests {
@@ -74,6 +92,11 @@ mod tests {
         Acceleration { timestamp, acceleration: acceleration.into() }
     }
 
+    fn half_turn() -> Accelerometer {
+        let camera_from_sensor = Quaternion(So3::from_quaternion_xyzw([0.0, 0.0, 1.0, 0.0]).unwrap());
+        Accelerometer { window: 1.0, camera_from_sensor }
+    }
+
     #[test]
     fn up_is_the_average_of_what_is_felt_at_first() {
         let accelerometer = vec![
@@ -81,10 +104,19 @@ mod tests {
             reading(10.5, [-1.0, 9.0, 0.0]),
             reading(13.0, [9.0, 0.0, 0.0]),
         ];
-        let half_turn = Quaternion(So3::from_quaternion_xyzw([0.0, 0.0, 1.0, 0.0]).unwrap());
-        let gravity = Accelerometer { camera_from_sensor: half_turn, ..Accelerometer::default() };
-        let map = gravity.locate(&Sequence { accelerometer, ..sequence() }).unwrap();
+        let map = half_turn().locate(&Sequence { accelerometer, ..sequence() }).unwrap();
         assert!((*map.up.unwrap() - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn a_camera_that_turns_feels_the_same_up() {
+        let quarter = So3::exp(&Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
+        let mut sequence = sequence();
+        sequence.frames[1].world_from_camera.rotation = quarter;
+        // up is -y in the world, and -x in the second camera
+        sequence.accelerometer = vec![reading(10.1, [0.0, 9.0, 0.0]), reading(10.9, [9.0, 0.0, 0.0])];
+        let map = half_turn().locate(&sequence).unwrap();
+        assert!((*map.up.unwrap() - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-12);
     }
 
     #[test]

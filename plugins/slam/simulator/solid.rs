@@ -102,7 +102,8 @@ impl Solid {
                 image = clip(&image, |p| p[axis]);
                 image = clip(&image, |p| size[axis] - p[axis]);
             }
-            image.iter().for_each(|p| inside.add(p));
+            // where an edge meets the border, up to rounding
+            image.iter().for_each(|p| inside.add(&p.sup(&Vector2::zeros()).inf(&size)));
         }
         Some(Boxes { whole: whole.bounding_box()?, inside: inside.bounding_box()? })
     }

@@ -8,7 +8,7 @@ use manifactor_slam::mapping::Mapping;
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
-use manifactor_solve::Silent;
+use manifactor_solve::{Silent, Stall, Termination};
 use std::path::{Path, PathBuf};
 
 /// Where the data lie; `None`, said aloud, where nobody said.
@@ -81,7 +81,10 @@ fn no_cost_is_above_the_reference_on_fr1_desk() {
         let (estimate, report) = run(&data, &document, variant);
         let cost = weighted_twice(&estimate);
         assert!(cost <= reference * 1.001, "{variant}: {cost}, reference {reference}");
-        assert!(report.solve.termination.is_converged(), "{variant}: {}", report.solve.termination);
+        // the orientation factor's cost jumps where another semi-axis becomes the longest
+        let at_a_jump = Termination::Stalled { reason: Stall::Jump };
+        let ended = &report.solve.termination;
+        assert!(ended.is_converged() || *ended == at_a_jump && variant.contains('O'), "{variant}: {ended}");
         assert_eq!(report.solve.inactive, 0, "{variant}");
         assert_sound(&estimate, variant);
         // to the digits that the reference gives of what came in
