@@ -6,11 +6,12 @@ import sys
 import venv
 from pathlib import Path
 
-from bench.methods import Method, Ours
+from bench.methods import ALL, POSE_GRAPHS, Method, Ours
 
 HERE = Path(__file__).resolve().parent.parent
 ROOT = HERE.parent.parent
 PYTHON_PACKAGES = ["numpy", "gtsam", "g2opy"]
+DEBIAN_PACKAGES = ["g++", "libceres-dev", "libopenblas0-serial", "nlohmann-json3-dev"]
 
 
 def say(text):
@@ -49,15 +50,72 @@ def ours(binary):
 
 def our_methods(ours, solvers, interpreter):
     adapter = (str(interpreter), str(HERE / "adapters" / "manifactor_solve.py"), ours.binary)
-    return [Method("manifactor", solver, adapter, ours=True) for solver in solvers]
+    return [Method("manifactor", solver, adapter, ALL, ours=True) for solver in solvers]
 
 
-def gtsam(interpreter):
-    if call([interpreter, "-c", "import gtsam"]):
+# on grids, which are there for growth with size, the methods that do best on small ones
+GRIDS = {("gtsam", "gn"), ("ceres", "lm+wide")}
+
+
+def on_pose_graphs(peer, names, command):
+    kinds = {name: POSE_GRAPHS + (("grid",) if (peer, name) in GRIDS else ()) for name in names}
+    return [Method(peer, name, command, kinds[name]) for name in names]
+
+
+def python_peers(interpreter):
+    adapters = {
+        "gtsam": ("gtsam", "gtsam_pose_graph.py", ["gn", "lm", "chordal+gn", "chordal+lm"]),
+        "g2opy": ("g2o", "g2o_pose_graph.py", ["gn", "lm", "dogleg"]),
+    }
+    methods = []
+    for package, (peer, adapter, names) in adapters.items():
+        if call([interpreter, "-c", f"import {package}"]) is None:
+            methods += on_pose_graphs(peer, names, (str(interpreter), str(HERE / "adapters" / adapter)))
+    return methods
+
+
+def ceres(cache):
+    """Our programs on Debian's libceres-dev, with a BLAS that is fast."""
+    if any(call(["dpkg", "--status", package]) for package in DEBIAN_PACKAGES):
+        call(["apt-get", "update"])
+        failed = call(["apt-get", "install", "--yes", "--no-install-recommends", *DEBIAN_PACKAGES])
+        if failed:
+            say(f"ceres: left out, apt-get failed; install {' '.join(DEBIAN_PACKAGES)}:\n{failed}")
+            return []
+    (cache / "ceres").mkdir(parents=True, exist_ok=True)
+    methods = []
+    pose_graph, quadrics = (compiled(program, cache / "ceres" / program) for program in ("pose_graph", "quadrics"))
+    if pose_graph:
+        methods += on_pose_graphs("ceres", ["lm", "lm+wide", "dogleg"], (pose_graph,))
+    if quadrics:
+        methods += [Method("ceres", name, (quadrics,), ("quadrics",)) for name in ("lm", "lm+schur", "dogleg")]
+    return methods
+
+
+def compiled(program, binary):
+    """The program, built anew where its source is newer; None where that fails."""
+    source = HERE / "adapters" / "ceres"
+    newest = max(file.stat().st_mtime for file in source.iterdir())
+    if not binary.exists() or binary.stat().st_mtime < newest:
+        command = ["g++", "-O3", "-DNDEBUG", "-std=c++17", "-I/usr/include/eigen3", source / f"{program}.cpp"]
+        failed = call([*command, "-o", binary, "-lceres", "-lglog"])
+        if failed:
+            say(f"ceres: {program} left out, g++ failed:\n{failed}")
+            return None
+    return str(binary)
+
+
+def crates(cache):
+    """factrs, apex-solver and tiny-solver, in a workspace of their own."""
+    target = cache / "rust"
+    options = {"cwd": HERE / "adapters" / "rust", "env": os.environ | {"CARGO_TARGET_DIR": str(target)}}
+    failed = call(["cargo", "build", "--release", "--locked"], **options)
+    if failed:
+        say(f"factrs, apex, tiny: left out, cargo failed:\n{failed}")
         return []
-    adapter = (str(interpreter), str(HERE / "adapters" / "gtsam_pose_graph.py"))
-    return [Method("gtsam", method, adapter) for method in ("gn", "lm", "chordal+gn", "chordal+lm")]
+    peers = {"factrs": ["gn", "lm"], "apex": ["gn", "lm", "dogleg"], "tiny": ["gn", "lm"]}
+    return [m for peer, names in peers.items() for m in on_pose_graphs(peer, names, (str(target / "release" / peer),))]
 
 
 def peers(cache, interpreter):
-    return gtsam(interpreter)
+    return python_peers(interpreter) + ceres(cache) + crates(cache)

@@ -5,8 +5,12 @@ import os
 import statistics
 import subprocess
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
+
+
+# for what counts cores by other means than the affinity
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1"}
 
 
 @dataclass(frozen=True)
@@ -49,10 +53,9 @@ def peak_kib(pid):
 def watched(command, core, patience, log):
     """Runs a command on one core; exit status, peak KiB, share of its time that it had the core."""
     began = time.perf_counter()
+    pinned = ["taskset", "--cpu-list", str(core), *map(str, command)]
     with open(log, "w") as out, open(f"{log}.err", "w") as err:
-        process = subprocess.Popen(
-            [str(word) for word in command], stdout=out, stderr=err, preexec_fn=lambda: os.sched_setaffinity(0, {core})
-        )
+        process = subprocess.Popen(pinned, stdout=out, stderr=err, env=os.environ | ONE_THREAD)
         peak = 0
         while True:
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
@@ -73,6 +76,8 @@ def report(log):
         told = json.loads(Path(log).read_text())
     except ValueError:
         return None
+    if "seconds" not in told:
+        return None
     if isinstance(told["seconds"], dict):  # our own command line
         told["stages"] = {k: v for k, v in told["seconds"].items() if k != "total"}
         told["seconds"] = told["seconds"]["total"]
@@ -81,16 +86,20 @@ def report(log):
     return told
 
 
+def last_words(log):
+    """Of what a failed adapter said, the last line with a message in it."""
+    lines = [line.strip() for line in Path(f"{log}.err").read_text().splitlines()]
+    return next((line for line in reversed(lines) if line and not line.startswith("note:")), "nothing said")
+
+
 def run_once(method, problem_input, folder, stop, core, patience):
     """One run; its report with peak memory, or a text that says how it failed."""
-    output, log = folder / "estimate.g2o", folder / "report.json"
+    output, log = folder / f"estimate{problem_input.suffix}", folder / "report.json"
     output.unlink(missing_ok=True)
     code, peak, share = watched(method.command(problem_input, output, stop), core, patience, log)
     told = report(log)
     if told is None:
-        killed = f"stopped after {patience:.0f} s" if code == -9 else f"exit status {code}"
-        errors = Path(f"{log}.err").read_text().strip().splitlines()
-        return f"{killed}: {errors[-1]}" if errors and code != -9 else killed
+        return f"stopped after {patience:.0f} s" if code == -9 else f"exit status {code}: {last_words(log)}"
     told["memory_mib"] = (peak - told.get("held_kib", 0)) / 1024.0
     told["disturbed"] = share < 0.95
     return told
@@ -106,7 +115,7 @@ def measure(methods, problem_input, folder, stop, core, repeat, patience):
             # long runs are stable, and failures stay failures
             if round and (not runs[method] or result.seconds[0] > patience / 6.0):
                 continue
-            place = folder / method.name.replace(" ", "_")
+            place = folder / method.folder
             place.mkdir(parents=True, exist_ok=True)
             told = run_once(method, problem_input, place, stop, core, patience)
             if isinstance(told, str):
@@ -123,6 +132,3 @@ def measure(methods, problem_input, folder, stop, core, repeat, patience):
             result.memory_mib = max(0.0, max(told["memory_mib"] for told in runs[method]))
     return results
 
-
-def as_json(result):
-    return asdict(result) | {"time": result.time}

@@ -8,6 +8,7 @@ from pathlib import Path
 from bench import pose_graph
 
 POSE_GRAPHS = ("se2", "se3")
+ALL = ("se2", "se3", "grid", "quadrics")
 
 
 @dataclass(frozen=True)
@@ -17,12 +18,16 @@ class Method:
     peer: str
     method: str
     adapter: tuple[str, ...]
-    kinds: tuple[str, ...] = POSE_GRAPHS
+    kinds: tuple[str, ...]
     ours: bool = False
 
     @property
     def name(self):
         return f"{self.peer} {self.method}"
+
+    @property
+    def folder(self):
+        return self.name.replace(" ", "_")
 
     def command(self, source, output, stop):
         return [*self.adapter, self.method, source, output, stop.max_iterations, stop.relative_cost]
@@ -38,9 +43,19 @@ class Ours:
         listed = subprocess.run([self.binary, "list", "solvers", "--json"], capture_output=True, check=True)
         return [entry["name"] for entry in json.loads(listed.stdout)]
 
+    def default_solvers(self):
+        """The one that needs no choice, once there is one."""
+        return ["auto"] if "auto" in self.solvers() else ["levenberg_marquardt", "gauss_newton"]
+
     def start(self, source, output):
         """Vertices for a file that has edges only: spanning trees of odometry."""
         solve = [self.binary, "solve", source, "--out", output, "--json", "--solver", "gauss_newton"]
         nothing = ["--set", "solver.stop.max_iterations=0"]
         subprocess.run([*solve, *nothing], capture_output=True, check=False)
         return pose_graph.read(Path(output)).vertices
+
+    def begin(self, document, output, data):
+        """Writes the graphs with which a run begins; what was said, in case they are not there."""
+        nothing = ["--set", "solver.type=levenberg_marquardt", "--set", "solver.stop.max_iterations=0"]
+        command = [self.binary, "run", document, "--out", output, "--data", data, *nothing]
+        return subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()

@@ -1,21 +1,28 @@
 """The problems, and their inputs: every method gets the same file, with a start for every pose."""
 
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 from bench import grids, pose_graph
 
 
+HERE = Path(__file__).resolve().parent.parent
+ROOT = HERE.parent.parent
+
+
 @dataclass
 class Problem:
     name: str
-    kind: str  # se2, se3 or quadrics
-    file: str = ""  # below the folder of data; empty where the benchmark makes it
-    best_known: float | None = None  # of 1/2 sum r' Omega r, where it has been published or found before
+    kind: str  # se2, se3, grid or quadrics
+    file: str = ""  # below the folder of data
+    best_known: float | None = None  # of 1/2 sum r' Omega r, where it was found before
     side: int = 0  # of a grid
+    document: Path | None = None  # of a run that makes a scene
+    variant: str = ""  # of that run
 
     def input(self, folder):
-        return folder / f"{self.name}.g2o"
+        return folder / f"{self.name}.{'json' if self.kind == 'quadrics' else 'g2o'}"
 
 
 PUBLISHED = [
@@ -33,25 +40,45 @@ PUBLISHED = [
 ]
 
 
+SCENES = [
+    Problem("fifty_objects", "quadrics", document=HERE / "scene.toml", variant="boxes"),
+    Problem("fr2_desk", "quadrics", document=ROOT / "examples" / "tum" / "fr2_desk.toml", variant="q"),
+]
+
+
 def grid(poses):
     """A cube of about so many poses."""
     side = round(poses ** (1.0 / 3.0))
-    return Problem(f"grid_{side**3}", "se3", side=side)
+    return Problem(f"grid_{side**3}", "grid", side=side)
 
 
 def prepare(problem, data, folder, ours):
-    """Writes the input unless it is there; returns why it cannot be had, or None."""
-    path = problem.input(folder)
+    """Writes the input; returns why it cannot be had, or None."""
     folder.mkdir(parents=True, exist_ok=True)
-    if problem.side:
-        if not path.exists():
-            pose_graph.write(path, grids.grid(problem.side))
-        return None
+    if problem.kind == "grid":
+        return prepare_grid(problem, folder)
+    if problem.kind == "quadrics":
+        return prepare_scene(problem, data, folder, ours)
     source = Path(data) / problem.file
     if not source.exists():
         return f"no {source}: docs/data.md says where data come from, MANIFACTOR_DATA where they lie"
     graph = pose_graph.read(source)
     if not graph.ids <= graph.vertices.keys():
         graph.vertices = ours.start(source, folder / f"{problem.name}.start.g2o") | graph.vertices
-    pose_graph.write(path, graph)
+    pose_graph.write(problem.input(folder), graph)
+    return None
+
+
+def prepare_grid(problem, folder):
+    if not problem.input(folder).exists():
+        pose_graph.write(problem.input(folder), grids.grid(problem.side))
+
+
+def prepare_scene(problem, data, folder, ours):
+    graph = folder / problem.name / problem.variant / "graph.json"
+    graph.unlink(missing_ok=True)
+    failed = ours.begin(problem.document, folder / problem.name, data)
+    if not graph.exists():
+        return failed
+    shutil.copy(graph, problem.input(folder))
     return None

@@ -1,84 +1,127 @@
 """What was measured, as tables of Markdown: they read well in a terminal too."""
 
+import math
+
 REACHES = 1e-4  # of the best known cost, relative
 
 
-def best_known(problem, results):
-    costs = [r.cost for r in results if r.cost is not None]
-    return min(costs + ([problem.best_known] if problem.best_known is not None else []), default=None)
+def best_known(measured):
+    costs = [r.cost for r in measured.results if r.cost is not None]
+    return min(costs + ([] if measured.best_known is None else [measured.best_known]), default=None)
 
 
 def reaches(result, best):
-    return result.cost is not None and result.time is not None and result.cost <= best * (1.0 + REACHES)
+    return None not in (result.cost, result.time, best) and result.cost <= best * (1.0 + REACHES)
 
 
-def best_peer(problem, results):
+def best_peer(measured):
     """The fastest that reaches the best known cost, whatever initialisation that takes."""
-    best = best_known(problem, results)
-    reaching = [r for r in results if not r.ours and best is not None and reaches(r, best)]
+    best = best_known(measured)
+    reaching = [r for r in measured.results if not r.ours and reaches(r, best)]
     return min(reaching, key=lambda r: r.time, default=None)
 
 
-def ratio(result, peer):
-    return result.time / peer.time if peer and result.time else None
+def ratio(result, measured):
+    """To the best peer's time; None where one of them does not reach the best known cost."""
+    peer = best_peer(measured)
+    return result.time / peer.time if peer and reaches(result, best_known(measured)) else None
 
 
-def number(x, form):
-    return "" if x is None else format(x, form)
+def number(x, form, scale=1.0):
+    return "" if x is None else format(scale * x, form)
 
 
-def row(cells):
-    return "| " + " | ".join(cells) + " |"
+def cost(result, best):
+    """✗: not the best known."""
+    return number(result.cost, ".9g") + ("" if reaches(result, best) else " ✗")
+
+
+def milliseconds(result):
+    """~: most runs did not have the core to themselves."""
+    return number(result.time, ".1f", 1e3) + (" ~" if result.disturbed > len(result.seconds) / 2 else "")
 
 
 def table(head, rows):
-    """Left-aligned first column, the others to the right."""
-    rule = "| --- |" + " ---: |" * (len(head) - 1)
-    return "\n".join([row(head), rule, *map(row, rows)])
+    """The first column to the left, the others to the right."""
+    lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
-def cells(result, best, peer):
-    share = ratio(result, peer) if best is not None and reaches(result, best) else None
+METHODS = ["method", "final cost", "iterations", "ms", "least ms", "MiB", "ratio", "stages in ms; how it ended"]
+
+
+def of_method(result, measured):
     stages = ", ".join(f"{name} {1e3 * seconds:.1f}" for name, seconds in result.stages.items())
-    spread = "" if not result.seconds else f"{1e3 * min(result.seconds):.1f}"
     return [
         f"**{result.method}**" if result.ours else result.method,
-        number(result.cost, ".9g") + ("" if best is None or reaches(result, best) else " ✗"),
+        cost(result, best_known(measured)),
         str(result.iterations) if result.seconds else "",
-        number(result.time and 1e3 * result.time, ".1f"),
-        spread,
+        milliseconds(result),
+        number(min(result.seconds, default=None), ".1f", 1e3),
         number(result.memory_mib or None, ".0f"),
-        number(share, ".2f"),
-        stages or result.status,
+        number(ratio(result, measured), ".2f"),
+        "; ".join(part for part in (stages, result.status.replace("|", "/")) if part),
     ]
 
 
-HEAD = ["method", "final cost", "iterations", "ms", "least ms", "MiB", "ratio", "stages in ms, or how it ended"]
+def of_problem(measured):
+    """All methods on one problem, those that reach the best known cost first, the fastest first."""
+    best = best_known(measured)
+    order = sorted(measured.results, key=lambda r: (not reaches(r, best), r.time or math.inf))
+    costs = f"Cost at the start {number(measured.start, '.9g')}, best known {number(best, '.12g')}."
+    return f"### {measured.name}\n{costs}\n\n" + table(METHODS, [of_method(r, measured) for r in order])
 
 
-def of_problem(problem, results, start):
-    """All methods on one problem, the fastest that reach the best known cost first."""
-    best, peer = best_known(problem, results), best_peer(problem, results)
-    order = sorted(results, key=lambda r: (best is None or not reaches(r, best), r.time or float("inf")))
-    known = f"start {number(start, '.9g')}, best known {number(best, '.12g')}"
-    return f"### {problem.name}\nCost at the {known}.\n\n" + table(HEAD, [cells(r, best, peer) for r in order])
+SUMMARY = ["problem", "ours, ms", "cost", "best peer", "ms", "cost", "ours - theirs, relative", "ratio"]
 
 
-def summary(measured, solver):
+def summary(all_measured, solver):
     """One row a problem: ours against the best peer."""
     rows = []
-    for problem, results, _ in measured:
-        best, peer = best_known(problem, results), best_peer(problem, results)
-        our = next((r for r in results if r.ours and r.method.endswith(f" {solver}")), None)
-        if our is None:
+    for measured in all_measured:
+        best, peer = best_known(measured), best_peer(measured)
+        our = next((r for r in measured.results if r.ours and r.method.endswith(f" {solver}")), None)
+        if our is None or measured.kind == "grid":
             continue
+        excess = (our.cost - peer.cost) / peer.cost if peer and our.cost is not None else None
         rows.append([
-            problem.name,
-            number(our.time and 1e3 * our.time, ".1f"),
-            number(our.cost, ".9g") + ("" if best is None or reaches(our, best) else " ✗"),
+            measured.name,
+            milliseconds(our),
+            cost(our, best),
             peer.method if peer else "none reaches it",
-            number(peer and 1e3 * peer.time, ".1f"),
+            milliseconds(peer) if peer else "",
             number(peer and peer.cost, ".9g"),
-            number(ratio(our, peer) if best is not None and reaches(our, best) else None, ".2f"),
+            number(excess, "+.1e"),
+            number(ratio(our, measured), ".2f"),
         ])
-    return table(["problem", f"ours ({solver}), ms", "cost", "best peer", "ms", "cost", "ratio"], rows)
+    return f"Ours: `{solver}`.\n\n" + table(SUMMARY, rows) if rows else ""
+
+
+def slope(points):
+    """Of a line through the logarithms, by least squares."""
+    if len(points) < 2:
+        return None
+    logs = [(math.log(x), math.log(y)) for x, y in points]
+    mx, my = (sum(values) / len(logs) for values in zip(*logs))
+    return sum((x - mx) * (y - my) for x, y in logs) / sum((x - mx) ** 2 for x, _ in logs)
+
+
+def growth(all_measured):
+    """Seconds and memory of each method on the grids, and the exponents with which they grow."""
+    grids = sorted((m for m in all_measured if m.kind == "grid"), key=lambda m: m.poses)
+    rows = {}
+    for measured in grids:
+        for r in measured.results:
+            rows.setdefault(r.method, {})[measured.poses] = r
+    lines = []
+    for method, by_size in rows.items():
+        done = [(n, r) for n, r in by_size.items() if r.time and r.memory_mib]
+        cells = []
+        for n in (m.poses for m in grids):
+            r = by_size.get(n)
+            whole = r and r.time
+            cells.append(f"{r.time:.3g} s, {r.memory_mib:.0f} MiB" if whole else r.status if r else "")
+        slopes = [slope([(n, r.time) for n, r in done]), slope([(n, r.memory_mib) for n, r in done])]
+        lines.append([method, *cells, *(number(x, ".2f") for x in slopes)])
+    head = ["method", *(f"{m.poses:,} poses" for m in grids), "time grows as n^", "memory as n^"]
+    return table(head, lines) if lines else ""

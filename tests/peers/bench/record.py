@@ -1,0 +1,30 @@
+"""Results in a file: each problem's last ones, so that a benchmark can be run piece by piece."""
+
+import json
+from dataclasses import asdict, dataclass
+
+from bench.measure import Result, Stop
+
+
+@dataclass
+class Measured:
+    name: str
+    kind: str
+    poses: int  # of a grid
+    start: float | None  # cost at the start
+    best_known: float | None  # from earlier, and from nothing measured here
+    results: list[Result]
+
+
+def load(path):
+    """By name of the problem, in the order of first measurement."""
+    if not path.exists():
+        return {}
+    problems = json.loads(path.read_text())["problems"]
+    results = [[Result(**r) for r in p.pop("results")] for p in problems]
+    return {p["name"]: Measured(**p, results=rs) for p, rs in zip(problems, results)}
+
+
+def save(path, measured, machine):
+    document = {"machine": machine, "stop": asdict(Stop()), "problems": [asdict(m) for m in measured.values()]}
+    path.write_text(json.dumps(document, indent=1) + "\n")
