@@ -58,7 +58,7 @@ impl BlockSystem {
         let pairs = pairs.iter().filter(known).copied().collect();
         let out_of_memory = BlockSystemError::OutOfMemory { unknowns };
         let layout = Layout::new(dims, pairs).ok_or(out_of_memory)?;
-        let cholesky = Cholesky::analyze(&layout.col_ptr, &layout.row_idx).ok_or(out_of_memory)?;
+        let cholesky = Cholesky::analyze(&layout).ok_or(out_of_memory)?;
         let values = vec![0.0; layout.row_idx.len()];
         let begin = |end: &mut usize, dim: &usize| {
             *end += dim;
@@ -104,8 +104,7 @@ impl BlockSystem {
     /// # Errors
     /// Where it is not positive definite, as far as f64 can tell.
     pub fn factorize(&mut self) -> Result<(), BlockSystemError> {
-        let Layout { col_ptr, row_idx, .. } = &self.layout;
-        let done = self.cholesky.factorize(col_ptr, row_idx, &self.values);
+        let done = self.cholesky.factorize(&self.values, None);
         done.map_err(|_| BlockSystemError::NotPositiveDefinite)
     }
 
@@ -192,6 +191,6 @@ mod tests {
         system.factorize().unwrap();
         let mut x = [1.0, 1.0];
         system.solve(&mut x);
-        assert_eq!(x, [0.5, 0.25]);
+        assert!((x[0] - 0.5).abs() < 1e-15 && (x[1] - 0.25).abs() < 1e-15);
     }
 }

@@ -84,7 +84,7 @@ pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, Compile
         }
     }
     let batches = batches(graph, &factor_ids, &variables, &block, &layout)?;
-    let cholesky = Cholesky::analyze(&layout.col_ptr, &layout.row_idx).ok_or(out_of_memory)?;
+    let cholesky = Cholesky::analyze(&layout).ok_or(out_of_memory)?;
     let (h, g) = (vec![0.0; layout.row_idx.len()], vec![0.0; unknowns]);
     let factor_keys = graph.factors().iter().map(|f| f.keys.clone()).collect();
     let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };

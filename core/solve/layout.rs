@@ -1,4 +1,6 @@
 //! The structure of the normal equations: which blocks there are, in which order, and where.
+use crate::linear::elimination::{Pattern, Tree};
+use crate::linear::structure::Structure;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
@@ -18,6 +20,8 @@ pub(crate) struct Layout {
     block_rows: Vec<u32>,
     /// Index of entry (0, 0) of each of those blocks.
     block_at: Vec<usize>,
+    /// By block column in elimination order, its first scalar, and one past the last.
+    first: Vec<u32>,
 }
 
 impl Layout {
@@ -28,49 +32,48 @@ impl Layout {
         pairs.sort_unstable();
         pairs.dedup();
         let order = minimum_degree(dims.len(), &pairs)?;
-        let mut layout = Self { rank: vec![0; dims.len()], start: vec![0; dims.len()], ..Self::default() };
+        // the same fill with subtrees together, so that updates of a factorization are on a stack
+        let lower = lower_triangle(&pairs, &order);
+        let tree = Tree::new(lower.pattern(), |rank| dims[order[rank]]);
+        let order: Vec<usize> = tree.postorder().into_iter().map(|rank| order[rank as usize]).collect();
+        let lower = lower_triangle(&pairs, &order);
+
+        let mut layout =
+            Self { rank: vec![0; dims.len()], start: vec![0; dims.len()], first: vec![0], ..Self::default() };
         let mut n = 0_usize;
         for (rank, &block) in order.iter().enumerate() {
             layout.rank[block] = rank as u32;
             layout.start[block] = u32::try_from(n).ok()?;
             n += dims[block];
+            layout.first.push(u32::try_from(n).ok()?);
         }
-        // (column, row) by rank, the diagonal included
-        let rank = &layout.rank;
-        let mut lower: Vec<(u32, u32)> = pairs
-            .iter()
-            .map(|&(a, b)| (rank[a as usize], rank[b as usize]))
-            .map(|(a, b)| (a.min(b), a.max(b)))
-            .chain((0..dims.len() as u32).map(|r| (r, r)))
-            .collect();
-        lower.sort_unstable();
-        layout.fill(dims, &order, &lower);
+        layout.fill(lower);
         Some(layout)
     }
 
-    fn fill(&mut self, dims: &[usize], order: &[usize], lower: &[(u32, u32)]) {
-        self.block_rows = lower.iter().map(|(_, row)| *row).collect();
-        self.block_ptr = vec![0];
-        self.col_ptr = vec![0];
-        let mut rest = lower;
+    fn fill(&mut self, lower: Lower) {
+        let first = |rank: usize| self.first[rank] as usize;
+        self.col_ptr.push(0);
         let mut rows: Vec<usize> = vec![];
-        for (column, &block) in order.iter().enumerate() {
-            let len = rest.partition_point(|(c, _)| *c as usize == column);
-            let (own, after) = rest.split_at(len);
-            rest = after;
+        for column in 0..lower.ptr.len() - 1 {
             rows.clear();
-            let first = self.row_idx.len();
-            for (_, row) in own {
-                let block = order[*row as usize];
-                self.block_at.push(first + rows.len());
-                rows.extend((0..dims[block]).map(|r| self.start[block] as usize + r));
+            let at = self.row_idx.len();
+            for &row in &lower.rows[lower.ptr[column]..lower.ptr[column + 1]] {
+                self.block_at.push(at + rows.len());
+                rows.extend(first(row as usize)..first(row as usize + 1));
             }
-            self.block_ptr.push(self.block_rows.len() - rest.len());
-            for c in 0..dims[block] {
+            for c in 0..first(column + 1) - first(column) {
                 self.row_idx.extend_from_slice(&rows[c..]);
                 self.col_ptr.push(self.row_idx.len());
             }
         }
+        (self.block_ptr, self.block_rows) = (lower.ptr, lower.rows);
+    }
+
+    /// What the factor of a matrix with this layout looks like.
+    pub(crate) fn structure(&self) -> Structure {
+        let blocks = Pattern { ptr: &self.block_ptr, rows: &self.block_rows };
+        Structure::new(blocks, &self.first, &self.col_ptr, &self.row_idx)
     }
 
     /// Number of scalar unknowns.
@@ -90,12 +93,39 @@ impl Layout {
         let range = self.block_ptr[column]..self.block_ptr[column + 1];
         let i = range.start + self.block_rows[range.clone()].binary_search(&row).ok()?;
         let at = self.block_at[i];
-        // block columns begin at a diagonal entry
-        let first = self.block_at[range.start];
-        let scalar = self.col_ptr.partition_point(|p| *p < first);
+        let scalar = self.first[column] as usize;
         let stride = (self.col_ptr[scalar + 1] - self.col_ptr[scalar] - 1) as u32;
         Some(Slot { at, stride, swapped: self.rank[a] < self.rank[b] })
     }
+}
+
+/// A lower triangle by ranks, in compressed columns, the diagonal included.
+struct Lower {
+    ptr: Vec<usize>,
+    rows: Vec<u32>,
+}
+
+impl Lower {
+    fn pattern(&self) -> Pattern<'_> {
+        Pattern { ptr: &self.ptr, rows: &self.rows }
+    }
+}
+
+/// The pattern of blocks in an order of elimination; rows of a column ascending.
+fn lower_triangle(pairs: &[(u32, u32)], order: &[usize]) -> Lower {
+    let mut rank = vec![0_u32; order.len()];
+    order.iter().enumerate().for_each(|(r, block)| rank[*block] = r as u32);
+    let by_rank = || pairs.iter().map(|(a, b)| (rank[*a as usize], rank[*b as usize]));
+    let mut ptr = vec![0; order.len() + 1];
+    by_rank().for_each(|(a, b)| ptr[a.min(b) as usize + 1] += 1);
+    (0..order.len()).for_each(|c| ptr[c + 1] += ptr[c] + 1);
+    let (mut next, mut rows) = (ptr.clone(), vec![0; pairs.len() + order.len()]);
+    for (row, column) in (0..order.len() as u32).map(|r| (r, r)).chain(by_rank()) {
+        rows[next[row.min(column) as usize]] = row.max(column);
+        next[row.min(column) as usize] += 1;
+    }
+    (0..order.len()).for_each(|c| rows[ptr[c]..ptr[c + 1]].sort_unstable());
+    Lower { ptr, rows }
 }
 
 /// Approximate minimum degree on blocks; `None` where there is no memory for it.

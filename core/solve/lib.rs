@@ -5,6 +5,7 @@
 //! estimate; an [`Observer`] watches. [`solve`] does it all.
 mod block_system;
 mod compile;
+mod covariance;
 mod diagnose;
 mod dogleg;
 mod gauss_newton;
@@ -21,6 +22,7 @@ mod termination;
 
 pub use block_system::{BlockSystem, BlockSystemError};
 pub use compile::CompileError;
+pub use covariance::CovarianceError;
 pub use dogleg::Dogleg;
 pub use gauss_newton::GaussNewton;
 pub use levenberg_marquardt::LevenbergMarquardt;

@@ -4,24 +4,10 @@ use crate::problem::Problem;
 use std::time::Instant;
 
 impl Problem {
-    /// Factorizes H + diag(added), in place of H for the time of the call.
+    /// Factorizes H + diag(added).
     pub(crate) fn factorize(&mut self, added: Option<&[f64]>) -> Result<(), NotPositiveDefinite> {
         let clock = Instant::now();
-        let shift = |h: &mut [f64], diagonal: &[usize], values: &[f64]| {
-            diagonal.iter().zip(values).for_each(|(i, x)| h[*i] = *x);
-        };
-        let saved: Vec<f64> = match added {
-            Some(_) => self.layout.diagonal().iter().map(|i| self.h[*i]).collect(),
-            None => vec![],
-        };
-        if let Some(added) = added {
-            let damped: Vec<f64> = saved.iter().zip(added).map(|(h, x)| h + x).collect();
-            shift(&mut self.h, self.layout.diagonal(), &damped);
-        }
-        let done = self.cholesky.factorize(&self.layout.col_ptr, &self.layout.row_idx, &self.h);
-        if added.is_some() {
-            shift(&mut self.h, self.layout.diagonal(), &saved);
-        }
+        let done = self.cholesky.factorize(&self.h, added);
         self.times.factorize += clock.elapsed().as_secs_f64();
         done
     }

@@ -1,19 +1,23 @@
 //! Supernodal sparse Cholesky: structure once, numbers many times, in memory that is reused.
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use super::kernel;
+use super::structure::{Node, Structure};
+use crate::layout::Layout;
+use faer::dyn_stack::MemBuffer;
+use pulp::{Arch, Simd, WithSimd};
 
 /// A factorization of a symmetric matrix with a fixed pattern, already ordered.
 pub(crate) struct Cholesky {
-    symbolic: SymbolicCholesky<usize>,
-    values: Vec<f64>,
+    pub(super) structure: Structure,
+    /// Panels of L.
+    pub(super) values: Vec<f64>,
+    /// Updates on their way to their parents.
+    stack: Vec<f64>,
+    /// Nodes whose updates are on the stack.
+    open: Vec<usize>,
+    /// Rows below a supernode, of a right-hand side.
+    below: Vec<f64>,
     memory: MemBuffer,
+    arch: Arch,
 }
 
 /// The matrix is not positive definite, as far as f64 can tell.
@@ -21,78 +25,37 @@ pub(crate) struct Cholesky {
 pub(crate) struct NotPositiveDefinite;
 
 impl Cholesky {
-    /// Analyses a lower triangle in compressed columns; `None` where there is no memory for it.
-    pub(crate) fn analyze(col_ptr: &[usize], row_idx: &[usize]) -> Option<Self> {
-        let n = col_ptr.len() - 1;
-        let lower = SymbolicSparseColMatRef::new_checked(n, n, col_ptr, None, row_idx);
-        // faer 0.24 reads an upper pattern here for `Identity`, whatever the side says, while its
-        // numeric part wants lower values
-        let upper = lower.to_row_major().ok()?;
-        let params = CholeskySymbolicParams {
-            // its own choice takes the simplicial kernel for pose graphs: up to three times slower
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let symbolic = factorize_symbolic_cholesky(
-            upper.as_ref().transpose(),
-            Side::Upper,
-            SymmetricOrdering::Identity,
-            params,
-        )
-        .ok()?;
-        let need = StackReq::any_of(&[
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
-            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
-        ]);
-        let mut values = vec![];
-        values.try_reserve_exact(symbolic.len_val()).ok()?;
-        values.resize(symbolic.len_val(), 0.0);
-        Some(Self { values, memory: MemBuffer::try_new(need).ok()?, symbolic })
+    /// Analyses the lower triangle of a layout; `None` where there is no memory for its factor.
+    pub(crate) fn analyze(layout: &Layout) -> Option<Self> {
+        let structure = layout.structure();
+        let most = |f: fn(&Node) -> usize| structure.nodes.iter().map(f).max().unwrap_or(0);
+        Some(Self {
+            values: zeros(structure.values)?,
+            stack: zeros(structure.stack)?,
+            open: Vec::with_capacity(structure.nodes.len()),
+            below: zeros(most(|n| n.below))?,
+            memory: kernel::scratch(most(|n| n.width)),
+            arch: Arch::new(),
+            structure,
+        })
     }
 
-    /// Factorizes a matrix of the analysed pattern.
-    pub(crate) fn factorize(
-        &mut self,
-        col_ptr: &[usize],
-        row_idx: &[usize],
-        values: &[f64],
-    ) -> Result<(), NotPositiveDefinite> {
-        let n = col_ptr.len() - 1;
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, col_ptr, None, row_idx);
-        let stack = MemStack::new(&mut self.memory);
-        let lower = SparseColMatRef::new(pattern, values);
-        self.symbolic
-            .factorize_numeric_llt(
-                &mut self.values,
-                lower,
-                Side::Lower,
-                Default::default(),
-                // threads bring nothing on graphs of this size, and would change the order of sums
-                Par::Seq,
-                stack,
-                Default::default(),
-            )
-            .map(|_| ())
-            .map_err(|_| NotPositiveDefinite)
+    /// Factorizes a matrix with these values in its lower triangle, and `added` to its diagonal.
+    pub(crate) fn factorize(&mut self, h: &[f64], added: Option<&[f64]>) -> Result<(), NotPositiveDefinite> {
+        self.arch.dispatch(Factorize { cholesky: self, h, added })
     }
 
     /// x ← H⁻¹ x.
     pub(crate) fn solve(&mut self, x: &mut [f64]) {
-        let n = x.len();
-        let stack = MemStack::new(&mut self.memory);
-        let x = MatMut::from_column_major_slice_mut(x, n, 1);
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(Conj::No, x, Par::Seq, stack);
+        self.arch.dispatch(Solve { cholesky: self, x });
     }
 
     /// The pivots: squares of the factor's diagonal.
     pub(crate) fn pivots(&self, visit: &mut impl FnMut(usize, f64)) {
-        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else { return };
-        let factor = SupernodalLltRef::new(symbolic, &self.values);
-        for s in 0..symbolic.n_supernodes() {
-            let node = factor.supernode(s);
-            let (first, block) = (node.start(), node.val());
-            for i in 0..block.ncols() {
-                visit(first + i, block[(i, i)] * block[(i, i)]);
+        for node in &self.structure.nodes {
+            for c in 0..node.width {
+                let diagonal = self.values[node.panel + c * (node.height() + 1)];
+                visit(node.first + c, diagonal * diagonal);
             }
         }
     }
@@ -100,6 +63,88 @@ impl Cholesky {
 
 impl std::fmt::Debug for Cholesky {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Cholesky({} values)", self.values.len())
+        write!(f, "Cholesky({} supernodes, {} values)", self.structure.nodes.len(), self.values.len())
+    }
+}
+
+pub(super) fn zeros(n: usize) -> Option<Vec<f64>> {
+    let mut values = vec![];
+    values.try_reserve_exact(n).ok()?;
+    values.resize(n, 0.0);
+    Some(values)
+}
+
+struct Factorize<'a> {
+    cholesky: &'a mut Cholesky,
+    h: &'a [f64],
+    added: Option<&'a [f64]>,
+}
+
+impl WithSimd for Factorize<'_> {
+    type Output = Result<(), NotPositiveDefinite>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Cholesky { structure, values, stack, open, memory, .. } = self.cholesky;
+        values.fill(0.0);
+        self.h.iter().zip(&structure.scatter).for_each(|(h, at)| values[*at] = *h);
+        open.clear();
+        for (n, node) in structure.nodes.iter().enumerate() {
+            let panel = &mut values[node.panel..node.panel + node.height() * node.width];
+            if let Some(added) = self.added {
+                for c in 0..node.width {
+                    panel[c * (node.height() + 1)] += added[node.first + c];
+                }
+            }
+            // its update is made above those of its children, and then takes their place
+            let children = open.len() - node.children;
+            let top = match open[children..].last() {
+                Some(child) => structure.nodes[*child].update + structure.nodes[*child].below.pow(2),
+                None => node.update,
+            };
+            let size = node.below.pow(2);
+            let (taken, update) = stack.split_at_mut(top);
+            let update = &mut update[..size];
+            update.fill(0.0);
+            for child in &open[children..] {
+                let child = &structure.nodes[*child];
+                let from = &taken[child.update..child.update + child.below.pow(2)];
+                kernel::assemble(from, child.rows(&structure.places), panel, update, node.width);
+            }
+            kernel::eliminate(simd, panel, update, node.width, memory).map_err(|_| NotPositiveDefinite)?;
+            stack.copy_within(top..top + size, node.update);
+            open.truncate(children);
+            open.push(n);
+        }
+        Ok(())
+    }
+}
+
+struct Solve<'a> {
+    cholesky: &'a mut Cholesky,
+    x: &'a mut [f64],
+}
+
+impl WithSimd for Solve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Cholesky { structure, values, below, .. } = self.cholesky;
+        let x = self.x;
+        for node in &structure.nodes {
+            let panel = &values[node.panel..node.panel + node.height() * node.width];
+            let below = &mut below[..node.below];
+            kernel::solve_lower(panel, &mut x[node.first..node.first + node.width], below);
+            let rows = node.rows(&structure.rows);
+            rows.iter().zip(&*below).for_each(|(row, value)| x[*row as usize] -= value);
+        }
+        for node in structure.nodes.iter().rev() {
+            let panel = &values[node.panel..node.panel + node.height() * node.width];
+            let below = &mut below[..node.below];
+            let rows = node.rows(&structure.rows);
+            below.iter_mut().zip(rows).for_each(|(value, row)| *value = x[*row as usize]);
+            kernel::solve_upper(panel, &mut x[node.first..node.first + node.width], below);
+        }
     }
 }

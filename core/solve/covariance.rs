@@ -1,0 +1,95 @@
+//! Covariances of estimates.
+use crate::diagnose::undetermined;
+use crate::problem::Problem;
+use crate::termination::Undetermined;
+use manifactor_graph::Key;
+use nalgebra::DMatrix;
+
+/// Why there are no covariances.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CovarianceError {
+    /// Something is not constrained: its covariance is infinite.
+    #[error("the covariance is infinite: {0}")]
+    Indeterminate(Undetermined),
+    /// The Hessian is not positive definite to working precision.
+    #[error(
+        "the Hessian is not positive definite at this estimate: solve to a minimum first, or scale the problem better"
+    )]
+    NotPositiveDefinite,
+    /// A variable that the problem does not have.
+    #[error("there is no variable `{0}`")]
+    Unknown(String),
+    /// They do not fit into memory.
+    #[error("no memory for the covariances of {unknowns} unknowns")]
+    OutOfMemory {
+        /// Size of the linear system.
+        unknowns: usize,
+    },
+}
+
+impl Problem {
+    /// The marginal covariance of each variable at the estimate, in its tangent space and the order of the values:
+    /// the blocks on the diagonal of (JᵀJ)⁻¹, in the units of the noise.
+    ///
+    /// By Gauss-Newton's Hessian without damping, robust weights as they are at the estimate. What is held, whole or
+    /// in part, has zeros. All of them together take about as long as a few factorizations.
+    ///
+    /// # Errors
+    /// Where something is not constrained, or there is no memory.
+    pub fn marginals(&mut self) -> Result<Vec<(Key, DMatrix<f64>)>, CovarianceError> {
+        self.factorize_for_covariance()?;
+        let out_of_memory = CovarianceError::OutOfMemory { unknowns: self.dim() };
+        let inverse = self.cholesky.selected_inverse().ok_or(out_of_memory)?;
+        let mut marginals = Vec::with_capacity(self.variables.len());
+        for place in &self.variables {
+            let dim = place.tangent.len();
+            let held = |d: usize| place.held >> d & 1 == 1;
+            let entry = |r: usize, c: usize| match place.start {
+                Some(start) if !held(r) && !held(c) => inverse.get(start + r, start + c).unwrap_or(0.0),
+                _ => 0.0,
+            };
+            marginals.push((place.key.clone(), DMatrix::from_fn(dim, dim, entry)));
+        }
+        Ok(marginals)
+    }
+
+    /// The joint covariance of a few variables at the estimate, in the order of `keys`; see
+    /// [`marginals`](Self::marginals).
+    ///
+    /// # Errors
+    /// Where a key is unknown, or something is not constrained.
+    pub fn joint_covariance(&mut self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
+        // by row of the result: its unknown, `None` for what is held
+        let mut unknowns = vec![];
+        for key in keys {
+            let place = self.variables.iter().find(|p| p.key.as_str() == *key);
+            let place = place.ok_or_else(|| CovarianceError::Unknown((*key).to_owned()))?;
+            let free = |d: usize| place.start.filter(|_| place.held >> d & 1 == 0).map(|start| start + d);
+            unknowns.extend((0..place.tangent.len()).map(free));
+        }
+        self.factorize_for_covariance()?;
+        let mut joint = DMatrix::zeros(unknowns.len(), unknowns.len());
+        let mut column = vec![0.0; self.dim()];
+        for (c, unknown) in unknowns.iter().enumerate() {
+            let Some(unknown) = unknown else { continue };
+            column.fill(0.0);
+            column[*unknown] = 1.0;
+            self.cholesky.solve(&mut column);
+            for (r, row) in unknowns.iter().enumerate() {
+                joint[(r, c)] = row.map_or(0.0, |row| column[row]);
+            }
+        }
+        Ok(joint)
+    }
+
+    fn factorize_for_covariance(&mut self) -> Result<(), CovarianceError> {
+        self.linearize();
+        let factorized = self.factorize(None);
+        if let Some(open) = undetermined(self, factorized.is_err(), 0.0) {
+            return Err(CovarianceError::Indeterminate(open));
+        }
+        // the search may have left another factorization
+        self.factorize(None).map_err(|_| CovarianceError::NotPositiveDefinite)
+    }
+}

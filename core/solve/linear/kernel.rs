@@ -1,0 +1,256 @@
+//! Dense kernels for fronts: small ones here, where a call costs more than the work; large ones by faer.
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Accum, MatMut, Par};
+use pulp::Simd;
+
+/// Columns that are eliminated together, and columns of a product that are summed up in registers.
+const COLUMNS: usize = 4;
+/// From so many multiplications on, a front is large.
+const LARGE: usize = 1 << 18;
+
+/// Room for faer's kernels.
+pub(crate) fn scratch(width: usize) -> MemBuffer {
+    MemBuffer::new(cholesky_in_place_scratch::<f64>(width, Par::Seq, Default::default()))
+}
+
+/// Factorizes the first `width` columns of a front: L into `panel`, and what is left of the others into
+/// `update`, lower triangle. Both column-major; above their diagonals, they hold garbage afterwards.
+///
+/// # Errors
+/// The column whose pivot is not positive.
+#[inline(always)]
+pub(crate) fn eliminate<S: Simd>(
+    simd: S,
+    panel: &mut [f64],
+    update: &mut [f64],
+    width: usize,
+    memory: &mut MemBuffer,
+) -> Result<(), usize> {
+    let height = panel.len() / width;
+    if height * height * width >= LARGE {
+        return eliminate_large(panel, update, width, memory);
+    }
+    for first in (0..width).step_by(COLUMNS) {
+        let n = COLUMNS.min(width - first);
+        let (left, rest) = panel.split_at_mut(first * height);
+        subtract(simd, left, height, (first, first), &mut rest[first..], height, n);
+        factorize_columns(&mut rest[..n * height], height, first).map_err(|c| first + c)?;
+    }
+    let below = height - width;
+    for column in (0..below).step_by(COLUMNS) {
+        let n = COLUMNS.min(below - column);
+        let from = width + column;
+        subtract(simd, panel, height, (from, from), &mut update[column * (below + 1)..], below, n);
+    }
+    Ok(())
+}
+
+/// Adds a child's update to the front of its parent: row i of the child's is row `places[i]` of the parent's.
+#[inline(always)]
+pub(crate) fn assemble(from: &[f64], places: &[u32], panel: &mut [f64], update: &mut [f64], width: usize) {
+    let n = places.len();
+    let height = panel.len() / width;
+    let below = height - width;
+    for (j, column) in from.chunks_exact(n).enumerate() {
+        let (column, places) = (&column[j..], &places[j..]);
+        let at = places[0] as usize;
+        let (to, first) = match at < width {
+            true => (&mut panel[at * height..(at + 1) * height], 0),
+            false => (&mut update[(at - width) * below..(at - width + 1) * below], width),
+        };
+        if places[places.len() - 1] as usize - at + 1 == places.len() {
+            to[at - first..].iter_mut().zip(column).for_each(|(to, x)| *to += x);
+        } else {
+            places.iter().zip(column).for_each(|(place, x)| to[*place as usize - first] += x);
+        }
+    }
+}
+
+/// Factorizes a few columns from row `first` on, which is the diagonal of the first of them.
+#[inline(always)]
+fn factorize_columns(columns: &mut [f64], height: usize, first: usize) -> Result<(), usize> {
+    for c in 0..columns.len() / height {
+        let (column, right) = columns[c * height..].split_at_mut(height);
+        let column = &mut column[first + c..];
+        let pivot = column[0];
+        // not a number is not positive either
+        if !(pivot > 0.0 && pivot < f64::INFINITY) {
+            return Err(c);
+        }
+        column[0] = pivot.sqrt();
+        let inverse = 1.0 / column[0];
+        column[1..].iter_mut().for_each(|x| *x *= inverse);
+        for (k, other) in right.chunks_exact_mut(height).enumerate() {
+            let factor = column[k + 1];
+            other[first + c..].iter_mut().zip(&*column).for_each(|(x, l)| *x -= l * factor);
+        }
+    }
+    Ok(())
+}
+
+/// C ← C − A Bᵀ for up to [`COLUMNS`] columns of C, where A are the rows from `rows.0` on of a matrix of `height`
+/// rows, and B as many rows as C has columns, from `rows.1` on. `to` begins at C's first entry.
+#[inline(always)]
+fn subtract<S: Simd>(
+    simd: S,
+    of: &[f64],
+    height: usize,
+    rows: (usize, usize),
+    to: &mut [f64],
+    stride: usize,
+    columns: usize,
+) {
+    if of.is_empty() {
+        return;
+    }
+    match columns {
+        1 => subtract_columns::<S, 1>(simd, of, height, rows, to, stride),
+        2 => subtract_columns::<S, 2>(simd, of, height, rows, to, stride),
+        3 => subtract_columns::<S, 3>(simd, of, height, rows, to, stride),
+        _ => subtract_columns::<S, 4>(simd, of, height, rows, to, stride),
+    }
+}
+
+#[inline(always)]
+fn subtract_columns<S: Simd, const C: usize>(
+    simd: S,
+    of: &[f64],
+    height: usize,
+    (from, beside): (usize, usize),
+    to: &mut [f64],
+    stride: usize,
+) {
+    let lanes = S::F64_LANES;
+    let n = height - from;
+    let mut row = 0;
+    while row + 2 * lanes <= n {
+        tile::<S, 2, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, 2 * lanes);
+        row += 2 * lanes;
+    }
+    if row + lanes <= n {
+        tile::<S, 1, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, lanes);
+        row += lanes;
+    }
+    if row < n {
+        tail::<S, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, n - row);
+    }
+}
+
+/// R registers of rows by C columns.
+#[inline(always)]
+fn tile<S: Simd, const R: usize, const C: usize>(
+    simd: S,
+    of: &[f64],
+    height: usize,
+    (from, beside): (usize, usize),
+    to: &mut [f64],
+    stride: usize,
+    rows: usize,
+) {
+    let mut sum = [[simd.splat_f64s(0.0); R]; C];
+    for column in of.chunks_exact(height) {
+        let a = S::as_simd_f64s(&column[from..from + rows]).0;
+        let b = &column[beside..beside + C];
+        for c in 0..C {
+            let b = simd.splat_f64s(b[c]);
+            for r in 0..R {
+                sum[c][r] = simd.mul_add_f64s(a[r], b, sum[c][r]);
+            }
+        }
+    }
+    for c in 0..C {
+        let to = S::as_mut_simd_f64s(&mut to[c * stride..c * stride + rows]).0;
+        for r in 0..R {
+            to[r] = simd.sub_f64s(to[r], sum[c][r]);
+        }
+    }
+}
+
+/// Rows that do not fill a register.
+#[inline(always)]
+fn tail<S: Simd, const C: usize>(
+    simd: S,
+    of: &[f64],
+    height: usize,
+    (from, beside): (usize, usize),
+    to: &mut [f64],
+    stride: usize,
+    rows: usize,
+) {
+    let mut sum = [simd.splat_f64s(0.0); C];
+    for column in of.chunks_exact(height) {
+        let a = simd.partial_load_f64s(&column[from..from + rows]);
+        let b = &column[beside..beside + C];
+        for c in 0..C {
+            sum[c] = simd.mul_add_f64s(a, simd.splat_f64s(b[c]), sum[c]);
+        }
+    }
+    for c in 0..C {
+        let to = &mut to[c * stride..c * stride + rows];
+        let rest = simd.sub_f64s(simd.partial_load_f64s(to), sum[c]);
+        simd.partial_store_f64s(to, rest);
+    }
+}
+
+fn eliminate_large(
+    panel: &mut [f64],
+    update: &mut [f64],
+    width: usize,
+    memory: &mut MemBuffer,
+) -> Result<(), usize> {
+    let height = panel.len() / width;
+    let below = height - width;
+    let panel = MatMut::from_column_major_slice_mut(panel, height, width);
+    let (mut top, mut bottom) = panel.split_at_row_mut(width);
+    cholesky_in_place(
+        top.as_mut(),
+        LltRegularization::default(),
+        Par::Seq,
+        MemStack::new(memory),
+        Default::default(),
+    )
+    .map_err(|faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index }| index)?;
+    if below == 0 {
+        return Ok(());
+    }
+    solve_lower_triangular_in_place(top.as_ref(), bottom.as_mut().transpose_mut(), Par::Seq);
+    matmul(
+        MatMut::from_column_major_slice_mut(update, below, below),
+        BlockStructure::TriangularLower,
+        Accum::Add,
+        bottom.as_ref(),
+        BlockStructure::Rectangular,
+        bottom.as_ref().transpose(),
+        BlockStructure::Rectangular,
+        -1.0,
+        Par::Seq,
+    );
+    Ok(())
+}
+
+/// x ← L⁻¹ x for the panel's columns, and what it takes from the rows below, into `below`.
+#[inline(always)]
+pub(crate) fn solve_lower(panel: &[f64], x: &mut [f64], below: &mut [f64]) {
+    let (width, height) = (x.len(), x.len() + below.len());
+    below.fill(0.0);
+    for (c, column) in panel.chunks_exact(height).enumerate() {
+        x[c] /= column[c];
+        let value = x[c];
+        x[c + 1..].iter_mut().zip(&column[c + 1..width]).for_each(|(x, l)| *x -= l * value);
+        below.iter_mut().zip(&column[width..]).for_each(|(x, l)| *x += l * value);
+    }
+}
+
+/// x ← L⁻ᵀ (x − L₂ᵀ below) for the panel's columns, where L₂ are its rows below.
+#[inline(always)]
+pub(crate) fn solve_upper(panel: &[f64], x: &mut [f64], below: &[f64]) {
+    let (width, height) = (x.len(), x.len() + below.len());
+    for (c, column) in panel.chunks_exact(height).enumerate().rev() {
+        let lower: f64 = column[c + 1..width].iter().zip(&x[c + 1..]).map(|(l, x)| l * x).sum();
+        let rest: f64 = column[width..].iter().zip(below).map(|(l, x)| l * x).sum();
+        x[c] = (x[c] - lower - rest) / column[c];
+    }
+}

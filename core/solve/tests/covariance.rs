@@ -1,0 +1,68 @@
+//! Covariances against the inverse of the dense Hessian.
+#![allow(missing_docs, clippy::unwrap_used)]
+mod toy;
+use manifactor_graph::{Graph, Noise, Values};
+use manifactor_solve::{CovarianceError, Problem};
+use nalgebra::DMatrix;
+use toy::*;
+
+/// A chain of points with a measurement of the first, and a loop.
+fn chain(n: usize) -> (Graph, Values) {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    for i in 0..n {
+        values.insert(format!("p{i}"), Plane { x: i as f64, y: 0.0 });
+    }
+    graph.add(["p0"], At { at: [0.0, 0.0] }).noise(Noise::sigma(0.5).unwrap());
+    for i in 1..n {
+        let by = [1.0, 0.0];
+        graph.add([format!("p{}", i - 1), format!("p{i}")], Apart { by }).noise(Noise::sigma(0.1).unwrap());
+    }
+    (graph, values)
+}
+
+#[test]
+fn uncertainty_adds_up_along_a_chain() {
+    let (graph, values) = chain(10);
+    let marginals = Problem::compile(&graph, &values).unwrap().marginals().unwrap();
+    for (i, (key, covariance)) in marginals.iter().enumerate() {
+        assert_eq!(key.as_str(), format!("p{i}"));
+        let expected = DMatrix::identity(2, 2) * (0.25 + 0.01 * i as f64);
+        assert!((covariance - expected).amax() < 1e-12, "{key}: {covariance}");
+    }
+}
+
+#[test]
+fn joint_covariances_have_what_is_common() {
+    let (graph, values) = chain(10);
+    let mut problem = Problem::compile(&graph, &values).unwrap();
+    let joint = problem.joint_covariance(&["p7", "p2"]).unwrap();
+    assert!((joint[(0, 0)] - 0.32).abs() < 1e-12 && (joint[(3, 3)] - 0.27).abs() < 1e-12);
+    // both have the error of the way to p2
+    assert!((joint[(0, 2)] - 0.27).abs() < 1e-12 && joint[(0, 3)].abs() < 1e-12);
+    let unknown = problem.joint_covariance(&["p2", "q"]).unwrap_err();
+    assert_eq!(unknown.to_string(), "there is no variable `q`");
+}
+
+#[test]
+fn what_is_held_is_certain() {
+    let (mut graph, values) = chain(4);
+    graph.fix_directions("p1", &["x"]);
+    graph.fix("p3");
+    let marginals = Problem::compile(&graph, &values).unwrap().marginals().unwrap();
+    let of = |key: &str| &marginals.iter().find(|(k, _)| k.as_str() == key).unwrap().1;
+    assert_eq!(of("p3").amax(), 0.0);
+    assert!(of("p1")[(0, 0)] == 0.0 && of("p1")[(1, 1)] > 0.0);
+    // between p1 and p3 along x, each of them certain: half the variance of a step
+    assert!((of("p2")[(0, 0)] - 0.005).abs() < 1e-12);
+}
+
+#[test]
+fn nothing_to_hold_it_is_an_error_with_a_name() {
+    let (graph, values) = chain(3);
+    let mut loose = Graph::new();
+    for entry in graph.factors().iter().skip(1) {
+        loose.push(entry.clone());
+    }
+    let error = Problem::compile(&loose, &values).unwrap().marginals().unwrap_err();
+    assert!(matches!(error, CovarianceError::Indeterminate(_)), "{error}");
+}
