@@ -3,12 +3,14 @@ use crate::failure::Failure;
 use crate::graph_file::{self, GraphFile};
 use crate::solver::SolverArguments;
 use crate::status::Status;
+use crate::text::seconds;
 use crate::watch::Watch;
 use crate::{interrupt, output, report};
 use clap::Args;
 use manifactor::solve::{All, Solution, solve};
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// Solve a graph: a literal graph (.toml, .json, .yaml) or a pose graph (.g2o, TORO).
 #[derive(Debug, Args)]
@@ -39,7 +41,10 @@ impl Solve {
         let mut watch = Watch::new(self.verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();
         let mut observer = All(vec![&mut watch, &mut interrupt]);
-        let solution = solve(&input.graph, &input.values, &*input.optimizer, &mut observer);
+        let clock = Instant::now();
+        let values = input.start.start(&input.graph, &input.values).map_err(Failure::input)?;
+        let start = clock.elapsed().as_secs_f64();
+        let solution = solve(&input.graph, &values, &*input.optimizer, &mut observer);
         let solution = solution.map_err(Failure::input)?;
         drop(watch);
         if let Some(path) = &self.out {
@@ -48,19 +53,22 @@ impl Solve {
             }
         }
         if self.json {
-            output::json(&self.as_json(&input, &solution));
+            output::json(&self.as_json(&input, &solution, start));
         } else {
-            output::print(&(graph_file::summary(&input) + &report::outcome(&solution.outcome)));
+            let name = input.start.typetag_name();
+            let start = format!("start {name} in {}\n", seconds(start));
+            output::print(&(graph_file::summary(&input) + &start + &report::outcome(&solution.outcome)));
         }
         Ok(Status::from(&solution.outcome.termination))
     }
 
-    fn as_json(&self, input: &GraphFile, solution: &Solution) -> Value {
+    fn as_json(&self, input: &GraphFile, solution: &Solution, start: f64) -> Value {
         let outcome = &solution.outcome;
         let mut json = json!({
             "graph": self.graph,
             "variables": input.values.len(),
             "factors": outcome.factors,
+            "start": { "type": input.start.typetag_name(), "seconds": start },
             "initial_cost": outcome.initial_cost,
             "final_cost": outcome.final_cost,
             "iterations": outcome.iterations,

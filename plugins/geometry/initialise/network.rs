@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, Matrix3, SMatrix, SVector};
 /// these.
 pub(crate) struct Network<P, const D: usize> {
     pub poses: Vec<P>,
-    /// Of each node but the outer frame.
-    pub keys: Vec<Key>,
+    /// Place of each node among the values; the outer frame has none.
+    pub places: Vec<usize>,
     /// Held by the graph, wholly or in part; and the outer frame.
     pub held: Vec<bool>,
     pub edges: Vec<Edge<D>>,
@@ -45,6 +45,24 @@ impl<const D: usize> Information<D> {
             shift: SMatrix::from_fn(|r, c| entry(shift(r), shift(c))),
         }
     }
+
+    /// κ: half of the inverse of the mean variance about the axes, marginal over the translation. For a
+    /// small angle θ, ‖R - I‖² is 2θ².
+    pub(crate) fn chordal_weight(&self) -> f64 {
+        let marginal = match self.shift.try_inverse() {
+            Some(inverse) if self.cross.iter().any(|x| *x != 0.0) => {
+                self.turn - self.cross.tr_mul(&(inverse * self.cross))
+            }
+            _ => self.turn,
+        };
+        let variance = if D == 2 {
+            1.0 / marginal[(2, 2)]
+        } else {
+            marginal.try_inverse().map_or(f64::INFINITY, |m: Matrix3<f64>| m.trace() / 3.0)
+        };
+        let weight = 0.5 / variance;
+        if weight.is_finite() { weight.max(0.0) } else { 0.0 }
+    }
 }
 
 impl<P: Pose<D>, const D: usize> Network<P, D>
@@ -57,14 +75,14 @@ where
         if !graph.factors().iter().any(|entry| as_factor::<Between<P>, 2>(entry).is_some()) {
             return Ok(None);
         }
-        let mut net = Self { poses: vec![], keys: vec![], held: vec![], edges: vec![] };
+        let mut net = Self { poses: vec![], places: vec![], held: vec![], edges: vec![] };
         // node of each place in the values
         let mut nodes = vec![usize::MAX; values.len()];
-        for (place, (key, value)) in values.iter().enumerate() {
+        for (place, (_, value)) in values.iter().enumerate() {
             if let Some(pose) = value.erased().as_any().downcast_ref::<P>() {
                 nodes[place] = net.poses.len();
                 net.poses.push(*pose);
-                net.keys.push(key.clone());
+                net.places.push(place);
             }
         }
         let outer = net.poses.len();
