@@ -78,12 +78,20 @@ def report(log):
         return None
     if "seconds" not in told:
         return None
-    if isinstance(told["seconds"], dict):  # our own command line
-        told["stages"] = {k: v for k, v in told["seconds"].items() if k != "total"}
-        told["seconds"] = told["seconds"]["total"]
-        end = told["termination"]
-        told["status"] = end.get("reason") or end["status"]
-    return told
+    return of_command_line(told) if isinstance(told["seconds"], dict) else told
+
+
+def of_command_line(told):
+    """The report of our own command line, in an adapter's words."""
+    seconds, end = told["seconds"], told["termination"]
+    start = told.get("start", {}).get("seconds", 0.0)
+    stages = {"start": start} | {name: spent for name, spent in seconds.items() if name != "total"}
+    return {
+        "seconds": start + seconds["total"],
+        "stages": {name: spent for name, spent in stages.items() if spent > 0.0},
+        "iterations": told["iterations"],
+        "status": end.get("reason") or end["status"],
+    }
 
 
 def last_words(log):
