@@ -159,3 +159,20 @@ factors = [{ keys = ["p"], factor = { type = "prior_point2", value = { position 
     let ran = manifactor(&format!("solve {} --start chordal", path(&folder, "graph.toml"))).ended(2);
     ran.complains("it needs between factors of rotations or poses");
 }
+
+#[test]
+fn a_solved_pose_graph_is_certified_on_request() {
+    let folder = folder(&[("graph.toml", GRAPH), ("graph.g2o", G2O)]);
+    for file in ["graph.toml", "graph.g2o"] {
+        let file = path(&folder, file);
+        let json = manifactor(&format!("solve {file} --certify --json")).ended(0).json();
+        assert_eq!(json["certificate"]["certified"], true, "{json}");
+        assert!(json["certificate"]["suboptimality"].as_f64().unwrap() < 1e-6);
+        let ran = manifactor(&format!("solve {file} --certify")).ended(0);
+        assert!(ran.stdout.contains("\ncertified: "), "{}", ran.stdout);
+    }
+    let robust = GRAPH.replace("noise = { sigma = 0.1 }", "loss = { type = \"cauchy\" }");
+    let folder = crate::folder(&[("graph.toml", &robust)]);
+    let ran = manifactor(&format!("solve {} --certify", path(&folder, "graph.toml"))).ended(2);
+    ran.complains("factor 0 has a robust loss");
+}

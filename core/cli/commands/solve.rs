@@ -7,6 +7,7 @@ use crate::text::seconds;
 use crate::watch::Watch;
 use crate::{interrupt, output, report};
 use clap::Args;
+use manifactor::geometry::certify;
 use manifactor::solve::{All, Solution, solve};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -21,6 +22,9 @@ pub(crate) struct Solve {
     solver: SolverArguments,
     #[command(flatten)]
     reading: graph_file::Reading,
+    /// Certify the minimum of a pose graph: whether it is the global one, as far as that can be known.
+    #[arg(long)]
+    certify: bool,
     /// Write the solved graph here; the extension tells the format.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -52,12 +56,20 @@ impl Solve {
                 eprintln!("note: {note}");
             }
         }
+        let certificate = self.certify.then(|| certify(&input.graph, &solution.values));
+        let certificate = certificate.transpose().map_err(Failure::input)?;
         if self.json {
-            output::json(&self.as_json(&input, &solution, start));
+            let mut json = self.as_json(&input, &solution, start);
+            if let Some(certificate) = certificate {
+                json["certificate"] = json!(certificate);
+            }
+            output::json(&json);
         } else {
             let name = input.start.typetag_name();
             let start = format!("start {name} in {}\n", seconds(start));
-            output::print(&(graph_file::summary(&input) + &start + &report::outcome(&solution.outcome)));
+            let certificate = certificate.map_or_else(String::new, |c| format!("{c}\n"));
+            let outcome = report::outcome(&solution.outcome);
+            output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate));
         }
         Ok(Status::from(&solution.outcome.termination))
     }
