@@ -56,7 +56,7 @@ pub mod prelude {
     pub use manifactor_graph::{register, register_factor, register_loss, register_manifold};
     pub use manifactor_solve::{
         Dogleg, GaussNewton, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome, Problem, Silent,
-        Solution, Stopping, Termination, solve,
+        Solution, Start, StartError, Stopping, Termination, solve,
     };
     pub use nalgebra::{
         Matrix2, Matrix3, Matrix4, U1, U2, U3, U4, U5, U6, U7, U8, U9, Vector1, Vector2, Vector3, Vector4,

@@ -7,7 +7,7 @@ use manifactor::config::{Document, Errors, Format, read_graph_section, write_gra
 use manifactor::formats::pose_graph::{self, Options, Repair, Report};
 use manifactor::formats::{FormatError, g2o};
 use manifactor::graph::{Graph, Values};
-use manifactor::solve::Optimizer;
+use manifactor::solve::{Optimizer, Start};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -37,27 +37,29 @@ pub(crate) struct GraphFile {
     pub graph: Graph,
     pub values: Values,
     pub optimizer: Box<dyn Optimizer>,
+    pub start: Box<dyn Start>,
     /// What the reader had to decide.
     pub notes: Vec<String>,
 }
 
 impl Reading {
-    /// Reads a graph, and the solver that file and command line ask for.
+    /// Reads a graph, and the solver and start that file and command line ask for.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         if Format::of_path(path).is_some() { literal(path, solver) } else { self.pose_graph(path, solver) }
     }
 
-    /// g2o or TORO: the solver is all that `--set` can set.
+    /// g2o or TORO: solver and start are all that `--set` can set.
     fn pose_graph(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         let mut settings = Document::parse("settings", "", Format::Toml)?;
         solver.apply(&mut settings)?;
         let errors = Errors::new();
-        let optimizer = settings.section(&errors).and_then(|mut section| {
+        let chosen = settings.section(&errors).and_then(|mut section| {
             let optimizer = solver.take(&mut section, settings.source());
+            let start = solver.take_start(&mut section, settings.source());
             section.finish();
-            optimizer
+            optimizer.zip(start)
         });
-        let optimizer = errors.finish(optimizer)?;
+        let (optimizer, start) = errors.finish(chosen)?;
         let repair = match self.repair {
             RepairChoice::Error => Repair::Error,
             RepairChoice::Reject => Repair::Reject,
@@ -65,11 +67,12 @@ impl Reading {
         };
         let options = Options { repair, anchor: !self.no_anchor, ..Options::default() };
         let read = pose_graph::read(path, &options).map_err(Failure::from)?;
-        Ok(GraphFile { graph: read.graph, values: read.values, optimizer, notes: notes(&read.report) })
+        let notes = notes(&read.report);
+        Ok(GraphFile { graph: read.graph, values: read.values, optimizer, start, notes })
     }
 }
 
-/// A literal graph, which may name its solver.
+/// A literal graph, which may name its solver and its start.
 fn literal(path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
     let mut document = Document::open(path)?;
     solver.apply(&mut document)?;
@@ -77,8 +80,9 @@ fn literal(path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> 
     let read = document.section(&errors).map(|mut section| {
         let (graph, values) = read_graph_section(&mut section);
         let optimizer = solver.take(&mut section, document.source());
+        let start = solver.take_start(&mut section, document.source());
         section.finish();
-        Some(GraphFile { graph, values, optimizer: optimizer?, notes: Vec::new() })
+        Some(GraphFile { graph, values, optimizer: optimizer?, start: start?, notes: Vec::new() })
     });
     Ok(errors.finish(read.flatten())?)
 }

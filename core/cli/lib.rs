@@ -11,6 +11,7 @@
 //!
 //! Exit codes are those of [`Status`] and [`Failure`]: 0 done, 1 no convergence, 2 bad input, 3 files, 130 interrupted.
 mod arguments;
+mod choice;
 mod commands;
 mod failure;
 mod fields;

@@ -35,13 +35,16 @@ pub fn graph_schema() -> Value {
         "required": ["keys", "factor"],
         "additionalProperties": false,
     });
+    let (start, solver) = (definitions.kind("start"), definitions.kind("solver"));
     definitions.document(json!({
         "title": "A factor graph",
-        "description": "Variables with their initial values, and the factors between them.",
+        "description": "Variables with their initial values, the factors between them, and how to solve them.",
         "type": "object",
         "properties": {
             "variables": { "type": "array", "items": variable },
             "factors": { "type": "array", "items": factor },
+            "start": start,
+            "solver": solver,
         },
         "required": ["variables"],
         "additionalProperties": false,

@@ -108,6 +108,17 @@ impl BlockSystem {
         done.map_err(|_| BlockSystemError::NotPositiveDefinite)
     }
 
+    /// The smallest pivot of the last factorization, as a share of its entry on A's diagonal: about 1e-16 where
+    /// rounding alone makes a singular matrix positive definite.
+    pub fn smallest_pivot(&self) -> f64 {
+        let mut smallest = f64::INFINITY;
+        self.cholesky.pivots(&mut |i, pivot| {
+            let diagonal = self.layout.diagonal().get(i).map_or(f64::NAN, |at| self.values[*at]);
+            smallest = smallest.min(pivot / diagonal);
+        });
+        smallest
+    }
+
     /// x ← A⁻¹x, by the last factorization. Entries of `x` beyond the system's dimension stay as they are.
     pub fn solve(&mut self, x: &mut [f64]) {
         for (&(dim, from), to) in self.blocks.iter().zip(&self.layout.start) {
@@ -192,5 +203,9 @@ mod tests {
         let mut x = [1.0, 1.0];
         system.solve(&mut x);
         assert!((x[0] - 0.5).abs() < 1e-15 && (x[1] - 0.25).abs() < 1e-15);
+        assert!((system.smallest_pivot() - 1.0).abs() < 1e-12);
+        system.add(1, 0, &[2.0]);
+        system.factorize().unwrap();
+        assert!((system.smallest_pivot() - 0.5).abs() < 1e-12);
     }
 }

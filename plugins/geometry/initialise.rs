@@ -1,8 +1,8 @@
 //! Initial values from relative measurements: along spanning trees, and by chordal relaxation.
 mod chordal;
-mod network;
-mod parts;
-mod pose;
+pub(crate) mod network;
+pub(crate) mod parts;
+pub(crate) mod pose;
 mod relaxation;
 mod spanning_tree;
 mod start;

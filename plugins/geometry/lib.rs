@@ -6,6 +6,8 @@
 mod bearing_range;
 mod bearing_range_3d;
 mod between;
+mod certificate;
+mod chordal_between;
 mod coordinates;
 mod initialise;
 mod landmark;
@@ -26,6 +28,8 @@ pub mod testing;
 pub use bearing_range::BearingRange2;
 pub use bearing_range_3d::BearingRange3;
 pub use between::Between;
+pub use certificate::{Certificate, CertificateError, certify};
+pub use chordal_between::ChordalBetween;
 pub use coordinates::{Coordinates, NoCoordinates};
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
 pub use landmark::Landmark;

@@ -128,3 +128,51 @@ fn files_that_are_not_there_are_named() {
     let ran = manifactor(&format!("solve {} --out {}", path(&folder, "graph.toml"), path(&folder, "a.txt")));
     ran.ended(2).complains("use .toml, .json, .yaml or .g2o");
 }
+
+#[test]
+fn the_start_is_chosen_by_name() {
+    let folder = folder(&[("graph.toml", GRAPH), ("graph.g2o", G2O)]);
+    for file in ["graph.toml", "graph.g2o"] {
+        let file = path(&folder, file);
+        let given = manifactor(&format!("solve {file} --json")).ended(0).json();
+        assert_eq!(given["start"]["type"], "given");
+        for start in ["chordal", "spanning_tree"] {
+            let json = manifactor(&format!("solve {file} --start {start} --json")).ended(0).json();
+            assert_eq!(json["start"]["type"], start);
+            assert!(json["initial_cost"].as_f64().unwrap() < 1e-12, "{json}");
+            assert!(given["initial_cost"].as_f64().unwrap() > 0.1);
+        }
+        let set = "--set start.type=spanning_tree --set start.tree=shallow";
+        let ran = manifactor(&format!("solve {file} {set}")).ended(0);
+        assert!(ran.stdout.contains("start spanning_tree in"), "{}", ran.stdout);
+        manifactor(&format!("solve {file} --start cordal")).ended(2).complains("did you mean `chordal`?");
+    }
+}
+
+#[test]
+fn a_start_that_does_not_apply_says_what_it_needs() {
+    let text = r#"
+variables = [{ key = "p", value = { type = "point2", position = [1.0, 2.0] } }]
+factors = [{ keys = ["p"], factor = { type = "prior_point2", value = { position = [0.0, 0.0] } } }]
+"#;
+    let folder = folder(&[("graph.toml", text)]);
+    let ran = manifactor(&format!("solve {} --start chordal", path(&folder, "graph.toml"))).ended(2);
+    ran.complains("it needs between factors of rotations or poses");
+}
+
+#[test]
+fn a_solved_pose_graph_is_certified_on_request() {
+    let folder = folder(&[("graph.toml", GRAPH), ("graph.g2o", G2O)]);
+    for file in ["graph.toml", "graph.g2o"] {
+        let file = path(&folder, file);
+        let json = manifactor(&format!("solve {file} --certify --json")).ended(0).json();
+        assert_eq!(json["certificate"]["certified"], true, "{json}");
+        assert!(json["certificate"]["suboptimality"].as_f64().unwrap() < 1e-6);
+        let ran = manifactor(&format!("solve {file} --certify")).ended(0);
+        assert!(ran.stdout.contains("\ncertified: "), "{}", ran.stdout);
+    }
+    let robust = GRAPH.replace("noise = { sigma = 0.1 }", "loss = { type = \"cauchy\" }");
+    let folder = crate::folder(&[("graph.toml", &robust)]);
+    let ran = manifactor(&format!("solve {} --certify", path(&folder, "graph.toml"))).ended(2);
+    ran.complains("factor 0 has a robust loss");
+}

@@ -3,12 +3,15 @@ use crate::failure::Failure;
 use crate::graph_file::{self, GraphFile};
 use crate::solver::SolverArguments;
 use crate::status::Status;
+use crate::text::seconds;
 use crate::watch::Watch;
 use crate::{interrupt, output, report};
 use clap::Args;
+use manifactor::geometry::certify;
 use manifactor::solve::{All, Solution, solve};
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// Solve a graph: a literal graph (.toml, .json, .yaml) or a pose graph (.g2o, TORO).
 #[derive(Debug, Args)]
@@ -19,6 +22,9 @@ pub(crate) struct Solve {
     solver: SolverArguments,
     #[command(flatten)]
     reading: graph_file::Reading,
+    /// Certify the minimum of a pose graph: whether it is the global one, as far as that can be known.
+    #[arg(long)]
+    certify: bool,
     /// Write the solved graph here; the extension tells the format.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -39,7 +45,10 @@ impl Solve {
         let mut watch = Watch::new(self.verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();
         let mut observer = All(vec![&mut watch, &mut interrupt]);
-        let solution = solve(&input.graph, &input.values, &*input.optimizer, &mut observer);
+        let clock = Instant::now();
+        let values = input.start.start(&input.graph, &input.values).map_err(Failure::input)?;
+        let start = clock.elapsed().as_secs_f64();
+        let solution = solve(&input.graph, &values, &*input.optimizer, &mut observer);
         let solution = solution.map_err(Failure::input)?;
         drop(watch);
         if let Some(path) = &self.out {
@@ -47,20 +56,31 @@ impl Solve {
                 eprintln!("note: {note}");
             }
         }
+        let certificate = self.certify.then(|| certify(&input.graph, &solution.values));
+        let certificate = certificate.transpose().map_err(Failure::input)?;
         if self.json {
-            output::json(&self.as_json(&input, &solution));
+            let mut json = self.as_json(&input, &solution, start);
+            if let Some(certificate) = certificate {
+                json["certificate"] = json!(certificate);
+            }
+            output::json(&json);
         } else {
-            output::print(&(graph_file::summary(&input) + &report::outcome(&solution.outcome)));
+            let name = input.start.typetag_name();
+            let start = format!("start {name} in {}\n", seconds(start));
+            let certificate = certificate.map_or_else(String::new, |c| format!("{c}\n"));
+            let outcome = report::outcome(&solution.outcome);
+            output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate));
         }
         Ok(Status::from(&solution.outcome.termination))
     }
 
-    fn as_json(&self, input: &GraphFile, solution: &Solution) -> Value {
+    fn as_json(&self, input: &GraphFile, solution: &Solution, start: f64) -> Value {
         let outcome = &solution.outcome;
         let mut json = json!({
             "graph": self.graph,
             "variables": input.values.len(),
             "factors": outcome.factors,
+            "start": { "type": input.start.typetag_name(), "seconds": start },
             "initial_cost": outcome.initial_cost,
             "final_cost": outcome.final_cost,
             "iterations": outcome.iterations,

@@ -14,9 +14,9 @@ use super::relaxation::{Relaxation, Term};
 use super::start::reseat;
 use super::{Tree, spanning_tree};
 use crate::{Between, Prior, Se2, Se3, So2, So3};
-use manifactor_graph::{Factor, Graph, Key, Values, register};
+use manifactor_graph::{Factor, Graph, ValueError, Values, Variable, register};
 use manifactor_solve::{BlockSystemError, Start, StartError};
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,36 +41,46 @@ const NAME: &str = "chordal";
 #[typetag::serde(name = "chordal")]
 impl Start for Chordal {
     fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError> {
-        let missing = |key: &Key| !values.contains(key.as_str());
-        let filled = match graph.factors().iter().any(|f| f.keys.iter().any(missing)) {
-            true => Some(spanning_tree(graph, values, Tree::Shallow)?),
-            false => None,
-        };
-        let values = filled.as_ref().unwrap_or(values);
-        let mut started = values.clone();
-        let found = [
-            relax::<So2, 2>(graph, values, &mut started)?,
-            relax::<So3, 3>(graph, values, &mut started)?,
-            relax::<Se2, 2>(graph, values, &mut started)?,
-            relax::<Se3, 3>(graph, values, &mut started)?,
-        ];
-        if !found.contains(&true) {
-            return Err(StartError::NotApplicable {
-                start: NAME,
-                needs: "between factors of rotations or poses (so2, so3, se2, se3)",
-            });
+        match relax_all(graph, values) {
+            // a graph without values: where relaxations have an anchor, the first of a tree does for it
+            Err(StartError::Value(ValueError::Missing { .. })) => {
+                relax_all(graph, &spanning_tree(graph, values, Tree::Shallow)?)
+            }
+            done => done,
         }
-        reseat(graph, &mut started);
-        Ok(started)
     }
 }
 register!(dyn Start, "chordal", Chordal);
 
-/// Puts the poses of one type to where the measurements between them say; false, where there are none.
+fn relax_all(graph: &Graph, values: &Values) -> Result<Values, StartError> {
+    let mut found = Found::default();
+    found.resize_with(values.len(), || None);
+    let applies = [
+        relax::<So2, 2>(graph, values, &mut found)?,
+        relax::<So3, 3>(graph, values, &mut found)?,
+        relax::<Se2, 2>(graph, values, &mut found)?,
+        relax::<Se3, 3>(graph, values, &mut found)?,
+    ];
+    if !applies.contains(&true) {
+        let needs = "between factors of rotations or poses (so2, so3, se2, se3)";
+        return Err(StartError::NotApplicable { start: NAME, needs });
+    }
+    let mut started = Values::new();
+    for ((key, value), found) in values.iter().zip(found) {
+        started.insert_boxed(key.clone(), found.unwrap_or_else(|| value.erased().clone_box()));
+    }
+    reseat(graph, &mut started);
+    Ok(started)
+}
+
+/// New values, by place among the values.
+type Found = Vec<Option<Box<dyn Variable>>>;
+
+/// Finds the poses of one type from the measurements between them; false, where there are none.
 fn relax<P: Pose<D>, const D: usize>(
     graph: &Graph,
     values: &Values,
-    started: &mut Values,
+    found: &mut Found,
 ) -> Result<bool, StartError>
 where
     Between<P>: Factor,
@@ -78,16 +88,14 @@ where
 {
     let Some(net) = Network::<P, D>::of(graph, values)? else { return Ok(false) };
     let failed = |what| {
-        let variables = net.keys.len();
-        let key = net.keys.first().cloned().unwrap_or_else(|| "".into());
+        let (variables, first) = (net.places.len(), net.places.first().copied().unwrap_or(0));
+        let key = values.iter().nth(first).map_or_else(|| "".into(), |(key, _)| key.clone());
         move |error| match error {
-            BlockSystemError::NotPositiveDefinite => {
-                StartError::Open { start: NAME, what, key, variables: variables }
-            }
+            BlockSystemError::NotPositiveDefinite => StartError::Open { start: NAME, what, key, variables },
             other => StartError::System(other),
         }
     };
-    let anchored = net.anchored(|e| weight(&e.information) > 0.0);
+    let anchored = net.anchored(|e| e.information.chordal_weight() > 0.0);
     let mut relaxation = Relaxation::new(&net.edges, anchored)?;
     let rotations = rotations(&net, &mut relaxation).map_err(failed("rotations"))?;
     let mut translations: Vec<_> = net.poses.iter().map(Pose::translation).collect();
@@ -100,27 +108,12 @@ where
             .minimize(&net.edges, &mut translations, |e| position_term::<P, D>(e, &rotations))
             .map_err(failed("positions"))?;
     }
-    for (i, key) in net.keys.iter().enumerate().filter(|(i, _)| !net.held[*i]) {
-        started.insert(key.clone(), P::assemble(&rotations[i], &translations[i]));
+    for (i, place) in net.places.iter().enumerate().filter(|(i, _)| !net.held[*i]) {
+        if let Some(found) = found.get_mut(*place) {
+            *found = Some(Box::new(P::assemble(&rotations[i], &translations[i])));
+        }
     }
     Ok(true)
-}
-
-/// κ: half of the inverse of the mean variance about the axes, marginal over the translation. For a small
-/// angle θ, ‖R - I‖² is 2θ².
-fn weight<const D: usize>(information: &Information<D>) -> f64 {
-    let Information { turn, cross, shift } = information;
-    let marginal = match shift.try_inverse() {
-        Some(inverse) if cross.iter().any(|x| *x != 0.0) => turn - cross.tr_mul(&(inverse * cross)),
-        _ => *turn,
-    };
-    let variance = if D == 2 {
-        1.0 / marginal[(2, 2)]
-    } else {
-        marginal.try_inverse().map_or(f64::INFINITY, |m: Matrix3<f64>| m.trace() / 3.0)
-    };
-    let weight = 0.5 / variance;
-    if weight.is_finite() { weight.max(0.0) } else { 0.0 }
 }
 
 fn rotations<P: Pose<D>, const D: usize>(
@@ -130,7 +123,7 @@ fn rotations<P: Pose<D>, const D: usize>(
     // the rows of R are the columns of x
     let mut x: Vec<SMatrix<f64, D, D>> = net.poses.iter().map(|p| p.rotation().transpose()).collect();
     relaxation.minimize(&net.edges, &mut x, |e| {
-        let kappa = weight(&e.information);
+        let kappa = e.information.chordal_weight();
         let w = SMatrix::identity() * kappa;
         (kappa > 0.0).then(|| Term { a: e.rotation, w, g: SMatrix::zeros() })
     })?;
@@ -157,3 +150,7 @@ fn position_term<P: Pose<D>, const D: usize>(
     let g: SVector<f64, D> = w * (rotations[edge.a] * edge.translation) - b.tr_mul(&(cross * omega));
     Some(Term { a: SMatrix::identity(), w, g })
 }
+
+#[cfg(test)]
+#[path = "chordal_tests.rs"]
+mod tests;

@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, Matrix3, SMatrix, SVector};
 /// these.
 pub(crate) struct Network<P, const D: usize> {
     pub poses: Vec<P>,
-    /// Of each node but the outer frame.
-    pub keys: Vec<Key>,
+    /// Place of each node among the values; the outer frame has none.
+    pub places: Vec<usize>,
     /// Held by the graph, wholly or in part; and the outer frame.
     pub held: Vec<bool>,
     pub edges: Vec<Edge<D>>,
@@ -23,6 +23,8 @@ pub(crate) struct Network<P, const D: usize> {
 pub(crate) struct Edge<const D: usize> {
     pub a: usize,
     pub b: usize,
+    /// Which factor of the graph it is.
+    pub factor: usize,
     pub rotation: SMatrix<f64, D, D>,
     pub translation: SVector<f64, D>,
     pub information: Information<D>,
@@ -45,6 +47,55 @@ impl<const D: usize> Information<D> {
             shift: SMatrix::from_fn(|r, c| entry(shift(r), shift(c))),
         }
     }
+
+    /// κ: half of the inverse of the mean variance about the axes, marginal over the translation; zero where
+    /// some axis is not measured. For a small angle θ, ‖R - I‖² is 2θ².
+    pub(crate) fn chordal_weight(&self) -> f64 {
+        let Self { turn, cross, shift } = self;
+        let coupled = cross.iter().any(|x| *x != 0.0);
+        let marginal = match shift.try_inverse() {
+            Some(inverse) if coupled => turn - cross.tr_mul(&(inverse * cross)),
+            _ => *turn,
+        };
+        let variance = match D {
+            2 => 1.0 / marginal[(2, 2)],
+            _ => marginal.try_inverse().map_or(f64::INFINITY, |m: Matrix3<f64>| m.trace() / 3.0),
+        };
+        above_zero(0.5 / variance)
+    }
+
+    /// τ: the inverse of the mean variance along the axes, marginal over the rotation; zero where some axis is
+    /// not measured.
+    pub(crate) fn shift_weight(&self) -> f64 {
+        let Self { turn, cross, shift } = self;
+        let mut turn = *turn;
+        // axes that a plane does not have
+        for i in 0..3 {
+            if turn[(i, i)] == 0.0 {
+                turn[(i, i)] = 1.0;
+            }
+        }
+        let marginal =
+            turn.try_inverse().map_or(*shift, |inverse| shift - cross * inverse * cross.transpose());
+        above_zero(marginal.try_inverse().map_or(0.0, |m| D as f64 / m.trace()))
+    }
+
+    /// Whether rotation and translation are apart and each as uncertain along all axes.
+    pub(crate) fn is_isotropic(&self) -> bool {
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
+        let turns = if D == 2 { 2..3 } else { 0..3 };
+        let even = turns.clone().all(|i| near(self.turn[(i, i)], self.turn[(2, 2)]))
+            && (0..D).all(|i| near(self.shift[(i, i)], self.shift[(0, 0)]));
+        let apart = |r: usize, c: usize| r == c || (self.turn[(r, c)] == 0.0);
+        let alone = |r: usize, c: usize| r == c || (self.shift[(r, c)] == 0.0);
+        even && self.cross.iter().all(|x| *x == 0.0)
+            && turns.clone().all(|r| turns.clone().all(|c| apart(r, c)))
+            && (0..D).all(|r| (0..D).all(|c| alone(r, c)))
+    }
+}
+
+fn above_zero(weight: f64) -> f64 {
+    if weight.is_finite() { weight.max(0.0) } else { 0.0 }
 }
 
 impl<P: Pose<D>, const D: usize> Network<P, D>
@@ -57,14 +108,14 @@ where
         if !graph.factors().iter().any(|entry| as_factor::<Between<P>, 2>(entry).is_some()) {
             return Ok(None);
         }
-        let mut net = Self { poses: vec![], keys: vec![], held: vec![], edges: vec![] };
+        let mut net = Self { poses: vec![], places: vec![], held: vec![], edges: vec![] };
         // node of each place in the values
         let mut nodes = vec![usize::MAX; values.len()];
-        for (place, (key, value)) in values.iter().enumerate() {
+        for (place, (_, value)) in values.iter().enumerate() {
             if let Some(pose) = value.erased().as_any().downcast_ref::<P>() {
                 nodes[place] = net.poses.len();
                 net.poses.push(*pose);
-                net.keys.push(key.clone());
+                net.places.push(place);
             }
         }
         let outer = net.poses.len();
@@ -95,6 +146,7 @@ where
             net.edges.push(Edge {
                 a,
                 b,
+                factor: i,
                 rotation: relative.rotation(),
                 translation: relative.translation(),
                 information: Information::of::<P>(&information),

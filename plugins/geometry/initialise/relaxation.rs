@@ -10,6 +10,9 @@ pub(crate) struct Term<const D: usize, const C: usize> {
     pub g: SMatrix<f64, D, C>,
 }
 
+/// A pivot that is a smaller share of its diagonal than this is rounding.
+const SINGULAR: f64 = 1e-14;
+
 /// The structure of a sum of such terms: a block for each node that may move.
 pub(crate) struct Relaxation<const D: usize> {
     system: BlockSystem,
@@ -78,6 +81,9 @@ impl<const D: usize> Relaxation<D> {
         }
         if n > 0 {
             self.system.factorize()?;
+            if self.system.smallest_pivot() < SINGULAR {
+                return Err(BlockSystemError::NotPositiveDefinite);
+            }
             right.chunks_exact_mut(n).for_each(|column| self.system.solve(column));
         }
         for (x, block) in x.iter_mut().zip(&self.block) {

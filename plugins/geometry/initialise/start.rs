@@ -6,6 +6,7 @@ use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, register};
 use manifactor_solve::{Start, StartError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 
 /// Variables placed one from the other along a spanning tree of the between factors.
 ///
@@ -41,16 +42,21 @@ register!(dyn Start, "spanning_tree", SpanningTree);
 
 /// Puts points that are not held, and that nothing but sightings places, to where they were first seen.
 pub(crate) fn reseat(graph: &Graph, values: &mut Values) {
-    let mut done: Vec<&Key> = graph.factors().iter().filter_map(placed).flatten().collect();
-    done.extend(graph.fixed().iter().filter(|(_, fixed)| **fixed != Fixed::Whole(false)).map(|(key, _)| key));
-    let mut done: std::collections::HashSet<&Key> = done.into_iter().collect();
-    for entry in graph.factors() {
-        if let Some((key, point)) = seen_point(entry, values)
-            && done.insert(key)
-        {
+    let seen: Vec<_> = graph.factors().iter().filter_map(|entry| seen_point(entry, values)).collect();
+    if seen.is_empty() {
+        return;
+    }
+    let held = graph.fixed().keys().filter(|key| is_held(graph, key));
+    let mut done: HashSet<&Key> = graph.factors().iter().filter_map(placed).flatten().chain(held).collect();
+    for (key, point) in seen {
+        if done.insert(key) {
             values.insert_boxed(key.clone(), point);
         }
     }
+}
+
+fn is_held(graph: &Graph, key: &Key) -> bool {
+    graph.fixed().get(key).is_some_and(|fixed| *fixed != Fixed::Whole(false))
 }
 
 /// The variables that a between factor or a prior places.
@@ -80,19 +86,59 @@ fn roots(graph: &Graph, values: &Values) -> Option<Values> {
             parts.join(a, b);
         }
     }
-    let held = |key: &Key| graph.fixed().get(key).is_some_and(|f| *f != Fixed::Whole(false));
-    let mut is_held = vec![false; values.len()];
-    let known = graph
-        .fixed()
-        .keys()
-        .filter(|key| held(key))
-        .chain(graph.factors().iter().filter_map(prior).flatten());
-    known.filter_map(place).for_each(|i| is_held[parts.root(i)] = true);
+    let held = graph.fixed().keys().filter(|key| is_held(graph, key));
+    let priors = graph.factors().iter().filter_map(prior).flatten();
+    let mut part_is_rooted = vec![false; values.len()];
+    held.chain(priors).filter_map(place).for_each(|i| part_is_rooted[parts.root(i)] = true);
     let mut roots = Values::new();
     for (i, (key, value)) in values.iter().enumerate() {
-        if held(key) || (parts.root(i) == i && !is_held[i]) {
+        if is_held(graph, key) || (parts.root(i) == i && !part_is_rooted[i]) {
             roots.insert_boxed(key.clone(), value.erased().clone_box());
         }
     }
     found.then_some(roots)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_graph::Manifold;
+    use nalgebra::{Vector2, Vector3};
+
+    fn pose(x: f64) -> Se2 {
+        Se2::exp(&Vector3::new(x, 0.0, 0.0))
+    }
+
+    #[test]
+    fn each_part_keeps_what_is_held_or_its_prior_or_its_first_value() {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        for key in ["a0", "a1", "b0", "b1", "c0", "c1"] {
+            values.insert(key, pose(10.0));
+        }
+        for [x, y] in [["a0", "a1"], ["b0", "b1"], ["c0", "c1"]] {
+            graph.add([x, y], Between { relative: pose(1.0) });
+        }
+        graph.fix("a1");
+        graph.add(["b1"], Prior { value: pose(5.0) });
+        let started = SpanningTree::default().start(&graph, &values).unwrap();
+        let x: Vec<f64> = started.all::<Se2>().map(|(_, x)| x.translation.x).collect();
+        assert_eq!(x, [9.0, 10.0, 4.0, 5.0, 10.0, 11.0]);
+    }
+
+    #[test]
+    fn what_no_tree_reaches_stays_and_points_are_seen_again() {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        for key in ["x0", "x1", "alone"] {
+            values.insert(key, pose(3.0));
+        }
+        values.insert("p", Point2::new(Vector2::new(9.0, 9.0)));
+        graph.add(["x0", "x1"], Between { relative: pose(1.0) });
+        let position = crate::Coordinates::new(Vector2::new(1.0, 0.0)).unwrap();
+        graph.add(["x1", "p"], crate::Landmark { position });
+        let started = SpanningTree { tree: Tree::Shallow }.start(&graph, &values).unwrap();
+        assert_eq!(started.get::<Point2>("p").unwrap().0, Vector2::new(5.0, 0.0));
+        assert!(started.get::<Se2>("alone").unwrap().local(&pose(3.0)).norm() < 1e-15);
+        let error = SpanningTree::default().start(&Graph::new(), &values).unwrap_err();
+        assert!(error.to_string().contains("needs between factors"), "{error}");
+    }
 }

@@ -1,4 +1,4 @@
-"""Ours, as its command line solves: METHOD is a solver's name. The time is what the report calls total.
+"""Ours, as its command line solves: METHOD is a solver's name, or that of a start and one, start+solver.
 
     manifactor_solve.py BINARY METHOD INPUT OUTPUT MAX_ITERATIONS RELATIVE_COST
 
@@ -9,6 +9,8 @@ import os
 import sys
 
 binary, method, source, output, iterations, relative_cost = sys.argv[1:]
+*start, solver = method.split("+")
 stop = {"max_iterations": iterations, "relative_cost": relative_cost}
 settings = [word for key, value in stop.items() for word in ("--set", f"solver.stop.{key}={value}")]
-os.execv(binary, [binary, "solve", source, "--json", "--out", output, "--solver", method, *settings])
+settings += [word for name in start for word in ("--start", name)]
+os.execv(binary, [binary, "solve", source, "--json", "--out", output, "--solver", solver, *settings])

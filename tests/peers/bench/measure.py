@@ -33,7 +33,7 @@ class Result:
     iterations: int = 0
     memory_mib: float = 0.0
     cost: float | None = None
-    disturbed: int = 0  # runs that had the core for less than 95 % of their time
+    disturbed: int = 0  # runs that had to share the core
 
     @property
     def time(self):
@@ -51,7 +51,7 @@ def peak_kib(pid):
 
 
 def watched(command, core, patience, log):
-    """Runs a command on one core; exit status, peak KiB, share of its time that it had the core."""
+    """Runs a command on one core; exit status, peak KiB, seconds that it had to wait for the core or for a file."""
     began = time.perf_counter()
     pinned = ["taskset", "--cpu-list", str(core), *map(str, command)]
     with open(log, "w") as out, open(f"{log}.err", "w") as err:
@@ -66,8 +66,8 @@ def watched(command, core, patience, log):
                 process.kill()
             time.sleep(0.002)
     process.returncode = os.waitstatus_to_exitcode(status)
-    elapsed = time.perf_counter() - began
-    return process.returncode, peak, (usage.ru_utime + usage.ru_stime) / elapsed
+    waited = time.perf_counter() - began - usage.ru_utime - usage.ru_stime
+    return process.returncode, peak, waited
 
 
 def report(log):
@@ -78,12 +78,20 @@ def report(log):
         return None
     if "seconds" not in told:
         return None
-    if isinstance(told["seconds"], dict):  # our own command line
-        told["stages"] = {k: v for k, v in told["seconds"].items() if k != "total"}
-        told["seconds"] = told["seconds"]["total"]
-        end = told["termination"]
-        told["status"] = end.get("reason") or end["status"]
-    return told
+    return of_command_line(told) if isinstance(told["seconds"], dict) else told
+
+
+def of_command_line(told):
+    """The report of our own command line, in an adapter's words."""
+    seconds, end = told["seconds"], told["termination"]
+    start = told.get("start", {}).get("seconds", 0.0)
+    stages = {"start": start} | {name: spent for name, spent in seconds.items() if name != "total"}
+    return {
+        "seconds": start + seconds["total"],
+        "stages": {name: spent for name, spent in stages.items() if spent > 0.0},
+        "iterations": told["iterations"],
+        "status": end.get("reason") or end["status"],
+    }
 
 
 def last_words(log):
@@ -96,12 +104,12 @@ def run_once(method, problem_input, folder, stop, core, patience):
     """One run; its report with peak memory, or a text that says how it failed."""
     output, log = folder / f"estimate{problem_input.suffix}", folder / "report.json"
     output.unlink(missing_ok=True)
-    code, peak, share = watched(method.command(problem_input, output, stop), core, patience, log)
+    code, peak, waited = watched(method.command(problem_input, output, stop), core, patience, log)
     told = report(log)
     if told is None:
         return f"stopped after {patience:.0f} s" if code == -9 else f"exit status {code}: {last_words(log)}"
     told["memory_mib"] = (peak - told.get("held_kib", 0)) / 1024.0
-    told["disturbed"] = share < 0.95
+    told["disturbed"] = waited > 0.01 + 0.05 * told["seconds"]
     return told
 
 

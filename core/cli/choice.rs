@@ -1,0 +1,42 @@
+//! A registered type that the document names, or the command line does.
+use manifactor::config::{Field, Node, Section, Source, Table, Value};
+use manifactor::graph::catalogue::Kind;
+
+/// Takes `field` out of a document's table: what `argument` names, such as `--solver`, with the document's
+/// settings; else what the document names; else `default`.
+pub(crate) fn choose<K: Kind + ?Sized>(
+    section: &mut Section<'_>,
+    field: &str,
+    (argument, name): (&str, Option<&str>),
+    default: &str,
+    document: &Source,
+) -> Option<Box<K>> {
+    let chosen = |node| named(argument, name.unwrap_or(default), node, document);
+    let node = match section.take(field) {
+        Some(node) if name.is_none() && has_type(&node) => node,
+        Some(node) => chosen(node),
+        None => {
+            let nothing = Source::argument(argument, name.unwrap_or(default));
+            chosen(Node::new(nothing.place(0..0), Value::Table(Table::new())))
+        }
+    };
+    node.read_registered(section.errors())
+}
+
+fn has_type(node: &Node) -> bool {
+    !matches!(&node.value, Value::Table(table) if !table.contains_key("type"))
+}
+
+/// The same settings for the type `name`. Those of another type, in the document, are left behind.
+fn named(argument: &str, name: &str, mut node: Node, document: &Source) -> Node {
+    let Value::Table(table) = &mut node.value else { return node };
+    let is = |field: &Field| matches!(&field.node.value, Value::String(text) if text == name);
+    if !table.get("type").is_none_or(is) {
+        table.retain(|_, field| field.key.source != *document);
+    }
+    let source = Source::argument(argument, name);
+    let place = source.place(0..name.len());
+    let tag = Field { key: place.clone(), node: Node::new(place, Value::String(name.to_owned())) };
+    table.insert("type".to_owned(), tag);
+    node
+}

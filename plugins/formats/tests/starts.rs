@@ -1,0 +1,64 @@
+//! The published pose graphs of `MANIFACTOR_DATA/g2o` from a chordal start: to the best known cost, all of them.
+#![allow(missing_docs, clippy::unwrap_used)]
+use manifactor_formats::pose_graph::{self, Options};
+use manifactor_geometry::{Chordal, SpanningTree, Tree};
+use manifactor_solve::{GaussNewton, LevenbergMarquardt, Optimizer, Silent, Start, solve};
+
+/// The cost at the start and at the end; `None`, said aloud, where there are no data.
+fn costs(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(f64, f64)> {
+    let Some(root) = std::env::var_os("MANIFACTOR_DATA") else {
+        eprintln!("skipped: MANIFACTOR_DATA does not name a folder with published data");
+        return None;
+    };
+    let loaded =
+        pose_graph::read(std::path::Path::new(&root).join("g2o").join(file), &Options::default()).unwrap();
+    let values = start.start(&loaded.graph, &loaded.values).unwrap();
+    let outcome = solve(&loaded.graph, &values, optimizer, &mut Silent).unwrap().outcome;
+    println!(
+        "{file}: {} -> {} in {} iterations",
+        outcome.initial_cost, outcome.final_cost, outcome.iterations
+    );
+    Some((outcome.initial_cost, outcome.final_cost))
+}
+
+/// File, best known cost, and how many times as much the chordal start may cost.
+const GRAPHS: [(&str, f64, f64); 11] = [
+    ("torus3D.g2o", 12_117.636_879, 1.02),
+    ("MIT.g2o", 20.603_473_521, 2.0),
+    ("input_INTEL_g2o.g2o", 107.919_060_6, 1.03),
+    ("intel.g2o", 22.502_116_5, 1.1),
+    ("CSAIL.g2o", 20.275_441_672, 1.02),
+    ("kitti_00.g2o", 49.161_069_116, 1.5),
+    ("manhattan.g2o", 1_774.520_535, 1.02),
+    ("input_M3500_g2o.g2o", 68.957_439_123, 1.3),
+    ("sphere2500.g2o", 675.700_962_927, 1.3),
+    ("parking-garage.g2o", 0.634_192_399_632, 1.2),
+    ("smallGrid3D.g2o", 517.925_332_36, 1.6),
+];
+
+#[test]
+fn from_a_chordal_start_gauss_newton_reaches_the_best_known_cost() {
+    let mut failures = vec![];
+    for (file, best, times) in GRAPHS {
+        let Some((first, last)) = costs(file, &Chordal {}, &GaussNewton::default()) else { return };
+        if (last - best).abs() > 1e-6 * best || first > times * best {
+            failures.push(format!("{file}: {first} -> {last}, expected {best}"));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+fn levenberg_marquardt_gets_there_too_where_it_is_hard() {
+    for (file, best, _) in &GRAPHS[..2] {
+        let Some((_, last)) = costs(file, &Chordal {}, &LevenbergMarquardt::default()) else { return };
+        assert!((last - best).abs() < 1e-6 * best, "{file}: {last}, expected {best}");
+    }
+}
+
+#[test]
+fn a_shallow_spanning_tree_is_a_start_that_torus3d_is_solved_from() {
+    let tree = SpanningTree { tree: Tree::Shallow };
+    let Some((_, last)) = costs("torus3D.g2o", &tree, &GaussNewton::default()) else { return };
+    assert!((last - GRAPHS[0].1).abs() < 1e-6 * GRAPHS[0].1, "{last}");
+}
