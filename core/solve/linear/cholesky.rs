@@ -10,8 +10,8 @@ pub(crate) struct Cholesky {
     pub(super) structure: Structure,
     /// Panels of L.
     pub(super) values: Vec<f64>,
-    /// Updates on their way to their parents.
-    stack: Vec<f64>,
+    /// Updates on their way to their parents, of nodes on even and on odd levels.
+    updates: [Vec<f64>; 2],
     /// Nodes whose updates are on the stack.
     open: Vec<usize>,
     /// Rows below a supernode, of a right-hand side.
@@ -31,7 +31,7 @@ impl Cholesky {
         let most = |f: fn(&Node) -> usize| structure.nodes.iter().map(f).max().unwrap_or(0);
         Some(Self {
             values: zeros(structure.values)?,
-            stack: zeros(structure.stack)?,
+            updates: [zeros(structure.updates[0])?, zeros(structure.updates[1])?],
             open: Vec::with_capacity(structure.nodes.len()),
             below: zeros(most(|n| n.below))?,
             memory: kernel::scratch(most(|n| n.width)),
@@ -85,35 +85,38 @@ impl WithSimd for Factorize<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Cholesky { structure, values, stack, open, memory, .. } = self.cholesky;
-        values.fill(0.0);
-        self.h.iter().zip(&structure.scatter).for_each(|(h, at)| values[*at] = *h);
+        let Cholesky { structure, values, updates, open, memory, .. } = self.cholesky;
         open.clear();
         for (n, node) in structure.nodes.iter().enumerate() {
             let panel = &mut values[node.panel..node.panel + node.height() * node.width];
+            panel.fill(0.0);
+            for (at, h) in structure.scatter[node.entries.clone()].iter().zip(&self.h[node.entries.clone()]) {
+                panel[*at as usize] = *h;
+            }
             if let Some(added) = self.added {
                 for c in 0..node.width {
                     panel[c * (node.height() + 1)] += added[node.first + c];
                 }
             }
-            // its update is made above those of its children, and then takes their place
+            let [own, other] = updates;
+            let (update, theirs) = if node.level % 2 == 0 { (own, other) } else { (other, own) };
             let children = open.len() - node.children;
-            let top = match open[children..].last() {
-                Some(child) => structure.nodes[*child].update + structure.nodes[*child].below.pow(2),
-                None => node.update,
-            };
-            let size = node.below.pow(2);
-            let (taken, update) = stack.split_at_mut(top);
-            let update = &mut update[..size];
-            update.fill(0.0);
             for child in &open[children..] {
                 let child = &structure.nodes[*child];
-                let from = &taken[child.update..child.update + child.below.pow(2)];
-                kernel::assemble(from, child.rows(&structure.places), panel, update, node.width);
+                kernel::assemble_panel(
+                    child.update_in(theirs),
+                    child.rows(&structure.places),
+                    panel,
+                    node.width,
+                );
             }
+            let update = &mut update[node.update..node.update + node.below.pow(2)];
             kernel::eliminate(simd, panel, update, node.width, memory).map_err(|_| NotPositiveDefinite)?;
-            stack.copy_within(top..top + size, node.update);
-            open.truncate(children);
+            for child in open.drain(children..) {
+                let child = &structure.nodes[child];
+                let (from, places) = (child.update_in(theirs), child.rows(&structure.places));
+                kernel::assemble_update(from, places, update, node.below, node.width);
+            }
             open.push(n);
         }
         Ok(())

@@ -16,8 +16,8 @@ pub(crate) fn scratch(width: usize) -> MemBuffer {
     MemBuffer::new(cholesky_in_place_scratch::<f64>(width, Par::Seq, Default::default()))
 }
 
-/// Factorizes the first `width` columns of a front: L into `panel`, and what is left of the others into
-/// `update`, lower triangle. Both column-major; above their diagonals, they hold garbage afterwards.
+/// Factorizes the first `width` columns of a front: L into `panel`, and what they subtract from the others, −L₂₁L₂₁ᵀ,
+/// into the lower triangle of `update`. Both column-major; above their diagonals, they hold garbage afterwards.
 ///
 /// # Errors
 /// The column whose pivot is not positive.
@@ -36,36 +36,52 @@ pub(crate) fn eliminate<S: Simd>(
     for first in (0..width).step_by(COLUMNS) {
         let n = COLUMNS.min(width - first);
         let (left, rest) = panel.split_at_mut(first * height);
-        subtract(simd, left, height, (first, first), &mut rest[first..], height, n);
+        if first > 0 {
+            product::<S, false>(simd, left, height, (first, first), &mut rest[first..], height, n);
+        }
         factorize_columns(&mut rest[..n * height], height, first).map_err(|c| first + c)?;
     }
     let below = height - width;
     for column in (0..below).step_by(COLUMNS) {
         let n = COLUMNS.min(below - column);
         let from = width + column;
-        subtract(simd, panel, height, (from, from), &mut update[column * (below + 1)..], below, n);
+        product::<S, true>(simd, panel, height, (from, from), &mut update[column * (below + 1)..], below, n);
     }
     Ok(())
 }
 
-/// Adds a child's update to the front of its parent: row i of the child's is row `places[i]` of the parent's.
+/// Adds the columns of a child's update that are columns of its parent's panel: row i of the child's is row
+/// `places[i]` of the parent's front.
 #[inline(always)]
-pub(crate) fn assemble(from: &[f64], places: &[u32], panel: &mut [f64], update: &mut [f64], width: usize) {
-    let n = places.len();
+pub(crate) fn assemble_panel(from: &[f64], places: &[u32], panel: &mut [f64], width: usize) {
     let height = panel.len() / width;
-    let below = height - width;
-    for (j, column) in from.chunks_exact(n).enumerate() {
-        let (column, places) = (&column[j..], &places[j..]);
-        let at = places[0] as usize;
-        let (to, first) = match at < width {
-            true => (&mut panel[at * height..(at + 1) * height], 0),
-            false => (&mut update[(at - width) * below..(at - width + 1) * below], width),
-        };
-        if places[places.len() - 1] as usize - at + 1 == places.len() {
-            to[at - first..].iter_mut().zip(column).for_each(|(to, x)| *to += x);
-        } else {
-            places.iter().zip(column).for_each(|(place, x)| to[*place as usize - first] += x);
+    for (j, column) in from.chunks_exact(places.len()).enumerate() {
+        let at = places[j] as usize;
+        if at >= width {
+            return;
         }
+        add_column(&column[j..], &places[j..], &mut panel[at * height..(at + 1) * height], 0);
+    }
+}
+
+/// Adds the other columns of a child's update to the update of its parent.
+#[inline(always)]
+pub(crate) fn assemble_update(from: &[f64], places: &[u32], update: &mut [f64], below: usize, width: usize) {
+    let inside = places.partition_point(|place| (*place as usize) < width);
+    for (j, column) in from.chunks_exact(places.len()).enumerate().skip(inside) {
+        let at = places[j] as usize - width;
+        add_column(&column[j..], &places[j..], &mut update[at * below..(at + 1) * below], width);
+    }
+}
+
+/// Adds a column to one whose entry i is in row i + `first` of the front.
+#[inline(always)]
+fn add_column(column: &[f64], places: &[u32], to: &mut [f64], first: usize) {
+    let (at, last) = (places[0] as usize - first, places[places.len() - 1] as usize - first);
+    if last - at + 1 == places.len() {
+        to[at..=last].iter_mut().zip(column).for_each(|(to, x)| *to += x);
+    } else {
+        places.iter().zip(column).for_each(|(place, x)| to[*place as usize - first] += x);
     }
 }
 
@@ -91,10 +107,11 @@ fn factorize_columns(columns: &mut [f64], height: usize, first: usize) -> Result
     Ok(())
 }
 
-/// C ← C − A Bᵀ for up to [`COLUMNS`] columns of C, where A are the rows from `rows.0` on of a matrix of `height`
-/// rows, and B as many rows as C has columns, from `rows.1` on. `to` begins at C's first entry.
+/// C ← C − A Bᵀ, or C ← −A Bᵀ to `REPLACE` it, for up to [`COLUMNS`] columns of C, where A are the rows from
+/// `rows.0` on of a matrix of `height` rows, and B as many rows as C has columns, from `rows.1` on. `to` begins at
+/// C's first entry.
 #[inline(always)]
-fn subtract<S: Simd>(
+fn product<S: Simd, const REPLACE: bool>(
     simd: S,
     of: &[f64],
     height: usize,
@@ -103,19 +120,16 @@ fn subtract<S: Simd>(
     stride: usize,
     columns: usize,
 ) {
-    if of.is_empty() {
-        return;
-    }
     match columns {
-        1 => subtract_columns::<S, 1>(simd, of, height, rows, to, stride),
-        2 => subtract_columns::<S, 2>(simd, of, height, rows, to, stride),
-        3 => subtract_columns::<S, 3>(simd, of, height, rows, to, stride),
-        _ => subtract_columns::<S, 4>(simd, of, height, rows, to, stride),
+        1 => product_columns::<S, REPLACE, 1>(simd, of, height, rows, to, stride),
+        2 => product_columns::<S, REPLACE, 2>(simd, of, height, rows, to, stride),
+        3 => product_columns::<S, REPLACE, 3>(simd, of, height, rows, to, stride),
+        _ => product_columns::<S, REPLACE, 4>(simd, of, height, rows, to, stride),
     }
 }
 
 #[inline(always)]
-fn subtract_columns<S: Simd, const C: usize>(
+fn product_columns<S: Simd, const REPLACE: bool, const C: usize>(
     simd: S,
     of: &[f64],
     height: usize,
@@ -127,21 +141,21 @@ fn subtract_columns<S: Simd, const C: usize>(
     let n = height - from;
     let mut row = 0;
     while row + 2 * lanes <= n {
-        tile::<S, 2, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, 2 * lanes);
+        tile::<S, REPLACE, 2, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, 2 * lanes);
         row += 2 * lanes;
     }
     if row + lanes <= n {
-        tile::<S, 1, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, lanes);
+        tile::<S, REPLACE, 1, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, lanes);
         row += lanes;
     }
     if row < n {
-        tail::<S, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, n - row);
+        tail::<S, REPLACE, C>(simd, of, height, (from + row, beside), &mut to[row..], stride, n - row);
     }
 }
 
 /// R registers of rows by C columns.
 #[inline(always)]
-fn tile<S: Simd, const R: usize, const C: usize>(
+fn tile<S: Simd, const REPLACE: bool, const R: usize, const C: usize>(
     simd: S,
     of: &[f64],
     height: usize,
@@ -164,14 +178,15 @@ fn tile<S: Simd, const R: usize, const C: usize>(
     for c in 0..C {
         let to = S::as_mut_simd_f64s(&mut to[c * stride..c * stride + rows]).0;
         for r in 0..R {
-            to[r] = simd.sub_f64s(to[r], sum[c][r]);
+            let before = if REPLACE { simd.splat_f64s(0.0) } else { to[r] };
+            to[r] = simd.sub_f64s(before, sum[c][r]);
         }
     }
 }
 
 /// Rows that do not fill a register.
 #[inline(always)]
-fn tail<S: Simd, const C: usize>(
+fn tail<S: Simd, const REPLACE: bool, const C: usize>(
     simd: S,
     of: &[f64],
     height: usize,
@@ -190,8 +205,8 @@ fn tail<S: Simd, const C: usize>(
     }
     for c in 0..C {
         let to = &mut to[c * stride..c * stride + rows];
-        let rest = simd.sub_f64s(simd.partial_load_f64s(to), sum[c]);
-        simd.partial_store_f64s(to, rest);
+        let before = if REPLACE { simd.splat_f64s(0.0) } else { simd.partial_load_f64s(to) };
+        simd.partial_store_f64s(to, simd.sub_f64s(before, sum[c]));
     }
 }
 
@@ -220,7 +235,7 @@ fn eliminate_large(
     matmul(
         MatMut::from_column_major_slice_mut(update, below, below),
         BlockStructure::TriangularLower,
-        Accum::Add,
+        Accum::Replace,
         bottom.as_ref(),
         BlockStructure::Rectangular,
         bottom.as_ref().transpose(),

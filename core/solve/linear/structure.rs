@@ -4,6 +4,7 @@
 //! dense update that it passes on to its parent, make up a front (multifrontal method: Duff and Reid, 1983; Liu,
 //! 1992).
 use super::elimination::{Pattern, ROOT, Tree};
+use std::ops::Range;
 
 /// Structure of a factor, for a matrix whose blocks are in a postordered order of elimination.
 #[derive(Debug, Clone, Default)]
@@ -13,18 +14,18 @@ pub(crate) struct Structure {
     pub rows: Vec<u32>,
     /// By entry of `rows`: its place in the parent's front.
     pub places: Vec<u32>,
-    /// By entry of the matrix: its place in the values of the factor.
-    pub scatter: Vec<usize>,
+    /// By entry of the matrix: its place in the panel of its node.
+    pub scatter: Vec<u32>,
     /// Number of values of the factor, with the room above the diagonals of its panels.
     pub values: usize,
-    /// Number of values that updates need at most at a time.
-    pub stack: usize,
+    /// Number of values that updates need at most at a time, of nodes on even and on odd levels.
+    pub updates: [usize; 2],
     /// Multiplications and additions of a factorization.
     pub flops: f64,
 }
 
 /// A supernode. Its panel is column-major, `height` × `width`; its update square, of `below` rows.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Node {
     /// Its first column.
     pub first: usize,
@@ -36,9 +37,14 @@ pub(crate) struct Node {
     pub panel: usize,
     /// Where its rows begin.
     pub rows: usize,
+    /// Entries of the matrix in its columns.
+    pub entries: Range<usize>,
     /// Number of children, which are the last nodes before it that have no parent yet.
     pub children: usize,
-    /// Where its update stays on the stack until its parent takes it.
+    /// Distance from its root. Updates of even and of odd levels are on two stacks, so that a parent's can be
+    /// made while those of its children are there.
+    pub level: u32,
+    /// Where its update is on its stack until its parent has taken it.
     pub update: usize,
 }
 
@@ -49,6 +55,9 @@ impl Node {
     pub(crate) fn rows<'a>(&self, of: &'a [u32]) -> &'a [u32] {
         &of[self.rows..self.rows + self.below]
     }
+    pub(crate) fn update_in<'a>(&self, stack: &'a [f64]) -> &'a [f64] {
+        &stack[self.update..self.update + self.below * self.below]
+    }
 }
 
 impl Structure {
@@ -57,17 +66,17 @@ impl Structure {
     pub(crate) fn new(blocks: Pattern<'_>, start: &[u32], col_ptr: &[usize], row_idx: &[usize]) -> Self {
         let groups = merge(groups(blocks, start));
         let mut structure = Self::default();
-        structure.allocate(blocks, start, &groups);
+        structure.allocate(blocks, start, &groups, col_ptr);
         structure.place(col_ptr, row_idx);
         structure
     }
 
     /// Nodes with their rows.
-    fn allocate(&mut self, blocks: Pattern<'_>, start: &[u32], groups: &[Group]) {
+    fn allocate(&mut self, blocks: Pattern<'_>, start: &[u32], groups: &[Group], col_ptr: &[usize]) {
         let mut seen = vec![ROOT; blocks.len()];
         let mut block_rows: Vec<u32> = vec![];
         // block rows of the nodes that have no parent yet
-        let mut open: Vec<(u32, std::ops::Range<usize>)> = vec![];
+        let mut open: Vec<(u32, Range<usize>)> = vec![];
         for (g, group) in groups.iter().enumerate() {
             let begin = block_rows.len();
             let mut add = |row: u32, rows: &mut Vec<u32>| {
@@ -99,8 +108,9 @@ impl Structure {
                 below: self.rows.len() - rows,
                 panel: self.values,
                 rows,
+                entries: col_ptr[first]..col_ptr[first + width],
                 children,
-                update: 0,
+                ..Node::default()
             };
             self.values += node.height() * width;
             let (m, k) = (node.height() as f64, width as f64);
@@ -109,40 +119,40 @@ impl Structure {
             self.nodes.push(node);
             open.push((group.parent, begin..block_rows.len()));
         }
+        for g in (0..groups.len()).rev().filter(|g| groups[*g].parent != ROOT) {
+            self.nodes[g].level = self.nodes[groups[g].parent as usize].level + 1;
+        }
     }
 
-    /// Where rows are in their parent's front, entries of the matrix in panels, and updates on the stack.
+    /// Where rows are in their parent's front, entries of the matrix in panels, and updates on their stacks.
     fn place(&mut self, col_ptr: &[usize], row_idx: &[usize]) {
         self.places = vec![0; self.rows.len()];
         self.scatter = vec![0; row_idx.len()];
         let mut place = vec![0_u32; col_ptr.len() - 1];
         let mut open: Vec<usize> = vec![];
-        let mut top = 0;
+        let mut top = [0; 2];
         for n in 0..self.nodes.len() {
-            let node = self.nodes[n];
+            let node = self.nodes[n].clone();
             let columns = node.first as u32..(node.first + node.width) as u32;
             for (i, row) in columns.chain(node.rows(&self.rows).iter().copied()).enumerate() {
                 place[row as usize] = i as u32;
             }
             for c in 0..node.width {
-                let panel = node.panel + c * node.height();
                 for i in col_ptr[node.first + c]..col_ptr[node.first + c + 1] {
-                    self.scatter[i] = panel + place[row_idx[i]] as usize;
+                    self.scatter[i] = (c * node.height()) as u32 + place[row_idx[i]];
                 }
             }
-            let mut bottom = top;
-            for child in open.drain(open.len() - node.children..) {
+            let level = node.level as usize % 2;
+            self.nodes[n].update = top[level];
+            top[level] += node.below * node.below;
+            self.updates[level] = self.updates[level].max(top[level]);
+            for child in open.drain(open.len() - node.children..).rev() {
                 let child = &self.nodes[child];
                 for i in child.rows..child.rows + child.below {
                     self.places[i] = place[self.rows[i] as usize];
                 }
-                bottom = bottom.min(child.update);
+                top[1 - level] = child.update;
             }
-            // an update is made above those of the children, then moved to where they were
-            let size = node.below * node.below;
-            self.stack = self.stack.max(top + size);
-            self.nodes[n].update = bottom;
-            top = bottom + size;
             open.push(n);
         }
     }
