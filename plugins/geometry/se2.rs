@@ -53,16 +53,22 @@ impl<T: Scalar> Se2<T> {
     }
     /// Where a frame gets that moves by v and turns by θ at constant speed, in its own frame: ξ = (v, θ).
     pub fn exp(xi: &Vector3<T>) -> Self {
+        Self::new(So2::exp(xi.z), Self::way(xi))
+    }
+    /// The translation of Exp(v, θ): V v with V = sin θ/θ + (1 - cos θ)/θ · quarter turn.
+    fn way(xi: &Vector3<T>) -> Vector2<T> {
         let (v, theta) = (xi.xy(), xi.z);
         let e = small_angle::exponential(theta * theta);
-        // V v with V = sin θ/θ + (1 - cos θ)/θ · quarter turn
-        Self::new(So2::exp(theta), v * (e.sin_half * e.cos_half * 2.0) + quarter(&v) * (e.a * theta))
+        v * (e.sin_half * e.cos_half * 2.0) + quarter(&v) * (e.a * theta)
     }
     /// ξ = (v, θ), the inverse of [`Se2::exp`].
     pub fn log(&self) -> Vector3<T> {
         let theta = self.rotation.angle();
         let (half, theta2) = (theta * 0.5, theta * theta);
-        let half_cot = T::one() - theta2 * small_angle::k(theta2, || half / half.tan());
+        let (c, s) = self.rotation.cos_sin();
+        // half a turn has a sine of zero, none a cosine of one
+        let cot = || if c > T::zero() { (c + 1.0) / s } else { s / (T::one() - c) };
+        let half_cot = T::one() - theta2 * small_angle::k(theta2, || half * cot());
         let v = self.translation * half_cot - quarter(&self.translation) * half;
         Vector3::new(v.x, v.y, theta)
     }
@@ -111,7 +117,7 @@ impl Se2 {
         let half_cot = 1.0 - theta * theta * k;
         let half_cot_slope = -2.0 * theta * k - theta.powi(3) * slope;
         // v = V⁻¹t changes with θ by (V⁻¹)' t, t = Vv
-        let t = Se2::exp(xi).translation;
+        let t = Se2::way(xi);
         let d = t * half_cot_slope - quarter(&t) * 0.5;
         Matrix3::new(half_cot, -half, d.x, half, half_cot, d.y, 0.0, 0.0, 1.0)
     }
@@ -133,7 +139,8 @@ impl Manifold for Se2 {
         Se2::new(So2::exp(angle), translation)
     }
     fn retract(&self, delta: &Vector3<f64>) -> Self {
-        self.compose(&Se2::exp(delta))
+        // the cosine of the sum, not of sums of sums: rounding does not add up
+        Se2::new(So2::exp(self.rotation.angle() + delta.z), self.act(&Se2::way(delta)))
     }
     fn local(&self, other: &Self) -> Vector3<f64> {
         self.between(other).log()

@@ -50,15 +50,14 @@ pub(crate) fn k<T: Scalar>(theta2: T, half_cot: impl FnOnce() -> T) -> T {
 
 /// k and k'(θ) / θ, what the inverse right Jacobians need.
 pub(crate) fn k_and_slope(theta2: f64) -> (f64, f64) {
+    if theta2 < SMALL {
+        let slope = [1.0 / 360.0, 1.0 / 7560.0, 1.0 / 201600.0, 1.0 / 5987520.0, 691.0 / 130767436800.0];
+        return (k(theta2, || 0.0), series(theta2, slope));
+    }
     let theta = theta2.sqrt();
     let (s, c) = (0.5 * theta).sin_cos();
     let half_cot = 0.5 * theta * c / s;
-    let slope = if theta2 < SMALL {
-        series(theta2, [1.0 / 360.0, 1.0 / 7560.0, 1.0 / 201600.0, 1.0 / 5987520.0, 691.0 / 130767436800.0])
-    } else {
-        (half_cot + theta2 / (4.0 * s * s) - 2.0) / (theta2 * theta2)
-    };
-    (k(theta2, || half_cot), slope)
+    (k(theta2, || half_cot), (half_cot + theta2 / (4.0 * s * s) - 2.0) / (theta2 * theta2))
 }
 
 #[cfg(test)]

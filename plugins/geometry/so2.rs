@@ -14,11 +14,16 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// [values]
 /// r0 = { type = "so2", angle = 0.5 }
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "Document", into = "Document")]
 #[serde(bound(serialize = "Self: Into<Document>", deserialize = "Self: From<Document>"))]
 #[schemars(with = "Document", bound = "")]
-pub struct So2<T: Scalar = f64>(T);
+pub struct So2<T: Scalar = f64> {
+    angle: T,
+    // of the angle: to turn a vector costs no trigonometric function
+    cos: T,
+    sin: T,
+}
 
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -60,31 +65,40 @@ pub fn atan2<T: Scalar>(y: T, x: T) -> T {
 impl<T: Scalar> So2<T> {
     /// The rotation by an angle in radians.
     pub fn exp(angle: T) -> Self {
-        Self(wrap(angle))
+        let (sin, cos) = angle.sin_cos();
+        Self { angle: wrap(angle), cos, sin }
     }
     /// No rotation.
     pub fn identity() -> Self {
-        Self(T::zero())
+        Self { angle: T::zero(), cos: T::one(), sin: T::zero() }
     }
     /// The angle in radians, within -π..π.
     pub fn angle(&self) -> T {
-        self.0
+        self.angle
+    }
+    /// Cosine and sine of the angle.
+    pub fn cos_sin(&self) -> (T, T) {
+        (self.cos, self.sin)
     }
     /// The angle, as a tangent vector.
     pub fn log(&self) -> Vector1<T> {
-        Vector1::new(self.0)
+        Vector1::new(self.angle)
     }
     /// self · other
     pub fn compose(&self, other: &Self) -> Self {
-        Self::exp(self.0 + other.0)
+        Self {
+            angle: wrap(self.angle + other.angle),
+            cos: self.cos * other.cos - self.sin * other.sin,
+            sin: self.sin * other.cos + self.cos * other.sin,
+        }
     }
     /// self⁻¹
     pub fn inverse(&self) -> Self {
-        Self(-self.0)
+        Self { angle: -self.angle, cos: self.cos, sin: -self.sin }
     }
     /// self⁻¹ · other
     pub fn between(&self, other: &Self) -> Self {
-        Self::exp(other.0 - self.0)
+        self.inverse().compose(other)
     }
     /// R v
     pub fn act(&self, v: &Vector2<T>) -> Vector2<T> {
@@ -92,8 +106,14 @@ impl<T: Scalar> So2<T> {
     }
     /// R
     pub fn matrix(&self) -> Matrix2<T> {
-        let (s, c) = self.0.sin_cos();
-        Matrix2::new(c, -s, s, c)
+        Matrix2::new(self.cos, -self.sin, self.sin, self.cos)
+    }
+}
+
+/// By the angle: cosine and sine follow from it.
+impl<T: Scalar> PartialEq for So2<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.angle == other.angle
     }
 }
 
@@ -103,19 +123,24 @@ impl Manifold for So2 {
     const TANGENT: &'static [&'static str] = &["theta"];
 
     fn lift<T: Scalar>(&self) -> So2<T> {
-        So2(self.0.lift())
+        So2 { angle: self.angle.lift(), cos: self.cos.lift(), sin: self.sin.lift() }
     }
     fn seed(&self) -> So2<JetOf<U1>> {
-        So2(Jet::with_gradient(self.0, &[1.0]))
+        let jet = <JetOf<U1> as Jet>::with_gradient;
+        So2 {
+            angle: jet(self.angle, &[1.0]),
+            cos: jet(self.cos, &[-self.sin]),
+            sin: jet(self.sin, &[self.cos]),
+        }
     }
     fn retract(&self, delta: &Vector1<f64>) -> Self {
-        Self::exp(self.0 + delta.x)
+        Self::exp(self.angle + delta.x)
     }
     fn local(&self, other: &Self) -> Vector1<f64> {
         self.between(other).log()
     }
     fn is_finite(&self) -> bool {
-        self.0.is_finite()
+        self.angle.is_finite()
     }
 }
 register_manifold!("so2", So2);
@@ -154,7 +179,7 @@ impl TryFrom<f64> for Angle {
 }
 impl From<Angle> for f64 {
     fn from(angle: Angle) -> f64 {
-        angle.0.0
+        angle.0.angle
     }
 }
 impl From<Document> for So2 {
