@@ -60,7 +60,7 @@ def our_methods(ours, solvers, interpreter):
 
 
 # on grids, which are there for growth with size, the methods that do best on small ones
-GRIDS = {("gtsam", "gn"), ("ceres", "lm+wide")}
+GRIDS = {("gtsam", "gn"), ("gtsam", "metis+gn"), ("ceres", "lm+wide")}
 
 
 def on_pose_graphs(peer, names, command):
@@ -70,7 +70,7 @@ def on_pose_graphs(peer, names, command):
 
 def python_peers(interpreter):
     adapters = {
-        "gtsam": ("gtsam", "gtsam_pose_graph.py", ["gn", "lm", "chordal+gn", "chordal+lm"]),
+        "gtsam": ("gtsam", "gtsam_pose_graph.py", ["gn", "metis+gn", "lm", "chordal+gn", "chordal+lm"]),
         "g2opy": ("g2o", "g2o_pose_graph.py", ["gn", "lm", "dogleg"]),
     }
     methods = []
