@@ -90,9 +90,7 @@ impl Layout {
         let range = self.block_ptr[column]..self.block_ptr[column + 1];
         let i = range.start + self.block_rows[range.clone()].binary_search(&row).ok()?;
         let at = self.block_at[i];
-        // block columns begin at a diagonal entry
-        let first = self.block_at[range.start];
-        let scalar = self.col_ptr.partition_point(|p| *p < first);
+        let scalar = self.start[if self.rank[a] < self.rank[b] { a } else { b }] as usize;
         let stride = (self.col_ptr[scalar + 1] - self.col_ptr[scalar] - 1) as u32;
         Some(Slot { at, stride, swapped: self.rank[a] < self.rank[b] })
     }
