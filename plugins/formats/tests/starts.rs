@@ -1,23 +1,31 @@
 //! The published pose graphs of `MANIFACTOR_DATA/g2o` from a chordal start: to the best known cost, all of them.
 #![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_formats::pose_graph::{self, Options};
-use manifactor_geometry::{Chordal, SpanningTree, Tree};
-use manifactor_solve::{GaussNewton, LevenbergMarquardt, Optimizer, Silent, Start, solve};
+use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
+use manifactor_graph::Graph;
+use manifactor_solve::{GaussNewton, Given, LevenbergMarquardt, Optimizer, Silent, Solution, Start, solve};
 
-/// The cost at the start and at the end; `None`, said aloud, where there are no data.
-fn costs(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(f64, f64)> {
+/// Graph and solution; `None`, said aloud, where there are no data.
+fn solved(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(Graph, Solution)> {
     let Some(root) = std::env::var_os("MANIFACTOR_DATA") else {
         eprintln!("skipped: MANIFACTOR_DATA does not name a folder with published data");
         return None;
     };
-    let loaded =
-        pose_graph::read(std::path::Path::new(&root).join("g2o").join(file), &Options::default()).unwrap();
+    let path = std::path::Path::new(&root).join("g2o").join(file);
+    let loaded = pose_graph::read(path, &Options::default()).unwrap();
     let values = start.start(&loaded.graph, &loaded.values).unwrap();
-    let outcome = solve(&loaded.graph, &values, optimizer, &mut Silent).unwrap().outcome;
+    let solution = solve(&loaded.graph, &values, optimizer, &mut Silent).unwrap();
+    let outcome = &solution.outcome;
     println!(
         "{file}: {} -> {} in {} iterations",
         outcome.initial_cost, outcome.final_cost, outcome.iterations
     );
+    Some((loaded.graph, solution))
+}
+
+/// The cost at the start and at the end.
+fn costs(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(f64, f64)> {
+    let outcome = solved(file, start, optimizer)?.1.outcome;
     Some((outcome.initial_cost, outcome.final_cost))
 }
 
@@ -61,4 +69,40 @@ fn a_shallow_spanning_tree_is_a_start_that_torus3d_is_solved_from() {
     let tree = SpanningTree { tree: Tree::Shallow };
     let Some((_, last)) = costs("torus3D.g2o", &tree, &GaussNewton::default()) else { return };
     assert!((last - GRAPHS[0].1).abs() < 1e-6 * GRAPHS[0].1, "{last}");
+}
+
+#[test]
+fn the_best_known_costs_are_certified_and_where_noise_is_isotropic_bounded() {
+    // how far the bound on the graph's own cost is below what was reached
+    let graphs = [
+        ("MIT.g2o", None),
+        ("intel.g2o", None),
+        ("input_M3500_g2o.g2o", Some(1e-4)),
+        ("smallGrid3D.g2o", Some(0.02)),
+    ];
+    for (file, gap) in graphs {
+        let Some((graph, solution)) = solved(file, &Chordal {}, &GaussNewton::default()) else { return };
+        let certificate = certify(&graph, &solution.values).unwrap();
+        println!("{certificate}");
+        assert!(certificate.certified, "{file}: {certificate:?}");
+        assert!(certificate.suboptimality < 1e-5 * certificate.chordal_cost, "{file}: {certificate:?}");
+        let reached = solution.outcome.final_cost;
+        let below = certificate.cost_bound.map(|bound| (reached - bound) / reached);
+        assert_eq!(below.is_some(), gap.is_some(), "{file}");
+        assert!(below.is_none_or(|below| below >= 0.0 && Some(below) < gap), "{file}: {below:?}");
+    }
+}
+
+#[test]
+fn a_minimum_that_is_not_the_best_is_not_certified() {
+    // from the file's own values others end at 385.12
+    let Some((graph, solution)) = solved("MIT.g2o", &Given {}, &GaussNewton::default()) else {
+        return;
+    };
+    let (reached, best) = (solution.outcome.final_cost, GRAPHS[1].1);
+    let certificate = certify(&graph, &solution.values).unwrap();
+    println!("{certificate}");
+    assert_eq!(certificate.certified, reached < 1.0001 * best, "{reached}: {certificate:?}");
+    // the bound holds wherever it is taken
+    assert!(certificate.lower_bound < 20.120_366);
 }

@@ -14,7 +14,7 @@ included and parsing excluded; the median of {repeat} runs that took turns, ~ wh
 other work. Memory is the peak of the process, less what an interpreter and its libraries held before any data. The
 ratio is to the best peer: the fastest that reaches the best known cost, its own initialisation included.
 
-Measured on {processor}, {cores} cores, {memory_gib} GiB; load at the start {load:.1f}.
+Measured on {processor}, {cores} cores, {memory_gib} GiB, {system}; load at the start {load:.1f}. Peers: {versions}.
 """
 
 QUOTED = """## Peers without a package

@@ -1,6 +1,8 @@
 """Peers, by the packages that they have. Whatever cannot be had is left out, and said."""
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 import venv
@@ -19,9 +21,13 @@ def say(text):
 
 
 def call(command, **options):
-    """Runs a command quietly; its last lines, where it fails."""
-    ran = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
-    return None if ran.returncode == 0 else "\n".join(ran.stdout.splitlines()[-15:])
+    """Runs a command quietly; None, or its last lines where it fails."""
+    try:
+        ran = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
+    except OSError as error:
+        return str(error)
+    last = "\n".join(ran.stdout.splitlines()[-15:])
+    return None if ran.returncode == 0 else last or f"exit status {ran.returncode}"
 
 
 def python(cache):
@@ -31,8 +37,8 @@ def python(cache):
     if not interpreter.exists():
         venv.create(folder, with_pip=True)
     for package in PYTHON_PACKAGES:
-        present = call([interpreter, "-c", f"import {package}"]) is None
-        failed = None if present else call([interpreter, "-m", "pip", "install", "--quiet", package])
+        missing = call([interpreter, "-c", f"import {package}"])
+        failed = missing and call([interpreter, "-m", "pip", "install", "--quiet", package])
         if failed:
             say(f"{package}: left out, pip failed:\n{failed}")
     return interpreter
@@ -54,7 +60,7 @@ def our_methods(ours, solvers, interpreter):
 
 
 # on grids, which are there for growth with size, the methods that do best on small ones
-GRIDS = {("gtsam", "gn"), ("ceres", "lm+wide")}
+GRIDS = {("gtsam", "gn"), ("gtsam", "metis+gn"), ("ceres", "lm+wide")}
 
 
 def on_pose_graphs(peer, names, command):
@@ -64,7 +70,7 @@ def on_pose_graphs(peer, names, command):
 
 def python_peers(interpreter):
     adapters = {
-        "gtsam": ("gtsam", "gtsam_pose_graph.py", ["gn", "lm", "chordal+gn", "chordal+lm"]),
+        "gtsam": ("gtsam", "gtsam_pose_graph.py", ["gn", "metis+gn", "lm", "chordal+gn", "chordal+lm"]),
         "g2opy": ("g2o", "g2o_pose_graph.py", ["gn", "lm", "dogleg"]),
     }
     methods = []
@@ -119,3 +125,14 @@ def crates(cache):
 
 def peers(cache, interpreter):
     return python_peers(interpreter) + ceres(cache) + crates(cache)
+
+
+def versions(interpreter):
+    """Of all packages that are there, in words."""
+    script = f"import importlib.metadata as m; print(*(f'{{p}} {{m.version(p)}}' for p in {PYTHON_PACKAGES}), sep=', ')"
+    python = subprocess.run([interpreter, "-c", script], capture_output=True, text=True, check=False).stdout.strip()
+    query = ["dpkg-query", "--show", "--showformat", "Ceres ${Version}", "libceres-dev"]
+    debian = subprocess.run(query, capture_output=True, text=True, check=False).stdout if shutil.which("dpkg") else ""
+    lock = (HERE / "adapters" / "rust" / "Cargo.lock").read_text()
+    found = re.findall(r'name = "(factrs|apex-solver|tiny-solver)"\nversion = "(.*)"', lock)
+    return ", ".join(part for part in [python, debian, *(" ".join(crate) for crate in found)] if part)

@@ -32,7 +32,8 @@ class Result:
     stages: dict[str, float] = field(default_factory=dict)
     iterations: int = 0
     memory_mib: float = 0.0
-    cost: float | None = None
+    cost: float | None = None  # by the referee
+    own_cost: float | None = None  # by the method's own account
     disturbed: int = 0  # runs that had to share the core
 
     @property
@@ -91,6 +92,7 @@ def of_command_line(told):
         "stages": {name: spent for name, spent in stages.items() if spent > 0.0},
         "iterations": told["iterations"],
         "status": end.get("reason") or end["status"],
+        "own_cost": told["final_cost"],
     }
 
 
@@ -136,7 +138,7 @@ def measure(methods, problem_input, folder, stop, core, repeat, patience):
         if runs[method]:
             middle = sorted(runs[method], key=lambda told: told["seconds"])[(len(runs[method]) - 1) // 2]
             result.status, result.iterations = middle["status"], middle["iterations"]
-            result.stages = middle.get("stages", {})
+            result.stages, result.own_cost = middle.get("stages", {}), middle.get("own_cost")
             result.memory_mib = max(0.0, max(told["memory_mib"] for told in runs[method]))
     return results
 

@@ -40,9 +40,10 @@ PUBLISHED = [
 ]
 
 
+TUM = ROOT / "examples" / "tum"
 SCENES = [
     Problem("fifty_objects", "quadrics", document=HERE / "scene.toml", variant="boxes"),
-    Problem("fr2_desk", "quadrics", best_known=1583.24668, document=ROOT / "examples" / "tum" / "fr2_desk.toml", variant="q"),
+    Problem("fr2_desk", "quadrics", best_known=1583.24668, document=TUM / "fr2_desk.toml", variant="q"),
 ]
 
 

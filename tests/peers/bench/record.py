@@ -1,4 +1,4 @@
-"""Results in a file: each problem's last ones, so that a benchmark can be run piece by piece."""
+"""Results in a file: the last of each method on each problem, so that a benchmark can be run piece by piece."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -16,8 +16,17 @@ class Measured:
     results: list[Result]
 
 
+def add(measured, new):
+    """Keeps what other methods did from the same start."""
+    old = measured.get(new.name)
+    if old and old.start == new.start:
+        names = [r.method for r in new.results]
+        new.results += [r for r in old.results if r.method not in names]
+    measured[new.name] = new
+
+
 def load(path):
-    """By name of the problem, in the order of first measurement."""
+    """By name of the problem."""
     if not path.exists():
         return {}
     problems = json.loads(path.read_text())["problems"]

@@ -41,5 +41,5 @@ class PoseGraphReferee:
 
 if __name__ == "__main__":
     source, *estimates = sys.argv[1:]
-    referee = scene.SceneReferee(source) if source.endswith(".json") else PoseGraphReferee(source)
+    referee = scene.SceneReferee.open(source) if source.endswith(".json") else PoseGraphReferee(source)
     print(json.dumps([referee.cost(path) for path in estimates]))

@@ -35,8 +35,12 @@ def axes(quadrics):
 
 
 class SceneReferee:
-    def __init__(self, path):
-        self.factors = json.loads(Path(path).read_text())["factors"]
+    def __init__(self, factors):
+        self.factors = factors
+
+    @classmethod
+    def open(cls, path):
+        return cls(json.loads(Path(path).read_text())["factors"])
 
     def of(self, kind):
         return [f for f in self.factors if f["factor"]["type"] == kind]

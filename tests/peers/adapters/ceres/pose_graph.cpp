@@ -116,7 +116,8 @@ struct PoseGraph {
     for (const auto& [number, pose] : poses) {
       const Eigen::Vector3d& x = pose.position;
       const Eigen::Vector4d& q = pose.rotation.coeffs();
-      std::fprintf(out, "%s %d %.17g %.17g %.17g", spatial ? "VERTEX_SE3:QUAT" : "VERTEX_SE2", number, x[0], x[1], x[2]);
+      const char* tag = spatial ? "VERTEX_SE3:QUAT" : "VERTEX_SE2";
+      std::fprintf(out, "%s %d %.17g %.17g %.17g", tag, number, x[0], x[1], x[2]);
       if (spatial) std::fprintf(out, " %.17g %.17g %.17g %.17g", q[0], q[1], q[2], q[3]);
       std::fprintf(out, "\n");
     }

@@ -96,6 +96,9 @@ fn main() {
     });
     let result = result.unwrap_or_else(|error| panic!("{error}"));
     let poses = graph.vertices.iter().map(|(id, _)| *id);
-    write(&task.output, poses.map(|id| (id, files_order(result.parameters[keys[&id]].to_dvector().as_slice()))));
+    write(
+        &task.output,
+        poses.map(|id| (id, files_order(result.parameters[keys[&id]].to_dvector().as_slice()))),
+    );
     report(seconds, result.iterations, format!("{:?}", result.status));
 }

@@ -6,9 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tiny_solver::factors::{Factor, PriorFactor, na};
 use tiny_solver::manifold::se3::{SE3, SE3Manifold};
-use tiny_solver::{
-    GaussNewtonOptimizer, LevenbergMarquardtOptimizer, Optimizer, OptimizerOptions, Problem,
-};
+use tiny_solver::{GaussNewtonOptimizer, LevenbergMarquardtOptimizer, Optimizer, OptimizerOptions, Problem};
 
 /// Linearizations, counted at the first edge: the optimizers do not tell.
 static LINEARIZATIONS: AtomicUsize = AtomicUsize::new(0);
