@@ -10,11 +10,13 @@ than {relative_cost:g} of it, {max_iterations} iterations at most), on the same 
 
 Costs are ½ Σ rᵀΩr with the full logarithm, recomputed by one referee from the estimates that each method wrote; ✗ marks
 those that are not within 1e-4 of the best known. Times run from loaded data to the final estimate, everything symbolic
-included and parsing excluded; the median of {repeat} runs that took turns, ~ where most of them shared their core with
-other work. Memory is the peak of the process, less what an interpreter and its libraries held before any data. The
-ratio is to the best peer: the fastest that reaches the best known cost, its own initialisation included.
+included and parsing excluded; the median of {repeat} runs that took turns (of one, where it takes long), ~ where most of
+them shared their core with other work. Memory is the peak of the process, less what an interpreter and its libraries
+held before any data. The ratio is to the best peer: the fastest that reaches the best known cost, its own
+initialisation included.
 
-Measured on {processor}, {cores} cores, {memory_gib} GiB, {system}; load at the start {load:.1f}. Peers: {versions}.
+Measured on {processor}, {cores} cores, {memory_gib} GiB, {system}; load at the start {load:.1f}.
+Peers: {versions}.
 """
 
 QUOTED = """## Peers without a package

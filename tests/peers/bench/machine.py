@@ -17,6 +17,6 @@ def describe():
         "processor": processor(),
         "cores": os.cpu_count(),
         "memory_gib": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30),
-        "system": platform.platform(),
+        "system": " ".join([platform.system(), *platform.libc_ver()]),
         "load": os.getloadavg()[0],
     }

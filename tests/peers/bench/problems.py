@@ -30,7 +30,7 @@ PUBLISHED = [
     Problem("intel", "se2", "g2o/intel.g2o", 22.50212),
     Problem("INTEL", "se2", "g2o/input_INTEL_g2o.g2o", 107.919),
     Problem("CSAIL", "se2", "g2o/CSAIL.g2o", 20.275441672),
-    Problem("MIT", "se2", "g2o/MIT.g2o", 262.66397),
+    Problem("MIT", "se2", "g2o/MIT.g2o", 20.603473520),
     Problem("kitti_00", "se2", "g2o/kitti_00.g2o", 49.161069116),
     Problem("manhattan", "se2", "g2o/manhattan.g2o", 1774.520535),
     Problem("sphere2500", "se3", "g2o/sphere2500.g2o", 675.700962927),

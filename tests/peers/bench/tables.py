@@ -121,7 +121,7 @@ def growth(all_measured):
         for r in measured.results:
             rows.setdefault(r.method, {})[measured.poses] = r
     lines = []
-    for method, by_size in rows.items():
+    for method, by_size in sorted(rows.items()):
         done = [(n, r) for n, r in by_size.items() if r.time and r.memory_mib]
         cells = []
         for n in (m.poses for m in grids):
