@@ -30,10 +30,10 @@ impl SolverArguments {
         Ok(document.set(&self.set)?)
     }
 
-    /// Takes the field `solver` out of a document's table: Levenberg-Marquardt, where nobody says anything.
+    /// Takes the field `solver` out of a document's table: `auto`, where nobody says anything.
     pub(crate) fn take(&self, section: &mut Section<'_>, document: &Source) -> Option<Box<dyn Optimizer>> {
         let argument = ("--solver", self.solver.as_deref());
-        choose(section, "solver", argument, "levenberg_marquardt", document)
+        choose(section, "solver", argument, "auto", document)
     }
 
     /// Takes the field `start`: the values as they are, where nobody says anything.

@@ -3,6 +3,7 @@
 //! [`Problem::compile`] turns a [`Graph`] and its [`Values`] into columns of variables, batches of
 //! factors and the structure of their normal equations, once. An [`Optimizer`] moves the problem's
 //! estimate; an [`Observer`] watches. [`solve`] does it all.
+mod auto;
 mod block_system;
 mod compile;
 mod covariance;
@@ -20,6 +21,7 @@ mod start;
 mod system;
 mod termination;
 
+pub use auto::Auto;
 pub use block_system::{BlockSystem, BlockSystemError};
 pub use compile::CompileError;
 pub use covariance::CovarianceError;
@@ -58,7 +60,12 @@ pub fn solve(
     optimizer: &dyn Optimizer,
     observer: &mut dyn Observer,
 ) -> Result<Solution, CompileError> {
-    let mut problem = Problem::compile(graph, values)?;
-    let outcome = optimizer.solve(&mut problem, observer);
-    Ok(Solution { values: problem.values(), factors: problem.inspect(), outcome })
+    optimizer.solve_graph(graph, values, observer)
+}
+
+impl Solution {
+    /// The problem's estimate, at the end of a solve.
+    fn of(problem: &Problem, outcome: Outcome) -> Self {
+        Self { values: problem.values(), factors: problem.inspect(), outcome }
+    }
 }

@@ -1,4 +1,6 @@
 //! What solvers have in common: the trait, when to stop, and the account of a solve.
+use crate::Solution;
+use crate::compile::CompileError;
 use crate::observer::Observer;
 use crate::outcome::{IterationRecord, Outcome};
 use crate::problem::Problem;
@@ -6,6 +8,7 @@ use crate::termination::{Stall, Termination, Tolerance, Undetermined};
 use manifactor_graph::batch::Evaluation;
 use manifactor_graph::catalogue::Kind;
 use manifactor_graph::column::Columns;
+use manifactor_graph::{Graph, Values};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
@@ -17,6 +20,21 @@ pub trait Optimizer: Debug + Send + Sync {
     /// Moves the problem's estimate to a minimum of its cost, or as far as it gets. The estimate is
     /// the best found, however the solve ends.
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome;
+
+    /// Compiles a graph and solves it. Override to begin somewhere else than at `values`.
+    ///
+    /// # Errors
+    /// Where graph and values do not fit each other.
+    fn solve_graph(
+        &self,
+        graph: &Graph,
+        values: &Values,
+        observer: &mut dyn Observer,
+    ) -> Result<Solution, CompileError> {
+        let mut problem = Problem::compile(graph, values)?;
+        let outcome = self.solve(&mut problem, observer);
+        Ok(Solution::of(&problem, outcome))
+    }
 }
 
 impl Kind for dyn Optimizer {

@@ -26,6 +26,17 @@ pub struct Outcome {
     pub history: Vec<IterationRecord>,
 }
 
+impl Outcome {
+    /// The account of two solves of one problem, the first and the `next`, whose end counts if it is `better`.
+    pub(crate) fn then(self, next: Self, better: bool) -> Self {
+        let (initial_cost, iterations) = (self.initial_cost, self.iterations + next.iterations);
+        let times = self.times.and(next.times);
+        let history = [&self.history[..], &next.history].concat();
+        let end = if better { next } else { self };
+        Self { initial_cost, iterations, times, history, ..end }
+    }
+}
+
 /// Seconds by stage.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Times {
@@ -41,6 +52,20 @@ pub struct Times {
     pub other: f64,
     /// All of it, compilation included.
     pub total: f64,
+}
+
+impl Times {
+    /// Both, of one compilation.
+    fn and(self, next: Self) -> Self {
+        Self {
+            compile: self.compile,
+            linearize: self.linearize + next.linearize,
+            factorize: self.factorize + next.factorize,
+            solve: self.solve + next.solve,
+            other: self.other + next.other,
+            total: self.total + next.total - next.compile,
+        }
+    }
 }
 
 /// One step that was tried.

@@ -76,6 +76,10 @@ pub enum StartError {
 #[serde(deny_unknown_fields)]
 pub struct Given {}
 
+impl Given {
+    pub(crate) const NAME: &'static str = "given";
+}
+
 #[typetag::serde(name = "given")]
 impl Start for Given {
     fn start(&self, _: &Graph, values: &Values) -> Result<Values, StartError> {

@@ -4,7 +4,7 @@ mod toy;
 use manifactor_graph::loss::{Cauchy, GemanMcClure};
 use manifactor_graph::{Graph, Noise, Values};
 use manifactor_solve::{
-    Dogleg, GaussNewton, LevenbergMarquardt, Optimizer, Problem, Silent, Solution, Termination, solve,
+    Auto, Dogleg, GaussNewton, LevenbergMarquardt, Optimizer, Problem, Silent, Solution, Termination, solve,
 };
 use std::ops::ControlFlow;
 use toy::*;
@@ -14,6 +14,7 @@ fn solvers() -> Vec<Box<dyn Optimizer>> {
         Box::new(GaussNewton::default()),
         Box::new(LevenbergMarquardt::default()),
         Box::new(Dogleg::default()),
+        Box::new(Auto::default()),
     ]
 }
 

@@ -1,0 +1,41 @@
+//! The default solver on published pose graphs: no tuning, the best known minimum of each.
+#![allow(missing_docs, clippy::unwrap_used)]
+use manifactor_formats::pose_graph::{Options, read};
+use manifactor_solve::{Auto, Silent, solve};
+use std::path::PathBuf;
+
+/// ½ Σ rᵀΩr at the best known minimum; that of MIT was found by this solver, and is certified.
+const BEST: [(&str, f64); 12] = [
+    ("input_M3500_g2o.g2o", 68.957439123),
+    ("intel.g2o", 22.50212),
+    ("input_INTEL_g2o.g2o", 107.919),
+    ("MIT.g2o", 20.603473521),
+    ("CSAIL.g2o", 20.275441672),
+    ("kitti_00.g2o", 49.161069116),
+    ("manhattan.g2o", 1774.520535),
+    ("sphere2500.g2o", 675.700962927),
+    ("parking-garage.g2o", 0.634192399632),
+    ("smallGrid3D.g2o", 517.92533236),
+    ("torus3D.g2o", 12117.636879),
+    ("tinyGrid3D.g2o", 9.31390943),
+];
+
+#[test]
+fn auto_reaches_the_best_known_minimum_of_every_graph() {
+    let Some(data) = std::env::var_os("MANIFACTOR_DATA").map(PathBuf::from) else {
+        eprintln!("skipped: set MANIFACTOR_DATA to the folder of the pose graphs to run this test");
+        return;
+    };
+    let mut missed = vec![];
+    for (file, best) in BEST {
+        let graph = read(data.join("g2o").join(file), &Options::default()).unwrap();
+        let outcome = solve(&graph.graph, &graph.values, &Auto::default(), &mut Silent).unwrap().outcome;
+        println!("{file}: {} in {}, {}", outcome.final_cost, outcome.iterations, outcome.termination);
+        // as many digits as the best known cost is given with
+        if !outcome.termination.is_converged() || (outcome.final_cost - best).abs() > 2e-6 * best {
+            missed
+                .push(format!("{file}: {}, best known {best}: {}", outcome.final_cost, outcome.termination));
+        }
+    }
+    assert!(missed.is_empty(), "{missed:#?}");
+}
