@@ -2,7 +2,7 @@
 use crate::catalogue::manifold_name;
 use crate::factor::{Factor, FactorEntry};
 use crate::key::Key;
-use crate::noise::{Noise, NoiseError};
+use crate::noise::{Noise, NoiseError, Whitener};
 use crate::values::Values;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
@@ -170,9 +170,18 @@ impl Graph {
 
     /// Everything that is wrong between this graph and `values`; empty, where it can be compiled.
     pub fn check(&self, values: &Values) -> Vec<GraphError> {
+        self.resolve(values).err().unwrap_or_default()
+    }
+
+    /// Looks up every factor's variables, and checks that all of them fit.
+    ///
+    /// # Errors
+    /// Everything that is wrong between this graph and `values`.
+    pub fn resolve(&self, values: &Values) -> Result<Vec<Resolved>, Vec<GraphError>> {
         let mut errors = vec![];
+        let mut resolved = Vec::with_capacity(self.factors.len());
         for (i, entry) in self.factors.iter().enumerate() {
-            check_factor(i, entry, values, &mut errors);
+            resolved.extend(resolve(i, entry, values, &mut errors));
         }
         for (key, fixed) in &self.fixed {
             let Some(value) = values.variable(key.as_str()) else {
@@ -191,11 +200,26 @@ impl Graph {
         }
         let bad = values.iter().filter(|(_, v)| !v.erased().is_finite());
         errors.extend(bad.map(|(key, _)| GraphError::NotFinite { key: key.clone() }));
-        errors
+        if errors.is_empty() { Ok(resolved) } else { Err(errors) }
     }
 }
 
-fn check_factor(factor: usize, entry: &FactorEntry, values: &Values, errors: &mut Vec<GraphError>) {
+/// What a factor needs, looked up.
+#[derive(Debug, Clone)]
+pub struct Resolved {
+    /// Places of its variables among the values.
+    pub variables: Vec<usize>,
+    /// Its noise.
+    pub whitener: Whitener,
+}
+
+fn resolve(
+    factor: usize,
+    entry: &FactorEntry,
+    values: &Values,
+    errors: &mut Vec<GraphError>,
+) -> Option<Resolved> {
+    let mut variables = Vec::with_capacity(entry.keys.len());
     let name = entry.factor.typetag_name();
     let signature = entry.factor.erased().signature();
     let (found, expected) = (entry.keys.len(), signature.variables.len());
@@ -204,21 +228,29 @@ fn check_factor(factor: usize, entry: &FactorEntry, values: &Values, errors: &mu
     } else {
         let types = signature.variables.iter().cycle();
         for (position, (key, expected)) in entry.keys.iter().zip(types).enumerate() {
-            let key = key.clone();
-            match values.variable(key.as_str()) {
-                None => errors.push(GraphError::MissingVariable { factor, name, position, key }),
-                Some(v) if v.erased().type_id() != *expected => {
-                    let (expected, found) = (manifold_name(*expected), v.typetag_name());
+            match values.find(key.as_str()) {
+                None => {
+                    let key = key.clone();
+                    errors.push(GraphError::MissingVariable { factor, name, position, key });
+                }
+                Some((_, v)) if v.erased().type_id() != *expected => {
+                    let (expected, found, key) = (manifold_name(*expected), v.typetag_name(), key.clone());
                     errors.push(GraphError::WrongType { factor, name, position, key, expected, found });
                 }
-                Some(_) if entry.keys[..position].contains(&key) => {
+                Some((place, _)) if variables.contains(&place) => {
+                    let key = key.clone();
                     errors.push(GraphError::RepeatedVariable { factor, name, position, key });
                 }
-                Some(_) => {}
+                Some((place, _)) => variables.push(place),
             }
         }
     }
-    if let Err(source) = entry.noise.whitener(signature.rows.unwrap_or(0)) {
-        errors.push(GraphError::Noise { factor, name, source });
+    let noise = |source| GraphError::Noise { factor, name, source };
+    match entry.noise.whitener(signature.rows.unwrap_or(0)) {
+        Ok(whitener) => Some(Resolved { variables, whitener }),
+        Err(source) => {
+            errors.push(noise(source));
+            None
+        }
     }
 }

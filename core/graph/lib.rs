@@ -29,7 +29,7 @@ mod variables;
 pub use dimension::{Block, Dimension, Matrix, Vector};
 pub use direction::{Direction, NoDirection};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
-pub use graph::{Fixed, Graph, GraphError};
+pub use graph::{Fixed, Graph, GraphError, Resolved};
 pub use key::Key;
 pub use manifold::{Manifold, Tangent};
 pub use many::{List, Many};

@@ -9,7 +9,7 @@ use std::any::TypeId;
 /// A value for each key, in the order of insertion.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Values(IndexMap<Key, Box<dyn Variable>>);
+pub struct Values(IndexMap<Key, Box<dyn Variable>, foldhash::fast::RandomState>);
 
 /// Why a value could not be had.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -74,6 +74,10 @@ impl Values {
     /// All values, in order.
     pub fn iter(&self) -> impl Iterator<Item = (&Key, &dyn Variable)> {
         self.0.iter().map(|(key, value)| (key, &**value))
+    }
+    /// The value of a key, of any type, and its place in the order.
+    pub fn find(&self, key: &str) -> Option<(usize, &dyn Variable)> {
+        self.0.get_full(key).map(|(place, _, value)| (place, &**value))
     }
     /// The place of a key in the order.
     pub fn position(&self, key: &str) -> Option<usize> {

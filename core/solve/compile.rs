@@ -5,7 +5,7 @@ use crate::outcome::Times;
 use crate::problem::{Place, Problem};
 use manifactor_graph::batch::{Batch, Member};
 use manifactor_graph::column::{Columns, FIXED};
-use manifactor_graph::{Fixed, Graph, GraphError, Key, Values};
+use manifactor_graph::{Fixed, Graph, GraphError, Key, Resolved, Values};
 use std::any::TypeId;
 use std::collections::HashMap;
 use std::time::Instant;
@@ -39,18 +39,8 @@ fn list(errors: &[GraphError]) -> String {
 
 pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, CompileError> {
     let clock = Instant::now();
-    let errors = graph.check(values);
-    if !errors.is_empty() {
-        return Err(CompileError::Graph(errors));
-    }
+    let resolved = graph.resolve(values).map_err(CompileError::Graph)?;
     let (mut variables, columns) = columns(graph, values);
-    let ids: HashMap<&str, usize> = values.iter().enumerate().map(|(i, (k, _))| (k.as_str(), i)).collect();
-    // checked above: every key has a value
-    let factor_ids: Vec<Vec<usize>> = graph
-        .factors()
-        .iter()
-        .map(|f| f.keys.iter().filter_map(|k| ids.get(k.as_str()).copied()).collect())
-        .collect();
 
     // the free variables are the blocks of the linear system
     let is_free = |place: &Place| place.held.count_ones() < place.tangent.len() as u32;
@@ -64,8 +54,10 @@ pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, Compile
     let dims: Vec<usize> = free.iter().map(|v| variables[*v].tangent.len()).collect();
     let unknowns = dims.iter().sum();
     let mut pairs = vec![];
-    for ids in &factor_ids {
-        let blocks: Vec<u32> = ids.iter().filter_map(|i| block[*i].map(|b| b as u32)).collect();
+    let mut blocks: Vec<u32> = vec![];
+    for factor in &resolved {
+        blocks.clear();
+        blocks.extend(factor.variables.iter().filter_map(|i| block[*i].map(|b| b as u32)));
         for (n, &a) in blocks.iter().enumerate() {
             pairs.extend(blocks[..n].iter().map(|&b| (a, b)));
         }
@@ -83,7 +75,7 @@ pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, Compile
             held.extend((0..place.tangent.len()).filter(|d| place.held >> d & 1 == 1).map(|d| start + d));
         }
     }
-    let batches = batches(graph, &factor_ids, &variables, &block, &layout)?;
+    let batches = batches(graph, &resolved, &variables, &block, &layout);
     let cholesky = Cholesky::analyze(&layout).ok_or(out_of_memory)?;
     let (h, g) = (vec![0.0; layout.row_idx.len()], vec![0.0; unknowns]);
     let factor_keys = graph.factors().iter().map(|f| f.keys.clone()).collect();
@@ -138,26 +130,23 @@ fn held_bits(fixed: &Fixed, tangent: &[&str]) -> u32 {
 /// Factors into batches, by residual type, kind of noise and type of loss.
 fn batches(
     graph: &Graph,
-    factor_ids: &[Vec<usize>],
+    resolved: &[Resolved],
     variables: &[Place],
     block: &[Option<usize>],
     layout: &Layout,
-) -> Result<Vec<Box<dyn Batch>>, CompileError> {
+) -> Vec<Box<dyn Batch>> {
     let mut batches: Vec<Box<dyn Batch>> = vec![];
     let mut of_type: HashMap<TypeId, Vec<usize>> = HashMap::new();
     let (mut index, mut starts, mut held, mut slots) = (vec![], vec![], vec![], vec![]);
-    for (entry, (factor, ids)) in graph.factors().iter().zip(factor_ids).enumerate() {
+    for (entry, (factor, Resolved { variables: ids, whitener })) in
+        graph.factors().iter().zip(resolved).enumerate()
+    {
         let erased = factor.factor.erased();
-        let rows = erased.signature().rows.unwrap_or(0);
-        let whitener = factor.noise.whitener(rows).map_err(|source| {
-            let name = factor.factor.typetag_name();
-            CompileError::Graph(vec![GraphError::Noise { factor: entry, name, source }])
-        })?;
         let loss = factor.loss.as_deref();
         let candidates = of_type.entry(erased.type_id()).or_default();
-        let found = candidates.iter().copied().find(|b| batches[*b].fits(&whitener, loss));
+        let found = candidates.iter().copied().find(|b| batches[*b].fits(whitener, loss));
         let batch = found.unwrap_or_else(|| {
-            batches.push(erased.new_batch(&whitener, loss));
+            batches.push(erased.new_batch(whitener, loss));
             candidates.push(batches.len() - 1);
             batches.len() - 1
         });
@@ -181,9 +170,9 @@ fn batches(
             starts: &starts,
             held: &held,
             slots: &slots,
-            whitener: &whitener,
+            whitener,
             loss,
         });
     }
-    Ok(batches)
+    batches
 }

@@ -42,7 +42,7 @@ fn a_ring_that_is_wrapped_around_is_unwound() {
 #[test]
 fn who_watches_may_stop_it_at_any_step() {
     let (graph, values) = ring(20, 2.0);
-    for last in 1..6 {
+    for last in 1..=2 {
         let mut seen = 0;
         let mut observer = |_: &manifactor_solve::IterationRecord| {
             seen += 1;
