@@ -104,7 +104,7 @@ impl BlockSystem {
     /// # Errors
     /// Where it is not positive definite, as far as f64 can tell.
     pub fn factorize(&mut self) -> Result<(), BlockSystemError> {
-        let done = self.cholesky.factorize(&self.values, None);
+        let done = self.cholesky.factorize(&self.values, None, &mut self.ordered);
         done.map_err(|_| BlockSystemError::NotPositiveDefinite)
     }
 

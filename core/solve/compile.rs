@@ -93,6 +93,7 @@ pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, Compile
         g,
         held,
         cholesky,
+        forward: vec![],
         times,
     })
 }

@@ -39,6 +39,8 @@ pub struct Problem {
     /// Indices of the scalar unknowns that are held; one on the diagonal of H.
     pub(crate) held: Vec<usize>,
     pub(crate) cholesky: Cholesky,
+    /// -L⁻¹g of the last factorization.
+    pub(crate) forward: Vec<f64>,
     pub(crate) times: Times,
 }
 

@@ -4,10 +4,12 @@ use crate::problem::Problem;
 use std::time::Instant;
 
 impl Problem {
-    /// Factorizes H + diag(added).
+    /// Factorizes H + diag(added), and takes -g half the way to the step.
     pub(crate) fn factorize(&mut self, added: Option<&[f64]>) -> Result<(), NotPositiveDefinite> {
         let clock = Instant::now();
-        let done = self.cholesky.factorize(&self.h, added);
+        self.forward.clear();
+        self.forward.extend(self.g.iter().map(|g| -g));
+        let done = self.cholesky.factorize(&self.h, added, &mut self.forward);
         self.times.factorize += clock.elapsed().as_secs_f64();
         done
     }
@@ -16,8 +18,8 @@ impl Problem {
     pub(crate) fn newton_step(&mut self, step: &mut Vec<f64>) {
         let clock = Instant::now();
         step.clear();
-        step.extend(self.g.iter().map(|g| -g));
-        self.cholesky.solve(step);
+        step.extend_from_slice(&self.forward);
+        self.cholesky.solve_upper(step);
         self.times.solve += clock.elapsed().as_secs_f64();
     }
 

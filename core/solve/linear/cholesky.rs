@@ -40,14 +40,25 @@ impl Cholesky {
         })
     }
 
-    /// Factorizes a matrix with these values in its lower triangle, and `added` to its diagonal.
-    pub(crate) fn factorize(&mut self, h: &[f64], added: Option<&[f64]>) -> Result<(), NotPositiveDefinite> {
-        self.arch.dispatch(Factorize { cholesky: self, h, added })
+    /// Factorizes a matrix with these values in its lower triangle, and `added` to its diagonal. On the way,
+    /// while panels are at hand, x ← L⁻¹ x.
+    pub(crate) fn factorize(
+        &mut self,
+        h: &[f64],
+        added: Option<&[f64]>,
+        x: &mut [f64],
+    ) -> Result<(), NotPositiveDefinite> {
+        self.arch.dispatch(Factorize { cholesky: self, h, added, x })
     }
 
     /// x ← H⁻¹ x.
     pub(crate) fn solve(&mut self, x: &mut [f64]) {
-        self.arch.dispatch(Solve { cholesky: self, x });
+        self.arch.dispatch(Solve { cholesky: self, x, lower: true });
+    }
+
+    /// x ← L⁻ᵀ x: the rest of a solve whose first half was made while factorizing.
+    pub(crate) fn solve_upper(&mut self, x: &mut [f64]) {
+        self.arch.dispatch(Solve { cholesky: self, x, lower: false });
     }
 
     /// The pivots: squares of the factor's diagonal.
@@ -68,16 +79,16 @@ impl std::fmt::Debug for Cholesky {
 }
 
 pub(super) fn zeros(n: usize) -> Option<Vec<f64>> {
-    let mut values = vec![];
-    values.try_reserve_exact(n).ok()?;
-    values.resize(n, 0.0);
-    Some(values)
+    // ask first; then take zeroed pages as the system has them, without writing to each
+    Vec::<f64>::new().try_reserve_exact(n).ok()?;
+    Some(vec![0.0; n])
 }
 
 struct Factorize<'a> {
     cholesky: &'a mut Cholesky,
     h: &'a [f64],
     added: Option<&'a [f64]>,
+    x: &'a mut [f64],
 }
 
 impl WithSimd for Factorize<'_> {
@@ -85,7 +96,7 @@ impl WithSimd for Factorize<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Cholesky { structure, values, updates, open, memory, .. } = self.cholesky;
+        let Cholesky { structure, values, updates, open, below, memory, .. } = self.cholesky;
         open.clear();
         for (n, node) in structure.nodes.iter().enumerate() {
             let panel = &mut values[node.panel..node.panel + node.height() * node.width];
@@ -112,6 +123,7 @@ impl WithSimd for Factorize<'_> {
             }
             let update = &mut update[node.update..node.update + node.below.pow(2)];
             kernel::eliminate(simd, panel, update, node.width, memory).map_err(|_| NotPositiveDefinite)?;
+            solve_lower(node, structure, panel, self.x, below);
             for child in open.drain(children..) {
                 let child = &structure.nodes[child];
                 let (from, places) = (child.update_in(theirs), child.rows(&structure.places));
@@ -123,9 +135,20 @@ impl WithSimd for Factorize<'_> {
     }
 }
 
+/// The part of x ← L⁻¹ x that one panel has.
+#[inline(always)]
+fn solve_lower(node: &Node, structure: &Structure, panel: &[f64], x: &mut [f64], below: &mut [f64]) {
+    let below = &mut below[..node.below];
+    kernel::solve_lower(panel, &mut x[node.first..node.first + node.width], below);
+    let rows = node.rows(&structure.rows);
+    rows.iter().zip(&*below).for_each(|(row, value)| x[*row as usize] -= value);
+}
+
 struct Solve<'a> {
     cholesky: &'a mut Cholesky,
     x: &'a mut [f64],
+    /// Whether L⁻¹ comes before L⁻ᵀ.
+    lower: bool,
 }
 
 impl WithSimd for Solve<'_> {
@@ -135,19 +158,17 @@ impl WithSimd for Solve<'_> {
     fn with_simd<S: Simd>(self, _: S) {
         let Cholesky { structure, values, below, .. } = self.cholesky;
         let x = self.x;
-        for node in &structure.nodes {
-            let panel = &values[node.panel..node.panel + node.height() * node.width];
-            let below = &mut below[..node.below];
-            kernel::solve_lower(panel, &mut x[node.first..node.first + node.width], below);
-            let rows = node.rows(&structure.rows);
-            rows.iter().zip(&*below).for_each(|(row, value)| x[*row as usize] -= value);
+        let panel = |node: &Node| &values[node.panel..node.panel + node.height() * node.width];
+        if self.lower {
+            for node in &structure.nodes {
+                solve_lower(node, structure, panel(node), x, below);
+            }
         }
         for node in structure.nodes.iter().rev() {
-            let panel = &values[node.panel..node.panel + node.height() * node.width];
             let below = &mut below[..node.below];
             let rows = node.rows(&structure.rows);
             below.iter_mut().zip(rows).for_each(|(value, row)| *value = x[*row as usize]);
-            kernel::solve_upper(panel, &mut x[node.first..node.first + node.width], below);
+            kernel::solve_upper(panel(node), &mut x[node.first..node.first + node.width], below);
         }
     }
 }

@@ -119,12 +119,16 @@ mod tests {
         let mut cholesky = Cholesky::analyze(&layout).unwrap();
         let added: Vec<f64> = (0..layout.dim()).map(|i| i as f64).collect();
         for added in [None, Some(&added[..])] {
-            cholesky.factorize(&values, added).unwrap();
+            let right: Vec<f64> = (0..layout.dim()).map(|i| (i as f64).cos()).collect();
+            let mut halfway = right.clone();
+            cholesky.factorize(&values, added, &mut halfway).unwrap();
             let shift = DMatrix::from_diagonal(&added.unwrap_or(&vec![0.0; layout.dim()]).to_vec().into());
             let inverse = (&dense + shift).try_inverse().unwrap();
-            let mut x: Vec<f64> = (0..layout.dim()).map(|i| (i as f64).cos()).collect();
-            let expected = &inverse * DMatrix::from_column_slice(x.len(), 1, &x);
+            let expected = &inverse * DMatrix::from_column_slice(right.len(), 1, &right);
+            let mut x = right;
             cholesky.solve(&mut x);
+            cholesky.solve_upper(&mut halfway);
+            assert_eq!(x, halfway, "one way and the other make the same sums");
             assert!(x.iter().zip(expected.iter()).all(|(a, b)| (a - b).abs() < 1e-12));
             let selected = cholesky.selected_inverse().unwrap();
             for c in 0..layout.dim() {

@@ -9,7 +9,7 @@ use pulp::Simd;
 /// Columns that are eliminated together, and columns of a product that are summed up in registers.
 const COLUMNS: usize = 4;
 /// From so many multiplications on, a front is large.
-const LARGE: usize = 1 << 18;
+const LARGE: usize = 1 << 24;
 
 /// Room for faer's kernels.
 pub(crate) fn scratch(width: usize) -> MemBuffer {
