@@ -1,5 +1,6 @@
 //! The default: what needs no tuning.
 use crate::compile::CompileError;
+use crate::gauss_newton::GaussNewton;
 use crate::levenberg_marquardt::LevenbergMarquardt;
 use crate::observer::Observer;
 use crate::optimizer::{Optimizer, Stopping};
@@ -72,7 +73,7 @@ impl Optimizer for Auto {
         outcome.times.total += looking;
         for point in points {
             problem.set_values(&point.values);
-            let next = self.solve(&mut problem, &mut watch);
+            let next = self.from_elsewhere(&mut problem, &mut watch);
             let better = (next.inactive, next.final_cost) <= (outcome.inactive, outcome.final_cost);
             if better {
                 best = problem.values();
@@ -88,6 +89,19 @@ impl Optimizer for Auto {
     }
 }
 register!(dyn Optimizer, "auto", Auto);
+
+impl Auto {
+    /// Full steps first: from a good start they are there in a few, where damping creeps along narrow valleys.
+    fn from_elsewhere(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        let outcome = GaussNewton { stop: self.stop.clone() }.solve(problem, observer);
+        match outcome.termination {
+            Termination::Stalled { .. } | Termination::Indeterminate(_) => {
+                outcome.then(self.solve(problem, observer), true)
+            }
+            _ => outcome,
+        }
+    }
+}
 
 /// Values to begin with.
 struct Point {
