@@ -73,7 +73,7 @@ impl Optimizer for Auto {
         outcome.times.total += looking;
         for point in points {
             problem.set_values(&point.values);
-            let next = self.from_elsewhere(&mut problem, &mut watch);
+            let next = self.full_steps_first(&mut problem, &mut watch);
             let better = (next.inactive, next.final_cost) <= (outcome.inactive, outcome.final_cost);
             if better {
                 best = problem.values();
@@ -91,8 +91,8 @@ impl Optimizer for Auto {
 register!(dyn Optimizer, "auto", Auto);
 
 impl Auto {
-    /// Full steps first: from a good start they are there in a few, where damping creeps along narrow valleys.
-    fn from_elsewhere(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+    /// From a good start full steps are there in a few, where damping creeps along narrow valleys.
+    fn full_steps_first(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let outcome = GaussNewton { stop: self.stop.clone() }.solve(problem, observer);
         match outcome.termination {
             Termination::Stalled { .. } | Termination::Indeterminate(_) => {
