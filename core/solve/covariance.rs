@@ -33,7 +33,7 @@ impl Problem {
     /// the blocks on the diagonal of (JᵀJ)⁻¹, in the units of the noise.
     ///
     /// By Gauss-Newton's Hessian without damping, robust weights as they are at the estimate. What is held, whole or
-    /// in part, has zeros. All of them together take about as long as a few factorizations.
+    /// in part, has zeros. All of them together take about as long as ten factorizations.
     ///
     /// # Errors
     /// Where something is not constrained, or there is no memory.
