@@ -1,11 +1,12 @@
 //! Exit codes.
-use manifactor::solve::Termination;
+use manifactor::solve::{Stall, Termination};
 use std::process::ExitCode;
 
 /// How a command ended that did what it was asked to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// All went well: exit code 0.
+    /// All went well: exit code 0. An estimate beside a jump of the cost counts: it is the least there is nearby, and
+    /// the report says what it is.
     Done,
     /// A solve ended without a minimum; its best values are written all the same: exit code 1.
     NotConverged,
@@ -28,7 +29,7 @@ impl Status {
 impl From<&Termination> for Status {
     fn from(termination: &Termination) -> Self {
         match termination {
-            Termination::Converged { .. } => Self::Done,
+            Termination::Converged { .. } | Termination::Stalled { reason: Stall::Jump } => Self::Done,
             Termination::Interrupted => Self::Interrupted,
             _ => Self::NotConverged,
         }
