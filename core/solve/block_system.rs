@@ -1,6 +1,7 @@
 //! Symmetric positive definite systems of small dense blocks: A X = B, for who has a linear problem of his own.
 use crate::layout::Layout;
 use crate::linear::Cholesky;
+use crate::linear::ordering::Order;
 
 /// A symmetric matrix of blocks with a fixed pattern, and its sparse Cholesky factor.
 ///
@@ -57,7 +58,7 @@ impl BlockSystem {
         let known = |(a, b): &&(u32, u32)| (*a as usize) < dims.len() && (*b as usize) < dims.len();
         let pairs = pairs.iter().filter(known).copied().collect();
         let out_of_memory = BlockSystemError::OutOfMemory { unknowns };
-        let layout = Layout::new(dims, pairs).ok_or(out_of_memory)?;
+        let layout = Layout::new(dims, pairs, &Order::Best).ok_or(out_of_memory)?;
         let cholesky = Cholesky::analyze(&layout).ok_or(out_of_memory)?;
         let values = vec![0.0; layout.row_idx.len()];
         let begin = |end: &mut usize, dim: &usize| {

@@ -1,6 +1,7 @@
 //! From the dynamic view of a graph to the columnar one.
 use crate::layout::Layout;
 use crate::linear::Cholesky;
+use crate::linear::ordering::Order;
 use crate::outcome::Times;
 use crate::problem::{Place, Problem};
 use manifactor_graph::batch::{Batch, Member};
@@ -63,7 +64,7 @@ pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, Compile
         }
     }
     let out_of_memory = CompileError::OutOfMemory { unknowns };
-    let layout = Layout::new(&dims, pairs).ok_or(out_of_memory.clone())?;
+    let layout = Layout::new(&dims, pairs, &Order::Best).ok_or(out_of_memory.clone())?;
     for (variable, block) in variables.iter_mut().zip(&block) {
         variable.start = block.map(|b| layout.start[b] as usize);
     }

@@ -1,0 +1,272 @@
+//! Small sets of vertices that split a graph into two parts of similar weight.
+//!
+//! Multilevel (Karypis and Kumar, *A fast and high quality multilevel scheme for partitioning irregular graphs*, 1998):
+//! shrink the graph, split the small one by growing a part of it, and refine the separator on the way back (Fiduccia
+//! and Mattheyses, 1982, on vertices: Ashcraft and Liu, 1997).
+use super::adjacency::Adjacency;
+use std::collections::BinaryHeap;
+
+/// Mark of the vertices of a separator; the two sides are 0 and 1.
+pub(crate) const SEPARATOR: u8 = 2;
+
+/// Graphs of at most so many vertices are not shrunk further.
+const SMALL: usize = 80;
+/// How often a small graph is split, each time from another vertex.
+const TRIES: usize = 8;
+/// Most that a side may have of the whole.
+const LARGEST: f64 = 0.6;
+/// Most passes of a refinement.
+const PASSES: usize = 4;
+/// A pass ends after so many moves that bring nothing.
+const PATIENCE: usize = 40;
+
+/// By vertex: side 0 or 1, or [`SEPARATOR`]. No edge leads from one side to the other.
+pub(crate) fn separate(graph: &Adjacency) -> Vec<u8> {
+    let mut levels: Vec<(Adjacency, Vec<u32>)> = vec![];
+    loop {
+        let finest = levels.last().map_or(graph, |(graph, _)| graph);
+        if finest.len() <= SMALL {
+            break;
+        }
+        let (coarser, into) = finest.coarsen();
+        if coarser.len() * 10 > finest.len() * 9 {
+            break;
+        }
+        levels.push((coarser, into));
+    }
+    let smallest = levels.last().map_or(graph, |(graph, _)| graph);
+    let mut sides = split(smallest);
+    while let Some((_, into)) = levels.pop() {
+        let finer = levels.last().map_or(graph, |(graph, _)| graph);
+        let mut state = State::new(finer, into.iter().map(|c| sides[*c as usize]).collect());
+        state.refine();
+        sides = state.sides;
+    }
+
+    sides
+}
+
+/// The best of several splits of a small graph.
+fn split(graph: &Adjacency) -> Vec<u8> {
+    let n = graph.len();
+    let candidates = (0..TRIES.min(n)).map(|i| {
+        let mut state = State::new(graph, grown(graph, i * n / TRIES.min(n)));
+        state.refine();
+        (state.score(), state.sides)
+    });
+    candidates.min_by_key(|(score, _)| *score).map(|(_, sides)| sides).unwrap_or_default()
+}
+
+/// Side 0 grown from a vertex, breadth first, until it has half the weight; what it touches is the separator.
+fn grown(graph: &Adjacency, from: usize) -> Vec<u8> {
+    let half = graph.total_weight() / 2;
+    let mut sides = vec![1; graph.len()];
+    let (mut queue, mut weight) = (vec![], 0);
+    let mut seeds = (from..graph.len()).chain(0..from);
+    let mut next = 0;
+    while weight < half {
+        if next == queue.len() {
+            // the next component
+            match seeds.find(|v| sides[*v] == 1) {
+                Some(seed) => {
+                    sides[seed] = 0;
+                    queue.push(seed);
+                }
+                None => break,
+            }
+        }
+        let v = queue[next];
+        next += 1;
+        weight += u64::from(graph.weights[v]);
+        for &u in graph.neighbours(v) {
+            if sides[u as usize] == 1 {
+                sides[u as usize] = 0;
+                queue.push(u as usize);
+            }
+        }
+    }
+    // what has been reached but not taken
+    queue[next..].iter().for_each(|v| sides[*v] = SEPARATOR);
+    sides
+}
+
+/// A split under refinement.
+struct State<'a> {
+    graph: &'a Adjacency,
+    sides: Vec<u8>,
+    /// Of side 0, side 1 and the separator.
+    weights: [u64; 3],
+    largest: u64,
+}
+
+/// How much lighter the separator gets by a move; the vertex; the side that it goes to.
+type Move = (i64, u32, u8);
+
+impl<'a> State<'a> {
+    fn new(graph: &'a Adjacency, sides: Vec<u8>) -> Self {
+        let mut weights = [0; 3];
+        sides.iter().zip(&graph.weights).for_each(|(side, w)| weights[*side as usize] += u64::from(*w));
+        let largest = (graph.total_weight() as f64 * LARGEST) as u64;
+        Self { graph, sides, weights, largest }
+    }
+
+    /// What is to be small: first the excess of a side, then the separator, then the difference of the sides.
+    fn score(&self) -> (u64, u64, u64) {
+        let [a, b, separator] = self.weights;
+        (a.max(b).saturating_sub(self.largest), separator, a.abs_diff(b))
+    }
+
+    /// How much lighter the separator gets when a vertex of it goes to a side, and draws in its neighbours beyond.
+    fn gain(&self, v: usize, side: u8) -> i64 {
+        let beyond = self.graph.neighbours(v).iter().filter(|u| self.sides[**u as usize] == 1 - side);
+        let drawn: i64 = beyond.map(|u| i64::from(self.graph.weights[*u as usize])).sum();
+        i64::from(self.graph.weights[v]) - drawn
+    }
+
+    fn assign(&mut self, v: usize, side: u8, log: &mut Vec<(u32, u8)>) {
+        let weight = u64::from(self.graph.weights[v]);
+        log.push((v as u32, self.sides[v]));
+        self.weights[self.sides[v] as usize] -= weight;
+        self.weights[side as usize] += weight;
+        self.sides[v] = side;
+    }
+
+    fn refine(&mut self) {
+        for _ in 0..PASSES {
+            if !self.pass() {
+                break;
+            }
+        }
+    }
+
+    /// Moves each vertex once at most, uphill too, and goes back to the best that it has seen; whether that is better.
+    fn pass(&mut self) -> bool {
+        let before = self.score();
+        let (mut best, mut best_at) = (before, 0);
+        let mut log: Vec<(u32, u8)> = vec![];
+        let mut locked = vec![false; self.sides.len()];
+        let mut heaps: [BinaryHeap<Move>; 2] = Default::default();
+        for v in (0..self.sides.len()).filter(|v| self.sides[*v] == SEPARATOR) {
+            for side in [0, 1] {
+                heaps[side as usize].push((self.gain(v, side), v as u32, side));
+            }
+        }
+        let mut in_vain = 0;
+        while in_vain < PATIENCE {
+            let Some((_, v, side)) = self.next(&mut heaps, &locked) else { break };
+            let v = v as usize;
+            locked[v] = true;
+            self.assign(v, side, &mut log);
+            for &u in self.graph.neighbours(v) {
+                let u = u as usize;
+                if self.sides[u] != 1 - side {
+                    continue;
+                }
+                self.assign(u, SEPARATOR, &mut log);
+                // it may move on, and its neighbours in the separator draw in one less
+                let neighbours = self.graph.neighbours(u).iter().map(|x| *x as usize);
+                for x in neighbours.chain([u]).filter(|x| self.sides[*x] == SEPARATOR && !locked[*x]) {
+                    for side in [0, 1] {
+                        heaps[side as usize].push((self.gain(x, side), x as u32, side));
+                    }
+                }
+            }
+            in_vain += 1;
+            if self.score() < best {
+                (best, best_at, in_vain) = (self.score(), log.len(), 0);
+            }
+        }
+        for &(v, side) in log[best_at..].iter().rev() {
+            self.assign(v as usize, side, &mut vec![]);
+        }
+        best < before
+    }
+
+    /// The best move of those that leave no side too heavy. Gains in the heaps may be out of date: too large ones are
+    /// put back, too small ones are there again.
+    fn next(&self, heaps: &mut [BinaryHeap<Move>; 2], locked: &[bool]) -> Option<Move> {
+        let mut top: [Option<Move>; 2] = [None; 2];
+        for side in [0, 1] {
+            let heap = &mut heaps[side];
+            while let Some(&(gain, v, to)) = heap.peek() {
+                let vertex = v as usize;
+                if locked[vertex] || self.sides[vertex] != SEPARATOR {
+                    heap.pop();
+                    continue;
+                }
+                let now = self.gain(vertex, to);
+                if now != gain {
+                    heap.pop();
+                    heap.push((now, v, to));
+                    continue;
+                }
+                let weight = self.weights[side] + u64::from(self.graph.weights[vertex]);
+                // to the lighter side always
+                if weight <= self.largest || self.weights[side] < self.weights[1 - side] {
+                    top[side] = Some((gain, v, to));
+                }
+                break;
+            }
+        }
+        let lighter = usize::from(self.weights[1] < self.weights[0]);
+        let better = |a: Move, b: Move| if b.0 > a.0 { b } else { a };
+        let chosen = match (top[lighter], top[1 - lighter]) {
+            (Some(a), Some(b)) => Some(better(a, b)),
+            (a, b) => a.or(b),
+        };
+        if let Some((_, _, to)) = chosen {
+            heaps[to as usize].pop();
+        }
+        chosen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn grid(side: u32) -> Adjacency {
+        let at = |x: u32, y: u32| x * side + y;
+        let mut edges = vec![];
+        for x in 0..side {
+            for y in 0..side {
+                edges.extend((y > 0).then(|| (at(x, y), at(x, y - 1))));
+                edges.extend((x > 0).then(|| (at(x, y), at(x - 1, y))));
+            }
+        }
+        edges.sort_unstable();
+        Adjacency::new(vec![1; (side * side) as usize], &edges)
+    }
+
+    fn crossing(graph: &Adjacency, sides: &[u8]) -> usize {
+        let edges = (0..graph.len()).flat_map(|v| graph.neighbours(v).iter().map(move |u| (v, *u as usize)));
+        edges.filter(|(v, u)| sides[*v] + sides[*u] == 1).count()
+    }
+
+    #[test]
+    fn a_square_grid_is_split_by_about_one_line() {
+        let graph = grid(40);
+        let sides = separate(&graph);
+        assert_eq!(crossing(&graph, &sides), 0);
+        let count = |side: u8| sides.iter().filter(|s| **s == side).count();
+        assert!(count(SEPARATOR) <= 46, "{}", count(SEPARATOR));
+        assert!(count(0) <= 960 && count(1) <= 960, "{} {}", count(0), count(1));
+    }
+
+    proptest! {
+        #[test]
+        fn no_edge_crosses_a_separator(
+            weights in prop::collection::vec(1..10u32, 1..200),
+            raw in prop::collection::vec((0..200u32, 0..200u32), 0..600),
+        ) {
+            let n = weights.len() as u32;
+            let mut edges: Vec<_> = raw.into_iter().map(|(a, b)| (a % n, b % n)).filter(|(a, b)| a != b)
+                .map(|(a, b)| (a.max(b), a.min(b))).collect();
+            edges.sort_unstable();
+            edges.dedup();
+            let graph = Adjacency::new(weights, &edges);
+            prop_assert_eq!(crossing(&graph, &separate(&graph)), 0);
+        }
+    }
+}
