@@ -15,6 +15,14 @@ pub struct Slot {
     pub swapped: bool,
 }
 
+impl Slot {
+    /// The same block, its rows as columns.
+    #[must_use]
+    pub fn transposed(self) -> Self {
+        Self { swapped: !self.swapped, ..self }
+    }
+}
+
 /// The values of H (lower triangle, compressed columns) and g.
 #[derive(Debug)]
 pub struct NormalEquations<'a> {

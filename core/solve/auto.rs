@@ -2,6 +2,7 @@
 use crate::compile::CompileError;
 use crate::gauss_newton::GaussNewton;
 use crate::levenberg_marquardt::LevenbergMarquardt;
+use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
 use crate::optimizer::{Optimizer, Stopping};
 use crate::outcome::{IterationRecord, Outcome};
@@ -31,6 +32,8 @@ use std::time::Instant;
 pub struct Auto {
     /// When to stop, from each start.
     pub stop: Stopping,
+    /// How the linear system of each step is solved.
+    pub linear: LinearSolver,
 }
 
 /// Damping of the first step, as a share of the diagonal: none to speak of.
@@ -42,6 +45,10 @@ const MISFIT: f64 = 1.5;
 
 #[typetag::serde(name = "auto")]
 impl Optimizer for Auto {
+    fn linear(&self) -> LinearSolver {
+        self.linear.clone()
+    }
+
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let stop = self.stop.clone();
         LevenbergMarquardt { initial_lambda: DAMPING, stop, ..Default::default() }.solve(problem, observer)
@@ -53,7 +60,7 @@ impl Optimizer for Auto {
         values: &Values,
         observer: &mut dyn Observer,
     ) -> Result<Solution, CompileError> {
-        let mut problem = Problem::compile(graph, values)?;
+        let mut problem = Problem::compile_for(graph, values, &self.linear)?;
         let mut watch = Watch { observer, until: EARLY, refused: false, stopped: false };
         let mut outcome = self.solve(&mut problem, &mut watch);
         let unfinished = watch.refused && !watch.stopped;
@@ -93,7 +100,8 @@ register!(dyn Optimizer, "auto", Auto);
 impl Auto {
     /// From a good start full steps are there in a few, where damping creeps along narrow valleys.
     fn full_steps_first(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        let outcome = GaussNewton { stop: self.stop.clone() }.solve(problem, observer);
+        let outcome =
+            GaussNewton { stop: self.stop.clone(), linear: self.linear.clone() }.solve(problem, observer);
         match outcome.termination {
             Termination::Stalled { .. } | Termination::Indeterminate(_) => {
                 outcome.then(self.solve(problem, observer), true)

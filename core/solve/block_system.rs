@@ -59,7 +59,7 @@ impl BlockSystem {
         let pairs = pairs.iter().filter(known).copied().collect();
         let out_of_memory = BlockSystemError::OutOfMemory { unknowns };
         let layout = Layout::new(dims, pairs, &Order::Best).ok_or(out_of_memory)?;
-        let cholesky = Cholesky::analyze(&layout).ok_or(out_of_memory)?;
+        let cholesky = Cholesky::new(layout.structure(false)).ok_or(out_of_memory)?;
         let values = vec![0.0; layout.row_idx.len()];
         let begin = |end: &mut usize, dim: &usize| {
             *end += dim;

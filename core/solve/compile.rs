@@ -1,7 +1,7 @@
 //! From the dynamic view of a graph to the columnar one.
 use crate::layout::Layout;
-use crate::linear::Cholesky;
-use crate::linear::ordering::Order;
+use crate::linear_solver::LinearSolver;
+use crate::linear_system::{self, Blocks};
 use crate::outcome::Times;
 use crate::problem::{Place, Problem};
 use manifactor_graph::batch::{Batch, Member};
@@ -21,12 +21,30 @@ pub enum CompileError {
     /// There is nothing to solve for.
     #[error("there is no variable to solve for: {0}")]
     Empty(&'static str),
+    /// The linear solver does not fit the graph.
+    #[error("the linear solver does not fit the graph: {0}")]
+    LinearSolver(String),
     /// The linear system does not fit into memory.
-    #[error("no memory for a linear system of {unknowns} unknowns")]
+    #[error("no memory for a linear system of {unknowns} unknowns{}", shortage(*.needed, *.available))]
     OutOfMemory {
         /// Its size.
         unknowns: usize,
+        /// Bytes that its factor takes, where that is known.
+        needed: Option<u64>,
+        /// Bytes that there are for it.
+        available: u64,
     },
+}
+
+fn shortage(needed: Option<u64>, available: u64) -> String {
+    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+    needed.map_or(String::new(), |needed| {
+        let (needed, available) = (gib(needed), gib(available));
+        format!(
+            ": its factor takes {needed:.2} GiB, and there are {available:.2}; \
+             take another ordering, or linear = {{ method = \"conjugate_gradients\" }}, or allow more by memory_gib"
+        )
+    })
 }
 
 fn list(errors: &[GraphError]) -> String {
@@ -38,7 +56,11 @@ fn list(errors: &[GraphError]) -> String {
     text
 }
 
-pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, CompileError> {
+pub(crate) fn compile(
+    graph: &Graph,
+    values: &Values,
+    linear: &LinearSolver,
+) -> Result<Problem, CompileError> {
     let clock = Instant::now();
     let resolved = graph.resolve(values).map_err(CompileError::Graph)?;
     let (mut variables, columns) = columns(graph, values);
@@ -63,8 +85,12 @@ pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, Compile
             pairs.extend(blocks[..n].iter().map(|&b| (a, b)));
         }
     }
-    let out_of_memory = CompileError::OutOfMemory { unknowns };
-    let layout = Layout::new(&dims, pairs, &Order::Best).ok_or(out_of_memory.clone())?;
+    let of_block: Vec<&Place> = free.iter().map(|v| &variables[*v]).collect();
+    let blocks = Blocks::new(&of_block, values);
+    let order = linear_system::order(linear, &blocks)?;
+    let out_of_memory = CompileError::OutOfMemory { unknowns, needed: None, available: 0 };
+    let layout = Layout::new(&dims, pairs, &order).ok_or(out_of_memory)?;
+    let method = linear_system::method(linear, &blocks, &layout)?;
     for (variable, block) in variables.iter_mut().zip(&block) {
         variable.start = block.map(|b| layout.start[b] as usize);
     }
@@ -77,7 +103,6 @@ pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, Compile
         }
     }
     let batches = batches(graph, &resolved, &variables, &block, &layout);
-    let cholesky = Cholesky::analyze(&layout).ok_or(out_of_memory)?;
     let (h, g) = (vec![0.0; layout.row_idx.len()], vec![0.0; unknowns]);
     let factor_keys = graph.factors().iter().map(|f| f.keys.clone()).collect();
     let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };
@@ -93,7 +118,9 @@ pub(crate) fn compile(graph: &Graph, values: &Values) -> Result<Problem, Compile
         h,
         g,
         held,
-        cholesky,
+        method,
+        refinements: linear.refinements,
+        added: None,
         forward: vec![],
         times,
     })

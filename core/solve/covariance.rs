@@ -1,5 +1,6 @@
 //! Covariances of estimates.
 use crate::diagnose::undetermined;
+use crate::linear::Method;
 use crate::problem::Problem;
 use crate::termination::Undetermined;
 use manifactor_graph::Key;
@@ -38,9 +39,14 @@ impl Problem {
     /// # Errors
     /// Where something is not constrained, or there is no memory.
     pub fn marginals(&mut self) -> Result<Vec<(Key, DMatrix<f64>)>, CovarianceError> {
+        self.directly(Self::marginals_directly).unwrap_or(Err(self.out_of_memory()))
+    }
+
+    fn marginals_directly(&mut self) -> Result<Vec<(Key, DMatrix<f64>)>, CovarianceError> {
+        let out_of_memory = self.out_of_memory();
         self.factorize_for_covariance()?;
-        let out_of_memory = CovarianceError::OutOfMemory { unknowns: self.dim() };
-        let inverse = self.cholesky.selected_inverse().ok_or(out_of_memory)?;
+        let Method::Cholesky(cholesky) = &self.method else { return Err(out_of_memory) };
+        let inverse = cholesky.selected_inverse().ok_or(out_of_memory)?;
         let mut marginals = Vec::with_capacity(self.variables.len());
         for place in &self.variables {
             let dim = place.tangent.len();
@@ -68,6 +74,10 @@ impl Problem {
             let free = |d: usize| place.start.filter(|_| place.held >> d & 1 == 0).map(|start| start + d);
             unknowns.extend((0..place.tangent.len()).map(free));
         }
+        self.directly(|problem| problem.joint_directly(&unknowns)).unwrap_or(Err(self.out_of_memory()))
+    }
+
+    fn joint_directly(&mut self, unknowns: &[Option<usize>]) -> Result<DMatrix<f64>, CovarianceError> {
         self.factorize_for_covariance()?;
         let mut joint = DMatrix::zeros(unknowns.len(), unknowns.len());
         let mut column = vec![0.0; self.dim()];
@@ -75,12 +85,18 @@ impl Problem {
             let Some(unknown) = unknown else { continue };
             column.fill(0.0);
             column[*unknown] = 1.0;
-            self.cholesky.solve(&mut column);
+            if let Some(cholesky) = self.cholesky() {
+                cholesky.solve(&mut column);
+            }
             for (r, row) in unknowns.iter().enumerate() {
                 joint[(r, c)] = row.map_or(0.0, |row| column[row]);
             }
         }
         Ok(joint)
+    }
+
+    fn out_of_memory(&self) -> CovarianceError {
+        CovarianceError::OutOfMemory { unknowns: self.dim() }
     }
 
     fn factorize_for_covariance(&mut self) -> Result<(), CovarianceError> {

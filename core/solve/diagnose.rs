@@ -1,4 +1,5 @@
 //! Which variables, in which direction, nothing constrains.
+use crate::linear::Method;
 use crate::problem::Problem;
 use crate::system::dot;
 use crate::termination::Undetermined;
@@ -18,12 +19,27 @@ const NAMED: usize = 3;
 ///
 /// Overwrites the factorization if it looks closer.
 pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
+    match problem.method {
+        Method::Cholesky(_) => search(problem, failed, damping),
+        // others have no pivots to look at
+        Method::Qr(_) => problem.directly(|problem| {
+            let failed = problem.factorize(None).is_err();
+            search(problem, failed, 0.0)
+        })?,
+        Method::ConjugateGradients(_) if failed => {
+            problem.directly(|problem| search(problem, true, damping))?
+        }
+        Method::ConjugateGradients(_) => None,
+    }
+}
+
+fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
     let mut diagonal = vec![];
     problem.diagonal(&mut diagonal);
     if !failed {
         let mut suspicious = false;
         let share = PIVOT.max(10.0 * damping);
-        problem.cholesky.pivots(&mut |i, pivot| {
+        problem.cholesky()?.pivots(&mut |i, pivot| {
             // a pivot that is not a number is suspicious too
             suspicious |= pivot.is_nan() || pivot < share * diagonal[i];
         });
@@ -39,7 +55,7 @@ pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) ->
     let mut v: Vec<f64> = (0..scale.len()).map(|i| ((i * 7919 % 104_729) as f64 + 1.0).sin()).collect();
     for _ in 0..6 {
         v.iter_mut().zip(&scale).for_each(|(v, d)| *v *= d);
-        problem.cholesky.solve(&mut v);
+        problem.cholesky()?.solve(&mut v);
         let length = v.iter().zip(&scale).map(|(v, d)| v * v * d).sum::<f64>().sqrt();
         v.iter_mut().for_each(|v| *v /= length);
     }

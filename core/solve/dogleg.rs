@@ -1,5 +1,6 @@
 //! Powell's dogleg: a trust region between the gradient and the Gauss-Newton step.
 use crate::diagnose::undetermined;
+use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
 use crate::optimizer::{Optimizer, Session, Step, Stopping, Tried};
 use crate::outcome::Outcome;
@@ -28,6 +29,8 @@ pub struct Dogleg {
     pub initial_radius: Option<f64>,
     /// When to stop.
     pub stop: Stopping,
+    /// How the linear system of each step is solved.
+    pub linear: LinearSolver,
 }
 
 /// Least share of the predicted decrease that makes a step good enough to take.
@@ -35,6 +38,10 @@ const GAIN: f64 = 1e-4;
 
 #[typetag::serde(name = "dogleg")]
 impl Optimizer for Dogleg {
+    fn linear(&self) -> LinearSolver {
+        self.linear.clone()
+    }
+
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let mut session = match Session::begin(problem, &self.stop, observer) {
             Ok(session) => session,

@@ -1,5 +1,6 @@
 //! Gauss-Newton: full steps.
 use crate::diagnose::undetermined;
+use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
 use crate::optimizer::{Best, Optimizer, Session, Step, Stopping, Tried};
 use crate::outcome::Outcome;
@@ -24,6 +25,8 @@ use serde::{Deserialize, Serialize};
 pub struct GaussNewton {
     /// When to stop.
     pub stop: Stopping,
+    /// How the linear system of each step is solved.
+    pub linear: LinearSolver,
 }
 
 /// Rises of the cost in a row that end a solve.
@@ -33,6 +36,10 @@ const HALVINGS: usize = 30;
 
 #[typetag::serde(name = "gauss_newton")]
 impl Optimizer for GaussNewton {
+    fn linear(&self) -> LinearSolver {
+        self.linear.clone()
+    }
+
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let mut session = match Session::begin(problem, &self.stop, observer) {
             Ok(session) => session,

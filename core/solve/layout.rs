@@ -62,15 +62,44 @@ impl Layout {
         (self.rank, self.block_ptr, self.block_rows) = (lower.rank, lower.ptr, lower.rows);
     }
 
-    /// What the factor of a matrix with this layout looks like.
-    pub(crate) fn structure(&self) -> Structure {
+    /// What the factor of a matrix with this layout looks like, sparse or `dense`.
+    pub(crate) fn structure(&self, dense: bool) -> Structure {
         let blocks = Pattern { ptr: &self.block_ptr, rows: &self.block_rows };
-        Structure::new(blocks, &self.first, &self.col_ptr, &self.row_idx)
+        Structure::new(blocks, &self.first, &self.col_ptr, &self.row_idx, dense)
     }
 
     /// Number of scalar unknowns.
     pub(crate) fn dim(&self) -> usize {
         self.col_ptr.len() - 1
+    }
+
+    /// By block in the order of elimination: its first scalar; and one past the last.
+    pub(crate) fn first_scalars(&self) -> Vec<usize> {
+        self.first.iter().map(|f| *f as usize).collect()
+    }
+
+    /// Visits the blocks below the diagonal: places of row and column in the order of elimination, and where it is.
+    pub(crate) fn couplings(&self, mut visit: impl FnMut(usize, usize, Slot)) {
+        for column in 0..self.rank.len() {
+            for i in self.block_ptr[column] + 1..self.block_ptr[column + 1] {
+                visit(self.block_rows[i] as usize, column, self.slot_at(i, column, false));
+            }
+        }
+    }
+
+    /// y ← y + H x.
+    pub(crate) fn multiply_add(&self, h: &[f64], x: &[f64], y: &mut [f64]) {
+        for c in 0..x.len() {
+            let range = self.col_ptr[c]..self.col_ptr[c + 1];
+            let (rows, values) = (&self.row_idx[range.clone()], &h[range]);
+            // in a lower triangle the diagonal comes first in its column
+            let mut sum = values[0] * x[c];
+            for (r, h) in rows[1..].iter().zip(&values[1..]) {
+                sum += h * x[*r];
+                y[*r] += h * x[c];
+            }
+            y[c] += sum;
+        }
     }
 
     /// Index of each diagonal entry in the values of H.
@@ -84,10 +113,13 @@ impl Layout {
         let (row, column) = (self.rank[a].max(self.rank[b]), self.rank[a].min(self.rank[b]) as usize);
         let range = self.block_ptr[column]..self.block_ptr[column + 1];
         let i = range.start + self.block_rows[range.clone()].binary_search(&row).ok()?;
-        let at = self.block_at[i];
+        Some(self.slot_at(i, column, self.rank[a] < self.rank[b]))
+    }
+
+    fn slot_at(&self, i: usize, column: usize, swapped: bool) -> Slot {
         let scalar = self.first[column] as usize;
         let stride = (self.col_ptr[scalar + 1] - self.col_ptr[scalar] - 1) as u32;
-        Some(Slot { at, stride, swapped: self.rank[a] < self.rank[b] })
+        Slot { at: self.block_at[i], stride, swapped }
     }
 }
 

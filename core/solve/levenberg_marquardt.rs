@@ -1,5 +1,6 @@
 //! Levenberg-Marquardt: steps damped along the diagonal of H.
 use crate::diagnose::undetermined;
+use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
 use crate::optimizer::{Optimizer, Session, Step, Stopping, Tried};
 use crate::outcome::Outcome;
@@ -34,6 +35,8 @@ pub struct LevenbergMarquardt {
     pub diagonal: [f64; 2],
     /// When to stop.
     pub stop: Stopping,
+    /// How the linear system of each step is solved.
+    pub linear: LinearSolver,
 }
 
 impl Default for LevenbergMarquardt {
@@ -45,6 +48,7 @@ impl Default for LevenbergMarquardt {
             decrease: 10.0,
             diagonal: [1e-6, 1e32],
             stop: Stopping::default(),
+            linear: LinearSolver::default(),
         }
     }
 }
@@ -56,6 +60,10 @@ const TRUSTED: f64 = 1.0;
 
 #[typetag::serde(name = "levenberg_marquardt")]
 impl Optimizer for LevenbergMarquardt {
+    fn linear(&self) -> LinearSolver {
+        self.linear.clone()
+    }
+
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let mut session = match Session::begin(problem, &self.stop, observer) {
             Ok(session) => session,

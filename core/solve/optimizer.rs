@@ -1,6 +1,7 @@
 //! What solvers have in common: the trait, when to stop, and the account of a solve.
 use crate::Solution;
 use crate::compile::CompileError;
+use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
 use crate::outcome::{IterationRecord, Outcome};
 use crate::problem::Problem;
@@ -21,6 +22,11 @@ pub trait Optimizer: Debug + Send + Sync {
     /// the best found, however the solve ends.
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome;
 
+    /// How the linear system of each step is solved.
+    fn linear(&self) -> LinearSolver {
+        LinearSolver::default()
+    }
+
     /// Compiles a graph and solves it. Override to begin somewhere else than at `values`.
     ///
     /// # Errors
@@ -31,7 +37,7 @@ pub trait Optimizer: Debug + Send + Sync {
         values: &Values,
         observer: &mut dyn Observer,
     ) -> Result<Solution, CompileError> {
-        let mut problem = Problem::compile(graph, values)?;
+        let mut problem = Problem::compile_for(graph, values, &self.linear())?;
         let outcome = self.solve(&mut problem, observer);
         Ok(Solution::of(&problem, outcome))
     }

@@ -1,7 +1,8 @@
 //! A compiled graph: indexed, columnar, with the structure of its linear system.
 use crate::compile::{self, CompileError};
 use crate::layout::Layout;
-use crate::linear::Cholesky;
+use crate::linear::Method;
+use crate::linear_solver::LinearSolver;
 use crate::outcome::Times;
 use manifactor_graph::batch::{Batch, Evaluation, FactorRows, FactorState};
 use manifactor_graph::column::Columns;
@@ -38,8 +39,12 @@ pub struct Problem {
     pub(crate) g: Vec<f64>,
     /// Indices of the scalar unknowns that are held; one on the diagonal of H.
     pub(crate) held: Vec<usize>,
-    pub(crate) cholesky: Cholesky,
-    /// -L⁻¹g of the last factorization.
+    pub(crate) method: Method,
+    /// Steps of iterative refinement after each solve.
+    pub(crate) refinements: usize,
+    /// Damping of the last factorization.
+    pub(crate) added: Option<Vec<f64>>,
+    /// -L⁻¹g of the last factorization, or the step itself, by what the method is.
     pub(crate) forward: Vec<f64>,
     pub(crate) times: Times,
 }
@@ -50,7 +55,15 @@ impl Problem {
     /// # Errors
     /// Everything that is wrong between graph and values, all at once.
     pub fn compile(graph: &Graph, values: &Values) -> Result<Self, CompileError> {
-        compile::compile(graph, values)
+        Self::compile_for(graph, values, &LinearSolver::default())
+    }
+
+    /// The same for a linear solver of choice.
+    ///
+    /// # Errors
+    /// Those of [`compile`](Self::compile), and where the solver does not fit the graph, or its factor into memory.
+    pub fn compile_for(graph: &Graph, values: &Values, linear: &LinearSolver) -> Result<Self, CompileError> {
+        compile::compile(graph, values, linear)
     }
 
     /// The estimate, in the order of the values that the problem was compiled with.

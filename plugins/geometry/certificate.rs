@@ -222,7 +222,9 @@ where
     let near = LevenbergMarquardt { stop: stop(1e-9, 100), ..LevenbergMarquardt::default() };
     let near = solve(&graph, &values, &near, &mut Silent)?.values;
     // the last digits: the certificate matrix is only as close to singular as the gradient is to zero
-    let exact = solve(&graph, &near, &GaussNewton { stop: stop(1e-12, 30) }, &mut Silent)?.values;
+    let exact =
+        solve(&graph, &near, &GaussNewton { stop: stop(1e-12, 30), ..Default::default() }, &mut Silent)?
+            .values;
     let pose = |(key, start): (&Key, &P)| exact.get::<P>(key).map_or(*start, |pose| *pose);
     Ok(keys.iter().zip(&net.poses).map(pose).collect())
 }

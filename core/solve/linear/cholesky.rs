@@ -1,7 +1,6 @@
 //! Supernodal sparse Cholesky: structure once, numbers many times, in memory that is reused.
-use super::kernel;
 use super::structure::{Node, Structure};
-use crate::layout::Layout;
+use super::{NotPositiveDefinite, kernel};
 use faer::dyn_stack::MemBuffer;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -20,14 +19,9 @@ pub(crate) struct Cholesky {
     arch: Arch,
 }
 
-/// The matrix is not positive definite, as far as f64 can tell.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct NotPositiveDefinite;
-
 impl Cholesky {
-    /// Analyses the lower triangle of a layout; `None` where there is no memory for its factor.
-    pub(crate) fn analyze(layout: &Layout) -> Option<Self> {
-        let structure = layout.structure();
+    /// Memory for a factor of this structure; `None` where there is none.
+    pub(crate) fn new(structure: Structure) -> Option<Self> {
         let most = |f: fn(&Node) -> usize| structure.nodes.iter().map(f).max().unwrap_or(0);
         Some(Self {
             values: zeros(structure.values)?,

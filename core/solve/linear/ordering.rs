@@ -18,7 +18,7 @@ pub(crate) enum Order {
     MinimumDegree,
     ColumnDegree,
     NestedDissection,
-    /// As listed, each block once.
+    /// As listed, each block once at most; then the others, by minimum degree.
     Given(Vec<usize>),
     /// The marked blocks first, then the others, each by minimum degree.
     First(Vec<bool>),
@@ -39,8 +39,12 @@ impl Order {
             Self::MinimumDegree => minimum_degree::minimum_degree(graph)?,
             Self::ColumnDegree => column_degree::column_degree(graph)?,
             Self::NestedDissection => dissection::nested_dissection(graph)?,
-            Self::Given(order) => order.clone(),
-            Self::First(first) => marked_first(graph, first)?,
+            Self::Given(order) => listed_first(graph, order.clone())?,
+            Self::First(first) => {
+                let marked: Vec<usize> = (0..graph.len()).filter(|v| first[*v]).collect();
+                let order = minimum_degree::minimum_degree(&graph.induced(&marked))?;
+                listed_first(graph, order.into_iter().map(|v| marked[v]).collect())?
+            }
         };
         Some(Elimination::new(graph, &order))
     }
@@ -70,13 +74,13 @@ fn best(graph: &Adjacency) -> Option<Elimination> {
     Some(best)
 }
 
-fn marked_first(graph: &Adjacency, first: &[bool]) -> Option<Vec<usize>> {
-    let part = |mark: bool| -> Vec<usize> { (0..graph.len()).filter(|v| first[*v] == mark).collect() };
-    let (marked, rest) = (part(true), part(false));
-    let mut order = Vec::with_capacity(graph.len());
-    order.extend(minimum_degree::minimum_degree(&graph.induced(&marked))?.into_iter().map(|v| marked[v]));
-    order
-        .extend(minimum_degree::minimum_degree(&graph.without(&marked, &rest))?.into_iter().map(|v| rest[v]));
+/// The blocks that are listed, in order, then the others by minimum degree.
+fn listed_first(graph: &Adjacency, mut order: Vec<usize>) -> Option<Vec<usize>> {
+    let mut is_listed = vec![false; graph.len()];
+    order.iter().for_each(|v| is_listed[*v] = true);
+    let rest: Vec<usize> = (0..graph.len()).filter(|v| !is_listed[*v]).collect();
+    let after = minimum_degree::minimum_degree(&graph.without(&order, &rest))?;
+    order.extend(after.into_iter().map(|v| rest[v]));
     Some(order)
 }
 

@@ -62,13 +62,24 @@ impl Node {
 
 impl Structure {
     /// Of a matrix with this lower triangle: by blocks, with the first scalar of each block and one past the
-    /// last, and by scalars, in compressed columns.
-    pub(crate) fn new(blocks: Pattern<'_>, start: &[u32], col_ptr: &[usize], row_idx: &[usize]) -> Self {
-        let groups = merge(groups(blocks, start));
+    /// last, and by scalars, in compressed columns. A `dense` one is a single supernode.
+    pub(crate) fn new(
+        blocks: Pattern<'_>,
+        start: &[u32],
+        col_ptr: &[usize],
+        row_idx: &[usize],
+        dense: bool,
+    ) -> Self {
+        let groups = if dense { whole(start) } else { merge(groups(blocks, start)) };
         let mut structure = Self::default();
         structure.allocate(blocks, start, &groups, col_ptr);
         structure.place(col_ptr, row_idx);
         structure
+    }
+
+    /// Bytes of a factorization.
+    pub(crate) fn bytes(&self) -> u64 {
+        8 * (self.values + self.updates[0] + self.updates[1]) as u64
     }
 
     /// Nodes with their rows.
@@ -169,6 +180,12 @@ struct Group {
     below: usize,
     /// Zeros that merging has put into the panel.
     zeros: usize,
+}
+
+/// All block columns as one group.
+fn whole(start: &[u32]) -> Vec<Group> {
+    let (end, width) = (start.len() - 1, start[start.len() - 1] as usize);
+    vec![Group { first: 0, end, parent: ROOT, width, below: 0, zeros: 0 }]
 }
 
 /// Block columns in groups with the same rows.

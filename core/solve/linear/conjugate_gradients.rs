@@ -1,0 +1,227 @@
+//! Preconditioned conjugate gradients, on H or on the Schur complement of some of its blocks.
+//!
+//! The complement S = H_uu − H_um H_mm⁻¹ H_mu is never formed: H_mm, of blocks that are not coupled among each other, is
+//! inverted block by block (Agarwal, Snavely, Seitz and Szeliski, *Bundle adjustment in the large*, 2010).
+use super::NotPositiveDefinite;
+use super::dense::DiagonalBlocks;
+use crate::layout::Layout;
+use crate::linear_solver::ConjugateGradients as Settings;
+use manifactor_graph::normal_equations::Slot;
+
+/// Vectors and blocks of an iteration, in memory that is reused.
+#[derive(Debug)]
+pub(crate) struct ConjugateGradients {
+    settings: Settings,
+    /// By block in the order of elimination: its first scalar.
+    first: Vec<usize>,
+    /// By block: whether it is eliminated.
+    eliminated: Vec<bool>,
+    /// By scalar: the same.
+    is_eliminated: Vec<bool>,
+    /// Pairs of an eliminated block and one that is left, sorted by the first: their place in H, from the one that is
+    /// left to the eliminated one.
+    couplings: Vec<Coupling>,
+    /// Inverses of the eliminated blocks on the diagonal, and those of the preconditioner.
+    diagonal: DiagonalBlocks,
+    r: Vec<f64>,
+    z: Vec<f64>,
+    p: Vec<f64>,
+    q: Vec<f64>,
+    eliminated_part: Vec<f64>,
+}
+
+#[derive(Debug)]
+struct Coupling {
+    eliminated: usize,
+    left: usize,
+    /// Of the block (left, eliminated).
+    slot: Slot,
+}
+
+/// H + diag(added), in the layout's order.
+#[derive(Clone, Copy)]
+pub(crate) struct Damped<'a> {
+    pub layout: &'a Layout,
+    pub h: &'a [f64],
+    pub added: Option<&'a [f64]>,
+}
+
+impl Damped<'_> {
+    /// y ← (H + diag(added)) x.
+    pub(crate) fn multiply(self, x: &[f64], y: &mut [f64]) {
+        match self.added {
+            Some(added) => y.iter_mut().zip(added).zip(x).for_each(|((y, a), x)| *y = a * x),
+            None => y.fill(0.0),
+        }
+        self.layout.multiply_add(self.h, x, y);
+    }
+
+    /// Entry (row, column) of a block.
+    fn entry(self, slot: Slot, row: usize, column: usize) -> f64 {
+        let (row, column) = if slot.swapped { (column, row) } else { (row, column) };
+        let above = column * column.saturating_sub(1) / 2;
+        self.h[slot.at + column * slot.stride as usize + row - above]
+    }
+}
+
+impl ConjugateGradients {
+    /// For matrices of this layout; `eliminated` marks blocks by their place in the order of elimination, of which no
+    /// two may be coupled.
+    pub(crate) fn new(layout: &Layout, eliminated: Vec<bool>, settings: Settings) -> Self {
+        let first = layout.first_scalars();
+        let n = layout.dim();
+        let mut couplings = vec![];
+        layout.couplings(|row, column, slot| match (eliminated[row], eliminated[column]) {
+            (true, false) => {
+                couplings.push(Coupling { eliminated: row, left: column, slot: slot.transposed() });
+            }
+            (false, true) => couplings.push(Coupling { eliminated: column, left: row, slot }),
+            _ => {}
+        });
+        couplings.sort_by_key(|c| (c.eliminated, c.left));
+        let is_eliminated = (0..eliminated.len())
+            .flat_map(|b| std::iter::repeat_n(eliminated[b], first[b + 1] - first[b]))
+            .collect();
+        let diagonal = DiagonalBlocks::new(&first);
+        let zeros = || vec![0.0; n];
+        Self {
+            settings,
+            first,
+            eliminated,
+            is_eliminated,
+            couplings,
+            diagonal,
+            r: zeros(),
+            z: zeros(),
+            p: zeros(),
+            q: zeros(),
+            eliminated_part: zeros(),
+        }
+    }
+
+    /// x ← (H + diag(added))⁻¹ x, as far as it gets.
+    pub(crate) fn solve(&mut self, system: Damped<'_>, x: &mut [f64]) -> Result<(), NotPositiveDefinite> {
+        self.precondition(system)?;
+        let n = x.len();
+        // the right-hand side of the complement: b_u − H_um H_mm⁻¹ b_m
+        self.z.copy_from_slice(x);
+        keep(true, &self.is_eliminated, &mut self.z);
+        self.diagonal.solve(&mut self.z);
+        system.multiply(&self.z, &mut self.q);
+        for i in 0..n {
+            self.r[i] = if self.is_eliminated[i] { 0.0 } else { x[i] - self.q[i] };
+            self.eliminated_part[i] = if self.is_eliminated[i] { x[i] } else { 0.0 };
+        }
+        let mut step = vec![0.0; n];
+        self.iterate(system, &mut step);
+        // back to what was eliminated: H_mm⁻¹ (b_m − H_mu x_u)
+        system.multiply(&step, &mut self.q);
+        for i in 0..n {
+            self.z[i] = if self.is_eliminated[i] { self.eliminated_part[i] - self.q[i] } else { 0.0 };
+        }
+        self.diagonal.solve(&mut self.z);
+        for i in 0..n {
+            x[i] = if self.is_eliminated[i] { self.z[i] } else { step[i] };
+        }
+        Ok(())
+    }
+
+    /// x ← S⁻¹ r, from zero.
+    fn iterate(&mut self, system: Damped<'_>, x: &mut [f64]) {
+        let mut rho = self.preconditioned_residual();
+        let target = rho * self.settings.tolerance.powi(2);
+        self.p.copy_from_slice(&self.z);
+        for _ in 0..self.settings.max_iterations {
+            // nothing is left, or not a number is
+            if !(rho > target && rho > 0.0) {
+                break;
+            }
+            self.multiply_complement(system);
+            let curvature: f64 = self.p.iter().zip(&self.q).map(|(p, q)| p * q).sum();
+            if !(curvature > 0.0) {
+                break;
+            }
+            let length = rho / curvature;
+            for i in 0..x.len() {
+                x[i] += length * self.p[i];
+                self.r[i] -= length * self.q[i];
+            }
+            let before = std::mem::replace(&mut rho, 0.0);
+            rho = self.preconditioned_residual();
+            let share = rho / before;
+            self.p.iter_mut().zip(&self.z).for_each(|(p, z)| *p = z + share * *p);
+        }
+    }
+
+    /// z ← M⁻¹ r; rᵀz.
+    fn preconditioned_residual(&mut self) -> f64 {
+        self.z.copy_from_slice(&self.r);
+        self.diagonal.solve(&mut self.z);
+        self.r.iter().zip(&self.z).map(|(r, z)| r * z).sum()
+    }
+
+    /// q ← S p, where p and q are zero at what is eliminated.
+    fn multiply_complement(&mut self, system: Damped<'_>) {
+        system.multiply(&self.p, &mut self.q);
+        if self.couplings.is_empty() {
+            return;
+        }
+        self.z.copy_from_slice(&self.q);
+        keep(true, &self.is_eliminated, &mut self.z);
+        self.diagonal.solve(&mut self.z);
+        for coupling in &self.couplings {
+            let (to, from) = (self.first[coupling.left], self.first[coupling.eliminated]);
+            for c in 0..self.first[coupling.eliminated + 1] - from {
+                for r in 0..self.first[coupling.left + 1] - to {
+                    self.q[to + r] -= system.entry(coupling.slot, r, c) * self.z[from + c];
+                }
+            }
+        }
+        keep(false, &self.is_eliminated, &mut self.q);
+    }
+
+    /// The blocks on the diagonal, of what is left those of the complement.
+    fn precondition(&mut self, system: Damped<'_>) -> Result<(), NotPositiveDefinite> {
+        let diagonal = system.layout.diagonal();
+        for b in 0..self.eliminated.len() {
+            let (first, end) = (self.first[b], self.first[b + 1]);
+            let block = self.diagonal.block_mut(b);
+            let dim = end - first;
+            for c in 0..dim {
+                let at = diagonal[first + c];
+                block[c * dim + c..(c + 1) * dim].copy_from_slice(&system.h[at..at + dim - c]);
+                block[c * dim + c] += system.added.map_or(0.0, |added| added[first + c]);
+            }
+        }
+        for b in (0..self.eliminated.len()).filter(|b| self.eliminated[*b]) {
+            self.diagonal.factorize(b)?;
+        }
+        let mut rows = vec![];
+        for coupling in &self.couplings {
+            let dim = self.first[coupling.eliminated + 1] - self.first[coupling.eliminated];
+            let left = self.first[coupling.left + 1] - self.first[coupling.left];
+            // rows of H_um L⁻ᵀ, whose products are taken off
+            rows.clear();
+            for r in 0..left {
+                rows.extend((0..dim).map(|c| system.entry(coupling.slot, r, c)));
+                self.diagonal.solve_lower(coupling.eliminated, &mut rows[r * dim..]);
+            }
+            let block = self.diagonal.block_mut(coupling.left);
+            for c in 0..left {
+                for r in c..left {
+                    let product = |k: usize| rows[r * dim + k] * rows[c * dim + k];
+                    block[c * left + r] -= (0..dim).map(product).sum::<f64>();
+                }
+            }
+        }
+        for b in (0..self.eliminated.len()).filter(|b| !self.eliminated[*b]) {
+            self.diagonal.factorize(b)?;
+        }
+        Ok(())
+    }
+}
+
+/// Sets to zero all but what is eliminated, or all but what is left.
+fn keep(eliminated: bool, is_eliminated: &[bool], x: &mut [f64]) {
+    x.iter_mut().zip(is_eliminated).filter(|(_, e)| **e != eliminated).for_each(|(x, _)| *x = 0.0);
+}
