@@ -132,13 +132,13 @@ impl ConjugateGradients {
         let target = rho * self.settings.tolerance.powi(2);
         self.p.copy_from_slice(&self.z);
         for _ in 0..self.settings.max_iterations {
-            // nothing is left, or not a number is
-            if !(rho > target && rho > 0.0) {
+            // the right-hand side may be zero
+            if rho <= target {
                 break;
             }
             self.multiply_complement(system);
             let curvature: f64 = self.p.iter().zip(&self.q).map(|(p, q)| p * q).sum();
-            if !(curvature > 0.0) {
+            if curvature <= 0.0 || !curvature.is_finite() {
                 break;
             }
             let length = rho / curvature;
