@@ -38,6 +38,9 @@ pub struct Auto {
 
 /// Damping of the first step, as a share of the diagonal: none to speak of.
 const DAMPING: f64 = 1e-10;
+/// Bounds of the diagonal that is damped by: the same for all directions but weak ones. By the diagonal itself, steps run
+/// off along what little constrains, as the size of an object that is seen from one side, and out of factors' domains.
+const DIAGONAL: [f64; 2] = [1e-6, 1.0];
 /// A step that is refused by this iteration is a sign of a bad start.
 const EARLY: usize = 3;
 /// 2F by degrees of freedom: about 1 where the noise is as stated, and the minimum the right one.
@@ -51,7 +54,8 @@ impl Optimizer for Auto {
 
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let stop = self.stop.clone();
-        LevenbergMarquardt { initial_lambda: DAMPING, stop, ..Default::default() }.solve(problem, observer)
+        LevenbergMarquardt { initial_lambda: DAMPING, diagonal: DIAGONAL, stop, ..Default::default() }
+            .solve(problem, observer)
     }
 
     fn solve_graph(
