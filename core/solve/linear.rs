@@ -9,6 +9,7 @@ pub(crate) mod memory;
 pub(crate) mod ordering;
 mod qr;
 pub(crate) mod structure;
+mod subtrees;
 pub(crate) use cholesky::Cholesky;
 pub(crate) use conjugate_gradients::{ConjugateGradients, Damped};
 pub(crate) use qr::Qr;

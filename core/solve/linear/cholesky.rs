@@ -1,58 +1,115 @@
 //! Supernodal sparse Cholesky: structure once, numbers many times, in memory that is reused.
 use super::structure::{Node, Structure};
+use super::subtrees::subtrees;
 use super::{NotPositiveDefinite, kernel};
 use faer::dyn_stack::MemBuffer;
 use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// A factorization of a symmetric matrix with a fixed pattern, already ordered.
 pub(crate) struct Cholesky {
     pub(super) structure: Structure,
     /// Panels of L.
     pub(super) values: Vec<f64>,
-    /// Updates on their way to their parents, of nodes on even and on odd levels.
-    updates: [Vec<f64>; 2],
-    /// Nodes whose updates are on the stack.
-    open: Vec<usize>,
+    /// For all nodes, in order.
+    whole: Workspace,
+    /// For subtrees, at the same time; made when first needed.
+    parts: Option<Vec<Part>>,
     /// Rows below a supernode, of a right-hand side.
     below: Vec<f64>,
-    memory: MemBuffer,
     arch: Arch,
 }
+
+/// Where nodes are factorized.
+struct Workspace {
+    /// Updates on their way to their parents, of nodes on even and on odd levels.
+    updates: [Vec<f64>; 2],
+    /// Where they begin on the stacks of the whole.
+    base: [usize; 2],
+    /// Nodes whose updates are on the stack.
+    open: Vec<usize>,
+    memory: MemBuffer,
+}
+
+/// A subtree, and where it is factorized.
+struct Part {
+    nodes: Range<usize>,
+    workspace: Workspace,
+}
+
+/// Operations from which on subtrees are factorized at the same time, if there are threads for it.
+const WORTH_THREADS: f64 = 5e7;
 
 impl Cholesky {
     /// Memory for a factor of this structure; `None` where there is none.
     pub(crate) fn new(structure: Structure) -> Option<Self> {
-        let most = |f: fn(&Node) -> usize| structure.nodes.iter().map(f).max().unwrap_or(0);
+        let most = structure.nodes.iter().map(|n| n.below).max().unwrap_or(0);
+        let nodes = 0..structure.nodes.len();
         Some(Self {
             values: zeros(structure.values)?,
-            updates: [zeros(structure.updates[0])?, zeros(structure.updates[1])?],
-            open: Vec::with_capacity(structure.nodes.len()),
-            below: zeros(most(|n| n.below))?,
-            memory: kernel::scratch(most(|n| n.width)),
+            whole: Workspace::new(&structure, nodes)?,
+            parts: None,
+            below: zeros(most)?,
             arch: Arch::new(),
             structure,
         })
     }
 
     /// Factorizes a matrix with these values in its lower triangle, and `added` to its diagonal. On the way,
-    /// while panels are at hand, x ← L⁻¹ x.
+    /// while panels are at hand, x ← L⁻¹ x. The same to the last bit for any number of threads.
     pub(crate) fn factorize(
         &mut self,
         h: &[f64],
         added: Option<&[f64]>,
         x: &mut [f64],
     ) -> Result<(), NotPositiveDefinite> {
-        self.arch.dispatch(Factorize { cholesky: self, h, added, x })
+        let of = Matrix { structure: &self.structure, h, added };
+        let all = 0..self.structure.nodes.len();
+        if rayon::current_num_threads() == 1 || self.structure.flops < WORTH_THREADS {
+            let (panels, right) = ((&mut self.values[..], 0), Some((x, &mut self.below[..])));
+            let task = Factorize { of, nodes: all, panels, workspace: &mut self.whole, parts: &[], right };
+            return self.arch.dispatch(task);
+        }
+        let parts = match &mut self.parts {
+            Some(parts) => parts,
+            none => none.insert(Part::all(&self.structure).ok_or(NotPositiveDefinite)?),
+        };
+        let mut rest = (&mut self.values[..], 0);
+        let mut tasks = Vec::with_capacity(parts.len());
+        for part in &mut *parts {
+            let nodes = &self.structure.nodes[part.nodes.clone()];
+            let (Some(first), Some(last)) = (nodes.first(), nodes.last()) else { continue };
+            let (_, from) = rest.0.split_at_mut(first.panel - rest.1);
+            let end = last.panel + last.height() * last.width;
+            let (panels, after) = from.split_at_mut(end - first.panel);
+            rest = (after, end);
+            let (panels, workspace) = ((panels, first.panel), &mut part.workspace);
+            tasks.push(Factorize {
+                of,
+                nodes: part.nodes.clone(),
+                panels,
+                workspace,
+                parts: &[],
+                right: None,
+            });
+        }
+        let arch = self.arch;
+        tasks.into_par_iter().try_for_each(|task| arch.dispatch(task))?;
+        let (panels, workspace) = ((&mut self.values[..], 0), &mut self.whole);
+        arch.dispatch(Factorize { of, nodes: all, panels, workspace, parts, right: None })?;
+        arch.dispatch(Solve { cholesky: self, x, lower: true, upper: false });
+        Ok(())
     }
 
     /// x ← H⁻¹ x.
     pub(crate) fn solve(&mut self, x: &mut [f64]) {
-        self.arch.dispatch(Solve { cholesky: self, x, lower: true });
+        self.arch.dispatch(Solve { cholesky: self, x, lower: true, upper: true });
     }
 
     /// x ← L⁻ᵀ x: the rest of a solve whose first half was made while factorizing.
     pub(crate) fn solve_upper(&mut self, x: &mut [f64]) {
-        self.arch.dispatch(Solve { cholesky: self, x, lower: false });
+        self.arch.dispatch(Solve { cholesky: self, x, lower: false, upper: true });
     }
 
     /// The pivots: squares of the factor's diagonal.
@@ -78,52 +135,117 @@ pub(super) fn zeros(n: usize) -> Option<Vec<f64>> {
     Some(vec![0.0; n])
 }
 
-struct Factorize<'a> {
-    cholesky: &'a mut Cholesky,
+impl Workspace {
+    /// For these nodes, which are whole subtrees; `None` where there is no memory for it.
+    fn new(structure: &Structure, nodes: Range<usize>) -> Option<Self> {
+        let nodes = &structure.nodes[nodes];
+        let of_level = |level: u32| nodes.iter().filter(move |n| n.level % 2 == level);
+        let base = [0, 1].map(|level| of_level(level).map(|n| n.update).min().unwrap_or(0));
+        let end = |level: u32| of_level(level).map(|n| n.update + n.below.pow(2)).max();
+        let size = |level: u32| end(level).map_or(0, |end| end - base[level as usize]);
+        let widest = nodes.iter().map(|n| n.width).max().unwrap_or(0);
+        Some(Self {
+            updates: [zeros(size(0))?, zeros(size(1))?],
+            base,
+            open: Vec::with_capacity(nodes.len()),
+            memory: kernel::scratch(widest),
+        })
+    }
+}
+
+impl Part {
+    fn all(structure: &Structure) -> Option<Vec<Self>> {
+        let part =
+            |nodes: Range<usize>| Some(Self { workspace: Workspace::new(structure, nodes.clone())?, nodes });
+        subtrees(structure).into_iter().map(part).collect()
+    }
+}
+
+/// What is factorized.
+#[derive(Clone, Copy)]
+struct Matrix<'a> {
+    structure: &'a Structure,
     h: &'a [f64],
     added: Option<&'a [f64]>,
-    x: &'a mut [f64],
+}
+
+/// The factorization of some nodes.
+struct Factorize<'a> {
+    of: Matrix<'a>,
+    nodes: Range<usize>,
+    /// Panels, and where the first is in the factor.
+    panels: (&'a mut [f64], usize),
+    workspace: &'a mut Workspace,
+    /// Subtrees that are done.
+    parts: &'a [Part],
+    /// A right-hand side for L⁻¹, and room for its rows below a supernode.
+    right: Option<(&'a mut [f64], &'a mut [f64])>,
 }
 
 impl WithSimd for Factorize<'_> {
     type Output = Result<(), NotPositiveDefinite>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Cholesky { structure, values, updates, open, below, memory, .. } = self.cholesky;
+    fn with_simd<S: Simd>(mut self, simd: S) -> Self::Output {
+        let Matrix { structure, h, added } = self.of;
+        let (panels, panels_at) = self.panels;
+        let Workspace { updates, base, open, memory } = self.workspace;
         open.clear();
-        for (n, node) in structure.nodes.iter().enumerate() {
-            let panel = &mut values[node.panel..node.panel + node.height() * node.width];
+        let mut parts = self.parts.iter().peekable();
+        let mut n = self.nodes.start;
+        while n < self.nodes.end {
+            if let Some(part) = parts.next_if(|part| part.nodes.start == n) {
+                n = part.nodes.end;
+                open.push(n - 1);
+                continue;
+            }
+            let node = &structure.nodes[n];
+            let at = node.panel - panels_at;
+            let panel = &mut panels[at..at + node.height() * node.width];
             panel.fill(0.0);
-            for (at, h) in structure.scatter[node.entries.clone()].iter().zip(&self.h[node.entries.clone()]) {
+            for (at, h) in structure.scatter[node.entries.clone()].iter().zip(&h[node.entries.clone()]) {
                 panel[*at as usize] = *h;
             }
-            if let Some(added) = self.added {
+            if let Some(added) = added {
                 for c in 0..node.width {
                     panel[c * (node.height() + 1)] += added[node.first + c];
                 }
             }
-            let [own, other] = updates;
-            let (update, theirs) = if node.level % 2 == 0 { (own, other) } else { (other, own) };
+            let level = node.level as usize % 2;
+            let [own, other] = &mut *updates;
+            let (update, theirs) = if level == 0 { (own, other) } else { (other, own) };
+            let of_child = |n: usize| {
+                let child = &structure.nodes[n];
+                let part = self.parts.binary_search_by_key(&(n + 1), |part| part.nodes.end);
+                let (stack, base) = match part {
+                    Ok(part) => {
+                        let done = &self.parts[part].workspace;
+                        (&done.updates[1 - level], done.base[1 - level])
+                    }
+                    Err(_) => (&*theirs, base[1 - level]),
+                };
+                (
+                    &stack[child.update - base..child.update - base + child.below.pow(2)],
+                    child.rows(&structure.places),
+                )
+            };
             let children = open.len() - node.children;
             for child in &open[children..] {
-                let child = &structure.nodes[*child];
-                kernel::assemble_panel(
-                    child.update_in(theirs),
-                    child.rows(&structure.places),
-                    panel,
-                    node.width,
-                );
+                let (from, places) = of_child(*child);
+                kernel::assemble_panel(from, places, panel, node.width);
             }
-            let update = &mut update[node.update..node.update + node.below.pow(2)];
+            let at = node.update - base[level];
+            let update = &mut update[at..at + node.below.pow(2)];
             kernel::eliminate(simd, panel, update, node.width, memory).map_err(|_| NotPositiveDefinite)?;
-            solve_lower(node, structure, panel, self.x, below);
+            if let Some((x, below)) = &mut self.right {
+                solve_lower(node, structure, panel, x, below);
+            }
             for child in open.drain(children..) {
-                let child = &structure.nodes[child];
-                let (from, places) = (child.update_in(theirs), child.rows(&structure.places));
+                let (from, places) = of_child(child);
                 kernel::assemble_update(from, places, update, node.below, node.width);
             }
             open.push(n);
+            n += 1;
         }
         Ok(())
     }
@@ -141,8 +263,9 @@ fn solve_lower(node: &Node, structure: &Structure, panel: &[f64], x: &mut [f64],
 struct Solve<'a> {
     cholesky: &'a mut Cholesky,
     x: &'a mut [f64],
-    /// Whether L⁻¹ comes before L⁻ᵀ.
+    /// Whether to apply L⁻¹, and L⁻ᵀ after it.
     lower: bool,
+    upper: bool,
 }
 
 impl WithSimd for Solve<'_> {
@@ -158,11 +281,48 @@ impl WithSimd for Solve<'_> {
                 solve_lower(node, structure, panel(node), x, below);
             }
         }
-        for node in structure.nodes.iter().rev() {
+        for node in structure.nodes.iter().rev().filter(|_| self.upper) {
             let below = &mut below[..node.below];
             let rows = node.rows(&structure.rows);
             below.iter_mut().zip(rows).for_each(|(value, row)| *value = x[*row as usize]);
             kernel::solve_upper(panel(node), &mut x[node.first..node.first + node.width], below);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::Layout;
+    use crate::linear::ordering::Order;
+
+    /// Factor and solution of a system on a square grid of blocks, by so many threads.
+    fn solved(threads: usize) -> (Vec<f64>, Vec<f64>) {
+        const SIDE: u32 = 40;
+        let right = (0..SIDE * SIDE).filter(|i| i % SIDE != SIDE - 1).map(|i| (i, i + 1));
+        let pairs = right.chain((0..SIDE * (SIDE - 1)).map(|i| (i, i + SIDE))).collect();
+        let layout = Layout::new(&[6; (SIDE * SIDE) as usize], pairs, &Order::Best).unwrap();
+        let mut h: Vec<f64> = (0..layout.row_idx.len()).map(|i| (i as f64 * 0.7).sin()).collect();
+        layout.diagonal().iter().for_each(|at| h[*at] += 40.0);
+        let mut cholesky = Cholesky::new(layout.structure(false)).unwrap();
+        assert!(cholesky.structure.flops > WORTH_THREADS, "{}", cholesky.structure.flops);
+        let mut x: Vec<f64> = (0..layout.dim()).map(|i| (i as f64).cos()).collect();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            cholesky.factorize(&h, None, &mut x).unwrap();
+            cholesky.solve_upper(&mut x);
+        });
+        (cholesky.values, x)
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() {
+        let alone = solved(1);
+        let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        for threads in [2, 4] {
+            let together = solved(threads);
+            assert!(bits(&together.1) == bits(&alone.1), "{threads} threads: another solution");
+            assert!(bits(&together.0) == bits(&alone.0), "{threads} threads: another factor");
         }
     }
 }

@@ -55,9 +55,6 @@ impl Node {
     pub(crate) fn rows<'a>(&self, of: &'a [u32]) -> &'a [u32] {
         &of[self.rows..self.rows + self.below]
     }
-    pub(crate) fn update_in<'a>(&self, stack: &'a [f64]) -> &'a [f64] {
-        &stack[self.update..self.update + self.below * self.below]
-    }
 }
 
 impl Structure {
