@@ -1,5 +1,5 @@
 //! Strategies for rotations, poses and points, with the places where formulas tend to break.
-use crate::{Point2, Point3, Rn, Se2, Se3, So2, So3};
+use crate::{BalCamera, Point2, Point3, Rn, Se2, Se3, So2, So3};
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
 use nalgebra::{Vector1, Vector2, Vector3, Vector6};
 use proptest::prelude::*;
@@ -40,6 +40,20 @@ pub fn any_se2() -> impl Strategy<Value = Se2> + Clone {
 /// Poses in space.
 pub fn any_se3() -> impl Strategy<Value = Se3> + Clone {
     (any_so3(), vector::<3>(SIZE)).prop_map(|(r, t)| Se3::new(r, t))
+}
+
+/// Cameras of bundle adjustment, with some distortion.
+pub fn any_bal_camera() -> impl Strategy<Value = BalCamera> + Clone {
+    let distortion = vector::<2>(0.1);
+    (any_se3(), 100.0..2000.0f64, distortion).prop_map(|(world_from_camera, focal_length, distortion)| {
+        BalCamera { world_from_camera, focal_length, distortion }
+    })
+}
+
+/// Points in front of a camera that looks along +z, in its frame: near and far, in the middle and to the side.
+pub fn in_front() -> impl Strategy<Value = Vector3<f64>> + Clone {
+    let depth = prop_oneof![4 => 0.5..10.0f64, 1 => 100.0..1000.0f64];
+    (vector::<2>(1.5), depth).prop_map(|(side, depth)| Vector3::new(side.x, side.y, 1.0) * depth)
 }
 
 /// Tangent vectors of SO(2) inside of its chart.

@@ -1,11 +1,10 @@
 //! An object is seen where a detector drew a box.
 use crate::bounding_box::BoundingBox;
-use crate::camera::Camera;
 use crate::dual_quadric::DualQuadric;
 use crate::ellipse::{Ellipse, Side};
 use crate::ellipsoid::Ellipsoid;
 use crate::tangent_line::TangentLine;
-use manifactor_geometry::Se3;
+use manifactor_geometry::{Camera, Se3};
 use manifactor_graph::{Jacobians, Lifted, Refs, Residual, Scalar, register_factor};
 use nalgebra::{Matrix4x6, SMatrix, U4, Vector4};
 use schemars::JsonSchema;
@@ -72,7 +71,7 @@ impl BoundingBoxFactor {
         if !ellipsoid.is_in_front() {
             return None;
         }
-        let outline = self.camera.outline(ellipsoid);
+        let outline = ellipsoid.outline(&self.camera);
         match self.model {
             BoxModel::Standard => Some(outline.sides()),
             BoxModel::Truncated => self.inside(&outline),

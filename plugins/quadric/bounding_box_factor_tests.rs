@@ -46,7 +46,7 @@ fn jacobian_law(model: BoxModel) {
         let factor = factor(camera, model);
         let mut law = JacobianLaw { step: 1e-3, ..JacobianLaw::default() };
         // a difference of huge numbers has few digits
-        let outline = camera.outline(&Ellipsoid::seen(&pose, &quadric));
+        let outline = Ellipsoid::seen(&pose, &quadric).outline(&camera);
         let digits_lost = 1.0 + outline.xx.max(outline.yy).sqrt() / 300.0;
         law.analytic *= digits_lost;
         law.numeric *= digits_lost;
@@ -162,7 +162,7 @@ fn whether_it_is_defined_is_decided_alike_everywhere() {
         assert_eq!(defined, factor.predict(&pose, &quadric).is_some());
         assert_eq!(defined, Ellipsoid::seen(&pose, &quadric).is_in_front());
         if defined {
-            assert!(camera.dual_conic(&Ellipsoid::seen(&pose, &quadric)).0[(2, 2)] < 0.0);
+            assert!(Ellipsoid::seen(&pose, &quadric).dual_conic(&camera).0[(2, 2)] < 0.0);
             assert!(!quadric.contains(&pose.translation));
         }
         Ok(())

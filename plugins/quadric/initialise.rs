@@ -7,11 +7,10 @@ mod shape;
 mod svd;
 
 use crate::bounding_box::BoundingBox;
-use crate::camera::Camera;
 use crate::dual_quadric::DualQuadric;
 use crate::ellipsoid::Ellipsoid;
 use crate::from_matrix::NotAnEllipsoid;
-use manifactor_geometry::Se3;
+use manifactor_geometry::{Camera, Se3};
 use manifactor_graph::Manifold;
 use manifactor_graph::catalogue::Kind;
 use nalgebra::Vector3;

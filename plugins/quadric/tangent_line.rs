@@ -1,7 +1,7 @@
 //! How a line that touches an outline moves with the object: analytic Jacobians of bounds.
-use crate::camera::Camera;
 use crate::ellipse::Side;
 use crate::ellipsoid::Ellipsoid;
+use manifactor_geometry::Camera;
 use nalgebra::{RowSVector, RowVector6, Vector3};
 
 /// A line that touches an outline, as the plane through it and the camera's centre: n·x = 0 in the

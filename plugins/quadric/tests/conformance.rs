@@ -183,7 +183,7 @@ fn visibility(input: &Node<'_>, output: &Node<'_>) -> Checked {
         Some(match key {
             "isBehind" => node.is_bool(seen.centroid.z < 0.0),
             "contains" => node.is_bool(q.contains(&pose.translation)),
-            "isEllipse" => is_ellipse(node, &input.camera().ok()?.dual_conic(&seen)),
+            "isEllipse" => is_ellipse(node, &seen.dual_conic(&input.camera().ok()?)),
             _ => return None,
         })
     })
@@ -201,7 +201,7 @@ fn conic(conic: &DualConic, key: &str, node: &Node<'_>) -> Option<Checked> {
 fn projection(input: &Node<'_>, output: &Node<'_>) -> Checked {
     let (q, pose, camera) = (input.quadric()?, input.camera_pose()?, input.camera()?);
     let seen = Ellipsoid::seen(&pose, &q);
-    let dual = camera.dual_conic(&seen);
+    let dual = seen.dual_conic(&camera);
     output.each(|key, node| match key {
         "P_3x4" => Some(node.is(dense(camera.projection(&pose)), VALUES)),
         "dual_conic_3x3" => Some(node.is(dense(dual.0), VALUES)),
@@ -261,13 +261,13 @@ fn failing_factor(input: &Node<'_>) -> Checked {
 fn truncated_factor(input: &Node<'_>, output: &Node<'_>) -> Checked {
     let (pose, q, camera) = (input.camera_pose()?, input.quadric()?, input.camera()?);
     let seen = Ellipsoid::seen(&pose, &q);
-    let outline = seen.is_in_front().then(|| camera.outline(&seen));
+    let outline = seen.is_in_front().then(|| seen.outline(&camera));
     let box_of = |bounds: Option<[f64; 4]>| bounds.and_then(|b| BoundingBox::new(b).ok());
     output.each(|key, node| {
         Some(match key {
             "truncated_bounds" => node
                 .is_box(box_of(outline.and_then(|o| o.truncated_bounds(camera.size()))))
-                .and(node.is_box(camera.dual_conic(&seen).truncated_bounds(camera.width, camera.height))),
+                .and(node.is_box(seen.dual_conic(&camera).truncated_bounds(camera.width, camera.height))),
             "untruncated_bounds" => node.is_box(box_of(outline.map(|o| o.bounds()))),
             "reference_said" => Ok(()),
             _ => return None,
@@ -317,14 +317,14 @@ fn box3(input: &Node<'_>, output: &Node<'_>) -> Checked {
 fn view(input: &Node<'_>, output: &Node<'_>) -> Checked {
     let (q, pose, camera) = (input.quadric()?, input.camera_pose()?, input.camera()?);
     let seen = Ellipsoid::seen(&pose, &q);
-    let outline = seen.is_in_front().then(|| camera.outline(&seen)).ok_or("it should be in front")?;
+    let outline = seen.is_in_front().then(|| seen.outline(&camera)).ok_or("it should be in front")?;
     let up = Direction::new(input.get("up")?.vector()?).map_err(|e| e.to_string())?;
     let mut squares = q.semi_axes.map(|s| s * s).as_slice().to_vec();
     squares.sort_by(f64::total_cmp);
     output.each(|key, node| {
         Some(match key {
             "dual_quadric_4x4" => node.is(dense(q.matrix()), VALUES),
-            "dual_conic_3x3_unit_corner" => node.is(dense(camera.dual_conic(&seen).unit_corner()?), VALUES),
+            "dual_conic_3x3_unit_corner" => node.is(dense(seen.dual_conic(&camera).unit_corner()?), VALUES),
             "bounds" => node.is_box(BoundingBox::new(outline.bounds()).ok()),
             "truncated_bounds" => {
                 let bounds = outline.truncated_bounds(camera.size());

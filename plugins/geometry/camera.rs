@@ -1,10 +1,7 @@
 //! Pinhole cameras without distortion.
-use crate::dual_conic::DualConic;
-use crate::ellipse::Ellipse;
-use crate::ellipsoid::Ellipsoid;
-use manifactor_geometry::Se3;
+use crate::Se3;
 use manifactor_graph::Scalar;
-use nalgebra::{Matrix3, Matrix3x4, RowVector3, Vector2, Vector3};
+use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -102,6 +99,12 @@ impl Camera {
         let camera_from_world = world_from_camera.inverse().matrix();
         self.matrix() * camera_from_world.fixed_view::<3, 4>(0, 0)
     }
+    /// Where a point of the camera's frame is seen, in pixels; it means something for one in front.
+    #[inline(always)]
+    pub fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        let (x, y) = (point.x / point.z, point.y / point.z);
+        Vector2::new(x * self.fx + y * self.skew + T::from(self.cx), y * self.fy + T::from(self.cy))
+    }
     /// The direction, in the camera's frame, of what is seen at a pixel; its z is 1.
     pub fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
         let y = (pixel.y - self.cy) / self.fy;
@@ -110,43 +113,6 @@ impl Camera {
     /// Width and height of the image, in pixels.
     pub fn size(&self) -> Vector2<f64> {
         Vector2::new(f64::from(self.width), f64::from(self.height))
-    }
-
-    /// C* = P Q* Pᵀ of an ellipsoid anywhere: in front of the camera, behind or around it.
-    pub fn dual_conic(&self, ellipsoid: &Ellipsoid) -> DualConic {
-        let (b, p) = (self.matrix() * ellipsoid.axes, self.matrix() * ellipsoid.centroid);
-        DualConic(b * b.transpose() - p * p.transpose())
-    }
-
-    /// The outline of an ellipsoid that [is in front](Ellipsoid::is_in_front).
-    ///
-    /// With A = BBᵀ the ellipsoid's shape, d = z² - A₃₃, and for each image axis k the row a of KB, the
-    /// coordinate x of Kp (both less the principal point), and w = z a - x b:
-    /// centre = (x z - a·b)/d, shape = (d wᵢ·wⱼ + (wᵢ·b)(wⱼ·b)) / (z d)². The usual C*₁₃² - C*₁₁C*₃₃
-    /// is a difference of nearly equal numbers for a far object; here all terms on the diagonal add up.
-    #[inline]
-    pub fn outline<T: Scalar>(&self, ellipsoid: &Ellipsoid<T>) -> Ellipse<T> {
-        let (p, b): (_, RowVector3<T>) = (&ellipsoid.centroid, ellipsoid.axes.row(2).into_owned());
-        let d = p.z * p.z - b.dot(&b);
-        let row = |i: usize| ellipsoid.axes.row(i).into_owned();
-        let a1 = row(0) * T::from(self.fx) + row(1) * T::from(self.skew);
-        let a2 = row(1) * T::from(self.fy);
-        let (x, y) = (p.x * self.fx + p.y * self.skew, p.y * self.fy);
-        let (w1, w2) = (a1 * p.z - b * x, a2 * p.z - b * y);
-        let (g1, g2) = (w1.dot(&b), w2.dot(&b));
-        let scale = (p.z * d).recip();
-        let scale = scale * scale;
-        let across = w1.cross(&w2).norm_squared() * d + (w2 * g1 - w1 * g2).norm_squared();
-        Ellipse {
-            centre: Vector2::new(
-                (x * p.z - a1.dot(&b)) / d + T::from(self.cx),
-                (y * p.z - a2.dot(&b)) / d + T::from(self.cy),
-            ),
-            xx: (w1.norm_squared() * d + g1 * g1) * scale,
-            xy: (w1.dot(&w2) * d + g1 * g2) * scale,
-            yy: (w2.norm_squared() * d + g2 * g2) * scale,
-            determinant: across * d * scale * scale,
-        }
     }
 }
 
