@@ -5,19 +5,19 @@ use crate::text::{count, list};
 use clap::{Args, ValueEnum};
 use manifactor::config::{Document, Errors, Format, read_graph_section, write_graph};
 use manifactor::formats::pose_graph::{self, Options, Repair, Report};
-use manifactor::formats::{FormatError, g2o};
-use manifactor::graph::{Graph, Values};
+use manifactor::formats::{FormatError, bal, g2o};
+use manifactor::graph::{Graph, Key, Values};
 use manifactor::solve::{Optimizer, Start};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// How a pose graph is read.
+/// How a graph that is no document is read.
 #[derive(Debug, Args)]
 pub(crate) struct Reading {
     /// What to do with information matrices of a pose graph that are not positive definite.
     #[arg(long, value_enum, default_value = "error")]
     repair: RepairChoice,
-    /// Do not hold the first pose where nothing in a pose graph fixes it.
+    /// Do not hold the first pose where nothing in a pose graph fixes it; nor a scale, where images alone are seen.
     #[arg(long)]
     no_anchor: bool,
 }
@@ -45,11 +45,11 @@ pub(crate) struct GraphFile {
 impl Reading {
     /// Reads a graph, and the solver and start that file and command line ask for.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
-        if Format::of_path(path).is_some() { literal(path, solver) } else { self.pose_graph(path, solver) }
+        if Format::of_path(path).is_some() { literal(path, solver) } else { self.plain(path, solver) }
     }
 
-    /// g2o or TORO: solver and start are all that `--set` can set.
-    fn pose_graph(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
+    /// g2o, TORO or BAL: solver and start are all that `--set` can set.
+    fn plain(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         let mut settings = Document::parse("settings", "", Format::Toml)?;
         solver.apply(&mut settings)?;
         let errors = Errors::new();
@@ -60,6 +60,11 @@ impl Reading {
             optimizer.zip(start)
         });
         let (optimizer, start) = errors.finish(chosen)?;
+        let (graph, values, notes) = if is_bal(path) { self.bundle(path)? } else { self.pose_graph(path)? };
+        Ok(GraphFile { graph, values, optimizer, start, notes })
+    }
+
+    fn pose_graph(&self, path: &Path) -> Result<Noted, Failure> {
         let repair = match self.repair {
             RepairChoice::Error => Repair::Error,
             RepairChoice::Reject => Repair::Reject,
@@ -68,8 +73,37 @@ impl Reading {
         let options = Options { repair, anchor: !self.no_anchor, ..Options::default() };
         let read = pose_graph::read(path, &options).map_err(Failure::from)?;
         let notes = notes(&read.report);
-        Ok(GraphFile { graph: read.graph, values: read.values, optimizer, start, notes })
+        Ok((read.graph, read.values, notes))
     }
+
+    fn bundle(&self, path: &Path) -> Result<Noted, Failure> {
+        let bal::Bundle { graph, values, report } =
+            bal::read(path, !self.no_anchor).map_err(Failure::from)?;
+        let mut notes = Vec::new();
+        if !report.unobserved.is_empty() {
+            notes.push(format!("nothing observes {}: held", keys(&report.unobserved)));
+        }
+        if !report.anchored.is_empty() {
+            let held = keys(&report.anchored);
+            notes.push(format!(
+                "nothing fixes the gauge: held pose and scale by {held} (--no-anchor does not)"
+            ));
+        }
+        Ok((graph, values, notes))
+    }
+}
+
+/// A graph, its values, and what the reader had to decide.
+type Noted = (Graph, Values, Vec<String>);
+
+/// `.bal`; or a text that begins like one, as such files are often called `.txt`.
+fn is_bal(path: &Path) -> bool {
+    let named = |extension| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
+    named("bal") || (named("txt") && std::fs::read_to_string(path).is_ok_and(|text| bal::begins(&text)))
+}
+
+fn keys(keys: &[Key]) -> String {
+    list(keys.iter().map(ToString::to_string))
 }
 
 /// A literal graph, which may name its solver and its start.
@@ -90,7 +124,6 @@ fn literal(path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> 
 /// What a pose graph's file left open, and how it was filled in.
 fn notes(report: &Report) -> Vec<String> {
     let mut notes = Vec::new();
-    let keys = |keys: &[manifactor::graph::Key]| list(keys.iter().map(ToString::to_string));
     let lines = |lines: &[usize]| list(lines.iter().map(ToString::to_string));
     for (tag, n) in &report.unknown {
         notes.push(format!("unknown tag `{tag}`: {} left out", count(*n, "line")));
@@ -125,33 +158,28 @@ fn notes(report: &Report) -> Vec<String> {
 
 /// Writes a graph with these values; returns what the format has no word for.
 pub(crate) fn write(path: &Path, graph: &Graph, values: &Values) -> Result<Vec<String>, Failure> {
-    let is_g2o = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("g2o"));
+    let named = |extension| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
     match Format::of_path(path) {
         Some(format) => {
             let text = write_graph(graph, values, format).map_err(Failure::input)?;
             std::fs::write(path, text).map_err(Failure::at(path))?;
             Ok(Vec::new())
         }
-        None if is_g2o => {
+        None if named("g2o") => {
             Ok(omitted(&g2o::write(path, graph, values).map_err(|e: FormatError| Failure::from(e))?))
+        }
+        None if named("bal") => {
+            Ok(omitted_from_bal(&bal::write(path, graph, values).map_err(Failure::from)?))
         }
         None => Err(Failure::with_help(
             format!("{}: the extension names no format that graphs are written in", path.display()),
-            "use .toml, .json, .yaml or .g2o",
+            "use .toml, .json, .yaml, .g2o or .bal",
         )),
     }
 }
 
 fn omitted(omitted: &g2o::Omitted) -> Vec<String> {
-    let mut notes: Vec<String> = Vec::new();
-    let counts = omitted
-        .variables
-        .iter()
-        .map(|c| (c, "variable"))
-        .chain(omitted.factors.iter().map(|c| (c, "factor")));
-    for ((name, n), what) in counts {
-        notes.push(format!("g2o has no word for {} of type {name}: left out", count(*n, what)));
-    }
+    let mut notes = omitted_types("g2o", &omitted.variables, &omitted.factors);
     if omitted.losses > 0 {
         notes.push(format!("g2o has no word for robust losses: {} left out", omitted.losses));
     }
@@ -165,6 +193,26 @@ fn omitted(omitted: &g2o::Omitted) -> Vec<String> {
         notes.push(format!("{} renamed: g2o has numbers only", count(omitted.renamed.len(), "variable")));
     }
     notes
+}
+
+fn omitted_from_bal(omitted: &bal::Omitted) -> Vec<String> {
+    let mut notes = omitted_types("BAL", &omitted.variables, &omitted.factors);
+    let others =
+        [("robust losses", omitted.losses), ("noise", omitted.noise), ("what is held", omitted.held)];
+    for (what, n) in others.into_iter().filter(|(_, n)| *n > 0) {
+        notes.push(format!("BAL has no word for {what}: {n} left out"));
+    }
+    notes
+}
+
+type ByName = BTreeMap<&'static str, usize>;
+
+fn omitted_types(format: &str, variables: &ByName, factors: &ByName) -> Vec<String> {
+    let counts = variables.iter().map(|c| (c, "variable")).chain(factors.iter().map(|c| (c, "factor")));
+    let note = |((name, n), what): ((&&str, &usize), &str)| {
+        format!("{format} has no word for {} of type {name}: left out", count(*n, what))
+    };
+    counts.map(note).collect()
 }
 
 /// What is in a graph, in a few lines.

@@ -102,6 +102,26 @@ pub enum Mistake {
         /// Its number.
         id: u64,
     },
+    /// A number above all that a file announces.
+    #[error("there is no {what} {id}: the first line says that there are {count}, counted from 0")]
+    NoSuch {
+        /// What is missing.
+        what: &'static str,
+        /// Its number.
+        id: u64,
+        /// How many there are.
+        count: usize,
+    },
+    /// More or fewer of something than a file announces.
+    #[error("the first line asks for {expected} {what}, found {found}")]
+    Count {
+        /// What is counted.
+        what: &'static str,
+        /// How many there should be.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
     /// A vertex used as another type than it has.
     #[error("vertex {id} is a {found} (line {first}), but is used as a {expected} here")]
     VertexType {

@@ -1,9 +1,10 @@
-//! File formats: g2o, TORO, TUM trajectories, detections.
+//! File formats: g2o, TORO, BAL, TUM trajectories, detections.
 //!
 //! All readers keep one bargain: nothing in a file is passed over in silence. A malformed line is an
 //! error with file and line; all of a file's errors come at once; what is left out on purpose is
 //! counted in a report. Blank lines, `#` comments, repeated spaces and CRLF are fine everywhere.
 pub mod accelerometer;
+pub mod bal;
 pub mod detections;
 mod error;
 pub mod g2o;

@@ -32,11 +32,7 @@ impl<'a> Fields<'a> {
         id(self.text())
     }
     pub(crate) fn number(&mut self) -> Result<f64, Mistake> {
-        let text = self.text();
-        match text.parse::<f64>() {
-            Ok(x) if x.is_finite() => Ok(x),
-            _ => Err(Mistake::Field { expected: "a finite number", found: text.to_owned() }),
-        }
+        number(self.text())
     }
     pub(crate) fn numbers<const N: usize>(&mut self) -> Result<[f64; N], Mistake> {
         let mut numbers = [0.0; N];
@@ -44,6 +40,13 @@ impl<'a> Fields<'a> {
             *x = self.number()?;
         }
         Ok(numbers)
+    }
+}
+
+pub(crate) fn number(text: &str) -> Result<f64, Mistake> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        _ => Err(Mistake::Field { expected: "a finite number", found: text.to_owned() }),
     }
 }
 

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-mod anchor;
+pub(crate) mod anchor;
 mod build;
 mod information;
 pub(crate) mod record;

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Solve a graph: a literal graph (.toml, .json, .yaml) or a pose graph (.g2o, TORO).
+/// Solve a graph: a literal graph (.toml, .json, .yaml), a pose graph (.g2o, TORO) or bundle adjustment (.bal).
 #[derive(Debug, Args)]
 pub(crate) struct Solve {
     /// The graph.

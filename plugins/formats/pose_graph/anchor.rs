@@ -4,13 +4,9 @@ use manifactor_graph::{Fixed, Graph, Key, Values};
 /// The first pose of each connected part in which nothing is held; of a part without a pose, its first
 /// variable.
 pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> bool) -> Vec<Key> {
-    let mut parts = Parts((0..values.len()).collect());
+    let mut parts = Parts::connected(graph, values);
     let place = |key: &Key| values.position(key.as_str());
     let mut held = vec![false; values.len()];
-    for factor in graph.factors() {
-        let places: Vec<usize> = factor.keys.iter().filter_map(place).collect();
-        places.windows(2).for_each(|pair| parts.join(pair[0], pair[1]));
-    }
     let whole = graph.fixed().iter().filter(|(_, fixed)| **fixed == Fixed::Whole(true));
     whole.filter_map(|(key, _)| place(key)).for_each(|i| held[i] = true);
     let mut part_is_held = vec![false; values.len()];
@@ -29,10 +25,20 @@ pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> 
 }
 
 /// Disjoint sets, by the parent of each member.
-struct Parts(Vec<usize>);
+pub(crate) struct Parts(Vec<usize>);
 
 impl Parts {
-    fn root(&mut self, mut i: usize) -> usize {
+    /// The places of the variables that factors connect.
+    pub(crate) fn connected(graph: &Graph, values: &Values) -> Self {
+        let mut parts = Self((0..values.len()).collect());
+        for factor in graph.factors() {
+            let places = factor.keys.iter().filter_map(|key| values.position(key.as_str()));
+            let places: Vec<usize> = places.collect();
+            places.windows(2).for_each(|pair| parts.join(pair[0], pair[1]));
+        }
+        parts
+    }
+    pub(crate) fn root(&mut self, mut i: usize) -> usize {
         while self.0[i] != i {
             // halve the path on the way
             self.0[i] = self.0[self.0[i]];

@@ -1,0 +1,165 @@
+//! BAL: problems of bundle adjustment in the large (Agarwal et al., ECCV 2010).
+//!
+//! | lines | fields |
+//! | --- | --- |
+//! | the first | cameras points observations: how many there are |
+//! | one each observation | camera point x y: numbers from 0; pixels from the image's centre, x right and y up |
+//! | nine numbers each camera | rotation vector (3), translation (3), f, k1, k2 |
+//! | three numbers each point | x y z |
+//!
+//! Rotation and translation take points from the world's frame to the camera's, which looks along -z; a
+//! [`BalCamera`] has the inverse. Cameras get the keys `c<number>`, points `p<number>`, observations become
+//! `projection_bal` factors with a standard deviation of one pixel.
+//!
+//! Nothing in such a file says where the whole is, how it is turned, and how large it is: seven directions are free.
+//! Unless told not to, the reader [holds](read) the pose of one camera and, for the scale, one direction of the
+//! camera that is farthest from it; this changes no cost. Gauss-Newton needs it. Damped steps do not, but
+//! end with a note that something is undetermined.
+use crate::error::{FormatError, Mistake, Problems, read_text};
+use crate::lines::{Fields, lines, number};
+use manifactor_geometry::{BalCamera, Coordinates, Point3, ProjectionBal, Se3, So3};
+use manifactor_graph::{Graph, Key, Values};
+use nalgebra::{Vector2, Vector3};
+use std::path::Path;
+
+mod gauge;
+mod write;
+pub use write::{Omitted, format, write};
+
+/// A problem from a file, with initial values for all of its variables.
+#[derive(Debug, Clone, Default)]
+pub struct Bundle {
+    /// The observations; held variables.
+    pub graph: Graph,
+    /// Cameras, then points, in the file's order.
+    pub values: Values,
+    /// What the file did not say.
+    pub report: Report,
+}
+
+/// What a file did not say.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Report {
+    /// Cameras of which the pose, or a direction, is held, as nothing in the file fixes the gauge.
+    pub anchored: Vec<Key>,
+    /// Cameras and points without any observation: they are held.
+    pub unobserved: Vec<Key>,
+}
+
+/// Cameras, points and observations, as the first line counts them.
+struct Counts([usize; 3]);
+
+const CAMERA: usize = 9;
+const POINT: usize = 3;
+
+/// Whether a text begins as a BAL file does: with three whole numbers.
+pub fn begins(text: &str) -> bool {
+    lines(text).next().is_some_and(|(_, line)| header(line).is_ok())
+}
+
+/// Reads a BAL file; holds what fixes the gauge, where `anchor` is set.
+///
+/// # Errors
+/// All malformed lines; observations of a camera or a point that is not there; fewer or more lines or numbers than
+/// the first line says.
+pub fn read(path: impl AsRef<Path>, anchor: bool) -> Result<Bundle, FormatError> {
+    let path = path.as_ref();
+    parse(&read_text(path)?, path, anchor)
+}
+
+/// As [`read`], of a text; `path` is what errors name.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle, FormatError> {
+    let mut problems = Problems::of(path.as_ref());
+    let mut lines = lines(text);
+    let first = lines.next().unwrap_or((0, ""));
+    let counts = problems.ok(first.0, header(first.1)).unwrap_or(Counts([0; 3]));
+    if !problems.is_empty() {
+        // without the counts no other line means anything
+        return problems.finish().map(|()| Bundle::default());
+    }
+    let Counts([cameras, points, observations]) = counts;
+    let mut seen = vec![];
+    for (line, text) in lines.by_ref().take(observations) {
+        let observation = observation(text, &counts);
+        seen.extend(problems.ok(line, observation));
+    }
+    let mut numbers = vec![];
+    for (line, text) in lines {
+        for word in text.split_whitespace() {
+            numbers.push(problems.ok(line, number(word)).unwrap_or_default());
+        }
+    }
+    let expected = cameras.saturating_mul(CAMERA).saturating_add(points.saturating_mul(POINT));
+    if problems.is_empty() && seen.len() != observations {
+        let found = seen.len();
+        problems.push(0, Mistake::Count { what: "lines of observations", expected: observations, found });
+    } else if problems.is_empty() && numbers.len() != expected {
+        let what = "numbers after the observations, nine for each camera and three for each point";
+        problems.push(0, Mistake::Count { what, expected, found: numbers.len() });
+    }
+    problems.finish()?;
+    Ok(build(&seen, numbers.split_at(cameras * CAMERA), anchor))
+}
+
+fn header(text: &str) -> Result<Counts, Mistake> {
+    let mut f = Fields::of(text, "cameras points observations")?;
+    let mut count = || {
+        let id = f.id()?;
+        usize::try_from(id)
+            .map_err(|_| Mistake::Field { expected: "a smaller number", found: id.to_string() })
+    };
+    Ok(Counts([count()?, count()?, count()?]))
+}
+
+/// Numbers of a camera and of a point, and where the one saw the other.
+type Observation = (usize, usize, Coordinates<2>);
+
+fn observation(text: &str, Counts([cameras, points, _]): &Counts) -> Result<Observation, Mistake> {
+    let mut f = Fields::of(text, "camera point x y")?;
+    let mut below = |what, count: usize| {
+        let id = f.id()?;
+        let found = usize::try_from(id).ok().filter(|i| *i < count);
+        found.ok_or(Mistake::NoSuch { what, id, count })
+    };
+    let (camera, point) = (below("camera", *cameras)?, below("point", *points)?);
+    Ok((camera, point, Coordinates::new(Vector2::from(f.numbers::<2>()?))?))
+}
+
+fn build(seen: &[Observation], (cameras, points): (&[f64], &[f64]), anchor: bool) -> Bundle {
+    let mut bundle = Bundle::default();
+    let camera_keys: Vec<Key> = (0..cameras.len() / CAMERA).map(|i| Key::indexed("c", i)).collect();
+    let point_keys: Vec<Key> = (0..points.len() / POINT).map(|i| Key::indexed("p", i)).collect();
+    for (key, x) in camera_keys.iter().zip(cameras.as_chunks::<CAMERA>().0) {
+        bundle.values.insert(key, camera(x));
+    }
+    for (key, x) in point_keys.iter().zip(points.as_chunks::<POINT>().0) {
+        bundle.values.insert(key, Point3::new(*x));
+    }
+    let mut observed = vec![false; bundle.values.len()];
+    for (camera, point, pixel) in seen {
+        bundle.graph.add([&camera_keys[*camera], &point_keys[*point]], ProjectionBal { pixel: *pixel });
+        observed[*camera] = true;
+        observed[camera_keys.len() + point] = true;
+    }
+    for ((key, _), _) in bundle.values.iter().zip(&observed).filter(|(_, observed)| !**observed) {
+        bundle.graph.fix(key);
+        bundle.report.unobserved.push(key.clone());
+    }
+    if anchor {
+        bundle.report.anchored = gauge::hold(&mut bundle.graph, &bundle.values);
+    }
+    bundle
+}
+
+fn camera(x: &[f64; CAMERA]) -> BalCamera {
+    let &[rx, ry, rz, x, y, z, focal_length, k1, k2] = x;
+    let camera_from_world = Se3::new(So3::exp(&Vector3::new(rx, ry, rz)), Vector3::new(x, y, z));
+    BalCamera {
+        world_from_camera: camera_from_world.inverse(),
+        focal_length,
+        distortion: Vector2::new(k1, k2),
+    }
+}

@@ -1,0 +1,86 @@
+//! Problems of bundle adjustment as BAL files.
+use crate::error::{FormatError, write_text};
+use manifactor_geometry::{BalCamera, Point3, ProjectionBal};
+use manifactor_graph::{FactorEntry, Graph, Key, Values};
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write;
+use std::path::Path;
+
+/// What BAL has no word for, and was left out.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Omitted {
+    /// Factors, by the name of their type: whatever is no observation of a point by a camera.
+    pub factors: BTreeMap<&'static str, usize>,
+    /// Variables, by the name of their type: what is neither a camera nor a point.
+    pub variables: BTreeMap<&'static str, usize>,
+    /// Robust losses; their observations are written without.
+    pub losses: usize,
+    /// Noise other than one pixel; its observations are written without.
+    pub noise: usize,
+    /// Variables that are held, wholly or in part; they are written as free.
+    pub held: usize,
+}
+
+/// The BAL text of a graph, and what could not be written. Cameras and points are numbered in their order.
+///
+/// Numbers have all their digits; poses read back to rounding, as a file has their inverse.
+pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
+    let cameras: Vec<_> = values.all::<BalCamera>().collect();
+    let points: Vec<_> = values.all::<Point3>().collect();
+    let camera_numbers: HashMap<&Key, usize> = cameras.iter().map(|(key, _)| *key).zip(0..).collect();
+    let point_numbers: HashMap<&Key, usize> = points.iter().map(|(key, _)| *key).zip(0..).collect();
+    let mut omitted = Omitted { held: graph.fixed().len(), ..Omitted::default() };
+    let mut observations = vec![];
+    for entry in graph.factors() {
+        match observation(entry, &camera_numbers, &point_numbers) {
+            None => *omitted.factors.entry(entry.factor.typetag_name()).or_default() += 1,
+            Some(line) => {
+                omitted.losses += usize::from(entry.loss.is_some());
+                let one_pixel = entry.noise.information_matrix(2).is_ok_and(|m| m.is_identity(1e-12));
+                omitted.noise += usize::from(!one_pixel);
+                observations.push(line);
+            }
+        }
+    }
+    for (key, variable) in values.iter() {
+        if !camera_numbers.contains_key(key) && !point_numbers.contains_key(key) {
+            *omitted.variables.entry(variable.typetag_name()).or_default() += 1;
+        }
+    }
+    let mut text = format!("{} {} {}\n", cameras.len(), points.len(), observations.len());
+    text.extend(observations);
+    let numbers = cameras.iter().flat_map(|(_, camera)| numbers(camera));
+    for number in numbers.chain(points.iter().flat_map(|(_, p)| p.iter().copied())) {
+        // Debug has all digits, and exponents for what is very small or large; a String takes all
+        let _ = writeln!(text, "{number:?}");
+    }
+    (text, omitted)
+}
+
+/// Writes a graph as BAL file, and returns what could not be written.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write(path: impl AsRef<Path>, graph: &Graph, values: &Values) -> Result<Omitted, FormatError> {
+    let (text, omitted) = format(graph, values);
+    write_text(path.as_ref(), &text).map(|()| omitted)
+}
+
+/// `None` where it is no observation.
+fn observation(
+    entry: &FactorEntry,
+    cameras: &HashMap<&Key, usize>,
+    points: &HashMap<&Key, usize>,
+) -> Option<String> {
+    let factor: &ProjectionBal = entry.factor.erased().as_any().downcast_ref()?;
+    let [camera, point] = entry.keys.as_slice() else { return None };
+    let (camera, point) = (cameras.get(camera)?, points.get(point)?);
+    Some(format!("{camera} {point} {:?} {:?}\n", factor.pixel.x, factor.pixel.y))
+}
+
+fn numbers(camera: &BalCamera) -> [f64; 9] {
+    let camera_from_world = camera.world_from_camera.inverse();
+    let ([rx, ry, rz], [x, y, z]) =
+        (camera_from_world.rotation.log().into(), camera_from_world.translation.into());
+    [rx, ry, rz, x, y, z, camera.focal_length, camera.distortion.x, camera.distortion.y]
+}
