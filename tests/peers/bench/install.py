@@ -77,6 +77,9 @@ def python_peers(interpreter):
     for package, (peer, adapter, names) in adapters.items():
         if call([interpreter, "-c", f"import {package}"]) is None:
             methods += on_pose_graphs(peer, names, (str(interpreter), str(HERE / "adapters" / adapter)))
+    if any(m.peer == "gtsam" for m in methods):
+        adapter = (str(interpreter), str(HERE / "adapters" / "gtsam_bundle.py"))
+        methods += [Method("gtsam", name, adapter, ("bundle",)) for name in ("lm", "lm+points", "sfm")]
     return methods
 
 
@@ -90,11 +93,15 @@ def ceres(cache):
             return []
     (cache / "ceres").mkdir(parents=True, exist_ok=True)
     methods = []
-    pose_graph, quadrics = (compiled(program, cache / "ceres" / program) for program in ("pose_graph", "quadrics"))
+    programs = ("pose_graph", "quadrics", "bundle")
+    pose_graph, quadrics, bundle = (compiled(program, cache / "ceres" / program) for program in programs)
     if pose_graph:
         methods += on_pose_graphs("ceres", ["lm", "lm+wide", "dogleg"], (pose_graph,))
     if quadrics:
         methods += [Method("ceres", name, (quadrics,), ("quadrics",)) for name in ("lm", "lm+schur", "dogleg")]
+    if bundle:
+        names = ["lm", "lm+schur", "lm+dense", "lm+iterative", "dogleg+schur"]
+        methods += [Method("ceres", name, (bundle,), ("bundle",)) for name in names]
     return methods
 
 
@@ -120,7 +127,9 @@ def crates(cache):
         say(f"factrs, apex, tiny: left out, cargo failed:\n{failed}")
         return []
     peers = {"factrs": ["gn", "lm"], "apex": ["gn", "lm", "dogleg"], "tiny": ["gn", "lm"]}
-    return [m for peer, names in peers.items() for m in on_pose_graphs(peer, names, (str(target / "release" / peer),))]
+    methods = [m for peer, names in peers.items() for m in on_pose_graphs(peer, names, (str(target / "release" / peer),))]
+    bundle = (str(target / "release" / "apex_bundle"),)
+    return methods + [Method("apex", name, bundle, ("bundle",)) for name in ("lm+schur", "lm+implicit")]
 
 
 def peers(cache, interpreter):

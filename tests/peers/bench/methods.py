@@ -8,7 +8,7 @@ from pathlib import Path
 from bench import pose_graph
 
 POSE_GRAPHS = ("se2", "se3")
-ALL = ("se2", "se3", "grid", "quadrics")
+ALL = ("se2", "se3", "grid", "quadrics", "bundle")
 
 
 @dataclass(frozen=True)

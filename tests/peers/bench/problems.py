@@ -4,9 +4,10 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from bench import grids, pose_graph
+from bench import bundles, grids, pose_graph
 
 
+POINTS_PER_CAMERA, OBSERVATIONS_PER_POINT = 100, 5  # of a bundle adjustment
 HERE = Path(__file__).resolve().parent.parent
 ROOT = HERE.parent.parent
 
@@ -14,15 +15,22 @@ ROOT = HERE.parent.parent
 @dataclass
 class Problem:
     name: str
-    kind: str  # se2, se3, grid or quadrics
+    kind: str  # se2, se3, grid, quadrics or bundle
     file: str = ""  # below the folder of data
     best_known: float | None = None  # of 1/2 sum r' Omega r, where it was found before
     side: int = 0  # of a grid
+    cameras: int = 0  # of a bundle adjustment
     document: Path | None = None  # of a run that makes a scene
     variant: str = ""  # of that run
 
     def input(self, folder):
-        return folder / f"{self.name}.{'json' if self.kind == 'quadrics' else 'g2o'}"
+        suffix = {"quadrics": "json", "bundle": "bal"}.get(self.kind, "g2o")
+        return folder / f"{self.name}.{suffix}"
+
+    @property
+    def size(self):
+        """What growth is measured against: poses of a grid, cameras of a bundle adjustment."""
+        return self.side**3 or self.cameras
 
 
 PUBLISHED = [
@@ -47,6 +55,17 @@ SCENES = [
 ]
 
 
+# 5,000 points, 25,000 observations
+BUNDLES = [Problem("bundle", "bundle", cameras=50)]
+
+
+NAMED = PUBLISHED + SCENES + BUNDLES
+
+
+def bundle(cameras):
+    return Problem(f"bundle_{cameras}", "bundle", cameras=cameras)
+
+
 def grid(poses):
     """A cube of about so many poses."""
     side = round(poses ** (1.0 / 3.0))
@@ -58,6 +77,8 @@ def prepare(problem, data, folder, ours):
     folder.mkdir(parents=True, exist_ok=True)
     if problem.kind == "grid":
         return prepare_grid(problem, folder)
+    if problem.kind == "bundle":
+        return prepare_bundle(problem, folder)
     if problem.kind == "quadrics":
         return prepare_scene(problem, data, folder, ours)
     source = Path(data) / problem.file
@@ -73,6 +94,11 @@ def prepare(problem, data, folder, ours):
 def prepare_grid(problem, folder):
     if not problem.input(folder).exists():
         pose_graph.write(problem.input(folder), grids.grid(problem.side))
+
+
+def prepare_bundle(problem, folder):
+    lines = bundles.bundle(problem.cameras, POINTS_PER_CAMERA * problem.cameras, OBSERVATIONS_PER_POINT)
+    problem.input(folder).write_text("\n".join(lines) + "\n")
 
 
 def prepare_scene(problem, data, folder, ours):

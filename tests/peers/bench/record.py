@@ -10,7 +10,7 @@ from bench.measure import Result, Stop
 class Measured:
     name: str
     kind: str
-    poses: int  # of a grid
+    size: int  # poses of a grid, cameras of a bundle adjustment
     start: float | None  # cost at the start
     best_known: float | None  # from earlier, and from nothing measured here
     results: list[Result]

@@ -1,14 +1,15 @@
-"""The cost of an estimate, 1/2 sum r' Omega r with full logarithms, independent of every solver under test.
+"""The cost of an estimate, 1/2 sum r' Omega r, logarithms in full, independent of every solver under test.
 
     referee INPUT ESTIMATE...      prints a JSON list: the cost at each estimate, null where variables are missing
 """
 
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 
-from bench import pose_graph, scene
+from bench import bal, pose_graph, scene
 from bench.lie import Plane, Space, unit
 
 
@@ -41,5 +42,6 @@ class PoseGraphReferee:
 
 if __name__ == "__main__":
     source, *estimates = sys.argv[1:]
-    referee = scene.SceneReferee.open(source) if source.endswith(".json") else PoseGraphReferee(source)
+    referees = {".json": scene.SceneReferee.open, ".bal": bal.BundleReferee}
+    referee = referees.get(Path(source).suffix, PoseGraphReferee)(source)
     print(json.dumps([referee.cost(path) for path in estimates]))

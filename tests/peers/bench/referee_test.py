@@ -4,7 +4,7 @@ import unittest
 
 import numpy as np
 
-from bench import lie, scene
+from bench import bal, bundles, lie, scene
 
 
 def exponential(generator):
@@ -69,6 +69,33 @@ class Boxes(unittest.TestCase):
         factor = {"type": "bounding_box", "box": [0, 0, 9, 9], "camera": camera}
         referee = scene.SceneReferee([{"keys": ["x", "q"], "factor": factor, "noise": {"sigma": 1.0}}])
         np.testing.assert_allclose(referee.boxes(values), np.zeros((1, 4)))
+
+
+class Bundles(unittest.TestCase):
+    def referee(self, observed):
+        referee = bal.BundleReferee.__new__(bal.BundleReferee)
+        referee.observed = np.array(observed)
+        return referee
+
+    def test_a_point_is_seen_where_the_formula_says(self):
+        # turned by a quarter about z and moved, the point is at (2, 4, -2): p = (1, 2), |p|^2 = 5
+        camera = [0.0, 0.0, np.pi / 2.0, 1.0, 1.0, -1.0, 100.0, 0.5, 0.25]
+        referee = self.referee([[0, 0, 975.0 - 3.0, 1950.0 + 1.0]])
+        residuals = referee.residuals(np.array([camera]), np.array([[3.0, -1.0, -1.0]]))
+        np.testing.assert_allclose(residuals, [[3.0, -1.0]], atol=1e-9)
+
+    def test_rotation_vectors_turn_as_the_exponential_does(self):
+        for w in ([0.3, -0.7, 0.2], [0.0, 0.0, 0.0], [1e-10, 0.0, 0.0], [0.0, 3.0, 0.5]):
+            turned = bal.rotate(np.array([w]), np.array([[1.0, 2.0, 3.0]]))[0]
+            np.testing.assert_allclose(turned, exponential(np.cross(w, np.eye(3), axisb=0, axisc=0)) @ [1.0, 2.0, 3.0])
+            np.testing.assert_allclose(turned, bundles.act(bundles.rotation(w), [1.0, 2.0, 3.0]))
+            np.testing.assert_allclose(bundles.rotation_vector(bundles.rotation(w)), w, atol=1e-12)
+
+    def test_cameras_that_were_not_disturbed_see_what_they_project(self):
+        point = [9.0, 0.5, 1.0]
+        camera = bundles.Camera.on_ring(0.1, 20.0)
+        referee = self.referee([[0, 0, *camera.project(point)]])
+        np.testing.assert_allclose(referee.residuals(np.array([camera.numbers()]), np.array([point])), 0.0, atol=1e-9)
 
 
 if __name__ == "__main__":

@@ -113,22 +113,22 @@ def slope(points):
     return sum((x - mx) * (y - my) for x, y in logs) / sum((x - mx) ** 2 for x, _ in logs)
 
 
-def growth(all_measured):
-    """Seconds and memory of each method on the grids, and the exponents with which they grow."""
-    grids = sorted((m for m in all_measured if m.kind == "grid"), key=lambda m: m.poses)
+def growth(all_measured, kind, unit):
+    """Seconds and memory of each method on problems of one kind, and the exponents with which they grow."""
+    sizes = sorted((m for m in all_measured if m.kind == kind), key=lambda m: m.size)
     rows = {}
-    for measured in grids:
+    for measured in sizes:
         for r in measured.results:
-            rows.setdefault(r.method, {})[measured.poses] = r
+            rows.setdefault(r.method, {})[measured.size] = r
     lines = []
     for method, by_size in sorted(rows.items()):
         done = [(n, r) for n, r in by_size.items() if r.time and r.memory_mib]
         cells = []
-        for n in (m.poses for m in grids):
+        for n in (m.size for m in sizes):
             r = by_size.get(n)
             whole = r and r.time
             cells.append(f"{r.time:.3g} s, {r.memory_mib:.0f} MiB" if whole else r.status if r else "")
         slopes = [slope([(n, r.time) for n, r in done]), slope([(n, r.memory_mib) for n, r in done])]
         lines.append([method, *cells, *(number(x, ".2f") for x in slopes)])
-    head = ["method", *(f"{m.poses:,} poses" for m in grids), "time grows as n^", "memory as n^"]
-    return table(head, lines) if lines else ""
+    head = ["method", *(f"{m.size:,} {unit}" for m in sizes), "time grows as n^", "memory as n^"]
+    return table(head, lines) if len(sizes) > 1 else ""
