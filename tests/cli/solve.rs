@@ -46,6 +46,39 @@ fn a_pose_graph_is_solved_and_its_gauge_is_said_to_be_held() {
 }
 
 #[test]
+fn a_bundle_adjustment_is_known_by_its_extension_or_its_first_line() {
+    let camera = |x: f64| format!("0 0 0 {} 0 0 100 0 0\n", -x);
+    let pixel = |camera: i32, x: f64, [px, py, pz]: [f64; 3]| {
+        let [u, v] = [100.0 * (px - x) / -pz, 100.0 * py / -pz];
+        (camera, u, v)
+    };
+    let points: Vec<[f64; 3]> =
+        (0..8).map(|i| [f64::from(i % 3) - 1.0, f64::from(i % 2), -3.0 - f64::from(i % 5)]).collect();
+    let mut text = format!("2 {} {}\n", points.len(), 2 * points.len());
+    for (i, point) in points.iter().enumerate() {
+        for (camera, u, v) in [pixel(0, 0.0, *point), pixel(1, 1.0, *point)] {
+            text += &format!("{camera} {i} {u} {v}\n");
+        }
+    }
+    text += &(camera(0.0) + &camera(1.0));
+    points.iter().for_each(|[x, y, z]| text += &format!("{x} {y} {}\n", z - 0.1));
+    let folder = folder(&[("problem.bal", &text), ("problem.txt", &text), ("short.bal", "2 1 1\n0 5 1 1\n")]);
+    let solved = path(&folder, "solved.bal");
+    for file in ["problem.bal", "problem.txt"] {
+        let ran = manifactor(&format!("solve {} --out {solved} --json", path(&folder, file)));
+        ran.complains("nothing fixes the gauge: held pose and scale by c0, c1");
+        ran.complains("BAL has no word for what is held: 2 left out");
+        let json = ran.json();
+        assert!(json["initial_cost"].as_f64().unwrap() > 1.0);
+        assert!(json["final_cost"].as_f64().unwrap() < 1e-6, "{json}");
+    }
+    let again = manifactor(&format!("solve {solved} --json")).json();
+    assert!(again["initial_cost"].as_f64().unwrap() < 1e-6);
+    let ran = manifactor(&format!("solve {}", path(&folder, "short.bal"))).ended(2);
+    ran.complains("there is no point 5: the first line says that there are 1, counted from 0");
+}
+
+#[test]
 fn solver_and_settings_come_from_the_command_line() {
     let folder =
         folder(&[("graph.g2o", G2O), ("graph.toml", &format!("{GRAPH}\n[solver]\ntype = \"dogleg\"\n"))]);
