@@ -159,7 +159,7 @@ fn files_that_are_not_there_are_named() {
     manifactor("solve nowhere.toml").ended(2).complains("nowhere.toml");
     let folder = folder(&[("graph.toml", GRAPH)]);
     let ran = manifactor(&format!("solve {} --out {}", path(&folder, "graph.toml"), path(&folder, "a.txt")));
-    ran.ended(2).complains("use .toml, .json, .yaml or .g2o");
+    ran.ended(2).complains("use .toml, .json, .yaml, .g2o or .bal");
 }
 
 #[test]
