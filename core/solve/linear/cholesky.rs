@@ -159,6 +159,13 @@ impl Part {
             |nodes: Range<usize>| Some(Self { workspace: Workspace::new(structure, nodes.clone())?, nodes });
         subtrees(structure).into_iter().map(part).collect()
     }
+
+    /// The update of its root.
+    fn update(&self, root: &Node) -> &[f64] {
+        let level = root.level as usize % 2;
+        let at = root.update - self.workspace.base[level];
+        &self.workspace.updates[level][at..at + root.below.pow(2)]
+    }
 }
 
 /// What is factorized.
@@ -191,17 +198,8 @@ impl WithSimd for Factorize<'_> {
         let (panels, panels_at) = self.panels;
         let Workspace { updates, base, open, memory } = self.workspace;
         open.clear();
-        let mut parts = self.parts.iter().peekable();
-        let mut n = self.nodes.start;
-        while n < self.nodes.end {
-            if let Some(part) = parts.next_if(|part| part.nodes.start == n) {
-                n = part.nodes.end;
-                open.push(n - 1);
-                continue;
-            }
-            let node = &structure.nodes[n];
-            let at = node.panel - panels_at;
-            let panel = &mut panels[at..at + node.height() * node.width];
+        let fill = |node: &Node, panels: &mut [f64]| {
+            let panel = &mut panels[node.panel - panels_at..][..node.height() * node.width];
             panel.fill(0.0);
             for (at, h) in structure.scatter[node.entries.clone()].iter().zip(&h[node.entries.clone()]) {
                 panel[*at as usize] = *h;
@@ -211,40 +209,80 @@ impl WithSimd for Factorize<'_> {
                     panel[c * (node.height() + 1)] += added[node.first + c];
                 }
             }
-            let level = node.level as usize % 2;
-            let [own, other] = &mut *updates;
-            let (update, theirs) = if level == 0 { (own, other) } else { (other, own) };
-            let of_child = |n: usize| {
-                let child = &structure.nodes[n];
-                let part = self.parts.binary_search_by_key(&(n + 1), |part| part.nodes.end);
-                let (stack, base) = match part {
-                    Ok(part) => {
-                        let done = &self.parts[part].workspace;
-                        (&done.updates[1 - level], done.base[1 - level])
-                    }
-                    Err(_) => (&*theirs, base[1 - level]),
-                };
-                (
-                    &stack[child.update - base..child.update - base + child.below.pow(2)],
-                    child.rows(&structure.places),
-                )
+        };
+        let mut parts = self.parts.iter().peekable();
+        let mut early = structure.early.iter().peekable();
+        let mut n = self.nodes.start;
+        while n < self.nodes.end {
+            let part = parts.next_if(|part| part.nodes.start == n);
+            // fronts that have to be there before their first descendant; those of a part are its own matter
+            while let Some((begin, front)) = early.next_if(|(begin, _)| *begin as usize <= n) {
+                let is_inside = (*front as usize) < self.nodes.end;
+                if *begin as usize == n && is_inside && part.is_none_or(|p| *front as usize >= p.nodes.end) {
+                    let front = &structure.nodes[*front as usize];
+                    fill(front, panels);
+                    let level = front.level as usize % 2;
+                    updates[level][front.update - base[level]..][..front.below.pow(2)].fill(0.0);
+                }
+            }
+            let node = match part {
+                Some(part) => {
+                    n = part.nodes.end - 1;
+                    &structure.nodes[n]
+                }
+                None => &structure.nodes[n],
             };
-            let children = open.len() - node.children;
-            for child in &open[children..] {
-                let (from, places) = of_child(*child);
-                kernel::assemble_panel(from, places, panel, node.width);
+            let level = node.level as usize % 2;
+            let [even, odd] = &mut *updates;
+            let (own, theirs) = if level == 0 { (even, odd) } else { (odd, even) };
+            let update = match part {
+                Some(part) => part.update(node),
+                None => {
+                    if !node.early {
+                        fill(node, panels);
+                    }
+                    let panel = &mut panels[node.panel - panels_at..][..node.height() * node.width];
+                    let update = &mut own[node.update - base[level]..][..node.below.pow(2)];
+                    let of_child = |n: usize| {
+                        let child = &structure.nodes[n];
+                        let part = self.parts.binary_search_by_key(&(n + 1), |part| part.nodes.end);
+                        let update = match part {
+                            Ok(part) => self.parts[part].update(child),
+                            Err(_) => &theirs[child.update - base[1 - level]..][..child.below.pow(2)],
+                        };
+                        (update, child.rows(&structure.places))
+                    };
+                    let children = if node.early { open.len() } else { open.len() - node.children };
+                    for child in &open[children..] {
+                        let (from, places) = of_child(*child);
+                        kernel::assemble_panel(from, places, panel, node.width);
+                    }
+                    let eliminated = match node.early {
+                        true => kernel::eliminate::<S, false>(simd, panel, update, node.width, memory),
+                        false => kernel::eliminate::<S, true>(simd, panel, update, node.width, memory),
+                    };
+                    eliminated.map_err(|_| NotPositiveDefinite)?;
+                    if let Some((x, below)) = &mut self.right {
+                        solve_lower(node, structure, panel, x, below);
+                    }
+                    for child in open.drain(children..) {
+                        let (from, places) = of_child(child);
+                        kernel::assemble_update(from, places, update, node.below, node.width);
+                    }
+                    &*update
+                }
+            };
+            let parent = node.parent as usize;
+            match structure.nodes.get(parent).filter(|front| front.early && parent < self.nodes.end) {
+                None => open.push(n),
+                Some(front) => {
+                    let places = node.rows(&structure.places);
+                    let panel = &mut panels[front.panel - panels_at..][..front.height() * front.width];
+                    kernel::assemble_panel(update, places, panel, front.width);
+                    let to = &mut theirs[front.update - base[1 - level]..][..front.below.pow(2)];
+                    kernel::assemble_update(update, places, to, front.below, front.width);
+                }
             }
-            let at = node.update - base[level];
-            let update = &mut update[at..at + node.below.pow(2)];
-            kernel::eliminate(simd, panel, update, node.width, memory).map_err(|_| NotPositiveDefinite)?;
-            if let Some((x, below)) = &mut self.right {
-                solve_lower(node, structure, panel, x, below);
-            }
-            for child in open.drain(children..) {
-                let (from, places) = of_child(child);
-                kernel::assemble_update(from, places, update, node.below, node.width);
-            }
-            open.push(n);
             n += 1;
         }
         Ok(())
@@ -296,14 +334,29 @@ mod tests {
     use crate::layout::Layout;
     use crate::linear::ordering::Order;
 
-    /// Factor and solution of a system on a square grid of blocks, by so many threads.
-    fn solved(threads: usize) -> (Vec<f64>, Vec<f64>) {
+    /// A square grid of blocks: dimensions and couplings.
+    fn grid() -> (Vec<usize>, Vec<(u32, u32)>) {
         const SIDE: u32 = 40;
         let right = (0..SIDE * SIDE).filter(|i| i % SIDE != SIDE - 1).map(|i| (i, i + 1));
-        let pairs = right.chain((0..SIDE * (SIDE - 1)).map(|i| (i, i + SIDE))).collect();
-        let layout = Layout::new(&[6; (SIDE * SIDE) as usize], pairs, &Order::Best).unwrap();
+        (
+            vec![6; (SIDE * SIDE) as usize],
+            right.chain((0..SIDE * (SIDE - 1)).map(|i| (i, i + SIDE))).collect(),
+        )
+    }
+
+    /// Cameras in a row, and points that six neighbours see: fronts with many children.
+    fn bundle() -> (Vec<usize>, Vec<(u32, u32)>) {
+        let (cameras, points) = (60, 8000);
+        let seen = |p: u32| (0..6).map(move |k| (p % (cameras - 5) + k, cameras + p));
+        let dims = [vec![9; cameras as usize], vec![3; points as usize]].concat();
+        (dims, (0..points).flat_map(seen).collect())
+    }
+
+    /// Factor and solution of a system, by so many threads.
+    fn solved((dims, pairs): (Vec<usize>, Vec<(u32, u32)>), threads: usize) -> (Vec<f64>, Vec<f64>) {
+        let layout = Layout::new(&dims, pairs, &Order::Best).unwrap();
         let mut h: Vec<f64> = (0..layout.row_idx.len()).map(|i| (i as f64 * 0.7).sin()).collect();
-        layout.diagonal().iter().for_each(|at| h[*at] += 40.0);
+        layout.diagonal().iter().for_each(|at| h[*at] += 2000.0);
         let mut cholesky = Cholesky::new(layout.structure(false)).unwrap();
         assert!(cholesky.structure.flops > WORTH_THREADS, "{}", cholesky.structure.flops);
         let mut x: Vec<f64> = (0..layout.dim()).map(|i| (i as f64).cos()).collect();
@@ -317,12 +370,14 @@ mod tests {
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() {
-        let alone = solved(1);
         let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        for threads in [2, 4] {
-            let together = solved(threads);
-            assert!(bits(&together.1) == bits(&alone.1), "{threads} threads: another solution");
-            assert!(bits(&together.0) == bits(&alone.0), "{threads} threads: another factor");
+        for system in [grid(), bundle()] {
+            let alone = solved(system.clone(), 1);
+            for threads in [2, 4] {
+                let together = solved(system.clone(), threads);
+                assert!(bits(&together.1) == bits(&alone.1), "{threads} threads: another solution");
+                assert!(bits(&together.0) == bits(&alone.0), "{threads} threads: another factor");
+            }
         }
     }
 }

@@ -163,4 +163,17 @@ mod tests {
         let right = (0..100).filter(|i| i % 10 != 9).map(|i| (i, i + 1));
         agrees(&[3; 100], right.chain((0..90).map(|i| (i, i + 10))).collect(), 3);
     }
+
+    #[test]
+    fn fronts_that_take_updates_as_they_come_agree_with_the_dense_matrix() {
+        // as in bundle adjustment: a row of cameras, and many points that three neighbours see
+        let (cameras, points) = (8, 150);
+        let dims: Vec<usize> = [vec![5; cameras], vec![2; points]].concat();
+        let seen = |p: u32| (0..3).map(move |k| (p % (cameras as u32 - 2) + k, cameras as u32 + p));
+        let pairs: Vec<_> = (0..points as u32).flat_map(seen).collect();
+        let structure = Layout::new(&dims, pairs.clone(), &Order::Best).unwrap().structure(false);
+        let early = |inside: bool| structure.nodes.iter().any(|n| n.early && (n.below > 0) == inside);
+        assert!(early(true) && early(false), "{} fronts are early", structure.early.len());
+        agrees(&dims, pairs, 4);
+    }
 }

@@ -17,12 +17,12 @@ pub(crate) fn scratch(width: usize) -> MemBuffer {
 }
 
 /// Factorizes the first `width` columns of a front: L into `panel`, and what they subtract from the others, −L₂₁L₂₁ᵀ,
-/// into the lower triangle of `update`. Both column-major; above their diagonals, they hold garbage afterwards.
+/// into the lower triangle of `update`, or onto what is there already where it is not to `REPLACE` it. Both column-major; above their diagonals, they hold garbage afterwards.
 ///
 /// # Errors
 /// The column whose pivot is not positive.
 #[inline(always)]
-pub(crate) fn eliminate<S: Simd>(
+pub(crate) fn eliminate<S: Simd, const REPLACE: bool>(
     simd: S,
     panel: &mut [f64],
     update: &mut [f64],
@@ -31,7 +31,7 @@ pub(crate) fn eliminate<S: Simd>(
 ) -> Result<(), usize> {
     let height = panel.len() / width;
     if height * height * width >= LARGE {
-        return eliminate_large(panel, update, width, memory);
+        return eliminate_large::<REPLACE>(panel, update, width, memory);
     }
     for first in (0..width).step_by(COLUMNS) {
         let n = COLUMNS.min(width - first);
@@ -45,7 +45,15 @@ pub(crate) fn eliminate<S: Simd>(
     for column in (0..below).step_by(COLUMNS) {
         let n = COLUMNS.min(below - column);
         let from = width + column;
-        product::<S, true>(simd, panel, height, (from, from), &mut update[column * (below + 1)..], below, n);
+        product::<S, REPLACE>(
+            simd,
+            panel,
+            height,
+            (from, from),
+            &mut update[column * (below + 1)..],
+            below,
+            n,
+        );
     }
     Ok(())
 }
@@ -210,7 +218,7 @@ fn tail<S: Simd, const REPLACE: bool, const C: usize>(
     }
 }
 
-fn eliminate_large(
+fn eliminate_large<const REPLACE: bool>(
     panel: &mut [f64],
     update: &mut [f64],
     width: usize,
@@ -235,7 +243,7 @@ fn eliminate_large(
     matmul(
         MatMut::from_column_major_slice_mut(update, below, below),
         BlockStructure::TriangularLower,
-        Accum::Replace,
+        if REPLACE { Accum::Replace } else { Accum::Add },
         bottom.as_ref(),
         BlockStructure::Rectangular,
         bottom.as_ref().transpose(),

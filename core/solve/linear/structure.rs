@@ -20,6 +20,8 @@ pub(crate) struct Structure {
     pub values: usize,
     /// Number of values that updates need at most at a time, of nodes on even and on odd levels.
     pub updates: [usize; 2],
+    /// Fronts to be opened before a node, by the node and the front's own: those that take updates as they come.
+    pub early: Vec<(u32, u32)>,
     /// Multiplications and additions of a factorization.
     pub flops: f64,
 }
@@ -41,6 +43,10 @@ pub(crate) struct Node {
     pub entries: Range<usize>,
     /// Number of children, which are the last nodes before it that have no parent yet.
     pub children: usize,
+    /// The node that takes its update; [`ROOT`] for those without.
+    pub parent: u32,
+    /// Whether it takes its children's updates one by one, as they come, and not all when its turn has come.
+    pub early: bool,
     /// Distance from its root. Updates of even and of odd levels are on two stacks, so that a parent's can be
     /// made while those of its children are there.
     pub level: u32,
@@ -118,6 +124,7 @@ impl Structure {
                 rows,
                 entries: col_ptr[first]..col_ptr[first + width],
                 children,
+                parent: group.parent,
                 ..Node::default()
             };
             self.values += node.height() * width;
@@ -130,6 +137,27 @@ impl Structure {
         for g in (0..groups.len()).rev().filter(|g| groups[*g].parent != ROOT) {
             self.nodes[g].level = self.nodes[groups[g].parent as usize].level + 1;
         }
+        self.open_early();
+    }
+
+    /// Finds the fronts whose children's updates would take much more room than they do themselves: of a camera
+    /// that sees thousands of points, say. They have to be there before their first descendant.
+    fn open_early(&mut self) {
+        let mut first: Vec<u32> = (0..self.nodes.len() as u32).collect();
+        let mut waiting = vec![0_usize; self.nodes.len()];
+        for n in 0..self.nodes.len() {
+            let (begin, parent) = (first[n], self.nodes[n].parent as usize);
+            if let Some(of_parent) = first.get_mut(parent) {
+                *of_parent = begin.min(*of_parent);
+                waiting[parent] += self.nodes[n].below.pow(2);
+            }
+            self.nodes[n].early = waiting[n] > EARLY * self.nodes[n].height().pow(2);
+            if self.nodes[n].early {
+                self.early.push((begin, n as u32));
+            }
+        }
+        // an ancestor before its descendants, as it is closed after them
+        self.early.sort_unstable_by_key(|(begin, n)| (*begin, std::cmp::Reverse(*n)));
     }
 
     /// Where rows are in their parent's front, entries of the matrix in panels, and updates on their stacks.
@@ -139,7 +167,11 @@ impl Structure {
         let mut place = vec![0_u32; col_ptr.len() - 1];
         let mut open: Vec<usize> = vec![];
         let mut top = [0; 2];
+        let mut early = self.early.clone().into_iter().peekable();
         for n in 0..self.nodes.len() {
+            while let Some((_, front)) = early.next_if(|(begin, _)| *begin == n as u32) {
+                self.push_update(front as usize, &mut top);
+            }
             let node = self.nodes[n].clone();
             let columns = node.first as u32..(node.first + node.width) as u32;
             for (i, row) in columns.chain(node.rows(&self.rows).iter().copied()).enumerate() {
@@ -151,20 +183,36 @@ impl Structure {
                 }
             }
             let level = node.level as usize % 2;
-            self.nodes[n].update = top[level];
-            top[level] += node.below * node.below;
-            self.updates[level] = self.updates[level].max(top[level]);
+            if !node.early {
+                self.push_update(n, &mut top);
+            }
             for child in open.drain(open.len() - node.children..).rev() {
                 let child = &self.nodes[child];
                 for i in child.rows..child.rows + child.below {
                     self.places[i] = place[self.rows[i] as usize];
                 }
-                top[1 - level] = child.update;
+                if !node.early {
+                    top[1 - level] = child.update;
+                }
+            }
+            if self.nodes.get(node.parent as usize).is_some_and(|parent| parent.early) {
+                top[level] = self.nodes[n].update;
             }
             open.push(n);
         }
     }
+
+    fn push_update(&mut self, n: usize, top: &mut [usize; 2]) {
+        let node = &mut self.nodes[n];
+        let level = node.level as usize % 2;
+        node.update = top[level];
+        top[level] += node.below * node.below;
+        self.updates[level] = self.updates[level].max(top[level]);
+    }
 }
+
+/// A front is opened early where updates of its children take so many times its room.
+const EARLY: usize = 2;
 
 /// A supernode before its rows are known.
 struct Group {
