@@ -38,6 +38,8 @@ pub struct Auto {
 
 /// Damping of the first step, as a share of the diagonal: none to speak of.
 const DAMPING: f64 = 1e-10;
+/// The same where next to none has been tried.
+const REFUSED: f64 = 1e-5;
 /// Bounds of the diagonal that is damped by: the same for all directions but weak ones. By the diagonal itself, steps run
 /// off along what little constrains, as the size of an object that is seen from one side, and out of factors' domains.
 const DIAGONAL: [f64; 2] = [1e-6, 1.0];
@@ -53,9 +55,7 @@ impl Optimizer for Auto {
     }
 
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        let stop = self.stop.clone();
-        LevenbergMarquardt { initial_lambda: DAMPING, diagonal: DIAGONAL, stop, ..Default::default() }
-            .solve(problem, observer)
+        self.damped(DAMPING).solve(problem, observer)
     }
 
     fn solve_graph(
@@ -73,9 +73,11 @@ impl Optimizer for Auto {
         }
         let clock = Instant::now();
         let mut best = problem.values();
-        let here = Point { inactive: outcome.inactive, cost: outcome.final_cost, values: best.clone() };
-        let mut points = starts(graph, values, &mut problem);
-        points.extend(unfinished.then_some(here));
+        let (inactive, cost) = (outcome.inactive, outcome.final_cost);
+        let here = Point { inactive, cost, values: best.clone(), refused: true };
+        // of two alike, where it is already
+        let mut points = Vec::from_iter(unfinished.then_some(here));
+        points.extend(starts(graph, values, &mut problem));
         points.sort_by(|a, b| {
             (a.inactive, a.cost).partial_cmp(&(b.inactive, b.cost)).unwrap_or(Ordering::Equal)
         });
@@ -84,7 +86,10 @@ impl Optimizer for Auto {
         outcome.times.total += looking;
         for point in points {
             problem.set_values(&point.values);
-            let next = self.full_steps_first(&mut problem, &mut watch);
+            let next = match point.refused {
+                true => self.damped(REFUSED).solve(&mut problem, &mut watch),
+                false => self.full_steps_first(&mut problem, &mut watch),
+            };
             let better = (next.inactive, next.final_cost) <= (outcome.inactive, outcome.final_cost);
             if better {
                 best = problem.values();
@@ -102,6 +107,12 @@ impl Optimizer for Auto {
 register!(dyn Optimizer, "auto", Auto);
 
 impl Auto {
+    /// Damped steps, the first by so much.
+    fn damped(&self, initial_lambda: f64) -> LevenbergMarquardt {
+        let stop = self.stop.clone();
+        LevenbergMarquardt { initial_lambda, diagonal: DIAGONAL, stop, ..Default::default() }
+    }
+
     /// From a good start full steps are there in a few, where damping creeps along narrow valleys.
     fn full_steps_first(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let outcome =
@@ -120,6 +131,8 @@ struct Point {
     inactive: usize,
     cost: f64,
     values: Values,
+    /// A step from here has been refused.
+    refused: bool,
 }
 
 /// What the registered starts have to offer.
@@ -132,7 +145,12 @@ fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> Vec<Point> {
             let values = start.start(graph, values).ok()?;
             problem.set_values(&values);
             let at = problem.linearize();
-            at.cost.is_finite().then_some(Point { inactive: at.inactive, cost: at.cost, values })
+            at.cost.is_finite().then_some(Point {
+                inactive: at.inactive,
+                cost: at.cost,
+                values,
+                refused: false,
+            })
         })
         .collect()
 }
