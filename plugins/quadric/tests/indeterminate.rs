@@ -19,8 +19,8 @@ fn open(graph: &Graph, values: &Values) -> Vec<Undetermined> {
         Box::new(LevenbergMarquardt::default()),
         Box::new(Auto::default()),
     ];
-    let find = |solver: &Box<dyn Optimizer>| {
-        let outcome = solve(graph, values, &**solver, &mut Silent).unwrap().outcome;
+    let find = |solver: &dyn Optimizer| {
+        let outcome = solve(graph, values, solver, &mut Silent).unwrap().outcome;
         let found = match outcome.termination.clone() {
             Termination::Indeterminate(found) => Some(found),
             _ => outcome.undetermined.clone(),
@@ -33,7 +33,7 @@ fn open(graph: &Graph, values: &Values) -> Vec<Undetermined> {
         );
         found.unwrap_or_else(|| panic!("{solver:?} ends with {}", outcome.termination))
     };
-    solvers.iter().map(find).collect()
+    solvers.iter().map(|solver| find(&**solver)).collect()
 }
 
 /// Names of the directions in which a variable moves.
