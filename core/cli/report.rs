@@ -1,6 +1,6 @@
 //! What a solve has to tell, for people.
-use crate::text::{count, seconds};
-use manifactor::solve::Outcome;
+use crate::text::{self, count, list, seconds};
+use manifactor::solve::{Diagnosis, FactorCost, Marginal, Outcome};
 
 /// A few lines: how it ended, what it cost, where the time went.
 pub(crate) fn outcome(outcome: &Outcome) -> String {
@@ -19,6 +19,11 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
     if let Some(undetermined) = &outcome.undetermined {
         out += &format!("warning: {undetermined}\n");
     }
+    if !outcome.rejected.is_empty() {
+        let (rejected, all) = (outcome.rejected.len(), count(outcome.factors, "factor"));
+        let keys = outcome.rejected.iter().map(|r| format!("{} ({})", r.factor, text::keys(&r.keys)));
+        out += &format!("{rejected} of {all} rejected as outliers: {}\n", list(keys));
+    }
     out += &format!(
         "{}: compile {}, linearize {}, factorize {}, solve {}, other {}\n",
         seconds(times.total),
@@ -29,4 +34,37 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
         seconds(times.other)
     );
     out
+}
+
+/// The factors that cost the most, and the condition of the linear system.
+pub(crate) fn diagnosis(diagnosis: &Diagnosis) -> String {
+    let condition = match diagnosis.condition {
+        Some(condition) => format!("condition {condition:.1e}"),
+        None => "condition infinite, or unknown: H could not be factorized".to_owned(),
+    };
+    let open = diagnosis.undetermined.as_ref();
+    let open = open.map_or_else(String::new, |open| format!("warning: at the estimate {open}\n"));
+    let condition = format!("{open}{condition} (of H with ones on its diagonal)\n");
+    if diagnosis.worst.is_empty() {
+        return condition;
+    }
+    let mut table = text::table(&["costs the most", "cost", "weight", "residual"]);
+    for FactorCost { factor, name, keys, residual, cost, weight } in &diagnosis.worst {
+        let residual: Vec<_> = residual.iter().map(|x| format!("{x:.3}")).collect();
+        let name = format!("{factor} {name} ({})", text::keys(keys));
+        table.add_row([name, format!("{cost:.4}"), format!("{weight:.3}"), residual.join(" ")]);
+    }
+    format!("{condition}{}\n", table.trim_fmt())
+}
+
+/// Standard deviations by direction.
+pub(crate) fn marginals(marginals: &[Marginal]) -> String {
+    let mut table = text::words(&["variable", "standard deviations"]);
+    for Marginal { key, tangent, covariance } in marginals {
+        let sigmas = covariance.diagonal().map(f64::sqrt);
+        let parts: Vec<_> =
+            tangent.iter().zip(&sigmas).map(|(name, sigma)| format!("{name} {sigma:.3e}")).collect();
+        table.add_row([key.to_string(), parts.join("  ")]);
+    }
+    format!("{}\n", table.trim_fmt())
 }

@@ -22,11 +22,31 @@ pub(crate) fn of_run(report: &RunReport) -> String {
                 of\nthe boxes around them, centred and where they stand: 0 is perfect, 1 is no overlap.\n";
     }
     for variant in &report.variants {
+        out += &diagnosis(variant);
+    }
+    for variant in &report.variants {
         for warning in &variant.warnings {
             out += &format!("warning: {}: {warning}\n", variant.name);
         }
     }
     out
+}
+
+/// A line: the condition, what is rejected, and the factor that costs the most. The report has the whole table.
+fn diagnosis(variant: &VariantReport) -> String {
+    let Some(diagnosis) = &variant.solve.diagnosis else { return String::new() };
+    let mut line = match diagnosis.condition {
+        Some(condition) => format!("{}: condition {condition:.1e}", variant.name),
+        None => format!("{}: condition infinite or unknown", variant.name),
+    };
+    if !variant.solve.rejected.is_empty() {
+        line += &format!(", {} rejected as outliers", text::count(variant.solve.rejected.len(), "factor"));
+    }
+    if let Some(worst) = diagnosis.worst.first() {
+        let (name, keys) = (worst.name, text::keys(&worst.keys));
+        line += &format!(", costs the most: factor {} {name} ({keys}) with {:.3}", worst.factor, worst.cost);
+    }
+    line + "\n"
 }
 
 /// What came in: odometry, and objects as they were initialised.

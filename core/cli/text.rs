@@ -1,5 +1,6 @@
 //! Numbers and words for people.
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+use manifactor::graph::Key;
 
 /// Lines above and below the header, none between rows.
 const STYLE: TableStyle = TableStyle::new().top_border(LINE).header_separator(LINE).bottom_border(LINE);
@@ -58,6 +59,11 @@ pub(crate) fn list(items: impl ExactSizeIterator<Item = String>) -> String {
     let more = items.len().saturating_sub(SHOWN);
     let text = items.take(SHOWN).collect::<Vec<_>>().join(", ");
     if more > 0 { format!("{text} and {more} more") } else { text }
+}
+
+/// `x0, x1`.
+pub(crate) fn keys(keys: &[Key]) -> String {
+    keys.iter().map(Key::as_str).collect::<Vec<_>>().join(", ")
 }
 
 /// Seconds, with three digits that say something.

@@ -99,6 +99,10 @@ pub trait Batch: Send + Sync {
     fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation;
     /// The cost of the factors that were active at the last linearization.
     fn cost(&self, columns: &Columns) -> Evaluation;
+    /// ½ρ of each factor, to its place in the graph, whatever its weight; zero where it is not defined.
+    fn costs(&self, columns: &Columns, to: &mut [f64]);
+    /// Makes each factor count as often as the entry at its place in the graph says, on top of its loss.
+    fn set_weights(&mut self, weights: &[f64]);
     /// Each factor as it stands, in order of the batch.
     fn inspect(&self, columns: &Columns) -> Vec<FactorState>;
     /// Each defined factor's rows of the Jacobian.
@@ -120,6 +124,8 @@ pub struct BatchOf<F: Residual> {
     slots: Vec<Slot>,
     whiteners: Whiteners<F::Dim>,
     losses: Option<Box<dyn LossColumn>>,
+    /// What each factor's cost is multiplied by; empty, where nobody weighs them.
+    weights: Vec<f64>,
     active: Vec<bool>,
     /// One for each chunk, for threads; empty until they are used.
     work: Vec<Work<F>>,
@@ -160,6 +166,7 @@ impl<F: Residual> BatchOf<F> {
             slots: vec![],
             whiteners: Whiteners::like(noise),
             losses: loss.map(|l| l.erased().column()),
+            weights: vec![],
             active: vec![],
             work: vec![],
         }
@@ -220,9 +227,9 @@ impl<F: Residual> BatchOf<F> {
     /// Squared norms into weights, and ½ Σ ρ: one virtual call. Inactive factors have norm 0.
     #[inline(always)]
     fn weigh(&self, first: usize, squared: &mut [f64], active: &[bool]) -> f64 {
-        let cost = match &self.losses {
-            Some(losses) => losses.weigh(first, squared),
-            None => squared.iter_mut().map(|s| 0.5 * std::mem::replace(s, 1.0)).sum(),
+        let cost = match self.weights.get(first..first + squared.len()) {
+            None => self.robust(first, squared),
+            Some(weights) => self.reweigh(first, squared, weights),
         };
         for (w, active) in squared.iter_mut().zip(active) {
             if !active {
@@ -230,6 +237,41 @@ impl<F: Residual> BatchOf<F> {
             }
         }
         cost
+    }
+
+    /// Squared norms into the loss's weights, and ½ Σ ρ.
+    #[inline(always)]
+    fn robust(&self, first: usize, squared: &mut [f64]) -> f64 {
+        match &self.losses {
+            Some(losses) => losses.weigh(first, squared),
+            None => squared.iter_mut().map(|s| 0.5 * std::mem::replace(s, 1.0)).sum(),
+        }
+    }
+
+    /// As `robust`, each factor `weights` times. A loss sums up what it is shown: show it one at a time.
+    fn reweigh(&self, first: usize, squared: &mut [f64], weights: &[f64]) -> f64 {
+        let one = |(k, (s, weight)): (usize, (&mut f64, &f64))| {
+            let cost = self.robust(first + k, std::slice::from_mut(s));
+            *s *= weight;
+            // a factor that does not count may be as far off as it likes
+            if *weight == 0.0 { 0.0 } else { weight * cost }
+        };
+        squared.iter_mut().zip(weights).enumerate().map(one).sum()
+    }
+
+    /// ‖whitened residual‖²; `None` where the factor is not defined.
+    #[inline(always)]
+    fn squared(&self, columns: <F::Variables as Variables>::Columns<'_>, i: usize) -> Option<f64> {
+        let x = F::Variables::load(columns, &self.index[Self::range(&self.ends, i)]);
+        if !self.factors[i].is_defined(x.clone()) {
+            return None;
+        }
+        let value = self.factors[i].residual::<f64>(F::Variables::lift(&x));
+        let mut r = <Matrix<F::Dim, U1> as Block>::zeros();
+        let r = r.as_mut_slice();
+        r.copy_from_slice(value.as_ref());
+        self.whiteners.whiten(i, r);
+        Some(r.iter().map(|x| x * x).sum())
     }
 
     #[inline(always)]
@@ -256,17 +298,11 @@ impl<F: Residual> BatchOf<F> {
                 out.inactive += 1;
                 continue;
             }
-            let x = F::Variables::load(columns, &self.index[Self::range(&self.ends, i)]);
-            if !self.factors[i].is_defined(x.clone()) {
+            let Some(s) = self.squared(columns, i) else {
                 out.left += 1;
                 continue;
-            }
-            let value = self.factors[i].residual::<f64>(F::Variables::lift(&x));
-            let mut r = <Matrix<F::Dim, U1> as Block>::zeros();
-            let r = r.as_mut_slice();
-            r.copy_from_slice(value.as_ref());
-            self.whiteners.whiten(i, r);
-            squared[k] = r.iter().map(|x| x * x).sum();
+            };
+            squared[k] = s;
             if !squared[k].is_finite() && out.not_finite.is_none() {
                 out.not_finite = Some(self.entries[i] as usize);
             }
@@ -360,6 +396,19 @@ impl<F: Residual> Batch for BatchOf<F> {
                 .map(|n| self.chunk_cost(columns, n * CHUNK))
                 .fold(Evaluation::default(), Evaluation::and)
         }
+    }
+
+    fn costs(&self, columns: &Columns, to: &mut [f64]) {
+        let columns = F::Variables::columns(columns);
+        for (i, entry) in self.entries.iter().enumerate() {
+            let squared = self.squared(columns, i);
+            to[*entry as usize] = squared.map_or(0.0, |s| self.robust(i, &mut [s]));
+        }
+    }
+
+    fn set_weights(&mut self, weights: &[f64]) {
+        self.weights.clear();
+        self.weights.extend(self.entries.iter().map(|entry| weights[*entry as usize]));
     }
 
     fn inspect(&self, columns: &Columns) -> Vec<FactorState> {

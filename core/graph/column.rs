@@ -25,6 +25,8 @@ pub trait Column: Send + Sync {
     fn retract_from(&mut self, from: &dyn Column, starts: &[u32], step: &[f64]);
     /// The first variable with a coordinate that is not finite.
     fn first_not_finite(&self) -> Option<usize>;
+    /// `self ← from`, a column of the same type, in the memory that is there.
+    fn copy_from(&mut self, from: &dyn Column);
     /// The same column again.
     fn clone_box(&self) -> Box<dyn Column>;
 }
@@ -56,6 +58,11 @@ impl<M: Manifold + Variable> Column for Plain<M> {
     }
     fn first_not_finite(&self) -> Option<usize> {
         self.0.iter().position(|x| !x.is_finite())
+    }
+    fn copy_from(&mut self, from: &dyn Column) {
+        if let Some(from) = from.as_any().downcast_ref::<Plain<M>>() {
+            self.0.clone_from(&from.0);
+        }
     }
     fn clone_box(&self) -> Box<dyn Column> {
         Box::new(self.clone())
@@ -102,5 +109,12 @@ impl Columns {
 impl Clone for Columns {
     fn clone(&self) -> Self {
         Columns(self.0.iter().map(|(id, c)| (*id, c.clone_box())).collect())
+    }
+    fn clone_from(&mut self, from: &Self) {
+        if self.0.iter().map(|(id, _)| id).eq(from.0.iter().map(|(id, _)| id)) {
+            self.0.iter_mut().zip(&from.0).for_each(|((_, to), (_, from))| to.copy_from(&**from));
+        } else {
+            *self = from.clone();
+        }
     }
 }

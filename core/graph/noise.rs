@@ -176,6 +176,23 @@ impl Noise {
         self.observed = Some(rows.to_vec());
         self
     }
+    /// The same noise, of a measurement that counts `weight` times: its information, multiplied.
+    ///
+    /// # Errors
+    /// Where that is not positive and finite.
+    pub fn weighted(&self, weight: f64) -> Result<Self, NoiseError> {
+        let spread = sigma(weight)?.sqrt().recip();
+        let model = match &self.model {
+            Model::Unit => Model::Isotropic(sigma(spread)?),
+            Model::Isotropic(s) => Model::Isotropic(sigma(s * spread)?),
+            Model::Diagonal(s) => {
+                Model::Diagonal(s.iter().map(|s| sigma(s * spread)).collect::<Result<_, _>>()?)
+            }
+            Model::Covariance(m) => Model::Covariance(spd(m / weight)?),
+            Model::Information(m) => Model::Information(spd(m * weight)?),
+        };
+        Ok(Self { model, observed: self.observed.clone() })
+    }
     /// Which rows were measured; `None` for all.
     pub fn observed(&self) -> Option<&[bool]> {
         self.observed.as_deref()

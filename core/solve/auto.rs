@@ -127,16 +127,16 @@ impl Auto {
 }
 
 /// Values to begin with.
-struct Point {
-    inactive: usize,
-    cost: f64,
-    values: Values,
+pub(crate) struct Point {
+    pub inactive: usize,
+    pub cost: f64,
+    pub values: Values,
     /// A step from here has been refused.
-    refused: bool,
+    pub refused: bool,
 }
 
 /// What the registered starts have to offer.
-fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> Vec<Point> {
+pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> Vec<Point> {
     let others = catalogue::entries(<dyn Start>::NAME).into_iter().filter(|e| e.name != Given::NAME);
     others
         .filter_map(|entry| {

@@ -6,7 +6,7 @@ use crate::outcome::Times;
 use crate::problem::{Place, Problem};
 use manifactor_graph::batch::{Batch, Member};
 use manifactor_graph::column::{Columns, FIXED};
-use manifactor_graph::{Fixed, Graph, GraphError, Key, Resolved, Values};
+use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values};
 use std::any::TypeId;
 use std::collections::HashMap;
 use std::time::Instant;
@@ -24,6 +24,14 @@ pub enum CompileError {
     /// The linear solver does not fit the graph.
     #[error("the linear solver does not fit the graph: {0}")]
     LinearSolver(String),
+    /// A solver that names a factor which is not there.
+    #[error("there is no factor {factor}: the graph has {factors}, from 0")]
+    NoFactor {
+        /// What was asked for.
+        factor: usize,
+        /// How many there are.
+        factors: usize,
+    },
     /// The linear system does not fit into memory.
     #[error("no memory for a linear system of {unknowns} unknowns{}", shortage(*.needed, *.available))]
     OutOfMemory {
@@ -105,11 +113,14 @@ pub(crate) fn compile(
     let batches = batches(graph, &resolved, &variables, &block, &layout);
     let (h, g) = (vec![0.0; layout.row_idx.len()], vec![0.0; unknowns]);
     let factor_keys = graph.factors().iter().map(|f| f.keys.clone()).collect();
+    let factor_types = graph.factors().iter().map(|f| (f.factor.typetag_name(), observed_rows(f))).collect();
     let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };
     let trial = columns.clone();
     Ok(Problem {
         variables,
         factor_keys,
+        factor_types,
+        weights: vec![],
         columns,
         trial,
         starts,
@@ -124,6 +135,11 @@ pub(crate) fn compile(
         forward: vec![],
         times,
     })
+}
+
+fn observed_rows(entry: &FactorEntry) -> usize {
+    let all = entry.factor.erased().signature().rows.unwrap_or(0);
+    entry.noise.observed().map_or(all, |observed| observed.iter().filter(|o| **o).count())
 }
 
 /// Values into columns, by type.

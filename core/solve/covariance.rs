@@ -1,10 +1,13 @@
 //! Covariances of estimates.
+use crate::Solution;
+use crate::compile::CompileError;
 use crate::diagnose::undetermined;
 use crate::linear::Method;
 use crate::problem::Problem;
 use crate::termination::Undetermined;
-use manifactor_graph::Key;
+use manifactor_graph::{Graph, Key};
 use nalgebra::DMatrix;
+use serde::{Serialize, Serializer};
 
 /// Why there are no covariances.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -27,6 +30,45 @@ pub enum CovarianceError {
         /// Size of the linear system.
         unknowns: usize,
     },
+    /// A graph that is not the one that was solved.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+}
+
+/// The uncertainty of one variable.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Marginal {
+    /// The variable.
+    pub key: Key,
+    /// Names of its tangent directions.
+    pub tangent: &'static [&'static str],
+    /// Covariance in these directions, by rows.
+    #[serde(serialize_with = "by_rows")]
+    pub covariance: DMatrix<f64>,
+}
+
+fn by_rows<S: Serializer>(matrix: &DMatrix<f64>, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(matrix.row_iter().map(|row| row.iter().copied().collect::<Vec<f64>>()))
+}
+
+impl Solution {
+    /// The marginal covariances of the variables that `keys` names, or of all where it names none; see
+    /// [`Problem::marginals`].
+    ///
+    /// # Errors
+    /// Where a key is unknown, something is not constrained, or `graph` is not the one that was solved.
+    pub fn marginals(&self, graph: &Graph, keys: &[&str]) -> Result<Vec<Marginal>, CovarianceError> {
+        if let Some(unknown) = keys.iter().find(|key| !self.values.contains(key)) {
+            return Err(CovarianceError::Unknown((*unknown).to_owned()));
+        }
+        let all = self.problem(graph)?.marginals()?;
+        let wanted = all.into_iter().filter(|(key, _)| keys.is_empty() || keys.contains(&key.as_str()));
+        let marginal = |(key, covariance): (Key, _)| {
+            let tangent = self.values.variable(key.as_str())?.erased().tangent();
+            Some(Marginal { key, tangent, covariance })
+        };
+        Ok(wanted.filter_map(marginal).collect())
+    }
 }
 
 impl Problem {

@@ -8,6 +8,10 @@ use crate::termination::Undetermined;
 const PIVOT: f64 = 1e-11;
 /// A direction in which ‖J v‖² is below this, where v has length one by the diagonal, is open.
 const OPEN: f64 = 1e-15;
+/// An entry of the diagonal below this share of the largest is nothing but rounding.
+const ROUNDING: f64 = 1e-24;
+/// Lengths are measured by the diagonal, or by this share of its largest entry where it is less.
+const FLOOR: f64 = 1e-9;
 /// Damping that lets the matrix be factorized for the search.
 const SHIFT: f64 = 1e-10;
 /// Variables named in a report.
@@ -34,21 +38,25 @@ pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) ->
 }
 
 fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
-    let mut diagonal = vec![];
-    problem.diagonal(&mut diagonal);
+    let largest = problem.layout.diagonal().iter().fold(0.0, |most, i| f64::max(most, problem.h[*i]));
     if !failed {
         let mut suspicious = false;
         let share = PIVOT.max(10.0 * damping);
-        problem.cholesky()?.pivots(&mut |i, pivot| {
+        let (h, diagonal) = (&problem.h, problem.layout.diagonal());
+        let Method::Cholesky(cholesky) = &problem.method else { return None };
+        cholesky.pivots(&mut |i, pivot| {
+            let entry = h[diagonal[i]];
             // a pivot that is not a number is suspicious too
-            suspicious |= pivot.is_nan() || pivot < share * diagonal[i];
+            suspicious |= pivot.is_nan() || pivot < share * entry || entry <= ROUNDING * largest;
         });
-        suspicious |= diagonal.contains(&0.0);
         if !suspicious {
             return None;
         }
     }
-    let scale: Vec<f64> = diagonal.iter().map(|d| if *d > 0.0 { *d } else { 1.0 }).collect();
+    let mut scale = vec![];
+    problem.diagonal(&mut scale);
+    let floor = if largest > 0.0 { FLOOR * largest } else { 1.0 };
+    scale.iter_mut().for_each(|d| *d = d.max(floor));
     let shift: Vec<f64> = scale.iter().map(|d| SHIFT * d).collect();
     problem.factorize(Some(&shift)).ok()?;
     // inverse iteration from a start with a part in every direction

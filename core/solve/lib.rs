@@ -6,10 +6,13 @@
 mod auto;
 mod block_system;
 mod compile;
+mod condition;
 mod covariance;
 mod diagnose;
+mod diagnosis;
 mod dogleg;
 mod gauss_newton;
+mod gnc;
 mod layout;
 mod levenberg_marquardt;
 mod linear;
@@ -26,14 +29,16 @@ mod termination;
 pub use auto::Auto;
 pub use block_system::{BlockSystem, BlockSystemError};
 pub use compile::CompileError;
-pub use covariance::CovarianceError;
+pub use covariance::{CovarianceError, Marginal};
+pub use diagnosis::{Diagnosis, FactorCost};
 pub use dogleg::Dogleg;
 pub use gauss_newton::GaussNewton;
+pub use gnc::{BadParameter, Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor};
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linear_solver::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
 pub use observer::{All, Interrupt, Observer, Silent};
 pub use optimizer::{Optimizer, Stopping};
-pub use outcome::{IterationRecord, Outcome, Times};
+pub use outcome::{IterationRecord, Outcome, Rejected, Times};
 pub use problem::Problem;
 pub use start::{Given, Start, StartError};
 pub use termination::{Stall, Termination, Tolerance, Undetermined};
@@ -50,6 +55,8 @@ pub struct Solution {
     pub outcome: Outcome,
     /// Each factor at the estimate, in the order of the graph.
     pub factors: Vec<FactorState>,
+    /// How often the solver has let each factor count, on top of its loss; empty, where it does not weigh them.
+    pub weights: Vec<f64>,
 }
 
 /// Compiles and solves.
@@ -69,6 +76,7 @@ pub fn solve(
 impl Solution {
     /// The problem's estimate, at the end of a solve.
     fn of(problem: &Problem, outcome: Outcome) -> Self {
-        Self { values: problem.values(), factors: problem.inspect(), outcome }
+        let weights = problem.weights().to_vec();
+        Self { values: problem.values(), factors: problem.inspect(), outcome, weights }
     }
 }

@@ -69,6 +69,9 @@ impl Default for Stopping {
     }
 }
 
+/// Records that there is room for from the beginning.
+const HISTORY: usize = 1000;
+
 /// A step to be tried, and what is expected of it.
 pub(crate) struct Step {
     /// ½ρ less by the quadratic model.
@@ -125,7 +128,7 @@ impl<'a> Session<'a> {
             initial_cost: at.cost,
             clock,
             compile,
-            history: vec![],
+            history: Vec::with_capacity(stop.max_iterations.min(HISTORY)),
             interrupted: false,
         };
         match at.not_finite {
@@ -241,6 +244,7 @@ impl<'a> Session<'a> {
             undetermined,
             factors: self.problem.factors(),
             inactive: self.at.inactive,
+            rejected: vec![],
             times,
             history: std::mem::take(&mut self.history),
         }
@@ -259,7 +263,8 @@ impl Best {
     }
     pub(crate) fn update(&mut self, session: &Session<'_>) {
         if session.at.cost < self.cost {
-            *self = Self::new(session);
+            self.cost = session.at.cost;
+            self.columns.clone_from(&session.problem.columns);
         }
     }
     /// Goes back to the best estimate, where that is not the last.

@@ -1,5 +1,6 @@
 //! What a solve has to tell.
 use crate::termination::{Termination, Undetermined};
+use manifactor_graph::Key;
 use serde::Serialize;
 
 /// What a solve did and how it ended.
@@ -20,6 +21,9 @@ pub struct Outcome {
     pub factors: usize,
     /// Factors that are not defined at the final values, and take no part in the cost.
     pub inactive: usize,
+    /// Factors that a solver has found to be outliers, in the order of the graph.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rejected: Vec<Rejected>,
     /// Where the time went.
     pub times: Times,
     /// A record for each step tried.
@@ -35,6 +39,21 @@ impl Outcome {
         let end = if better { next } else { self };
         Self { initial_cost, iterations, times, history, ..end }
     }
+}
+
+/// A factor that costs more than an inlier may.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rejected {
+    /// Its place in the graph, from 0.
+    pub factor: usize,
+    /// Its type.
+    pub name: &'static str,
+    /// Its variables.
+    pub keys: Vec<Key>,
+    /// How much it still counts, from 0 to 1.
+    pub weight: f64,
+    /// What it would cost with full weight.
+    pub cost: f64,
 }
 
 /// Seconds by stage.

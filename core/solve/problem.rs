@@ -28,6 +28,10 @@ pub(crate) struct Place {
 pub struct Problem {
     pub(crate) variables: Vec<Place>,
     pub(crate) factor_keys: Vec<Vec<Key>>,
+    /// By factor: its type's name, and the rows of its residual that were observed.
+    pub(crate) factor_types: Vec<(&'static str, usize)>,
+    /// By factor: how often it counts; empty, where nobody weighs them.
+    pub(crate) weights: Vec<f64>,
     /// The estimate, and room for a trial step.
     pub(crate) columns: Columns,
     pub(crate) trial: Columns,
@@ -128,6 +132,26 @@ impl Problem {
     /// Cost at the estimate, over the factors that took part in the last linearization.
     pub fn cost(&self) -> Evaluation {
         self.batches.iter().map(|b| b.cost(&self.columns)).fold(Evaluation::default(), Evaluation::and)
+    }
+
+    /// ½ρ of each factor at the estimate, in the order of the graph, whatever its weight; zero where it is not
+    /// defined.
+    pub fn factor_costs(&self, costs: &mut Vec<f64>) {
+        costs.resize(self.factors(), 0.0);
+        self.batches.iter().for_each(|b| b.costs(&self.columns, costs));
+    }
+
+    /// Makes each factor count as often as its weight says, on top of its loss; those without a weight once.
+    pub fn set_weights(&mut self, weights: &[f64]) {
+        self.weights.clear();
+        self.weights.extend_from_slice(weights);
+        self.weights.resize(self.factors(), 1.0);
+        self.batches.iter_mut().for_each(|b| b.set_weights(&self.weights));
+    }
+
+    /// The weight of each factor, in the order of the graph; empty, where none was set.
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
     }
 
     /// Makes `estimate ⊞ step` the trial, and returns its cost.

@@ -2,13 +2,13 @@
 //!
 //! `report.json` for the run as a whole, and a folder for each variant with `config.toml` (all settings, ready to be
 //! run again), `trajectory.txt` (TUM's format), `objects.json`, `graph.json` (the literal graph at the estimate),
-//! `iterations.csv` and `metrics.json`. Each file is written whole or not at all.
+//! `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all.
 use crate::estimate::Estimate;
 use crate::report::{RunReport, VariantReport};
 use crate::run_document::{RunDocument, Variant, slug};
 use manifactor_config::{Format, WriteError, to_json, to_toml, write_graph};
 use manifactor_formats::tum;
-use manifactor_solve::IterationRecord;
+use manifactor_solve::{CovarianceError, IterationRecord};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::io;
@@ -26,6 +26,9 @@ pub enum OutputError {
         /// What the system said.
         source: io::Error,
     },
+    /// Covariances that are asked for, and infinite or out of reach.
+    #[error("covariances.json: {0}")]
+    Covariance(#[from] CovarianceError),
     /// A result that no document can hold.
     #[error("{}: {source}", path.display())]
     Document {
@@ -87,6 +90,10 @@ pub fn write_variant(
     write_document(&file("graph.json"), graph)?;
     write_whole(&file("iterations.csv"), &iterations(&estimate.solution.outcome.history))?;
     write_document(&file("metrics.json"), to_json(report))?;
+    if variant.settings.report.covariances {
+        let marginals = estimate.solution.marginals(&estimate.mapping.graph, &[])?;
+        write_document(&file("covariances.json"), to_json(&marginals))?;
+    }
     Ok(folder)
 }
 

@@ -4,7 +4,7 @@ use crate::mapping::{MappedObject, Rejection, Warning};
 use crate::settings::Settings;
 use manifactor_graph::Direction;
 use manifactor_quadric::{DualQuadric, LandmarkError};
-use manifactor_solve::{Outcome, Termination, Times};
+use manifactor_solve::{Diagnosis, Outcome, Rejected, Termination, Times};
 use serde::Serialize;
 
 mod landmarks;
@@ -91,6 +91,12 @@ pub struct SolveReport {
     pub inactive: usize,
     /// Their share of all, from 0 to 1.
     pub inactive_share: f64,
+    /// Factors that the solver has found to be outliers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rejected: Vec<Rejected>,
+    /// The factors that fit worst, and the condition of the linear system.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diagnosis: Option<Diagnosis>,
     /// Where the time of the solver went.
     pub times: Times,
     /// Time spent on objects alone.
@@ -170,6 +176,9 @@ impl SolveReport {
             factors,
             inactive,
             inactive_share: inactive as f64 / factors.max(1) as f64,
+            rejected: outcome.rejected.clone(),
+            // a graph that was solved can be compiled
+            diagnosis: estimate.solution.diagnose(&estimate.mapping.graph).ok(),
             times: outcome.times,
             refinement_seconds: estimate.refinement_seconds,
         }

@@ -15,10 +15,12 @@ mod detections;
 mod evaluation;
 mod number;
 mod objects;
+mod report;
 
 pub use detections::{CutSides, DetectionSettings};
 pub use evaluation::EvaluationSettings;
 pub use objects::ObjectSettings;
+pub use report::ReportSettings;
 
 /// Everything that is to be known to make an estimate.
 #[derive(Debug, Clone, Serialize)]
@@ -44,6 +46,8 @@ pub struct Settings {
     pub solver: Arc<dyn Optimizer>,
     /// What the estimate is compared with, and how.
     pub evaluation: EvaluationSettings,
+    /// What is written besides the usual.
+    pub report: ReportSettings,
 }
 
 fn no_aliases(aliases: &Aliases) -> bool {
@@ -94,6 +98,7 @@ impl Settings {
         let aliases = section.or_default("aliases");
         let solver = section.optional_registered::<dyn Optimizer>("solver");
         let evaluation = section.or_default("evaluation");
+        let report = section.or_default("report");
         Some(Self {
             source: Arc::from(source?),
             odometry: odometry?,
@@ -105,6 +110,7 @@ impl Settings {
             aliases,
             solver: solver.map_or_else(default_solver, Arc::from),
             evaluation,
+            report,
         })
     }
 }

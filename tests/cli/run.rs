@@ -9,9 +9,10 @@ const SMALL: &str = "--set source.trajectory.frames=40 --set source.scene.object
 fn a_run_leaves_its_files() {
     let folder = folder(&[]);
     let out = path(&folder, "desk");
-    let ran = manifactor(&format!("run examples/desk/desk.toml --out {out} {SMALL}"));
+    let ran =
+        manifactor(&format!("run examples/desk/desk.toml --out {out} {SMALL} --set report.covariances=true"));
     assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
-    for text in ["ATE", "position", "shape", "quality", "QuadricSLAM", "before the solve"] {
+    for text in ["ATE", "position", "shape", "quality", "QuadricSLAM", "before the solve", "condition"] {
         assert!(ran.stdout.contains(text), "{text} is missing:\n{}", ran.stdout);
     }
     let out = Path::new(&out);
@@ -21,6 +22,13 @@ fn a_run_leaves_its_files() {
     {
         assert!(out.join("quadricslam").join(file).is_file(), "{file}");
     }
+    let read = |file: &str| {
+        let text = std::fs::read_to_string(out.join("quadricslam").join(file)).unwrap();
+        serde_json::from_str::<Value>(&text).unwrap()
+    };
+    let covariances = read("covariances.json");
+    assert_eq!(covariances[0]["covariance"].as_array().unwrap().len(), 6);
+    assert_eq!(read("metrics.json")["solve"]["diagnosis"]["worst"].as_array().unwrap().len(), 10);
     for view in ["map_top.svg", "map_side.svg"] {
         let picture = std::fs::read_to_string(out.join("quadricslam").join(view)).unwrap();
         assert!(picture.contains("</svg>") && picture.contains("odometry"), "{view}");

@@ -209,3 +209,76 @@ fn a_solved_pose_graph_is_certified_on_request() {
     let ran = manifactor(&format!("solve {} --certify", path(&folder, "graph.toml"))).ended(2);
     ran.complains("factor 0 has a robust loss");
 }
+
+/// A line of poses with loop closures, one of them false.
+fn with_an_outlier() -> String {
+    let mut text = String::new();
+    for i in 0..12 {
+        text += &format!("VERTEX_SE2 {i} {i} 0 0\n");
+    }
+    let mut edge = |a: usize, b: usize, x: usize| {
+        text += &format!("EDGE_SE2 {a} {b} {x} 0 0 100 0 0 100 0 100\n");
+    };
+    (1..12).for_each(|i| edge(i - 1, i, 1));
+    (4..12).for_each(|i| edge(i - 4, i, 4));
+    edge(0, 11, 3);
+    text
+}
+
+#[test]
+fn an_outlier_is_rejected_and_named() {
+    let folder = folder(&[("graph.g2o", &with_an_outlier())]);
+    let file = path(&folder, "graph.g2o");
+    let json = manifactor(&format!("solve {file} --solver gnc --json")).ended(0).json();
+    assert_eq!(json["rejected"].as_array().unwrap().len(), 1);
+    assert_eq!(
+        (&json["rejected"][0]["factor"], &json["rejected"][0]["keys"][1]),
+        (&19.into(), &"x11".into())
+    );
+    assert!(json["final_cost"].as_f64().unwrap() < 1e-12);
+    let ran = manifactor(&format!("solve {file} --solver gnc")).ended(0);
+    assert!(ran.stdout.contains("1 of 20 factors rejected as outliers: 19 (x0, x11)"), "{}", ran.stdout);
+    let set =
+        "--set solver.cost=geman_mcclure --set solver.solver.type=dogleg --set solver.probability=0.999";
+    let json = manifactor(&format!("solve {file} --solver gnc {set} --json")).ended(0).json();
+    assert_eq!(json["rejected"][0]["factor"], 19);
+    manifactor(&format!("solve {file} --solver gnc --set solver.probability=2")).ended(2).complains("got 2");
+    manifactor(&format!("solve {file} --solver gnc --set solver.inliers=[99]"))
+        .ended(2)
+        .complains("no factor 99");
+}
+
+#[test]
+fn what_costs_the_most_is_shown_with_the_condition() {
+    let folder = folder(&[("graph.g2o", &with_an_outlier())]);
+    let file = path(&folder, "graph.g2o");
+    let ran = manifactor(&format!("solve {file}")).ended(0);
+    assert!(
+        ran.stdout.contains("19 between_se2 (x0, x11)") && ran.stdout.contains("condition "),
+        "{}",
+        ran.stdout
+    );
+    let diagnosis = &manifactor(&format!("solve {file} --json")).ended(0).json()["diagnosis"];
+    let worst = diagnosis["worst"].as_array().unwrap();
+    assert!(
+        worst.len() == 10 && worst[0]["factor"] == 19 && worst[0]["residual"].as_array().unwrap().len() == 3
+    );
+    assert!(worst[0]["cost"].as_f64() >= worst[9]["cost"].as_f64());
+    assert!(diagnosis["condition"].as_f64().unwrap() > 10.0);
+}
+
+#[test]
+fn covariances_are_given_on_request() {
+    let folder = folder(&[("graph.g2o", G2O)]);
+    let file = path(&folder, "graph.g2o");
+    let json = manifactor(&format!("solve {file} --covariances --json")).ended(0).json();
+    let [held, free] = json["covariances"].as_array().unwrap().as_slice() else { panic!("{json}") };
+    assert_eq!((&held["key"], &held["covariance"][0][0]), (&"x0".into(), &0.0.into()));
+    assert_eq!(free["tangent"].as_array().unwrap().len(), 3);
+    assert!((free["covariance"][2][2].as_f64().unwrap() - 0.01).abs() < 1e-9);
+    let ran = manifactor(&format!("solve {file} --covariances=x1")).ended(0);
+    assert!(ran.stdout.contains("x1") && ran.stdout.contains("1.000e-1"), "{}", ran.stdout);
+    let json = manifactor(&format!("solve {file} --covariances=x1 --json")).ended(0).json();
+    assert_eq!(json["covariances"].as_array().unwrap().len(), 1);
+    manifactor(&format!("solve {file} --covariances=x7")).ended(2).complains("no variable `x7`");
+}

@@ -25,6 +25,10 @@ pub(crate) struct Solve {
     /// Certify the minimum of a pose graph: whether it is the global one, as far as that can be known.
     #[arg(long)]
     certify: bool,
+    /// Marginal covariances at the estimate: of all variables, or of those named, separated by commas. Standard
+    /// deviations as a table; matrices with --json.
+    #[arg(long, value_name = "KEYS", num_args = 0.., require_equals = true, value_delimiter = ',', default_missing_value = "")]
+    covariances: Option<Vec<String>>,
     /// Write the solved graph here; the extension tells the format.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -58,8 +62,18 @@ impl Solve {
         }
         let certificate = self.certify.then(|| certify(&input.graph, &solution.values));
         let certificate = certificate.transpose().map_err(Failure::input)?;
+        let diagnosis = solution.diagnose(&input.graph).map_err(Failure::input)?;
+        let marginals = self.covariances.as_ref().map(|keys| {
+            let keys: Vec<&str> = keys.iter().map(String::as_str).filter(|key| !key.is_empty()).collect();
+            solution.marginals(&input.graph, &keys)
+        });
+        let marginals = marginals.transpose().map_err(Failure::input)?;
         if self.json {
             let mut json = self.as_json(&input, &solution, start);
+            json["diagnosis"] = json!(diagnosis);
+            if let Some(marginals) = marginals {
+                json["covariances"] = json!(marginals);
+            }
             if let Some(certificate) = certificate {
                 json["certificate"] = json!(certificate);
             }
@@ -68,8 +82,9 @@ impl Solve {
             let name = input.start.typetag_name();
             let start = format!("start {name} in {}\n", seconds(start));
             let certificate = certificate.map_or_else(String::new, |c| format!("{c}\n"));
-            let outcome = report::outcome(&solution.outcome);
-            output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate));
+            let outcome = report::outcome(&solution.outcome) + &report::diagnosis(&diagnosis);
+            let marginals = marginals.map_or_else(String::new, |m| report::marginals(&m));
+            output::print(&(graph_file::summary(&input) + &start + &outcome + &certificate + &marginals));
         }
         Ok(Status::from(&solution.outcome.termination))
     }
@@ -87,6 +102,7 @@ impl Solve {
             "termination": outcome.termination,
             "undetermined": outcome.undetermined,
             "inactive": outcome.inactive,
+            "rejected": outcome.rejected,
             "seconds": outcome.times,
             "notes": input.notes,
         });

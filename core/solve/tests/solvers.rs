@@ -291,3 +291,43 @@ fn the_gradient_is_that_of_the_cost() {
         }
     }
 }
+
+#[test]
+fn the_diagnosis_names_the_worst_factors_and_the_condition() {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: 0.0, y: 0.0 });
+    values.insert("q", Plane { x: 0.0, y: 0.0 });
+    for i in 0..14 {
+        graph.add(["p"], At { at: [i as f64, 0.0] });
+    }
+    graph.add(["p", "q"], Apart { by: [0.0, 0.0] }).noise(Noise::sigma(10.0).unwrap());
+    graph.add(["q"], At { at: [6.5, 0.0] }).loss(GemanMcClure::default());
+    let diagnosis = run(&graph, &values, &GaussNewton::default()).diagnose(&graph).unwrap();
+    let worst: Vec<usize> = diagnosis.worst.iter().map(|f| f.factor).collect();
+    assert_eq!(worst.len(), 10);
+    assert!(worst[..4].iter().all(|f| [0, 1, 12, 13].contains(f)), "{worst:?}");
+    let first = &diagnosis.worst[0];
+    assert_eq!((first.name, first.keys[0].as_str(), first.weight), ("toy_at", "p", 1.0));
+    assert!((first.cost - 0.5 * 6.5 * 6.5).abs() < 1e-6 && (first.residual[0].abs() - 6.5).abs() < 1e-6);
+    // two blocks that are almost apart: [1, c; c, 1] with c = 0.01/√(14.01·1.01), of which all eigenvalues are 1 ± c
+    let c = 0.01 / (14.01_f64 * 1.01).sqrt();
+    let condition = diagnosis.condition.unwrap();
+    assert!(condition >= 1.0 - 1e-9 && condition <= (1.0 + c) / (1.0 - c) + 1e-9, "{condition}");
+}
+
+#[test]
+fn the_condition_is_that_of_the_scaled_matrix() {
+    // two points tied k times as firmly to one another as to the ground: eigenvalues 1 and 1 + 2k
+    for k in [10.0, 1e6] {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        for key in ["p", "q"] {
+            values.insert(key, Plane { x: 0.0, y: 1.0 });
+            graph.add([key], At { at: [0.0, 0.0] });
+        }
+        graph.add(["p", "q"], Apart { by: [0.0, 0.0] }).noise(Noise::sigma((1.0_f64 / k).sqrt()).unwrap());
+        let condition = Problem::compile(&graph, &values).unwrap().condition().unwrap();
+        assert!((condition / (1.0 + 2.0 * k) - 1.0).abs() < 0.05, "{condition}");
+    }
+    let (graph, values) = chain(5);
+    assert_eq!(Problem::compile(&graph, &values).unwrap().condition(), None);
+}

@@ -1,0 +1,69 @@
+//! Which factors may be outliers.
+use crate::problem::Problem;
+use manifactor_graph::Key;
+use manifactor_graph::catalogue;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// The factors that may be outliers. All others are trusted, and keep their full weight.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Candidates {
+    /// Factors that couple variables, but for odometry: between variables of one type that follow one another in
+    /// the order of the values. Priors and other factors of a single variable are trusted too.
+    #[default]
+    LoopClosures,
+    /// Every factor.
+    All,
+}
+
+/// The name of a registered factor.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "String", into = "String")]
+#[schemars(with = "String")]
+pub struct FactorType(String);
+
+/// A name that no factor has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("there is no factor `{0}`; see `manifactor list factors`")]
+pub struct UnknownFactor(String);
+
+impl TryFrom<String> for FactorType {
+    type Error = UnknownFactor;
+    fn try_from(name: String) -> Result<Self, UnknownFactor> {
+        match catalogue::find("factor", &name) {
+            Some(_) => Ok(Self(name)),
+            None => Err(UnknownFactor(name)),
+        }
+    }
+}
+
+impl From<FactorType> for String {
+    fn from(name: FactorType) -> Self {
+        name.0
+    }
+}
+
+impl FactorType {
+    pub(crate) fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl Candidates {
+    /// By factor: whether it is a candidate.
+    pub(crate) fn of(self, problem: &Problem) -> Vec<bool> {
+        let places: HashMap<&Key, (usize, usize)> =
+            problem.variables.iter().map(|p| (&p.key, (p.column, p.index))).collect();
+        let follows = |pair: &[Key]| match (places.get(&pair[0]), places.get(&pair[1])) {
+            (Some(a), Some(b)) => a.0 == b.0 && a.1.abs_diff(b.1) == 1,
+            _ => false,
+        };
+        let may = |keys: &Vec<Key>| match self {
+            Self::All => true,
+            Self::LoopClosures => keys.len() > 1 && !keys.windows(2).all(follows),
+        };
+        problem.factor_keys.iter().map(may).collect()
+    }
+}

@@ -1,0 +1,118 @@
+//! The family of costs that leads from a convex one to the robust one, and the weights of each.
+//!
+//! Throughout u is what a factor costs by what an inlier may cost: u = ‖r‖²/c².
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A robust cost, in units of what an inlier may cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Truncation {
+    /// min(u, 1): a factor counts in full or not at all.
+    #[default]
+    TruncatedLeastSquares,
+    /// u / (1 + u): a factor counts the less the worse it fits.
+    GemanMcclure,
+}
+
+use Truncation::{GemanMcclure, TruncatedLeastSquares};
+
+impl Truncation {
+    /// The first μ, where the worst factor has u = `worst`; `None` where nothing has to be graduated.
+    pub(super) fn first(self, worst: f64) -> Option<f64> {
+        match self {
+            // remark 5 of the paper: convex as far as the worst
+            TruncatedLeastSquares => Some(2.0 * worst - 1.0).filter(|d| *d > 0.0).map(f64::recip),
+            GemanMcclure => Some(2.0 * worst).filter(|mu| *mu > 1.0),
+        }
+    }
+
+    /// The next μ, `step` times nearer to the robust cost; `None` where that is reached.
+    pub(super) fn next(self, mu: f64, step: f64) -> Option<f64> {
+        match self {
+            TruncatedLeastSquares => Some(mu * step).filter(|mu| *mu < self.last()),
+            GemanMcclure => Some(mu / step).filter(|mu| *mu > self.last()),
+        }
+    }
+
+    /// The μ of the robust cost itself. For least squares that are truncated it is infinite; here the surrogate
+    /// differs within a millionth of u = 1 only.
+    pub(super) fn last(self) -> f64 {
+        match self {
+            TruncatedLeastSquares => 1e6,
+            GemanMcclure => 1.0,
+        }
+    }
+
+    /// The weight that the surrogate of this μ gives to a factor: equations 12 and 14.
+    pub(super) fn weight(self, mu: f64, u: f64) -> f64 {
+        match self {
+            TruncatedLeastSquares if u <= mu / (mu + 1.0) => 1.0,
+            TruncatedLeastSquares if u >= (mu + 1.0) / mu => 0.0,
+            TruncatedLeastSquares => ((mu * (mu + 1.0) / u).sqrt() - mu).clamp(0.0, 1.0),
+            GemanMcclure => (mu / (u + mu)).powi(2),
+        }
+    }
+
+    /// The robust cost.
+    pub(super) fn rho(self, u: f64) -> f64 {
+        match self {
+            TruncatedLeastSquares => u.min(1.0),
+            GemanMcclure => u / (1.0 + u),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The surrogates ρ_μ, equations 8 and 10 in units of c².
+    fn surrogate(cost: Truncation, mu: f64, u: f64) -> f64 {
+        match cost {
+            TruncatedLeastSquares if u <= mu / (mu + 1.0) => u,
+            TruncatedLeastSquares if u >= (mu + 1.0) / mu => 1.0,
+            TruncatedLeastSquares => 2.0 * (u * mu * (mu + 1.0)).sqrt() - mu * (1.0 + u),
+            GemanMcclure => mu * u / (mu + u),
+        }
+    }
+
+    fn both() -> impl Strategy<Value = Truncation> {
+        prop_oneof![Just(TruncatedLeastSquares), Just(GemanMcclure)]
+    }
+
+    proptest! {
+        #[test]
+        fn a_weight_is_the_slope_of_its_surrogate(cost in both(), log_mu in -8.0..4.0f64, log_u in -4.0..8.0f64) {
+            let (mu, u) = (log_mu.exp(), log_u.exp());
+            let h = 1e-6 * u;
+            let slope = (surrogate(cost, mu, u + h) - surrogate(cost, mu, u - h)) / (2.0 * h);
+            let weight = cost.weight(mu, u);
+            prop_assert!((slope - weight).abs() < 1e-3 * (1.0 + weight) * (1.0 + mu.sqrt()), "{slope} {weight}");
+        }
+
+        #[test]
+        fn the_last_surrogate_is_the_robust_cost(cost in both(), u in 0.0..100.0f64) {
+            prop_assert!((surrogate(cost, cost.last(), u) - cost.rho(u)).abs() < 1e-5);
+        }
+
+        #[test]
+        fn the_schedule_leads_from_almost_all_of_the_worst_to_the_end(cost in both(), worst in 1.0..1e9f64) {
+            let mut mu = cost.first(worst);
+            // both begin with a positive second derivative in √u everywhere
+            prop_assert!(mu.is_some_and(|mu| cost.weight(mu, worst) > 0.0));
+            let mut steps = 0;
+            while let Some(now) = mu {
+                mu = cost.next(now, 1.4);
+                steps += 1;
+            }
+            prop_assert!(steps < 120);
+        }
+    }
+
+    #[test]
+    fn what_fits_everywhere_needs_no_schedule() {
+        assert!(TruncatedLeastSquares.first(0.4).is_none() && GemanMcclure.first(0.4).is_none());
+    }
+}
