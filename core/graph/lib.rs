@@ -14,6 +14,7 @@ mod dimension;
 mod direction;
 mod factor;
 mod graph;
+mod kernel;
 mod key;
 pub mod loss;
 mod manifold;
