@@ -12,6 +12,7 @@ pub mod checked;
 pub mod column;
 mod dimension;
 mod direction;
+mod dynamic;
 mod factor;
 mod graph;
 mod kernel;
@@ -29,6 +30,7 @@ mod variables;
 
 pub use dimension::{Block, Dimension, Matrix, Vector};
 pub use direction::{Direction, NoDirection};
+pub use dynamic::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
 pub use graph::{Fixed, Graph, GraphError, Resolved};
 pub use key::Key;
