@@ -172,13 +172,7 @@ impl<F: Kernel> BatchOf<F> {
 
     /// Whitened residuals, Jacobians and robust weights of the chunk that begins at `first`.
     #[inline(always)]
-    fn evaluate(
-        &self,
-        columns: F::Columns<'_>,
-        first: usize,
-        active: &mut [bool],
-        work: &mut Work<F>,
-    ) {
+    fn evaluate(&self, columns: F::Columns<'_>, first: usize, active: &mut [bool], work: &mut Work<F>) {
         let mut inactive = 0;
         for (k, active) in active.iter_mut().enumerate() {
             let i = first + k;

@@ -83,7 +83,9 @@ pub struct Dynamic<F>(F);
 
 /// A number of rows that no [`DynamicResidual`] can have.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("expected a residual of 1 to {MAX_ROWS} rows, got {0}; a longer one can be split over several factors")]
+#[error(
+    "expected a residual of 1 to {MAX_ROWS} rows, got {0}; a longer one can be split over several factors"
+)]
 pub struct WrongRows(pub usize);
 
 impl<F: DynamicResidual> Dynamic<F> {
@@ -200,13 +202,7 @@ impl<F: DynamicResidual, const N: usize> Kernel for Rows<F, N> {
     fn each(blocks: &mut DynamicBlocks, mut visit: impl FnMut(usize, &mut [f64])) {
         (0..blocks.ends.len()).for_each(|i| visit(i, blocks.block_mut(i)));
     }
-    fn scatter(
-        blocks: &DynamicBlocks,
-        r: &[f64],
-        w: f64,
-        places: Places<'_>,
-        to: &mut NormalEquations<'_>,
-    ) {
+    fn scatter(blocks: &DynamicBlocks, r: &[f64], w: f64, places: Places<'_>, to: &mut NormalEquations<'_>) {
         for a in 0..blocks.ends.len() {
             to.add_dynamic::<N>(places, a, |i| blocks.block(i), r, w);
         }

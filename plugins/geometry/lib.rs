@@ -9,6 +9,7 @@ mod between;
 mod certificate;
 mod chordal_between;
 mod coordinates;
+mod functions;
 mod initialise;
 mod landmark;
 mod lie_group;
