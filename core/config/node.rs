@@ -126,6 +126,18 @@ impl Node {
         }
     }
 
+    /// The place of a name below this node.
+    pub(crate) fn place_of_name(&self, name: &str) -> Option<Place> {
+        match &self.value {
+            Value::Table(table) => match table.get(name) {
+                Some(field) => Some(field.key.clone()),
+                None => table.values().find_map(|field| field.node.place_of_name(name)),
+            },
+            Value::Array(items) => items.iter().find_map(|item| item.place_of_name(name)),
+            _ => None,
+        }
+    }
+
     /// In words, for messages: `the number 3`, `a table`.
     pub fn in_words(&self) -> String {
         match &self.value {

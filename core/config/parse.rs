@@ -57,7 +57,9 @@ impl Node {
     fn explain(&self, failure: &ParseError) -> (Place, Problem) {
         let found = self.find(failure.path());
         if let Some(error) = TextError::parse(&failure.inner().to_string()) {
-            let place = found.node.place_in_text(&error).unwrap_or_else(|| found.node.place.clone());
+            // the text may be a value or a name
+            let place = found.node.place_in_text(&error).or_else(|| found.node.place_of_name(&error.text));
+            let place = place.unwrap_or_else(|| found.node.place.clone());
             return (place, Problem::Invalid { message: error.message, help: error.help });
         }
         let problem = problem_of(&failure.inner().to_string(), found.complete.then_some(found.node));

@@ -23,6 +23,13 @@ pub struct Shape {
     pub size: usize,
 }
 
+impl Shape {
+    /// Whether it is a vector of numbers.
+    pub fn is_vector(&self) -> bool {
+        VECTORS.contains(&self.name)
+    }
+}
+
 impl fmt::Display for Shape {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name)

@@ -1,5 +1,5 @@
 //! What formulas know of rotations, poses and points.
-use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
+use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3, atan2, wrap};
 use manifactor_graph::{register_functions, register_quantity};
 use nalgebra::{Vector2, Vector3, Vector6};
 
@@ -110,4 +110,19 @@ register_functions! {
 
     /// The y axis, turned.
     fn y_axis(x: So2) -> Vector2<f64> { x.act(&Vector2::y()) }
+
+    /// The angle of the vector (x, y) within -π..π, in radians.
+    fn atan2(y: f64, x: f64) -> f64 { atan2(y, x) }
+
+    /// The same angle within -π..π, in radians.
+    fn wrap(angle: f64) -> f64 { wrap(angle) }
+
+    /// The angle between two vectors, 0 to π. At both ends it has a kink; the derivative taken there is zero.
+    fn angle(a: Vector3<f64>, b: Vector3<f64>) -> f64 {
+        let across = a.cross(&b).norm_squared();
+        atan2(if across > T::zero() { across.sqrt() } else { across }, a.dot(&b))
+    }
+
+    /// The angle from a to b, counter-clockwise, within -π..π.
+    fn angle(a: Vector2<f64>, b: Vector2<f64>) -> f64 { atan2(a.x * b.y - a.y * b.x, a.dot(&b)) }
 }
