@@ -53,11 +53,14 @@ pub mod prelude {
     pub use manifactor_graph::__private::typetag;
     pub use manifactor_graph::checked::Positive;
     pub use manifactor_graph::loss::{Loss, RobustLoss};
+    pub use manifactor_graph::quantity::Quantity;
     pub use manifactor_graph::{
         Dimension, Direction, Factor, Graph, Jacobians, Jet, JetOf, Key, Lift, Lifted, Manifold, Many, Noise,
         Refs, Residual, Scalar, Tangent, Values, Variable, Variables, Vector,
     };
-    pub use manifactor_graph::{register, register_factor, register_loss, register_manifold};
+    pub use manifactor_graph::{
+        register, register_factor, register_functions, register_loss, register_manifold, register_quantity,
+    };
     pub use manifactor_solve::{
         Dogleg, GaussNewton, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome, Problem, Silent,
         Solution, Start, StartError, Stopping, Termination, solve,

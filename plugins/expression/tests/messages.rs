@@ -49,14 +49,17 @@ write norm(v)";
 `dot` takes a vector3 here, found a number
   1 - dot(major_axis(q), 3)
                          ^
-there is dot(a: vector2, b: vector2) -> number, dot(a: vector3, b: vector3) -> number, dot(a: vector6, b: vector6) -> number; what takes a number: abs, acos, asin, atan, atan2, cos, exp, ln, max, min, rotation, sin, sqrt, tan, vector, wrap";
+there is dot(a: vector3, b: vector3) -> number";
     an_object_where_a_pose_is_taken: "norm(position(q))" => "
 `position` takes an se2 or an se3 here, found a dual_quadric
   norm(position(q))
                 ^
 there is position(x: se2) -> vector2, position(x: se3) -> vector3; what takes a dual_quadric: centroid, extent, major_axis, pose, rotation, semi_axes";
     too_few_arguments: "1 - dot(up)" => "
-x";
+`dot` takes 2 arguments, found 1
+  1 - dot(up)
+      ^^^^^^^
+there is dot(a: vector2, b: vector2) -> number, dot(a: vector3, b: vector3) -> number, dot(a: vector6, b: vector6) -> number";
     a_number_and_a_vector: "1 + major_axis(q)" => "
 `+` is not defined between a number and a vector3
   1 + major_axis(q)
@@ -80,13 +83,17 @@ take it out, or open it before";
     a_bracket_that_is_never_closed: "dot([0, 0, 1, major_axis(q))" => "
 expected `,`, an operator or `]`, found `)`
   dot([0, 0, 1, major_axis(q))
-                             ^";
+                             ^
+a `[` before it is still open";
     a_value_that_is_missing: "1 - " => "
 the formula ends where a value is expected
   1 - 
       ^";
     two_operators_in_a_row: "1 * / x" => "
-x";
+unexpected `/`
+  1 * / x
+      ^
+expected a number, a name, a call such as `norm(v)`, a vector such as `[0, 0, 1]`, or `(`";
     a_sign_that_means_nothing: "dot(up, major_axis(q)) $ 2" => "
 expected an operator or the end of the formula, found `$`
   dot(up, major_axis(q)) $ 2
