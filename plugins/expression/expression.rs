@@ -9,11 +9,11 @@ use manifactor_graph::{Direction, Dynamic, ErasedResidual, Factor, TextError, Wr
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A factor whose residual is written as formulas. Its docs are those of the catalogue, with every function that is
-/// linked: `manifactor explain expression`.
+/// A factor whose residual is written as formulas. The catalogue has the language, with every function that is linked:
+/// `manifactor explain expression`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Document", into = "Document")]
-#[schemars(with = "Document")]
+#[schemars(with = "Document", description = page())]
 pub struct Expression {
     document: Document,
     program: Dynamic<Program>,
@@ -21,7 +21,7 @@ pub struct Expression {
 
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(rename = "Expression", description = page())]
+#[schemars(rename = "Expression")]
 struct Document {
     /// Names of the variables, in the order of the factor's keys, and the type of each.
     #[schemars(with = "std::collections::BTreeMap<String, String>")]
