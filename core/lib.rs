@@ -28,6 +28,8 @@ pub use manifactor_graph as graph;
 pub use manifactor_solve as solve;
 pub use nalgebra;
 
+#[cfg(feature = "expression")]
+pub use manifactor_expression as expression;
 #[cfg(feature = "formats")]
 pub use manifactor_formats as formats;
 #[cfg(feature = "geometry")]
@@ -39,7 +41,9 @@ pub use manifactor_slam as slam;
 #[cfg(feature = "viz")]
 pub use manifactor_viz as viz;
 
-pub use manifactor_graph::{register, register_factor, register_loss, register_manifold};
+pub use manifactor_graph::{
+    register, register_factor, register_functions, register_loss, register_manifold, register_quantity,
+};
 
 /// For traits that [`register!`] enters: `use manifactor::typetag;`, then `#[typetag::serde(name = "…")]` on the `impl`.
 pub use manifactor_graph::__private::typetag;
@@ -49,11 +53,14 @@ pub mod prelude {
     pub use manifactor_graph::__private::typetag;
     pub use manifactor_graph::checked::Positive;
     pub use manifactor_graph::loss::{Loss, RobustLoss};
+    pub use manifactor_graph::quantity::Quantity;
     pub use manifactor_graph::{
         Dimension, Direction, Factor, Graph, Jacobians, Jet, JetOf, Key, Lift, Lifted, Manifold, Many, Noise,
         Refs, Residual, Scalar, Tangent, Values, Variable, Variables, Vector,
     };
-    pub use manifactor_graph::{register, register_factor, register_loss, register_manifold};
+    pub use manifactor_graph::{
+        register, register_factor, register_functions, register_loss, register_manifold, register_quantity,
+    };
     pub use manifactor_solve::{
         Dogleg, GaussNewton, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome, Problem, Silent,
         Solution, Start, StartError, Stopping, Termination, solve,
@@ -65,6 +72,8 @@ pub mod prelude {
 }
 
 // a crate that nothing names is not linked, and its registrations are gone
+#[cfg(feature = "expression")]
+use manifactor_expression as _;
 #[cfg(feature = "formats")]
 use manifactor_formats as _;
 #[cfg(feature = "geometry")]

@@ -40,7 +40,7 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
 pub(crate) fn diagnosis(diagnosis: &Diagnosis) -> String {
     let condition = match diagnosis.condition {
         Some(condition) => format!("condition {condition:.1e}"),
-        None => "condition infinite, or unknown: H could not be factorized".to_owned(),
+        None => "condition infinite, or not estimated: H could not be factorized, or is large".to_owned(),
     };
     let open = diagnosis.undetermined.as_ref();
     let open = open.map_or_else(String::new, |open| format!("warning: at the estimate {open}\n"));

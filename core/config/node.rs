@@ -3,6 +3,7 @@ use crate::diagnostic::Diagnostic;
 use crate::problem::Problem;
 use crate::source::Place;
 use indexmap::IndexMap;
+use manifactor_graph::TextError;
 use serde::{Serialize, Serializer};
 use serde_path_to_error::{Path, Segment};
 
@@ -105,6 +106,36 @@ impl Node {
             }
         }
         found
+    }
+
+    /// The place that an error within one of the texts below this node means; the whole text, where it is written with
+    /// escapes; `None`, where there is no such text.
+    pub(crate) fn place_in_text(&self, error: &TextError) -> Option<Place> {
+        match &self.value {
+            Value::String(text) if TextError::line(text) == error.text => {
+                let written = self.place.text();
+                let quote = written.len() - written.trim_start_matches(['"', '\'', '\n', '\r']).len();
+                let plain = written.get(quote..quote + text.len()) == Some(text);
+                let start = self.place.span.start + quote;
+                let within = start + error.span.start..start + error.span.end;
+                Some(if plain { self.place.source.place(within) } else { self.place.clone() })
+            }
+            Value::Array(items) => items.iter().find_map(|item| item.place_in_text(error)),
+            Value::Table(table) => table.values().find_map(|field| field.node.place_in_text(error)),
+            _ => None,
+        }
+    }
+
+    /// The place of a name below this node.
+    pub(crate) fn place_of_name(&self, name: &str) -> Option<Place> {
+        match &self.value {
+            Value::Table(table) => match table.get(name) {
+                Some(field) => Some(field.key.clone()),
+                None => table.values().find_map(|field| field.node.place_of_name(name)),
+            },
+            Value::Array(items) => items.iter().find_map(|item| item.place_of_name(name)),
+            _ => None,
+        }
     }
 
     /// In words, for messages: `the number 3`, `a table`.

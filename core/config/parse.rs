@@ -5,6 +5,7 @@ use crate::node::{Node, Value};
 use crate::problem::Problem;
 use crate::source::Place;
 use crate::suggest::nearest;
+use manifactor_graph::TextError;
 use serde::de::DeserializeOwned;
 use serde_json::Value as Json;
 use serde_path_to_error::{Path, Segment};
@@ -55,6 +56,12 @@ impl Node {
     /// A failure's place in the document, and its problem in words that do not show serde's types.
     fn explain(&self, failure: &ParseError) -> (Place, Problem) {
         let found = self.find(failure.path());
+        if let Some(error) = TextError::parse(&failure.inner().to_string()) {
+            // the text may be a value or a name
+            let place = found.node.place_in_text(&error).or_else(|| found.node.place_of_name(&error.text));
+            let place = place.unwrap_or_else(|| found.node.place.clone());
+            return (place, Problem::Invalid { message: error.message, help: error.help });
+        }
         let problem = problem_of(&failure.inner().to_string(), found.complete.then_some(found.node));
         let key = match &problem {
             Problem::UnknownField { field, .. } => match &found.node.value {

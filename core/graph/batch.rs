@@ -1,11 +1,10 @@
 //! Factors of one concrete type, side by side: the loop that runs.
 use crate::column::{Columns, FIXED};
 use crate::dimension::{Block, Dimension, Matrix};
+use crate::kernel::Kernel;
 use crate::loss::{Loss, LossColumn};
 use crate::noise::{Whitener, Whiteners};
 use crate::normal_equations::{NormalEquations, Places, Slot};
-use crate::residual::{Jacobians, Residual};
-use crate::variables::Variables;
 use nalgebra::U1;
 use rayon::prelude::*;
 use std::any::Any;
@@ -110,7 +109,7 @@ pub trait Batch: Send + Sync {
 }
 
 /// The batch of a residual type.
-pub struct BatchOf<F: Residual> {
+pub(crate) struct BatchOf<F: Kernel> {
     factors: Vec<F>,
     entries: Vec<u32>,
     /// Factor i's variables are `ends[i-1]..ends[i]` of `index`, `starts`, `free` and `held`.
@@ -133,27 +132,27 @@ pub struct BatchOf<F: Residual> {
 
 /// Room for one chunk.
 #[derive(Clone)]
-struct Work<F: Residual> {
+struct Work<F: Kernel> {
     r: [Matrix<F::Dim, U1>; CHUNK],
-    j: [Jacobians<F>; CHUNK],
+    j: [F::Blocks; CHUNK],
     w: [f64; CHUNK],
     evaluation: Evaluation,
 }
 
-impl<F: Residual> Work<F> {
+impl<F: Kernel> Work<F> {
     fn new() -> Self {
         Self {
             r: [Block::zeros(); CHUNK],
-            j: std::array::from_fn(|_| F::Variables::blocks::<F::Dim>(0)),
+            j: std::array::from_fn(|_| F::blocks()),
             w: [0.0; CHUNK],
             evaluation: Evaluation::default(),
         }
     }
 }
 
-impl<F: Residual> BatchOf<F> {
+impl<F: Kernel> BatchOf<F> {
     /// An empty batch, for factors with such a noise and loss.
-    pub fn new(noise: &Whitener, loss: Option<&dyn Loss>) -> Self {
+    pub(crate) fn new(noise: &Whitener, loss: Option<&dyn Loss>) -> Self {
         Self {
             factors: vec![],
             entries: vec![],
@@ -180,18 +179,12 @@ impl<F: Residual> BatchOf<F> {
 
     /// Whitened residuals, Jacobians and robust weights of the chunk that begins at `first`.
     #[inline(always)]
-    fn evaluate(
-        &self,
-        columns: <F::Variables as Variables>::Columns<'_>,
-        first: usize,
-        active: &mut [bool],
-        work: &mut Work<F>,
-    ) {
+    fn evaluate(&self, columns: F::Columns<'_>, first: usize, active: &mut [bool], work: &mut Work<F>) {
         let mut inactive = 0;
         for (k, active) in active.iter_mut().enumerate() {
             let i = first + k;
             let range = Self::range(&self.ends, i);
-            let x = F::Variables::load(columns, &self.index[range.clone()]);
+            let x = self.factors[i].load(columns, &self.index[range.clone()]);
             *active = self.factors[i].is_defined(x.clone());
             if !*active {
                 inactive += 1;
@@ -199,14 +192,13 @@ impl<F: Residual> BatchOf<F> {
                 continue;
             }
             let j = &mut work.j[k];
-            F::Variables::resize::<F::Dim>(j, range.len());
             let value = self.factors[i].linearize(x, &self.free[range.clone()], j);
             let r = work.r[k].as_mut_slice();
             r.copy_from_slice(value.as_ref());
             self.whiteners.whiten(i, r);
             work.w[k] = r.iter().map(|x| x * x).sum();
             let held = if self.held.is_empty() { &[][..] } else { &self.held[range] };
-            F::Variables::each::<F::Dim>(j, |a, block| {
+            F::each(j, |a, block| {
                 self.whiteners.whiten(i, block);
                 if let Some(held) = held.get(a) {
                     hold::<F::Dim>(*held, block);
@@ -261,12 +253,12 @@ impl<F: Residual> BatchOf<F> {
 
     /// ‖whitened residual‖²; `None` where the factor is not defined.
     #[inline(always)]
-    fn squared(&self, columns: <F::Variables as Variables>::Columns<'_>, i: usize) -> Option<f64> {
-        let x = F::Variables::load(columns, &self.index[Self::range(&self.ends, i)]);
+    fn squared(&self, columns: F::Columns<'_>, i: usize) -> Option<f64> {
+        let x = self.factors[i].load(columns, &self.index[Self::range(&self.ends, i)]);
         if !self.factors[i].is_defined(x.clone()) {
             return None;
         }
-        let value = self.factors[i].residual::<f64>(F::Variables::lift(&x));
+        let value = self.factors[i].value(&x);
         let mut r = <Matrix<F::Dim, U1> as Block>::zeros();
         let r = r.as_mut_slice();
         r.copy_from_slice(value.as_ref());
@@ -282,12 +274,12 @@ impl<F: Residual> BatchOf<F> {
                 starts: &self.starts[Self::range(&self.ends, i)],
                 slots: &self.slots[Self::range(&self.slot_ends, i)],
             };
-            F::Variables::scatter::<F::Dim>(&work.j[k], work.r[k].as_slice(), work.w[k], places, to);
+            F::scatter(&work.j[k], work.r[k].as_slice(), work.w[k], places, to);
         }
     }
 
     #[inline(always)]
-    fn chunk_cost(&self, columns: <F::Variables as Variables>::Columns<'_>, first: usize) -> Evaluation {
+    fn chunk_cost(&self, columns: F::Columns<'_>, first: usize) -> Evaluation {
         let len = CHUNK.min(self.factors.len() - first);
         let active = &self.active[first..first + len];
         let mut out = Evaluation::default();
@@ -325,21 +317,21 @@ fn hold<R: Dimension>(held: u32, block: &mut [f64]) {
     }
 }
 
-impl<F: Residual> Batch for BatchOf<F> {
+impl<F: Kernel> Batch for BatchOf<F> {
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool {
         self.whiteners.fits(noise)
             && self.losses.as_ref().map(|l| l.loss_type()) == loss.map(|l| l.erased().as_any().type_id())
     }
 
     fn push(&mut self, member: &Member<'_>) {
-        let Some(factor) = member.factor.downcast_ref::<F>() else { return };
+        let Some(factor) = F::of(member.factor) else { return };
         if !member.held.iter().all(|h| *h == 0) {
             self.held.resize(self.index.len(), 0);
             self.held.extend_from_slice(member.held);
         } else if !self.held.is_empty() {
             self.held.extend(member.index.iter().map(|_| 0));
         }
-        self.factors.push(factor.clone());
+        self.factors.push(factor);
         self.entries.push(member.entry as u32);
         self.index.extend_from_slice(member.index);
         self.starts.extend_from_slice(member.starts);
@@ -355,7 +347,7 @@ impl<F: Residual> Batch for BatchOf<F> {
     }
 
     fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation {
-        let columns = F::Variables::columns(columns);
+        let columns = F::columns(columns);
         let mut active = std::mem::take(&mut self.active);
         let mut total = Evaluation::default();
         if self.in_parallel() {
@@ -385,7 +377,7 @@ impl<F: Residual> Batch for BatchOf<F> {
     }
 
     fn cost(&self, columns: &Columns) -> Evaluation {
-        let columns = F::Variables::columns(columns);
+        let columns = F::columns(columns);
         let chunks = self.factors.len().div_ceil(CHUNK);
         if self.in_parallel() {
             let costs: Vec<_> =
@@ -399,7 +391,7 @@ impl<F: Residual> Batch for BatchOf<F> {
     }
 
     fn costs(&self, columns: &Columns, to: &mut [f64]) {
-        let columns = F::Variables::columns(columns);
+        let columns = F::columns(columns);
         for (i, entry) in self.entries.iter().enumerate() {
             let squared = self.squared(columns, i);
             to[*entry as usize] = squared.map_or(0.0, |s| self.robust(i, &mut [s]));
@@ -412,11 +404,11 @@ impl<F: Residual> Batch for BatchOf<F> {
     }
 
     fn inspect(&self, columns: &Columns) -> Vec<FactorState> {
-        let columns = F::Variables::columns(columns);
+        let columns = F::columns(columns);
         let one = |i: usize| {
-            let x = F::Variables::load(columns, &self.index[Self::range(&self.ends, i)]);
+            let x = self.factors[i].load(columns, &self.index[Self::range(&self.ends, i)]);
             let defined = self.factors[i].is_defined(x.clone());
-            let value = self.factors[i].residual::<f64>(F::Variables::lift(&x));
+            let value = self.factors[i].value(&x);
             let residual = value.as_ref().to_vec();
             let mut whitened = residual.clone();
             self.whiteners.whiten(i, &mut whitened);
@@ -436,7 +428,7 @@ impl<F: Residual> Batch for BatchOf<F> {
     }
 
     fn rows(&self, columns: &Columns, visit: &mut dyn FnMut(FactorRows<'_>)) {
-        let columns = F::Variables::columns(columns);
+        let columns = F::columns(columns);
         let mut work = Work::<F>::new();
         let mut active = self.active.clone();
         for (n, active) in active.chunks_mut(CHUNK).enumerate() {
@@ -446,7 +438,7 @@ impl<F: Residual> Batch for BatchOf<F> {
                 let (starts, root) = (&self.starts[Self::range(&self.ends, i)], work.w[k].sqrt());
                 work.r[k].as_mut_slice().iter_mut().for_each(|x| *x *= root);
                 let mut blocks = vec![];
-                F::Variables::each::<F::Dim>(&mut work.j[k], |a, block| {
+                F::each(&mut work.j[k], |a, block| {
                     if starts[a] != FIXED {
                         blocks.push((starts[a] as usize, block.iter().map(|x| x * root).collect()));
                     }

@@ -19,6 +19,8 @@ pub trait Column: Send + Sync {
     fn push(&mut self, value: &dyn Variable);
     /// Overwrites a variable by one of this column's type.
     fn set(&mut self, index: usize, value: &dyn Variable);
+    /// A variable, for a downcast to its type.
+    fn value(&self, index: usize) -> Option<&dyn Any>;
     /// A copy of a variable.
     fn get(&self, index: usize) -> Option<Box<dyn Variable>>;
     /// `self ← from ⊞ step`, where variable i's part of the step begins at `starts[i]`.
@@ -42,6 +44,9 @@ impl<M: Manifold + Variable> Column for Plain<M> {
         if let (Some(x), Some(value)) = (self.0.get_mut(index), value.erased().as_any().downcast_ref::<M>()) {
             *x = value.clone();
         }
+    }
+    fn value(&self, index: usize) -> Option<&dyn Any> {
+        self.0.get(index).map(|x| x as &dyn Any)
     }
     fn get(&self, index: usize) -> Option<Box<dyn Variable>> {
         self.0.get(index).map(|x| Box::new(x.clone()) as Box<dyn Variable>)
@@ -98,6 +103,10 @@ impl Columns {
     /// Whether there is no column.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
+    }
+    /// A variable of any type, for a downcast to it.
+    pub fn value(&self, id: TypeId, index: usize) -> Option<&dyn Any> {
+        self.0.iter().find(|(i, _)| *i == id)?.1.value(index)
     }
     /// The variables of type `M`; empty where there are none.
     pub fn typed<M: Manifold>(&self) -> &[M] {

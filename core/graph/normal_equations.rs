@@ -136,4 +136,35 @@ impl NormalEquations<'_> {
             to += slot.stride as usize - c;
         }
     }
+
+    /// g ← g + w Jₐᵀr and H ← H + w JₐᵀJ_b for all b ≤ a, for blocks of widths that are known at run time.
+    pub(crate) fn add_dynamic<'b, const R: usize>(
+        &mut self,
+        places: Places<'_>,
+        a: usize,
+        block: impl Fn(usize) -> &'b [f64],
+        r: &[f64],
+        w: f64,
+    ) {
+        let (ja, start) = (block(a).as_chunks::<R>().0, places.starts[a]);
+        if start == FIXED {
+            return;
+        }
+        let dot = |x: &[f64; R], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        for (g, column) in self.g[start as usize..].iter_mut().zip(ja) {
+            *g += w * dot(column, r);
+        }
+        for b in (0..=a).filter(|b| places.starts[*b] != FIXED) {
+            let (jb, slot) = (block(b).as_chunks::<R>().0, places.slots[a * (a + 1) / 2 + b]);
+            let (rows, columns) = if slot.swapped { (jb, ja) } else { (ja, jb) };
+            let mut to = slot.at;
+            for (c, column) in columns.iter().enumerate() {
+                let first = if a == b { c } else { 0 };
+                for (h, row) in self.h[to + first..].iter_mut().zip(&rows[first..]) {
+                    *h += w * dot(row, column);
+                }
+                to += slot.stride as usize - c;
+            }
+        }
+    }
 }

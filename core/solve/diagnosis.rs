@@ -10,15 +10,17 @@ use serde::Serialize;
 
 /// Factors in the table of the worst.
 const WORST: usize = 10;
+/// Variables up to which the linear system is looked at: it takes another compilation and some factorizations.
+const LARGE: usize = 50_000;
 
 /// What is worth a look after a solve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// The ten factors that cost the most, the worst first; none that cost nothing.
     pub worst: Vec<FactorCost>,
-    /// See [`Problem::condition`]; `None` also where something is undetermined.
+    /// See [`Problem::condition`]; `None` also where something is undetermined, and for more than 50,000 variables.
     pub condition: Option<f64>,
-    /// A direction that nothing constrains at the estimate.
+    /// A direction that nothing constrains at the estimate; not looked for among more than 50,000 variables.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub undetermined: Option<Undetermined>,
 }
@@ -68,9 +70,12 @@ impl Solution {
     /// # Errors
     /// Where `graph` is not the one that was solved.
     pub fn diagnose(&self, graph: &Graph) -> Result<Diagnosis, CompileError> {
-        let mut problem = self.problem(graph)?;
-        let undetermined = problem.undetermined();
-        let condition = if undetermined.is_none() { problem.condition() } else { None };
+        let (mut undetermined, mut condition) = (None, None);
+        if self.values.len() <= LARGE {
+            let mut problem = self.problem(graph)?;
+            undetermined = problem.undetermined();
+            condition = if undetermined.is_none() { problem.condition() } else { None };
+        }
         let mut costly: Vec<_> = self.factors.iter().filter(|f| f.cost > 0.0).collect();
         costly.sort_by(|a, b| b.cost.total_cmp(&a.cost));
         let row = |(state, entry): (&FactorState, &FactorEntry)| FactorCost {

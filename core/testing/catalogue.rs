@@ -43,7 +43,7 @@ pub fn example<K: Kind + ?Sized>(entry: &'static Entry) -> Result<Box<K>, LawErr
 /// The law that is broken, or what the catalogue lacks.
 pub fn factor_law(entry: &'static Entry, cases: usize) -> Result<usize, LawError> {
     let factor = example::<dyn Factor>(entry)?;
-    let signature = (entry.signature)();
+    let signature = factor.erased().signature();
     let mut types = signature.variables.clone();
     if signature.many {
         types.resize(3, types.first().copied().unwrap_or(TypeId::of::<()>()));

@@ -11,6 +11,7 @@ mod camera;
 mod certificate;
 mod chordal_between;
 mod coordinates;
+mod functions;
 mod initialise;
 mod landmark;
 mod lie_group;

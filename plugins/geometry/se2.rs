@@ -3,6 +3,7 @@ use crate::coordinates::Coordinates;
 use crate::lie_group::LieGroup;
 use crate::small_angle;
 use crate::so2::{Angle, So2};
+use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
 use nalgebra::{Matrix3, U3, Vector2, Vector3};
 use schemars::JsonSchema;
@@ -120,6 +121,21 @@ impl Se2 {
         let t = Se2::way(xi);
         let d = t * half_cot_slope - quarter(&t) * 0.5;
         Matrix3::new(half_cot, -half, d.x, half, half_cot, d.y, 0.0, 0.0, 1.0)
+    }
+}
+
+/// The rotation, then the translation.
+impl Quantity for Se2 {
+    const SHAPE: Shape = Shape { name: "se2", size: 5 };
+    type Of<T: Scalar> = Se2<T>;
+    #[inline]
+    fn read<T: Scalar>(from: &[T]) -> Se2<T> {
+        Se2::new(So2::read(from), Vector2::<f64>::read(&from[3..]))
+    }
+    #[inline]
+    fn write<T: Scalar>(x: &Se2<T>, to: &mut [T]) {
+        So2::write(&x.rotation, &mut to[..3]);
+        Vector2::<f64>::write(&x.translation, &mut to[3..]);
     }
 }
 

@@ -3,6 +3,7 @@ use crate::coordinates::Coordinates;
 use crate::lie_group::LieGroup;
 use crate::small_angle;
 use crate::so3::{So3, Xyzw, jet};
+use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
 use nalgebra::{Matrix3, Matrix4, Matrix6, U6, Vector3, Vector6};
 use schemars::JsonSchema;
@@ -127,6 +128,21 @@ impl Se3 {
             jet(self.translation[i], dim, first + 3, [r[(i, 0)], r[(i, 1)], r[(i, 2)]])
         });
         Se3::new(self.rotation.seed_in(dim, first), translation)
+    }
+}
+
+/// The rotation, then the translation.
+impl Quantity for Se3 {
+    const SHAPE: Shape = Shape { name: "se3", size: 7 };
+    type Of<T: Scalar> = Se3<T>;
+    #[inline]
+    fn read<T: Scalar>(from: &[T]) -> Se3<T> {
+        Se3::new(So3::read(from), Vector3::<f64>::read(&from[4..]))
+    }
+    #[inline]
+    fn write<T: Scalar>(x: &Se3<T>, to: &mut [T]) {
+        So3::write(&x.rotation, &mut to[..4]);
+        Vector3::<f64>::write(&x.translation, &mut to[4..]);
     }
 }
 

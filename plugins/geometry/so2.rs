@@ -1,5 +1,6 @@
 //! SO(2): rotations in the plane, by their angle.
 use crate::lie_group::LieGroup;
+use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
 use nalgebra::{Matrix1, Matrix2, U1, Vector1, Vector2};
 use schemars::JsonSchema;
@@ -114,6 +115,20 @@ impl<T: Scalar> So2<T> {
 impl<T: Scalar> PartialEq for So2<T> {
     fn eq(&self, other: &Self) -> bool {
         self.angle == other.angle
+    }
+}
+
+/// Angle, cosine and sine.
+impl Quantity for So2 {
+    const SHAPE: Shape = Shape { name: "so2", size: 3 };
+    type Of<T: Scalar> = So2<T>;
+    #[inline]
+    fn read<T: Scalar>(from: &[T]) -> So2<T> {
+        So2 { angle: from[0], cos: from[1], sin: from[2] }
+    }
+    #[inline]
+    fn write<T: Scalar>(x: &So2<T>, to: &mut [T]) {
+        to.copy_from_slice(&[x.angle, x.cos, x.sin]);
     }
 }
 

@@ -2,6 +2,7 @@
 use crate::lie_group::LieGroup;
 use crate::small_angle;
 use crate::so2::atan2;
+use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Jet, JetOf, Manifold, Scalar, register_manifold};
 use nalgebra::{Matrix3, Quaternion, Rotation3, U3, UnitQuaternion, Vector3, Vector4};
 use schemars::JsonSchema;
@@ -164,6 +165,20 @@ pub(crate) fn jet<J: Jet>(value: f64, dim: usize, first: usize, derivatives: [f6
     let mut gradient = [0.0; 32];
     gradient[first..first + 3].copy_from_slice(&derivatives);
     J::with_gradient(value, &gradient[..dim])
+}
+
+/// The quaternion: x, y, z, w.
+impl Quantity for So3 {
+    const SHAPE: Shape = Shape { name: "so3", size: 4 };
+    type Of<T: Scalar> = So3<T>;
+    #[inline]
+    fn read<T: Scalar>(from: &[T]) -> So3<T> {
+        So3(UnitQuaternion::new_unchecked(Quaternion::new(from[3], from[0], from[1], from[2])))
+    }
+    #[inline]
+    fn write<T: Scalar>(x: &So3<T>, to: &mut [T]) {
+        to.copy_from_slice(x.0.coords.as_slice());
+    }
 }
 
 impl Manifold for So3 {

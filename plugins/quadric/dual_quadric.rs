@@ -3,6 +3,7 @@ use crate::box3::Box3;
 use crate::ellipsoid;
 use crate::semi_axes::{self, SemiAxes};
 use manifactor_geometry::{Coordinates, NotARotation, Se3, So3};
+use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
 use nalgebra::{Matrix4, SVector, U9, Vector3, Vector6};
 use schemars::JsonSchema;
@@ -95,6 +96,21 @@ impl DualQuadric {
     /// Whether a point of the outer frame is inside, or on the surface.
     pub fn contains(&self, point: &Vector3<f64>) -> bool {
         self.pose.inverse_act(point).component_div(&self.semi_axes).norm_squared() <= 1.0
+    }
+}
+
+/// The pose, then the semi-axes.
+impl Quantity for DualQuadric {
+    const SHAPE: Shape = Shape { name: "dual_quadric", size: 10 };
+    type Of<T: Scalar> = DualQuadric<T>;
+    #[inline]
+    fn read<T: Scalar>(from: &[T]) -> DualQuadric<T> {
+        DualQuadric { pose: Se3::read(from), semi_axes: Vector3::<f64>::read(&from[7..]) }
+    }
+    #[inline]
+    fn write<T: Scalar>(x: &DualQuadric<T>, to: &mut [T]) {
+        Se3::write(&x.pose, &mut to[..7]);
+        Vector3::<f64>::write(&x.semi_axes, &mut to[7..]);
     }
 }
 

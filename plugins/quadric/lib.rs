@@ -7,6 +7,7 @@ mod dual_quadric;
 mod ellipse;
 mod ellipsoid;
 mod from_matrix;
+mod functions;
 mod horizontal_orientation;
 pub mod initialise;
 mod landmark;

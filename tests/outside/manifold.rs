@@ -43,6 +43,13 @@ impl Manifold for Scale {
 }
 register_manifold!("test_scale", Scale);
 
+// what it is in formulas, and a function of them
+register_quantity!(Scale as f64);
+register_functions! {
+    /// Twice a number.
+    fn test_doubled(x: f64) -> f64 { x * 2.0 }
+}
+
 /// Two lengths, one measured in the units of the other: r = x·a - b.
 ///
 /// ```toml
@@ -78,6 +85,17 @@ fn a_graph_names_it() {
     let solution = solve_document(
         "variables = [{ key = \"s\", value = { type = \"test_scale\", factor = 1.0 } }]\n\
          factors = [{ keys = [\"s\"], factor = { type = \"test_ratio\", a = 2.0, b = 3.0 } }]\n",
+    );
+    let s: &Scale = solution.values.get("s").unwrap();
+    assert!((s.factor.get() - 1.5).abs() < 1e-9);
+}
+
+#[test]
+fn a_formula_computes_with_it() {
+    let solution = solve_document(
+        "variables = [{ key = \"s\", value = { type = \"test_scale\", factor = 1.0 } }]\n\
+         factors = [{ keys = [\"s\"], factor = { type = \"expression\", variables = { s = \"test_scale\" }, \
+         residual = [\"test_doubled(s) - 3\"] } }]\n",
     );
     let s: &Scale = solution.values.get("s").unwrap();
     assert!((s.factor.get() - 1.5).abs() < 1e-9);

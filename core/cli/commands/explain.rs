@@ -74,11 +74,20 @@ fn explain(entry: &Entry) -> String {
     out
 }
 
-/// The docs without the blocks of code, which are shown apart, and without their line breaks.
+/// The docs without their line breaks, and without the example, which is shown apart.
 fn prose(docs: &str) -> String {
-    let outside = docs.split("```").step_by(2).collect::<Vec<_>>().join("\n\n");
-    let paragraphs = outside.split("\n\n").map(str::trim).filter(|p| !p.is_empty());
-    paragraphs.map(text::wrap).collect::<Vec<_>>().join("\n\n")
+    let mut paragraphs = Vec::new();
+    for (i, part) in docs.split("```").enumerate() {
+        match (i % 2 == 1, part.strip_prefix("text\n")) {
+            (true, Some(verbatim)) => paragraphs.push(indent(verbatim.trim_end())),
+            (true, None) => {}
+            (false, _) => {
+                paragraphs
+                    .extend(part.split("\n\n").map(str::trim).filter(|p| !p.is_empty()).map(text::wrap));
+            }
+        }
+    }
+    paragraphs.join("\n\n")
 }
 
 fn indent(text: &str) -> String {

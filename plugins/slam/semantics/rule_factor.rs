@@ -61,9 +61,8 @@ impl RuleFactor {
             },
             _ => String::new(),
         };
-        node.read_registered::<dyn Factor>(errors)?;
-        let entry = find(<dyn Factor as Kind>::NAME, &name)?;
-        let variables = (entry.signature)().variables;
+        let factor = node.read_registered::<dyn Factor>(errors)?;
+        let variables = factor.erased().signature().variables;
         if variables != [TypeId::of::<DualQuadric>()] {
             let names: Vec<_> = variables.iter().map(|id| manifold_name(*id)).collect();
             let message = format!("`{name}` connects {}", names.join(" and "));
@@ -73,7 +72,9 @@ impl RuleFactor {
         }
         let Ok(Value::Object(mut fields)) = json else { return None };
         fields.shift_remove("type");
-        let has_up = (entry.schema)().get("properties").is_some_and(|p| p.get(UP).is_some());
+        // a factor that uses up writes the one that it has
+        let written = serde_json::to_value(&factor).ok()?;
+        let has_up = written.get(UP).is_some();
         Some(Self { name, wants_up: has_up && !fields.contains_key(UP), fields })
     }
 

@@ -1,4 +1,5 @@
 //! What a batch adds to H and g is what the factor's own Jacobian says, whitened and weighed.
+use crate::dynamic::Chain;
 use crate::toy::{Area, SOUND, Spot, Spread};
 use manifactor_graph::batch::Member;
 use manifactor_graph::column::{Columns, FIXED};
@@ -164,5 +165,20 @@ fn any_number_of_variables_adds_all_its_pairs() {
             setup.held[0] = 0b11;
             setup.check();
         }
+    }
+}
+
+#[test]
+fn rows_and_variables_by_number_add_the_same() {
+    // from one row to the most; beyond eight variables the lists are allocated
+    for count in 2..=10 {
+        let (chain, loss) = (Chain::from(count), Cauchy::new(0.5).unwrap());
+        let mut setup = Setup { loss: Some(&loss), ..Setup::new(&chain, count) };
+        setup.check();
+        setup.starts.reverse();
+        setup.check();
+        setup.starts[0] = FIXED;
+        setup.held[1] = 0b10;
+        setup.check();
     }
 }

@@ -1,4 +1,5 @@
 //! Each flaw of a factor breaks the Jacobian law, with a message that leads to it.
+use crate::dynamic::Chain;
 use crate::toy::*;
 use manifactor_graph::catalogue::find;
 use manifactor_testing::catalogue::{documentation_law, factor_law, manifold_law};
@@ -15,6 +16,8 @@ fn area() -> impl Strategy<Value = Area> {
 
 jacobian_laws! {
     a_sound_factor_keeps_the_law: (area(), spot(), spot());
+    a_factor_that_is_known_at_run_time_keeps_the_law: (spot(), spot(), spot(), spot())
+        .prop_map(|(a, b, c, d)| (Chain::from(4), a, b, c, d));
     a_factor_of_any_number_of_variables_keeps_the_law:
         proptest::collection::vec(spot(), 1..12).prop_map(|spots| (Spread {}, Each(spots)));
 }

@@ -1,0 +1,134 @@
+//! The factor.
+use crate::compile::compile;
+use crate::constant::Constant;
+use crate::language::page;
+use crate::program::Program;
+use crate::scope::Scope;
+use indexmap::IndexMap;
+use manifactor_graph::{Direction, Dynamic, ErasedResidual, Factor, TextError, WrongRows, register};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A factor whose residual is written as formulas. The catalogue has the language, with every function that is linked:
+/// `manifactor explain expression`.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Document", into = "Document")]
+#[schemars(with = "Document", description = page())]
+pub struct Expression {
+    document: Document,
+    program: Dynamic<Program>,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "Expression")]
+struct Document {
+    /// Names of the variables, in the order of the factor's keys, and the type of each.
+    #[schemars(with = "std::collections::BTreeMap<String, String>")]
+    variables: IndexMap<String, String>,
+    /// Formulas, each a row or, where it is a vector, several.
+    residual: Vec<String>,
+    /// Numbers, vectors and other values that formulas use by name.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    #[schemars(with = "std::collections::BTreeMap<String, Constant>")]
+    constants: IndexMap<String, Constant>,
+    /// The world's up, of any length but zero; z, where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    up: Option<Direction>,
+    /// Formulas that are above zero wherever the factor means something.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    domain: Vec<String>,
+}
+
+/// Why formulas make no factor.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExpressionError {
+    /// No formula at all.
+    #[error("`residual` is empty: expected at least one formula, such as \"norm(position(x)) - 1\"")]
+    NoResidual,
+    /// No variables, or too many.
+    #[error("expected 1 to {most} variables, such as variables = {{ q = \"dual_quadric\" }}, found {0}", most = MOST)]
+    WrongVariables(usize),
+    /// Something within a formula, a name or a type.
+    #[error(transparent)]
+    Text(#[from] TextError),
+    /// More rows than a factor may have.
+    #[error("`residual`: {0}")]
+    WrongRows(#[from] WrongRows),
+}
+
+/// The most variables of a factor.
+const MOST: usize = 32;
+
+impl TryFrom<Document> for Expression {
+    type Error = ExpressionError;
+    fn try_from(mut document: Document) -> Result<Self, ExpressionError> {
+        let Document { variables, residual, constants, up, domain } = &document;
+        if residual.is_empty() {
+            return Err(ExpressionError::NoResidual);
+        }
+        if variables.is_empty() || variables.len() > MOST {
+            return Err(ExpressionError::WrongVariables(variables.len()));
+        }
+        let scope = Scope::new(variables, constants, up.unwrap_or_default())?;
+        let (program, uses_up) = compile(&scope, residual, domain)?;
+        let program = Dynamic::new(program)?;
+        // written down with the up that it uses, so that the document is complete
+        document.up = document.up.or(uses_up.then(Direction::default));
+        Ok(Self { document, program })
+    }
+}
+
+impl From<Expression> for Document {
+    fn from(expression: Expression) -> Self {
+        expression.document
+    }
+}
+
+impl Expression {
+    /// Compiles formulas of named variables of named types.
+    ///
+    /// # Errors
+    /// What is wrong with a formula, with the place in it.
+    pub fn new<'a>(
+        variables: impl IntoIterator<Item = (&'a str, &'a str)>,
+        residual: impl IntoIterator<Item = &'a str>,
+    ) -> Result<Self, ExpressionError> {
+        Self::with_constants(variables, [], residual)
+    }
+    /// Compiles formulas of named variables of named types, with constants of their own.
+    ///
+    /// # Errors
+    /// What is wrong with a formula, with the place in it.
+    pub fn with_constants<'a>(
+        variables: impl IntoIterator<Item = (&'a str, &'a str)>,
+        constants: impl IntoIterator<Item = (&'a str, Constant)>,
+        residual: impl IntoIterator<Item = &'a str>,
+    ) -> Result<Self, ExpressionError> {
+        let variables = variables.into_iter().map(|(name, of)| (name.to_owned(), of.to_owned())).collect();
+        let constants = constants.into_iter().map(|(name, is)| (name.to_owned(), is)).collect();
+        let residual = residual.into_iter().map(str::to_owned).collect();
+        Document { variables, residual, constants, up: None, domain: vec![] }.try_into()
+    }
+    /// With another direction for up.
+    ///
+    /// # Errors
+    /// As [`Expression::new`].
+    pub fn with_up(mut self, up: Direction) -> Result<Self, ExpressionError> {
+        self.document.up = Some(up);
+        self.document.try_into()
+    }
+    /// What runs.
+    pub fn program(&self) -> &Program {
+        self.program.get()
+    }
+}
+
+#[typetag::serde(name = "expression")]
+impl Factor for Expression {
+    fn erased(&self) -> &dyn ErasedResidual {
+        &self.program
+    }
+}
+register!(dyn Factor, "expression", Expression);

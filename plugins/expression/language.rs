@@ -1,0 +1,52 @@
+//! The language of formulas, as the catalogue explains it.
+use crate::resolve::is_word;
+use manifactor_graph::quantity::{Function, functions};
+use std::fmt::Write;
+
+const MEANING: &str = "\
+A formula of named variables: a factor in a config, without a compiler.
+
+`variables` names the factor's keys, in their order, and says of which type each is. Each formula of `residual` is a \
+number or a vector, one row or several. Numbers are `1`, `0.5`, `1e-3`; vectors `[0, 0, 1]`; operators `+ - * / ^`, of \
+which `^` binds most. Names are those of the variables, of `constants`, `pi`, and `up`, the world's up: where a semantic \
+rule leaves it open, it gets the run's gravity. A constant may be a number, a vector, or a value with its `type`. \
+Formulas are checked when they are read, and compiled once; their derivatives are exact.
+
+It is defined where all formulas of `domain` are above zero, and everywhere, where there are none. Division by zero, \
+the root of a negative number and the like are not a domain: they end a solve as not finite. Kinks are those of the \
+functions.
+
+```toml
+[[factors]]
+keys   = [\"q3\"]
+factor = { type = \"expression\", variables = { q = \"dual_quadric\" }, residual = [\"1 - abs(dot(major_axis(q), up))\"] }
+noise  = { sigma = 0.1 }
+```
+";
+
+/// The page of the catalogue: what is meant, and every function that is linked.
+pub(crate) fn page() -> String {
+    let all = functions();
+    let (words, operators): (Vec<&Function>, Vec<&Function>) = all.into_iter().partition(|f| is_word(f.name));
+    let mut text = String::from(MEANING);
+    for (title, list) in [("Operators:", operators), ("Functions:", words)] {
+        let lines: Vec<(String, &str)> = list.into_iter().map(|f| (written(f), f.summary.trim())).collect();
+        let width = lines.iter().map(|(signature, _)| signature.chars().count()).max().unwrap_or(0);
+        let _ = writeln!(text, "\n{title}\n\n```text");
+        for (signature, summary) in lines {
+            let _ = writeln!(text, "{signature:width$}  {summary}");
+        }
+        text += "```\n";
+    }
+    text.trim_end().to_owned()
+}
+
+/// `a * b: number * vector3 -> vector3` for an operator, the signature of a function.
+fn written(function: &Function) -> String {
+    let types: Vec<&str> = function.arguments.iter().map(|(_, shape)| shape.name).collect();
+    match (is_word(function.name), types.as_slice()) {
+        (false, [a, b]) => format!("{a} {} {b} -> {}", function.name, function.result),
+        (false, [a]) => format!("{}{a} -> {}", function.name, function.result),
+        _ => function.signature(),
+    }
+}

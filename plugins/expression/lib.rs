@@ -1,0 +1,19 @@
+//! A factor that is written as a formula in a config.
+//!
+//! A formula is [parsed](syntax), checked and [compiled](compile) once, to a [program](program) of calls over flat
+//! values, which runs over numbers and over dual numbers. What it can call is registered by whoever owns the geometry:
+//! see [`manifactor_graph::quantity`].
+mod compile;
+mod constant;
+mod expression;
+mod functions;
+mod language;
+mod mistake;
+mod program;
+mod resolve;
+mod scope;
+mod syntax;
+
+pub use constant::Constant;
+pub use expression::{Expression, ExpressionError};
+pub use program::Program;

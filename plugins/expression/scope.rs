@@ -1,0 +1,97 @@
+//! The names that formulas use: variables, constants, `up` and `pi`.
+use crate::constant::Constant;
+use crate::mistake::Mistake;
+use indexmap::IndexMap;
+use manifactor_config::nearest;
+use manifactor_graph::catalogue::{Kind, entries, find};
+use manifactor_graph::quantity::{Quantity, Shape, VariableQuantity, variable_quantity};
+use manifactor_graph::{Direction, TextError, Variable};
+use nalgebra::Vector3;
+
+/// The name of the world's up.
+pub(crate) const UP: &str = "up";
+/// The names that are always there, and so free to nobody.
+const TAKEN: [&str; 2] = [UP, "pi"];
+/// What a name stands for.
+pub(crate) enum Named {
+    Variable(&'static VariableQuantity),
+    /// What it is, and its flat form.
+    Constant(Shape, Vec<f64>),
+}
+
+/// Variables first, in the order of a factor's keys.
+#[derive(Default)]
+pub(crate) struct Scope {
+    pub names: IndexMap<String, Named>,
+}
+
+impl Scope {
+    pub(crate) fn new(
+        variables: &IndexMap<String, String>,
+        constants: &IndexMap<String, Constant>,
+        up: Direction,
+    ) -> Result<Self, TextError> {
+        let mut scope = Self::default();
+        for (name, of) in variables {
+            scope.add(name, Named::Variable(quantity_of(of)?))?;
+        }
+        for (name, constant) in constants {
+            let flat = constant.flat().and_then(|(shape, flat)| match flat.iter().all(|x| x.is_finite()) {
+                true => Ok((shape, flat)),
+                false => Err("it is not finite".to_owned()),
+            });
+            let (shape, flat) = flat.map_err(|why| {
+                Mistake::new(0..name.len(), format!("the constant `{name}`: {why}")).within(name)
+            })?;
+            scope.add(name, Named::Constant(shape, flat))?;
+        }
+        let always = [
+            (UP, Vector3::<f64>::SHAPE, up.as_slice().to_vec()),
+            ("pi", f64::SHAPE, vec![std::f64::consts::PI]),
+        ];
+        for (name, shape, flat) in always {
+            scope.names.insert(name.to_owned(), Named::Constant(shape, flat));
+        }
+        Ok(scope)
+    }
+
+    /// Names of the variables.
+    pub(crate) fn variables(&self) -> impl Iterator<Item = &str> {
+        let variables = self.names.iter().filter(|(_, named)| matches!(named, Named::Variable(_)));
+        variables.map(|(name, _)| name.as_str())
+    }
+
+    fn add(&mut self, name: &str, named: Named) -> Result<(), TextError> {
+        let wrong = |message: String| Mistake::new(0..name.len(), message).within(name);
+        let letter = |c: char| c.is_alphabetic() || c == '_';
+        let plain = name.starts_with(letter) && name.chars().all(|c| letter(c) || c.is_numeric());
+        if !plain {
+            return Err(wrong(format!("`{name}` is not a name: expected letters, digits and `_`")));
+        }
+        if TAKEN.contains(&name) {
+            return Err(wrong(format!("`{name}` means something already: choose another name")));
+        }
+        match self.names.insert(name.to_owned(), named) {
+            None => Ok(()),
+            Some(_) => Err(wrong(format!("`{name}` is a variable and a constant: rename one of them"))),
+        }
+    }
+}
+
+fn quantity_of(name: &str) -> Result<&'static VariableQuantity, TextError> {
+    let kind = <dyn Variable as Kind>::NAME;
+    let entry = find(kind, name);
+    if let Some(quantity) = entry.and_then(|entry| variable_quantity((entry.type_id)())) {
+        return Ok(quantity);
+    }
+    let known = entries(kind).into_iter().filter(|e| variable_quantity((e.type_id)()).is_some());
+    let known: Vec<&str> = known.map(|e| e.name).collect();
+    let message = match entry {
+        None => format!("unknown type of variables `{name}`"),
+        Some(_) => format!("formulas know nothing of variables of the type `{name}`"),
+    };
+    let meant =
+        nearest(name, known.iter().copied()).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+    let help = format!("{meant}there are {}", known.join(", "));
+    Err(Mistake::new(0..name.len(), message).help(help).within(name))
+}
