@@ -1,6 +1,6 @@
 //! A factor that is written as a formula in a config.
 //!
-//! A formula is [parsed](syntax), checked and [compiled](compile) once, to a [program](program) of calls over flat
+//! A formula is parsed, checked and compiled once, to a program of calls over flat
 //! values, which runs over numbers and over dual numbers. What it can call is registered by whoever owns the geometry:
 //! see [`manifactor_graph::quantity`].
 mod compile;

@@ -38,7 +38,7 @@ fn room() -> (Graph, Values) {
     (graph, values)
 }
 
-fn agrees(linear: LinearSolver, tolerance: f64) {
+fn agrees(linear: &LinearSolver, tolerance: f64) {
     let (graph, values) = room();
     let reference = solve(&graph, &values, &GaussNewton::default(), &mut Silent).unwrap();
     let solvers: [Box<dyn Optimizer>; 2] = [
@@ -69,25 +69,25 @@ fn every_ordering_leads_to_the_same_estimate() {
         given,
     ];
     for ordering in orderings {
-        agrees(LinearSolver { ordering, method: Method::Cholesky, ..Default::default() }, 1e-11);
+        agrees(&LinearSolver { ordering, method: Method::Cholesky, ..Default::default() }, 1e-11);
     }
 }
 
 #[test]
 fn every_method_leads_to_the_same_estimate() {
     for method in [Method::Auto, Method::Dense, Method::Qr] {
-        agrees(LinearSolver { method, ..Default::default() }, 1e-11);
+        agrees(&LinearSolver { method, ..Default::default() }, 1e-11);
     }
-    agrees(LinearSolver { refinements: 2, ..Default::default() }, 1e-11);
+    agrees(&LinearSolver { refinements: 2, ..Default::default() }, 1e-11);
     for preconditioner in [Preconditioner::BlockJacobi, Preconditioner::SchurJacobi] {
         let conjugate_gradients = ConjugateGradients { preconditioner, ..Default::default() };
         let method = Method::ConjugateGradients;
         agrees(
-            LinearSolver { method, conjugate_gradients: conjugate_gradients.clone(), ..Default::default() },
+            &LinearSolver { method, conjugate_gradients: conjugate_gradients.clone(), ..Default::default() },
             1e-8,
         );
         let ordering = Ordering::First(vec!["point3".to_owned()]);
-        agrees(LinearSolver { method, conjugate_gradients, ordering, ..Default::default() }, 1e-8);
+        agrees(&LinearSolver { method, conjugate_gradients, ordering, ..Default::default() }, 1e-8);
     }
 }
 
@@ -109,7 +109,7 @@ fn what_does_not_fit_into_memory_says_how_much_it_takes() {
     );
     assert!(error.to_string().contains("conjugate_gradients"), "{error}");
     // and, left to itself, iterates
-    agrees(LinearSolver { memory_gib: Some(1e-5), ..Default::default() }, 1e-8);
+    agrees(&LinearSolver { memory_gib: Some(1e-5), ..Default::default() }, 1e-8);
 }
 
 #[test]
