@@ -25,13 +25,14 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
         out += &format!("{rejected} of {all} rejected as outliers: {}\n", list(keys));
     }
     out += &format!(
-        "{}: compile {}, linearize {}, factorize {}, solve {}, other {}\n",
+        "{}: compile {}, linearize {}, factorize {}, solve {}, evaluate {}, other {}\n",
         seconds(times.total),
         seconds(times.compile),
         seconds(times.linearize),
         seconds(times.factorize),
         seconds(times.solve),
-        seconds(times.other)
+        seconds(times.evaluate),
+        seconds(times.diagnose + times.other)
     );
     out
 }

@@ -6,6 +6,7 @@ use crate::noise::{Noise, NoiseError, Whitener};
 use crate::values::Values;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// Factors between named variables, and which variables are held.
@@ -204,11 +205,14 @@ impl Graph {
     }
 }
 
+/// Places of a factor's variables among the values. Up to four, nothing is allocated.
+pub type VariableIndices = SmallVec<[u32; 4]>;
+
 /// What a factor needs, looked up.
 #[derive(Debug, Clone)]
 pub struct Resolved {
     /// Places of its variables among the values.
-    pub variables: Vec<usize>,
+    pub variables: VariableIndices,
     /// Its noise.
     pub whitener: Whitener,
 }
@@ -219,7 +223,7 @@ fn resolve(
     values: &Values,
     errors: &mut Vec<GraphError>,
 ) -> Option<Resolved> {
-    let mut variables = Vec::with_capacity(entry.keys.len());
+    let mut variables = VariableIndices::new();
     let name = entry.factor.typetag_name();
     let signature = entry.factor.erased().signature();
     let (found, expected) = (entry.keys.len(), signature.variables.len());
@@ -237,11 +241,11 @@ fn resolve(
                     let (expected, found, key) = (manifold_name(*expected), v.typetag_name(), key.clone());
                     errors.push(GraphError::WrongType { factor, name, position, key, expected, found });
                 }
-                Some((place, _)) if variables.contains(&place) => {
+                Some((place, _)) if variables.contains(&(place as u32)) => {
                     let key = key.clone();
                     errors.push(GraphError::RepeatedVariable { factor, name, position, key });
                 }
-                Some((place, _)) => variables.push(place),
+                Some((place, _)) => variables.push(place as u32),
             }
         }
     }

@@ -34,7 +34,7 @@ pub use dimension::{Block, Dimension, Matrix, Vector};
 pub use direction::{Direction, NoDirection};
 pub use dynamic::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
-pub use graph::{Fixed, Graph, GraphError, Resolved};
+pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices};
 pub use key::Key;
 pub use manifold::{Manifold, Tangent};
 pub use many::{List, Many};

@@ -261,7 +261,7 @@ impl Model {
             (Model::Diagonal(s), _) => {
                 Whitener::Diagonal(s.iter().enumerate().map(|(i, s)| mask(*s, i)).collect())
             }
-            (Model::Information(m), None) => Whitener::Full(cholesky(m)?.l().transpose()),
+            (Model::Information(m), None) => Whitener::Full(root(m)?),
             (Model::Covariance(m), None) => Whitener::Full(inverse_root(m)?),
             (Model::Information(m), Some(o)) => Whitener::Full(marginal_root(&cholesky(m)?.inverse(), o)?),
             (Model::Covariance(m), Some(o)) => Whitener::Full(marginal_root(m, o)?),
@@ -270,8 +270,33 @@ impl Model {
 }
 
 fn cholesky(m: &DMatrix<f64>) -> Result<Cholesky<f64, nalgebra::Dyn>, NoiseError> {
-    Cholesky::new(m.clone())
-        .ok_or_else(|| NoiseError::NotPositiveDefinite { smallest: m.clone().symmetric_eigenvalues().min() })
+    Cholesky::new(m.clone()).ok_or_else(|| not_positive_definite(m))
+}
+
+/// Upper triangular W with WᵀW = m: Cholesky by rows, in one allocation, since a graph has one for each factor.
+fn root(m: &DMatrix<f64>) -> Result<DMatrix<f64>, NoiseError> {
+    let (n, mut w) = (m.nrows(), m.clone());
+    for k in 0..n {
+        let pivot = w[(k, k)];
+        if pivot.is_nan() || pivot <= 0.0 {
+            return Err(not_positive_definite(m));
+        }
+        let scale = pivot.sqrt().recip();
+        for j in k..n {
+            w[(k, j)] *= scale;
+            w[(j, k)] = if j == k { w[(k, k)] } else { 0.0 };
+        }
+        for j in k + 1..n {
+            for i in k + 1..=j {
+                w[(i, j)] -= w[(k, i)] * w[(k, j)];
+            }
+        }
+    }
+    Ok(w)
+}
+
+fn not_positive_definite(m: &DMatrix<f64>) -> NoiseError {
+    NoiseError::NotPositiveDefinite { smallest: m.clone().symmetric_eigenvalues().min() }
 }
 
 /// Upper triangular W with WᵀW = m⁻¹: m = U Uᵀ by a Cholesky from the last row up, W = U⁻¹.

@@ -88,7 +88,7 @@ pub(crate) fn compile(
     let mut blocks: Vec<u32> = vec![];
     for factor in &resolved {
         blocks.clear();
-        blocks.extend(factor.variables.iter().filter_map(|i| block[*i].map(|b| b as u32)));
+        blocks.extend(factor.variables.iter().filter_map(|i| block[*i as usize].map(|b| b as u32)));
         for (n, &a) in blocks.iter().enumerate() {
             pairs.extend(blocks[..n].iter().map(|&b| (a, b)));
         }
@@ -112,13 +112,13 @@ pub(crate) fn compile(
     }
     let batches = batches(graph, &resolved, &variables, &block, &layout);
     let (h, g) = (vec![0.0; layout.row_idx.len()], vec![0.0; unknowns]);
-    let factor_keys = graph.factors().iter().map(|f| f.keys.clone()).collect();
+    let factor_variables = resolved.into_iter().map(|factor| factor.variables).collect();
     let factor_types = graph.factors().iter().map(|f| (f.factor.typetag_name(), observed_rows(f))).collect();
     let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };
     let trial = columns.clone();
     Ok(Problem {
         variables,
-        factor_keys,
+        factor_variables,
         factor_types,
         weights: vec![],
         columns,
@@ -199,12 +199,12 @@ fn batches(
         starts.clear();
         held.clear();
         slots.clear();
-        for (n, &a) in ids.iter().enumerate() {
+        for (n, a) in ids.iter().map(|a| *a as usize).enumerate() {
             index.push(variables[a].index as u32);
             starts.push(variables[a].start.map_or(FIXED, |s| s as u32));
             held.push(if variables[a].start.is_some() { variables[a].held } else { 0 });
             for &b in &ids[..=n] {
-                let both = block[a].zip(block[b]);
+                let both = block[a].zip(block[b as usize]);
                 slots.push(both.and_then(|(a, b)| layout.slot(a, b)).unwrap_or_default());
             }
         }

@@ -1,8 +1,8 @@
 //! Which variables, in which direction, nothing constrains.
 use crate::linear::Method;
 use crate::problem::Problem;
-use crate::system::dot;
 use crate::termination::Undetermined;
+use std::time::Instant;
 
 /// A pivot below this share of its diagonal entry calls for a closer look.
 const PIVOT: f64 = 1e-11;
@@ -23,7 +23,8 @@ const NAMED: usize = 3;
 ///
 /// Overwrites the factorization if it looks closer.
 pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
-    match problem.method {
+    let (clock, before) = (Instant::now(), problem.times.stages());
+    let found = match problem.method {
         Method::Cholesky(_) => search(problem, failed, damping),
         // others have no pivots to look at
         Method::Qr(_) => problem.directly(|problem| {
@@ -34,7 +35,9 @@ pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) ->
             problem.directly(|problem| search(problem, true, damping))?
         }
         Method::ConjugateGradients(_) => None,
-    }
+    };
+    problem.times.diagnose += clock.elapsed().as_secs_f64() - (problem.times.stages() - before);
+    found
 }
 
 fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
@@ -70,13 +73,12 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
     // through the rows of J: the quadratic form of H would drown in rounding
     let mut bent: f64 = problem.held.iter().map(|i| v[*i] * v[*i]).sum();
     problem.rows(&mut |factor| {
-        for row in 0..factor.residual.len() {
-            let rows = factor.residual.len();
-            let entry = |(start, block): &(usize, Vec<f64>)| {
-                let gradient: Vec<f64> = block.iter().skip(row).step_by(rows).copied().collect();
-                dot(&gradient, &v[*start..*start + gradient.len()])
+        let rows = factor.residual.len();
+        for row in 0..rows {
+            let along = |(start, block): &(usize, Vec<f64>)| -> f64 {
+                block.iter().skip(row).step_by(rows).zip(&v[*start..]).map(|(j, v)| j * v).sum()
             };
-            bent += factor.blocks.iter().map(entry).sum::<f64>().powi(2);
+            bent += factor.blocks.iter().map(along).sum::<f64>().powi(2);
         }
     });
     (bent < OPEN).then(|| name(problem, &v, &scale))

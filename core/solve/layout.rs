@@ -28,7 +28,8 @@ impl Layout {
     pub(crate) fn new(dims: &[usize], mut pairs: Vec<(u32, u32)>, order: &Order) -> Option<Self> {
         pairs.iter_mut().filter(|(a, b)| a < b).for_each(|p| *p = (p.1, p.0));
         pairs.retain(|(a, b)| a != b);
-        pairs.sort_unstable();
+        // as one number: compared without a branch
+        pairs.sort_unstable_by_key(|(a, b)| u64::from(*a) << 32 | u64::from(*b));
         pairs.dedup();
         let weights = dims.iter().map(|dim| *dim as u32).collect();
         let elimination = order.of(&Adjacency::new(weights, &pairs))?;

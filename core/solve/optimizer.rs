@@ -134,7 +134,7 @@ impl<'a> Session<'a> {
         match at.not_finite {
             None => Ok(session),
             Some(factor) => {
-                let keys = session.problem.factor_keys[factor].clone();
+                let keys = session.problem.factor_keys(factor);
                 Err(Box::new(session.end(Termination::NonFinite { factor, keys }, None)))
             }
         }
@@ -235,7 +235,7 @@ impl<'a> Session<'a> {
         let mut times = self.problem.times;
         let solve = self.clock.elapsed().as_secs_f64();
         times.total = solve + self.compile;
-        times.other = (solve - times.linearize - times.factorize - times.solve).max(0.0);
+        times.other = (solve - times.stages()).max(0.0);
         Outcome {
             initial_cost: self.initial_cost,
             final_cost: self.at.cost,

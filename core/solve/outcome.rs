@@ -67,23 +67,40 @@ pub struct Times {
     pub factorize: f64,
     /// Triangular solves.
     pub solve: f64,
-    /// Retractions and costs of trial steps, and all else.
+    /// Retractions and costs of trial steps.
+    pub evaluate: f64,
+    /// The search for directions that nothing constrains, but for its factorizations and solves.
+    pub diagnose: f64,
+    /// All else.
     pub other: f64,
     /// All of it, compilation included.
     pub total: f64,
 }
 
 impl Times {
-    /// Both, of one compilation.
-    fn and(self, next: Self) -> Self {
+    /// Both together.
+    #[must_use]
+    pub fn plus(self, next: Self) -> Self {
         Self {
-            compile: self.compile,
+            compile: self.compile + next.compile,
             linearize: self.linearize + next.linearize,
             factorize: self.factorize + next.factorize,
             solve: self.solve + next.solve,
+            evaluate: self.evaluate + next.evaluate,
+            diagnose: self.diagnose + next.diagnose,
             other: self.other + next.other,
-            total: self.total + next.total - next.compile,
+            total: self.total + next.total,
         }
+    }
+
+    /// Both, of one compilation.
+    fn and(self, next: Self) -> Self {
+        self.plus(Self { compile: 0.0, total: next.total - next.compile, ..next })
+    }
+
+    /// What the stages of a solve have taken, its compilation excluded.
+    pub(crate) fn stages(&self) -> f64 {
+        self.linearize + self.factorize + self.solve + self.evaluate + self.diagnose
     }
 }
 

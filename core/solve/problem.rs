@@ -7,7 +7,7 @@ use crate::outcome::Times;
 use manifactor_graph::batch::{Batch, Evaluation, FactorRows, FactorState};
 use manifactor_graph::column::Columns;
 use manifactor_graph::normal_equations::NormalEquations;
-use manifactor_graph::{Graph, Key, Values};
+use manifactor_graph::{Graph, Key, Values, VariableIndices};
 use std::time::Instant;
 
 /// A variable in a problem.
@@ -27,7 +27,8 @@ pub(crate) struct Place {
 /// A graph, compiled. The structure lives as long as the problem; solves reuse it.
 pub struct Problem {
     pub(crate) variables: Vec<Place>,
-    pub(crate) factor_keys: Vec<Vec<Key>>,
+    /// By factor: which variables.
+    pub(crate) factor_variables: Vec<VariableIndices>,
     /// By factor: its type's name, and the rows of its residual that were observed.
     pub(crate) factor_types: Vec<(&'static str, usize)>,
     /// By factor: how often it counts; empty, where nobody weighs them.
@@ -97,7 +98,12 @@ impl Problem {
 
     /// Number of factors.
     pub fn factors(&self) -> usize {
-        self.factor_keys.len()
+        self.factor_variables.len()
+    }
+
+    /// The variables of a factor.
+    pub(crate) fn factor_keys(&self, factor: usize) -> Vec<Key> {
+        self.factor_variables[factor].iter().map(|v| self.variables[*v as usize].key.clone()).collect()
     }
 
     /// Scalar unknowns of a variable: `None` where there is no such variable, or it is held.
@@ -162,7 +168,7 @@ impl Problem {
         }
         let cost = self.batches.iter().map(|b| b.cost(&self.trial));
         let cost = cost.fold(Evaluation::default(), Evaluation::and);
-        self.times.other += clock.elapsed().as_secs_f64();
+        self.times.evaluate += clock.elapsed().as_secs_f64();
         cost
     }
 

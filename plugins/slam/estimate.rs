@@ -72,13 +72,7 @@ impl Rounds {
         };
         self.history.extend(outcome.history.iter().map(later));
         self.iterations += outcome.iterations;
-        let (sum, times) = (&mut self.times, &outcome.times);
-        sum.compile += times.compile;
-        sum.linearize += times.linearize;
-        sum.factorize += times.factorize;
-        sum.solve += times.solve;
-        sum.other += times.other;
-        sum.total += times.total;
+        self.times = self.times.plus(outcome.times);
         Ok(solution)
     }
 

@@ -1,10 +1,9 @@
 //! Which factors may be outliers.
 use crate::problem::Problem;
-use manifactor_graph::Key;
+use manifactor_graph::VariableIndices;
 use manifactor_graph::catalogue;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
 
 /// The factors that may be outliers. All others are trusted, and keep their full weight.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -54,16 +53,14 @@ impl FactorType {
 impl Candidates {
     /// By factor: whether it is a candidate.
     pub(crate) fn of(self, problem: &Problem) -> Vec<bool> {
-        let places: HashMap<&Key, (usize, usize)> =
-            problem.variables.iter().map(|p| (&p.key, (p.column, p.index))).collect();
-        let follows = |pair: &[Key]| match (places.get(&pair[0]), places.get(&pair[1])) {
-            (Some(a), Some(b)) => a.0 == b.0 && a.1.abs_diff(b.1) == 1,
-            _ => false,
+        let follows = |pair: &[u32]| {
+            let (a, b) = (&problem.variables[pair[0] as usize], &problem.variables[pair[1] as usize]);
+            a.column == b.column && a.index.abs_diff(b.index) == 1
         };
-        let may = |keys: &Vec<Key>| match self {
+        let may = |variables: &VariableIndices| match self {
             Self::All => true,
-            Self::LoopClosures => keys.len() > 1 && !keys.windows(2).all(follows),
+            Self::LoopClosures => variables.len() > 1 && !variables.windows(2).all(follows),
         };
-        problem.factor_keys.iter().map(may).collect()
+        problem.factor_variables.iter().map(may).collect()
     }
 }

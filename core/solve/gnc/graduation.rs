@@ -65,7 +65,7 @@ impl<'a> Graduation<'a> {
         outcome.rejected = self.rejected();
         let times = &mut outcome.times;
         (times.compile, times.total) = (compile, compile + clock.elapsed().as_secs_f64());
-        times.other = (times.total - compile - times.linearize - times.factorize - times.solve).max(0.0);
+        times.other = (times.total - compile - times.stages()).max(0.0);
         outcome
     }
 
@@ -213,7 +213,7 @@ impl<'a> Graduation<'a> {
         let one = |factor: usize| Rejected {
             factor,
             name: self.problem.factor_types[factor].0,
-            keys: self.problem.factor_keys[factor].clone(),
+            keys: self.problem.factor_keys(factor),
             weight: self.weights[factor],
             cost: self.costs[factor],
         };
