@@ -1,0 +1,80 @@
+//! Runs the binary on a file, and shows what became of it.
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Seconds after which a case counts as hung.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// KiB of address space that a case may have.
+const MEMORY: u32 = 4 << 20;
+/// Bytes of an input that are shown.
+const SHOWN: usize = 300;
+
+/// A name, and what is in the file.
+pub(crate) type Case = (&'static str, Vec<u8>);
+
+/// A case of text.
+pub(crate) fn text(name: &'static str, text: impl Into<String>) -> Case {
+    (name, text.into().into_bytes())
+}
+
+/// Runs `command` on each case, with `FILE` for the file, and gives an account of all.
+pub(crate) fn account(file: &str, command: &str, cases: Vec<Case>) -> String {
+    let mut account = String::new();
+    for (name, bytes) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(file), &bytes).unwrap();
+        let _ = write!(account, "## {name}\n{}\n{}\n", shown(&bytes), ended(folder.path(), command, file));
+    }
+    account
+}
+
+/// Runs `command` in a folder; its exit code, and what it says.
+pub(crate) fn ended(folder: &Path, command: &str, file: &str) -> String {
+    let arguments = command.split_whitespace().map(|word| if word == "FILE" { file } else { word });
+    let mut child = Command::new("sh")
+        .args(["-c", &format!("ulimit -v {MEMORY}; exec \"$0\" \"$@\"")])
+        .arg(env!("CARGO_BIN_EXE_manifactor"))
+        .args(arguments)
+        .args(["--threads", "1"])
+        .current_dir(folder)
+        .env("NO_COLOR", "1")
+        .env_remove("MANIFACTOR_DATA")
+        .stdin(Stdio::null())
+        .stdout(std::fs::File::create(folder.join(".stdout")).unwrap())
+        .stderr(std::fs::File::create(folder.join(".stderr")).unwrap())
+        .spawn()
+        .unwrap();
+    let begun = Instant::now();
+    let status = loop {
+        match child.try_wait().unwrap() {
+            Some(status) => break status,
+            None if begun.elapsed() > PATIENCE => {
+                child.kill().unwrap();
+                child.wait().unwrap();
+                panic!("`{command}` hangs");
+            }
+            None => std::thread::sleep(Duration::from_millis(2)),
+        }
+    };
+    let said = String::from_utf8(std::fs::read(folder.join(".stderr")).unwrap()).unwrap();
+    let code = status.code().unwrap_or_else(|| panic!("{status}: {said}"));
+    assert!(!said.contains("panicked"), "{said}");
+    // temporary folders have another name each time
+    let said = said.replace(&folder.display().to_string(), "FOLDER");
+    assert!(code == 0 || !said.trim().is_empty(), "exit code {code}, and not a word");
+    format!("exit code {code}\n{}\n", said.trim_end())
+}
+
+/// An input as text, shortened.
+fn shown(bytes: &[u8]) -> String {
+    let text: String =
+        bytes.iter().take(SHOWN).flat_map(|b| std::ascii::escape_default(*b)).map(char::from).collect();
+    let text = text.replace("\\n", "\n").replace("\\\"", "\"").replace("\\'", "'");
+    let more = if bytes.len() > SHOWN { format!("… ({} bytes)", bytes.len()) } else { String::new() };
+    text.lines()
+        .chain([more.as_str()])
+        .filter(|l| !l.is_empty())
+        .fold(String::new(), |all, l| all + "    " + l + "\n")
+}
