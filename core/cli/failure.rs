@@ -1,5 +1,5 @@
 //! What keeps a command from doing what it was asked to do, and how it is shown.
-use crate::output;
+use crate::{output, text};
 use manifactor::config::{Diagnostic, Diagnostics, Problem, Source};
 use manifactor::formats::{FormatError, Malformed};
 use manifactor::slam::output::OutputError;
@@ -132,7 +132,9 @@ impl From<FormatError> for Failure {
 
 /// The lines of a file that are wrong, with what is written there.
 fn places(malformed: &Malformed) -> Diagnostics {
-    let text = std::fs::read_to_string(&malformed.path).unwrap_or_default();
+    // what is no text is shown as far as it is
+    let bytes = std::fs::read(&malformed.path).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes).into_owned();
     let source = Source::new(malformed.path.display().to_string(), text.clone());
     let mut list: Vec<_> = malformed
         .problems
@@ -174,6 +176,11 @@ pub(crate) fn render(diagnostic: &Diagnostic) -> String {
         // a file that could not be read has no line to show
         return fancy(plain(&format!("{}: {}", source.name(), diagnostic.message()), help.as_deref()).into());
     }
+    let around = lines_around(source.text(), &diagnostic.place.span);
+    if around.split('\n').any(|line| line.len() > LONG) {
+        let at = format!("{}: {}", diagnostic.place, diagnostic.message());
+        return fancy(plain(&at, help.as_deref()).into());
+    }
     let mut labels = vec![LabeledSpan::underline(diagnostic.place.span.clone())];
     let mut message = message;
     if let Some((place, label)) = &diagnostic.related {
@@ -184,11 +191,25 @@ pub(crate) fn render(diagnostic: &Diagnostic) -> String {
         }
     }
     let report = Report::from(message.with_labels(labels));
-    fancy(report.with_source_code(NamedSource::new(source.name(), source.text().to_owned())))
+    // one byte for one byte: places stay where they are
+    let visible = source.text().replace(|c: char| c.is_ascii_control() && !"\n\r\t".contains(c), "?");
+    fancy(report.with_source_code(NamedSource::new(source.name(), visible)))
+}
+
+/// Bytes beyond which a line is not shown: a place and a message say more.
+const LONG: usize = 500;
+
+/// The lines of a place, and those before and after it.
+fn lines_around<'a>(text: &'a str, span: &std::ops::Range<usize>) -> &'a str {
+    let line = |end: usize| text.get(..end).and_then(|before| before.rfind('\n')).unwrap_or(0);
+    let begin = line(line(span.start.min(text.len())));
+    let after = text.get(span.end.min(text.len())..).unwrap_or_default();
+    let rest = after.match_indices('\n').nth(1).map_or(after.len(), |(at, _)| at);
+    text.get(begin..text.len() - after.len() + rest).unwrap_or_default()
 }
 
 fn plain(message: &str, help: Option<&str>) -> MietteDiagnostic {
-    let diagnostic = MietteDiagnostic::new(message);
+    let diagnostic = MietteDiagnostic::new(text::printable(message));
     match help {
         Some(help) => diagnostic.with_help(help),
         None => diagnostic,

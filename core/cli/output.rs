@@ -1,4 +1,5 @@
 //! Standard output: results only; everything else goes to stderr.
+use crate::text;
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 
@@ -11,6 +12,11 @@ pub(crate) fn print(text: &str) {
     {
         eprintln!("cannot write to standard output: {error}");
     }
+}
+
+/// Says something that is worth knowing, on stderr.
+pub(crate) fn note(note: &str) {
+    eprintln!("note: {}", text::printable(note));
 }
 
 /// Prints one JSON document.

@@ -6,6 +6,20 @@ use manifactor::graph::Key;
 const STYLE: TableStyle = TableStyle::new().top_border(LINE).header_separator(LINE).bottom_border(LINE);
 const LINE: LineStyle = LineStyle::none().fill('─').junction('─');
 
+/// What others wrote, fit for a terminal: without control characters, and not without end.
+pub(crate) fn printable(text: &str) -> String {
+    const MOST: usize = 2000;
+    let mut out = String::new();
+    for c in text.chars() {
+        if out.len() > MOST {
+            out.push('…');
+            break;
+        }
+        if c.is_control() && c != '\n' { out.extend(c.escape_default()) } else { out.push(c) }
+    }
+    out
+}
+
 /// A table with a header, its numbers to the right: all columns but the first.
 pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();

@@ -8,8 +8,8 @@ use ::toml::Spanned;
 use ::toml::de::{DeInteger, DeTable, DeValue};
 use std::ops::Range;
 
-/// One mistake can make a hundred: no more than these are told.
-const MAX_ERRORS: usize = 50;
+/// One bracket that is missing makes a dozen errors: no more than these are told.
+const MAX_ERRORS: usize = 5;
 
 /// Parses a document.
 pub(crate) fn parse(source: &Source) -> Result<Node, Diagnostics> {

@@ -50,6 +50,8 @@ pub struct Report {
 struct Counts([usize; 3]);
 
 const CAMERA: usize = 9;
+/// Its place among a camera's numbers.
+const FOCAL_LENGTH: usize = 6;
 const POINT: usize = 3;
 
 /// Whether a text begins as a BAL file does: with three whole numbers.
@@ -99,6 +101,15 @@ pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle,
     } else if problems.is_empty() && numbers.len() != expected {
         let what = "numbers after the observations, nine for each camera and three for each point";
         problems.push(0, Mistake::Count { what, expected, found: numbers.len() });
+    }
+    // without the right number of numbers, none is known to be a focal length
+    let known = if problems.is_empty() { cameras } else { 0 };
+    for (i, camera) in numbers.chunks_exact(CAMERA).take(known).enumerate() {
+        let found = camera[FOCAL_LENGTH];
+        if found <= 0.0 {
+            let what = format!("camera {i}: expected a focal length above zero, got {found}");
+            problems.push(0, Mistake::Row(what));
+        }
     }
     problems.finish()?;
     Ok(build(&seen, numbers.split_at(cameras * CAMERA), anchor))

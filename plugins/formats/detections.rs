@@ -72,6 +72,9 @@ impl Detection {
         if !self.timestamp.is_finite() {
             return row(format!("expected a finite time stamp, got {}", self.timestamp));
         }
+        if self.class_name.is_empty() {
+            return row("the class has no name".to_owned());
+        }
         if !(0.0..=1.0).contains(&self.score) {
             return row(format!("expected a score from 0 to 1, got {}", self.score));
         }
@@ -116,7 +119,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Detection>, Forma
             }
             Err(e) => {
                 let line = e.position().map_or(0, |p| line(text, p));
-                problems.push(line, Mistake::Row(reason(&e)));
+                problems.push(line, Mistake::Row(reason(&e, &header)));
             }
         }
     }
@@ -124,7 +127,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Detection>, Forma
 }
 
 fn row(record: &StringRecord, header: &StringRecord) -> Result<Detection, Mistake> {
-    record.deserialize::<Detection>(Some(header)).map_err(|e| Mistake::Row(reason(&e)))?.check()
+    record.deserialize::<Detection>(Some(header)).map_err(|e| Mistake::Row(reason(&e, header)))?.check()
 }
 
 /// The line of a record: csv counts the blank lines and comments before it as its own.
@@ -135,13 +138,16 @@ fn line(text: &str, position: &csv::Position) -> usize {
 }
 
 /// What is wrong, without csv's own way to say where.
-fn reason(e: &csv::Error) -> String {
+fn reason(e: &csv::Error, header: &StringRecord) -> String {
     match e.kind() {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
             format!("expected {expected_len} fields as in the header, got {len}")
         }
         csv::ErrorKind::Deserialize { err, .. } => match err.field() {
-            Some(field) => format!("field {}: {}", field + 1, err.kind()),
+            Some(field) => {
+                let column = header.get(field as usize).unwrap_or_default();
+                format!("column `{column}`, the {}. of the row: {}", field + 1, err.kind())
+            }
             None => err.kind().to_string(),
         },
         _ => e.to_string(),

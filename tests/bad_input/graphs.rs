@@ -53,7 +53,7 @@ fn values_that_are_wrong() {
         |name, q: &str| text(name, format!("[[variables]]\nkey = \"x\"\nvalue = {}\n", quaternion(q)));
     let quadric = |name, axes: &str| {
         let value = format!(
-            "{{ type = \"dual_quadric\", pose = {{ rotation = [0.0, 0.0, 0.0, 1.0], translation = [0.0, 0.0, 0.0] }}, semi_axes = {axes} }}"
+            "{{ type = \"dual_quadric\", rotation = [0.0, 0.0, 0.0, 1.0], translation = [0.0, 0.0, 0.0], semi_axes = {axes} }}"
         );
         text(name, format!("[[variables]]\nkey = \"q\"\nvalue = {value}\n"))
     };
@@ -130,7 +130,7 @@ fn factors_that_are_wrong() {
         change(
             "loss of a negative width",
             "noise = { sigma = 0.1 }",
-            "noise = { sigma = 0.1 }\nloss = { type = \"huber\", k = -1.0 }",
+            "noise = { sigma = 0.1 }\nloss = { type = \"huber\", scale = -1.0 }",
         ),
         change(
             "formula that is wrong",

@@ -23,11 +23,20 @@ pub(crate) fn text(name: &'static str, text: impl Into<String>) -> Case {
 pub(crate) fn account(file: &str, command: &str, cases: Vec<Case>) -> String {
     let mut account = String::new();
     for (name, bytes) in cases {
+        keep(name, file, &bytes);
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join(file), &bytes).unwrap();
         let _ = write!(account, "## {name}\n{}\n{}\n", shown(&bytes), ended(folder.path(), command, file));
     }
     account
+}
+
+/// Writes a case into the folder that `MANIFACTOR_KEEP` names, if it does, for others to be tried on.
+fn keep(name: &str, file: &str, bytes: &[u8]) {
+    let Some(folder) = std::env::var_os("MANIFACTOR_KEEP") else { return };
+    let extension = Path::new(file).extension().unwrap().to_str().unwrap();
+    let name = format!("{}.{extension}", name.replace(' ', "_"));
+    std::fs::write(Path::new(&folder).join(name), bytes).unwrap();
 }
 
 /// Runs `command` in a folder; its exit code, and what it says.
@@ -63,8 +72,13 @@ pub(crate) fn ended(folder: &Path, command: &str, file: &str) -> String {
     assert!(!said.contains("panicked"), "{said}");
     // temporary folders have another name each time
     let said = said.replace(&folder.display().to_string(), "FOLDER");
-    assert!(code == 0 || !said.trim().is_empty(), "exit code {code}, and not a word");
-    format!("exit code {code}\n{}\n", said.trim_end())
+    // how a solve ended is a result, and so on standard output, above what differs each time
+    let results = String::from_utf8(std::fs::read(folder.join(".stdout")).unwrap()).unwrap();
+    let ending =
+        results.lines().skip_while(|line| !line.starts_with("start")).skip(1).take(1).collect::<String>();
+    let ending = if code == 1 { ending } else { String::new() };
+    assert!(code == 0 || !said.trim().is_empty() || !ending.is_empty(), "exit code {code}, and not a word");
+    format!("exit code {code}\n{}\n", [said.trim_end(), &ending].join("\n").trim())
 }
 
 /// An input as text, shortened.

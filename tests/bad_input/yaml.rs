@@ -18,7 +18,7 @@ fn change(name: &'static str, from: &str, to: &str) -> Case {
 
 /// Ten names, each nine times the one before: a billion of the first.
 fn laughs() -> String {
-    let line = |i: usize| format!("a{i}: &a{i} [{}]\n", [format!("*a{}", i - 1); 9].join(", "));
+    let line = |i: usize| format!("a{i}: &a{i} [{}]\n", vec![format!("*a{}", i - 1); 9].join(", "));
     "a0: &a0 [lol]\n".to_owned() + &(1..10).map(line).collect::<String>()
 }
 

@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::path::Path;
 use targets::{TARGETS, Target};
 
-/// Changed inputs for each one that is kept.
+/// Changed inputs for each one that is kept; `MANIFACTOR_FUZZ` asks for more.
 const CHANGES: usize = 150;
 /// What may be put in anywhere.
 const WORDS: [&[u8]; 16] = [
@@ -32,6 +32,8 @@ const WORDS: [&[u8]; 16] = [
 
 #[test]
 fn no_target_panics() {
+    let asked = std::env::var("MANIFACTOR_FUZZ").map(|n| n.parse().unwrap());
+    let changes = asked.unwrap_or(CHANGES);
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
     for (name, target) in TARGETS {
         let files = std::fs::read_dir(corpus.join(name)).unwrap();
@@ -41,7 +43,7 @@ fn no_target_panics() {
         let mut rng = StdRng::seed_from_u64(7);
         for input in &inputs {
             run((name, target), input);
-            for _ in 0..CHANGES {
+            for _ in 0..changes {
                 let other = &inputs[rng.random_range(0..inputs.len())];
                 run((name, target), &changed(input, other, &mut rng));
             }

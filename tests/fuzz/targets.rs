@@ -45,8 +45,8 @@ pub fn bundle(data: &[u8]) {
 /// TUM's trajectories: what is read is read back from what is written.
 pub fn trajectory(data: &[u8]) {
     if let Ok(read) = tum::parse(&String::from_utf8_lossy(data), "poses.txt") {
-        let again = tum::parse(&tum::format(&read), "poses.txt").unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(again.len(), read.len());
+        let again = tum::parse(&tum::format(&read.poses), "poses.txt").unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(again.poses.len(), read.poses.len());
     }
 }
 
@@ -79,7 +79,7 @@ pub fn expression(data: &[u8]) {
     let graph = format!(
         r#"{{ "variables": [
             {{ "key": "a", "value": {pose} }},
-            {{ "key": "q", "value": {{ "type": "dual_quadric", "pose": {{ "rotation": [0, 0, 0, 1], "translation": [0, 0, 9] }}, "semi_axes": [1, 2, 3] }} }}],
+            {{ "key": "q", "value": {{ "type": "dual_quadric", "rotation": [0, 0, 0, 1], "translation": [0, 0, 9], "semi_axes": [1, 2, 3] }} }}],
            "factors": [{{ "keys": ["a", "q"], "factor": {{ "type": "expression",
             "variables": {{ "a": "se3", "q": "dual_quadric" }}, "residual": [{formula}] }} }}] }}"#
     );

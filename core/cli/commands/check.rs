@@ -48,7 +48,7 @@ impl Check {
     fn graph(&self) -> Result<String, Failure> {
         let input = self.reading.open(&self.run.config, &SolverArguments::set_only(&self.run.set))?;
         for note in &input.notes {
-            eprintln!("note: {note}");
+            output::note(note);
         }
         Ok(graph_file::summary(&input).trim_end().to_owned())
     }

@@ -4,10 +4,12 @@ use crate::status::Status;
 use crate::{output, text};
 use clap::{Args, ValueEnum};
 use manifactor::formats::tum;
+use manifactor::graph::checked::Positive;
 use manifactor::slam::metrics::{
     Alignment, MetricsError, Pairing, Statistics, absolute_error, align, associate, relative_error,
 };
 use serde_json::json;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Compare two trajectories in TUM's format (timestamp tx ty tz qx qy qz qw): ATE and RPE.
@@ -21,17 +23,22 @@ pub(crate) struct Evaluate {
     #[arg(long, value_enum, default_value = "se3")]
     align: Align,
     /// How far apart in time two poses of one pair may be, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
-    within: f64,
+    #[arg(long, value_name = "SECONDS", default_value = "0.02", value_parser = positive, allow_negative_numbers = true)]
+    within: Positive,
     /// Poses between the two ends of a relative error.
-    #[arg(long, value_name = "POSES", default_value_t = 1)]
-    delta: usize,
+    #[arg(long, value_name = "POSES", default_value = "1")]
+    delta: NonZeroUsize,
     /// Relative errors from each pose on, not from each end to the next.
     #[arg(long)]
     all_pairs: bool,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+fn positive(text: &str) -> Result<Positive, String> {
+    let number = text.parse::<f64>().map_err(|_| "expected a number".to_owned())?;
+    Positive::new(number).map_err(|e| e.to_string())
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -62,9 +69,9 @@ impl Evaluate {
         let (truth, estimate) = (tum::read(&self.truth)?, tum::read(&self.estimate)?);
         let pairing = if self.all_pairs { Pairing::All } else { Pairing::Consecutive };
         let measure = || -> Result<_, MetricsError> {
-            let pairs = associate(&truth.poses, &estimate.poses, self.within)?;
+            let pairs = associate(&truth.poses, &estimate.poses, self.within.get())?;
             let (similarity, pairs) = align(&pairs, self.align.into())?;
-            let (ate, rpe) = (absolute_error(&pairs)?, relative_error(&pairs, self.delta, pairing)?);
+            let (ate, rpe) = (absolute_error(&pairs)?, relative_error(&pairs, self.delta.get(), pairing)?);
             Ok((similarity.scale, pairs.len(), ate, rpe))
         };
         let (scale, pairs, ate, rpe) = measure().map_err(Failure::input)?;

@@ -44,7 +44,7 @@ impl Solve {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         let input = self.reading.open(&self.graph, &self.solver)?;
         for note in &input.notes {
-            eprintln!("note: {note}");
+            output::note(&note);
         }
         let mut watch = Watch::new(self.verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();
@@ -57,7 +57,7 @@ impl Solve {
         drop(watch);
         if let Some(path) = &self.out {
             for note in graph_file::write(path, &input.graph, &solution.values)? {
-                eprintln!("note: {note}");
+                output::note(&note);
             }
         }
         let certificate = self.certify.then(|| certify(&input.graph, &solution.values));

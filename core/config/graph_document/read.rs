@@ -91,6 +91,10 @@ impl Read {
         let fixed = section.take("fixed").and_then(|node| fixed(&node, errors));
         section.finish();
         let Some(key) = key else { return };
+        if key.as_str().is_empty() {
+            errors.push(Diagnostic::new(place, Problem::invalid("a key needs at least one character")));
+            return;
+        }
         if let Some(first) = self.variables.get(&key) {
             errors.push(Diagnostic::duplicate("variable", key.as_str(), place, first.key.clone()));
             return;
