@@ -1,6 +1,6 @@
 //! Numbers that are checked when they are read.
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A finite number above zero.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
@@ -28,6 +28,14 @@ impl Positive {
     pub const fn get(self) -> f64 {
         self.0
     }
+}
+
+/// For fields that are plain numbers in code: `#[serde(deserialize_with = "positive")]`.
+///
+/// # Errors
+/// Where the number is zero, negative or not finite.
+pub fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Positive::deserialize(from).map(Positive::get)
 }
 
 impl TryFrom<f64> for Positive {

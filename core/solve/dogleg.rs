@@ -7,6 +7,7 @@ use crate::outcome::Outcome;
 use crate::problem::Problem;
 use crate::system::{dot, norm};
 use crate::termination::{Stall, Termination, Tolerance};
+use manifactor_graph::checked::Positive;
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,7 +27,7 @@ pub struct Dogleg {
     /// Radius of the first step, in standard deviations; the length of the first Gauss-Newton step,
     /// where it is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub initial_radius: Option<f64>,
+    pub initial_radius: Option<Positive>,
     /// When to stop.
     pub stop: Stopping,
     /// How the linear system of each step is solved.
@@ -100,7 +101,7 @@ impl Path {
 
 impl Dogleg {
     fn iterate(&self, session: &mut Session<'_>) -> Termination {
-        let mut radius = self.initial_radius;
+        let mut radius = self.initial_radius.map(Positive::get);
         'linearized: loop {
             if let Some(termination) = session.finished() {
                 return termination;

@@ -7,6 +7,7 @@ use crate::outcome::Outcome;
 use crate::problem::Problem;
 use crate::system::{dot, norm};
 use crate::termination::{Stall, Termination, Tolerance};
+use manifactor_graph::checked::{Positive, positive};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,12 +25,20 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct LevenbergMarquardt {
     /// Damping of the first step, as a share of the diagonal.
+    #[serde(deserialize_with = "positive")]
+    #[schemars(with = "Positive")]
     pub initial_lambda: f64,
     /// Least damping.
+    #[serde(deserialize_with = "positive")]
+    #[schemars(with = "Positive")]
     pub min_lambda: f64,
     /// Damping at which a solve gives up.
+    #[serde(deserialize_with = "positive")]
+    #[schemars(with = "Positive")]
     pub max_lambda: f64,
     /// Largest factor by which one good step lowers the damping.
+    #[serde(deserialize_with = "positive")]
+    #[schemars(with = "Positive")]
     pub decrease: f64,
     /// Least and largest entry of the diagonal that is used for damping.
     pub diagonal: [f64; 2],

@@ -77,6 +77,12 @@ pub(crate) fn ended(folder: &Path, command: &str, file: &str) -> String {
     let ending =
         results.lines().skip_while(|line| !line.starts_with("start")).skip(1).take(1).collect::<String>();
     let ending = if code == 1 { ending } else { String::new() };
+    // which direction is open is rounding's choice, where several are
+    let warnings = results.lines().filter(|line| line.starts_with("warning"));
+    let warnings =
+        warnings.map(|line| line.find("constrains").map_or(line, |at| &line[..at + "constrains".len()]));
+    let warnings: String = warnings.map(|line| format!("{line}\n")).collect();
+    let ending = warnings + &ending;
     assert!(code == 0 || !said.trim().is_empty() || !ending.is_empty(), "exit code {code}, and not a word");
     format!("exit code {code}\n{}\n", [said.trim_end(), &ending].join("\n").trim())
 }
