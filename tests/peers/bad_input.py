@@ -60,20 +60,22 @@ def ended(command):
         ran = subprocess.run(command, capture_output=True, timeout=PATIENCE, text=True, errors="replace")
     except subprocess.TimeoutExpired:
         return "hangs", ""
-    last = (ran.stderr.strip() or ran.stdout.strip()).splitlines()[-1:]
     if ran.returncode < 0:
         return f"crash (signal {-ran.returncode})", ""
-    return ("error" if ran.returncode else "answer"), "".join(last)
+    return ("error" if ran.returncode else "answer"), ran.stderr + ran.stdout
 
 
 def peer(name, path):
     verdict, said = ended([sys.executable, __file__, "--peer", name, path])
     if verdict != "answer":
         return verdict
-    sizes = json.loads(said)
+    *words, sizes = said.strip().splitlines()
+    sizes, words = json.loads(sizes), "with a word" if words else "no word"
     if not sizes:
-        return "empty answer, no word"
-    return "NaN or infinity as answer" if any(size != size or size == float("inf") for size in sizes) else "answer, no word"
+        return f"empty answer, {words}"
+    if any(size != size or size == float("inf") for size in sizes):
+        return f"NaN or infinity as answer, {words}"
+    return f"answer, {words}"
 
 
 def ours(binary, path):
