@@ -36,13 +36,18 @@ pub use manifactor_formats as formats;
 pub use manifactor_geometry as geometry;
 #[cfg(feature = "quadric")]
 pub use manifactor_quadric as quadric;
+#[cfg(feature = "semantic")]
+pub use manifactor_semantic as semantic;
 #[cfg(feature = "slam")]
 pub use manifactor_slam as slam;
+#[cfg(feature = "testing")]
+pub use manifactor_testing as testing;
 #[cfg(feature = "viz")]
 pub use manifactor_viz as viz;
 
 pub use manifactor_graph::{
-    register, register_factor, register_functions, register_loss, register_manifold, register_quantity,
+    register, register_factor, register_functions, register_invariance, register_loss, register_manifold,
+    register_quantity,
 };
 
 /// For traits that [`register!`] enters: `use manifactor::typetag;`, then `#[typetag::serde(name = "…")]` on the `impl`.
@@ -59,7 +64,8 @@ pub mod prelude {
         Refs, Residual, Scalar, Tangent, Values, Variable, Variables, Vector,
     };
     pub use manifactor_graph::{
-        register, register_factor, register_functions, register_loss, register_manifold, register_quantity,
+        register, register_factor, register_functions, register_invariance, register_loss, register_manifold,
+        register_quantity,
     };
     pub use manifactor_solve::{
         Dogleg, GaussNewton, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome, Problem, Silent,
@@ -80,7 +86,22 @@ use manifactor_formats as _;
 use manifactor_geometry as _;
 #[cfg(feature = "quadric")]
 use manifactor_quadric as _;
+#[cfg(feature = "semantic")]
+use manifactor_semantic as _;
 #[cfg(feature = "slam")]
 use manifactor_slam as _;
 #[cfg(feature = "viz")]
 use manifactor_viz as _;
+
+/// The blocks of Rust in the book are tests.
+#[cfg(doctest)]
+mod book {
+    #[doc = include_str!("../docs/concepts.md")]
+    mod concepts {}
+    #[doc = include_str!("../docs/first-factor.md")]
+    mod first_factor {}
+    #[doc = include_str!("../docs/authors-guide.md")]
+    mod authors_guide {}
+    #[doc = include_str!("../docs/coming-from.md")]
+    mod coming_from {}
+}

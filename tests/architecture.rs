@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// From the bottom up: a plugin may build on those before it.
-const PLUGINS: [&str; 6] = ["geometry", "quadric", "formats", "slam", "viz", "expression"];
+const PLUGINS: [&str; 7] = ["geometry", "quadric", "semantic", "formats", "slam", "viz", "expression"];
 /// What a plugin may take from the core.
 const FOR_PLUGINS: [&str; 4] = ["graph", "solve", "config", "testing"];
 

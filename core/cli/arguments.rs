@@ -1,12 +1,15 @@
 //! The command line.
-use crate::commands::{Check, Evaluate, Explain, List, Run, Schema, Simulate, Solve};
+use crate::commands::{
+    Check, CheckFactor, Evaluate, Explain, List, New, Run, Schema, ShowGraph, Simulate, Solve,
+};
 use crate::failure::Failure;
 use crate::status::Status;
 use clap::{Parser, Subcommand};
+use manifactor::graph::catalogue::{all, check_names};
 
 /// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 ///
-/// Exit codes: 0 done; 1 a solve ended without converging (its best values are written); 2 the command line or a
+/// Exit codes: 0 done; 1 a solve ended without converging (its best values are written), or a factor breaks a law; 2 the command line or a
 /// document is wrong; 3 a file could not be read or written; 130 interrupted (the best values so far are written).
 #[derive(Debug, Parser)]
 #[command(name = "manifactor", version, max_term_width = 100)]
@@ -23,8 +26,11 @@ enum Command {
     Run(Run),
     Solve(Solve),
     Check(Check),
+    CheckFactor(CheckFactor),
     List(List),
     Explain(Explain),
+    Graph(ShowGraph),
+    New(New),
     Evaluate(Evaluate),
     Simulate(Simulate),
     Schema(Schema),
@@ -40,12 +46,16 @@ impl Cli {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
             pool.build_global().map_err(Failure::input)?;
         }
+        check_names(&all()).map_err(Failure::input)?;
         match &self.command {
             Command::Run(command) => command.run(),
             Command::Solve(command) => command.run(),
             Command::Check(command) => command.run(),
+            Command::CheckFactor(command) => command.run(),
             Command::List(command) => command.run(),
             Command::Explain(command) => command.run(),
+            Command::Graph(command) => command.run(),
+            Command::New(command) => command.run(),
             Command::Evaluate(command) => command.run(),
             Command::Simulate(command) => command.run(),
             Command::Schema(command) => command.run(),
@@ -58,10 +68,12 @@ impl Cli {
             Command::Run(command) => command.json,
             Command::Solve(command) => command.json,
             Command::Check(command) => command.json,
+            Command::CheckFactor(command) => command.json,
             Command::List(command) => command.json,
             Command::Explain(command) => command.json,
+            Command::Graph(command) => command.json,
             Command::Evaluate(command) => command.json,
-            Command::Simulate(_) => false,
+            Command::New(_) | Command::Simulate(_) => false,
             Command::Schema(_) => true,
         }
     }

@@ -28,7 +28,7 @@ fn has_type(node: &Node) -> bool {
 }
 
 /// The same settings for the type `name`. Those of another type, in the document, are left behind.
-fn named(argument: &str, name: &str, mut node: Node, document: &Source) -> Node {
+pub(crate) fn named(argument: &str, name: &str, mut node: Node, document: &Source) -> Node {
     let Value::Table(table) = &mut node.value else { return node };
     let is = |field: &Field| matches!(&field.node.value, Value::String(text) if text == name);
     if !table.get("type").is_none_or(is) {

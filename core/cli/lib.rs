@@ -16,8 +16,10 @@ mod commands;
 mod failure;
 mod fields;
 mod graph_file;
+mod inspection;
 mod interrupt;
 mod output;
+mod reference;
 mod report;
 mod run_file;
 mod solver;
@@ -25,6 +27,7 @@ mod status;
 mod table;
 mod text;
 mod watch;
+mod what_if;
 
 pub use arguments::Cli;
 pub use failure::Failure;

@@ -10,6 +10,8 @@ pub enum Status {
     Done,
     /// A solve ended without a minimum; its best values are written all the same: exit code 1.
     NotConverged,
+    /// A factor was checked, and breaks a law: exit code 1.
+    Broken,
     /// Ctrl-C; the best values so far are written: exit code 130.
     Interrupted,
 }
@@ -40,7 +42,7 @@ impl From<Status> for ExitCode {
     fn from(status: Status) -> ExitCode {
         match status {
             Status::Done => ExitCode::SUCCESS,
-            Status::NotConverged => ExitCode::from(1),
+            Status::NotConverged | Status::Broken => ExitCode::from(1),
             Status::Interrupted => ExitCode::from(130),
         }
     }

@@ -31,7 +31,7 @@ pub use graph_document::{read_graph, read_graph_section, write_graph};
 pub use merge::merge;
 pub use node::{Field, Found, MAX_DEPTH, Node, Table, Value};
 pub use problem::{Problem, quoted_list};
-pub use schema::{Definitions, graph_schema};
+pub use schema::{Definitions, graph_root, graph_schema};
 pub use section::Section;
 pub use source::{Place, Source};
 pub use suggest::nearest;

@@ -70,15 +70,25 @@ fn entry_of(tag: &Node, kind: &str, errors: &Errors) -> Option<&'static Entry> {
                     let message = format!("`{name}` is {b} {other}, not {a} {kind}");
                     Problem::Invalid { message, help: advice("", &known(kind)) }
                 }
-                None => {
-                    Problem::UnknownName { what: kind.to_owned(), name: name.clone(), known: known(kind) }
-                }
+                None => unknown(kind, name),
             },
         },
         _ => Problem::wrong_type(format!("the name of {a} {kind}"), tag.in_words()),
     };
     errors.report(tag.place.clone(), problem);
     None
+}
+
+/// A name that nothing has: misspelt, or of a plugin that is not there.
+fn unknown(kind: &str, name: &str) -> Problem {
+    let known = known(kind);
+    if nearest(name, known.iter().map(String::as_str)).is_some() {
+        return Problem::UnknownName { what: kind.to_owned(), name: name.to_owned(), known };
+    }
+    let link =
+        "if a plugin brings it, the binary has to link the plugin: `use the_plugin as _;` beside its `main`";
+    let help = advice(name, &known).map_or_else(|| link.to_owned(), |known| format!("{known}; {link}"));
+    Problem::with_help(format!("unknown {kind} `{name}`"), help)
 }
 
 /// Reports what has no `type`.

@@ -13,6 +13,12 @@ const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 /// The schema of [literal graphs](crate::read_graph), with every factor, manifold and loss that is linked.
 pub fn graph_schema() -> Value {
     let mut definitions = Definitions::new();
+    let root = graph_root(&mut definitions);
+    definitions.document(root)
+}
+
+/// [`graph_schema`] without its definitions, which are put among the others.
+pub fn graph_root(definitions: &mut Definitions) -> Value {
     let key = json!({ "type": "string", "description": "The name of a variable." });
     let variable = json!({
         "type": "object",
@@ -36,7 +42,7 @@ pub fn graph_schema() -> Value {
         "additionalProperties": false,
     });
     let (start, solver) = (definitions.kind("start"), definitions.kind("solver"));
-    definitions.document(json!({
+    json!({
         "title": "A factor graph",
         "description": "Variables with their initial values, the factors between them, and how to solve them.",
         "type": "object",
@@ -48,7 +54,7 @@ pub fn graph_schema() -> Value {
         },
         "required": ["variables"],
         "additionalProperties": false,
-    }))
+    })
 }
 
 /// The `$defs` of a schema that is being put together out of many.

@@ -109,6 +109,36 @@ pub fn entries(kind: &str) -> Vec<&'static Entry> {
     all().into_iter().filter(|e| e.kind == kind).collect()
 }
 
+/// Two entries of one kind and one name: a document could mean either.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "two types are registered as the {kind} `{name}`, in `{}` and in `{}`: give one of them another name in its \
+     `register_…!` line", modules[0], modules[1]
+)]
+pub struct NameTaken {
+    /// What both are.
+    pub kind: &'static str,
+    /// What both are called.
+    pub name: &'static str,
+    /// Where they are registered.
+    pub modules: [&'static str; 2],
+}
+
+/// Checks that every registered type has a name of its own among its kind.
+///
+/// # Errors
+/// The first two that share one.
+pub fn check_names(sorted: &[&Entry]) -> Result<(), NameTaken> {
+    let same = sorted.windows(2).find(|pair| (pair[0].kind, pair[0].name) == (pair[1].kind, pair[1].name));
+    match same {
+        Some(pair) => {
+            let modules = [pair[0].module, pair[1].module];
+            Err(NameTaken { kind: pair[0].kind, name: pair[0].name, modules })
+        }
+        None => Ok(()),
+    }
+}
+
 /// The entry of this kind and name.
 pub fn find(kind: &str, name: &str) -> Option<&'static Entry> {
     inventory::iter::<Entry>.into_iter().find(|e| e.kind == kind && e.name == name)
@@ -177,6 +207,12 @@ macro_rules! register_manifold {
                     self
                 }
             }
+            $crate::__private::inventory::submit! {
+                $crate::AsVariable {
+                    type_id: || ::std::any::TypeId::of::<$type>(),
+                    cast: |x| x.downcast_ref::<$type>().map(|x| x as &dyn $crate::Variable),
+                }
+            }
             $crate::register!(
                 dyn $crate::Variable,
                 $name,
@@ -205,4 +241,29 @@ macro_rules! register_loss {
             $crate::register!(dyn $crate::loss::Loss, $name, $type);
         };
     };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_of_one_name_are_told_with_where_they_are() {
+        let entry = |name, module| Entry {
+            kind: "factor",
+            name,
+            module,
+            schema: || schemars::schema_for!(f64),
+            type_id: || TypeId::of::<f64>(),
+            signature: Signature::default,
+            parse: |_| Err(ParseError::new(Path::empty(), serde::de::Error::custom("none"))),
+        };
+        let (a, b, c) = (entry("leans", "one"), entry("rests_on", "one"), entry("rests_on", "other"));
+        assert_eq!(check_names(&[&a, &b]), Ok(()));
+        let error = check_names(&[&a, &b, &c]).unwrap_err().to_string();
+        assert!(
+            error.starts_with("two types are registered as the factor `rests_on`, in `one` and in `other`"),
+            "{error}"
+        );
+    }
 }

@@ -30,6 +30,10 @@ impl<const R: usize, const C: usize> Block for SMatrix<f64, R, C> {
 }
 
 /// `U1`, `U2`, …: a dimension, with the vectors, matrices and jets of that size.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a number of rows or directions",
+    note = "write nalgebra's type for it: `type Dim = U1;`, `U2`, `U3`, …"
+)]
 pub trait Dimension: Debug + Send + Sync + 'static {
     /// The number itself.
     const N: usize;

@@ -15,6 +15,11 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 /// A registered residual. Implemented by [`register_factor!`](crate::register_factor).
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not registered as a factor",
+    label = "not a factor",
+    note = "write `register_factor!(\"its_name\", {Self});` below `impl Residual for {Self}`"
+)]
 #[typetag::serde(tag = "type")]
 pub trait Factor: Debug + Send + Sync {
     /// Everything else.
@@ -64,6 +69,10 @@ pub struct Linearization {
 }
 
 /// The object-safe face of [`Residual`], implemented once for all of them.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a residual, so it cannot be registered as a factor",
+    note = "implement `Residual` for `{Self}`: `type Variables`, `type Dim` and `fn residual`"
+)]
 pub trait ErasedResidual: Send + Sync {
     /// For a downcast to the concrete type.
     fn as_any(&self) -> &dyn Any;

@@ -15,6 +15,7 @@ mod direction;
 mod dynamic;
 mod factor;
 mod graph;
+pub mod invariance;
 mod kernel;
 mod key;
 pub mod loss;
@@ -43,7 +44,7 @@ pub use residual::{Jacobians, Lifted, Refs, Residual};
 pub use scalar::{Jet, JetOf, Lift, Scalar};
 pub use text_error::TextError;
 pub use values::{ValueError, Values};
-pub use variable::{ErasedManifold, Variable};
+pub use variable::{AsVariable, ErasedManifold, Variable, as_variable};
 pub use variables::Variables;
 
 #[doc(hidden)]

@@ -7,6 +7,10 @@ use num_dual::{Derivative, DualNum, DualSVec64};
 ///
 /// `x * 2.0` works, `2.0 * x` does not; lift constants with [`Lift::lift`] or `T::from(c)`.
 /// Comparisons, `max` and `clamp` see the real part only.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a scalar that residuals can be differentiated through",
+    note = "write residuals over `T: Scalar`; lift constants with `T::from(c)` or `.lift()`"
+)]
 pub trait Scalar: RealField + Copy + DualNum<Primitive = f64> {}
 impl<T: RealField + Copy + DualNum<Primitive = f64>> Scalar for T {}
 
@@ -33,6 +37,10 @@ impl<const N: usize> Jet for DualSVec64<N> {
 pub type JetOf<D> = <D as Dimension>::Jet;
 
 /// Constants, lifted to another scalar.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` cannot be lifted to the scalar of a residual",
+    note = "numbers, nalgebra's vectors and matrices, `Direction` and the manifolds can; for another type write `impl Lift for {Self}`"
+)]
 pub trait Lift {
     /// The same thing over `T`.
     type Of<T: Scalar>;

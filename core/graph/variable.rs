@@ -7,6 +7,11 @@ use std::any::{Any, TypeId};
 use std::fmt::Debug;
 
 /// A point of a registered manifold. Implemented by [`register_manifold!`](crate::register_manifold).
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not registered as a type of variables",
+    label = "not a type of variables",
+    note = "write `register_manifold!(\"its_name\", {Self});` below `impl Manifold for {Self}`, or use a registered one such as `Se3`"
+)]
 #[typetag::serde(tag = "type")]
 pub trait Variable: Debug + Send + Sync {
     /// Everything else.
@@ -15,6 +20,23 @@ pub trait Variable: Debug + Send + Sync {
 
 impl Kind for dyn Variable {
     const NAME: &'static str = "variable";
+}
+
+/// The way from `dyn Any` back to a registered type of variables. Made by
+/// [`register_manifold!`](crate::register_manifold).
+#[derive(Debug)]
+pub struct AsVariable {
+    /// The type.
+    pub type_id: fn() -> TypeId,
+    /// The same variable; `None` where it is of another type.
+    pub cast: for<'a> fn(&'a dyn Any) -> Option<&'a dyn Variable>,
+}
+inventory::collect!(AsVariable);
+
+/// How a [`DynamicResidual`](crate::DynamicResidual) gets at its variables as trait objects; `None` for a type that is
+/// not registered.
+pub fn as_variable(id: TypeId) -> Option<&'static AsVariable> {
+    inventory::iter::<AsVariable>.into_iter().find(|c| (c.type_id)() == id)
 }
 
 impl Clone for Box<dyn Variable> {

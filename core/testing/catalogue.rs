@@ -3,7 +3,7 @@
 //! A registered type brings an example in its docs. That is a factor to check, or a point around
 //! which others can be drawn, so that no type goes without the laws.
 use crate::error::LawError;
-use crate::jacobian::jacobian_law;
+use crate::factor_check::{FactorCheck, FactorReport, Subject};
 use crate::manifold::manifold_laws;
 use manifactor_graph::catalogue::{self, Entry, Kind};
 use manifactor_graph::{Factor, Variable};
@@ -36,31 +36,43 @@ pub fn example<K: Kind + ?Sized>(entry: &'static Entry) -> Result<Box<K>, LawErr
     entry.parse::<K>(example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))
 }
 
-/// Checks [`jacobian_law`] for a factor's example, at `cases` random points around the examples of its
-/// variables. Returns at how many of them the factor was defined.
+/// Checks a factor's example, see [`FactorCheck`], at so many points. Returns what was found.
 ///
 /// # Errors
 /// The law that is broken, or what the catalogue lacks.
-pub fn factor_law(entry: &'static Entry, cases: usize) -> Result<usize, LawError> {
-    let factor = example::<dyn Factor>(entry)?;
-    let signature = factor.erased().signature();
-    let mut types = signature.variables.clone();
-    if signature.many {
-        types.resize(3, types.first().copied().unwrap_or(TypeId::of::<()>()));
-    }
-    let origins: Vec<_> = types.iter().map(|id| example_point(entry, *id)).collect::<Result<_, _>>()?;
-    let mut rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-    let mut defined = 0;
-    for _ in 0..cases {
-        let point: Vec<_> = origins.iter().filter_map(|x| around(&**x, &mut rng)).collect();
-        let point: Vec<&dyn Variable> = point.iter().map(|x| &**x).collect();
-        match jacobian_law(&*factor, &point) {
-            Ok(()) => defined += 1,
-            Err(LawError::NotDefined { .. }) => {}
-            Err(broken) => return Err(broken),
+pub fn factor_law(entry: &'static Entry, points: usize) -> Result<FactorReport, LawError> {
+    let report = FactorCheck { points, ..FactorCheck::default() }.run(&Subject::example(entry)?);
+    if report.holds() { Ok(report) } else { Err(problem(entry, report.to_string())) }
+}
+
+/// Checks [`documentation_law`] and [`factor_law`] of a registered factor, at 256 points: what
+/// [`factor_laws!`](crate::factor_laws) makes a test of.
+///
+/// # Panics
+/// Where one does not hold, with what is wrong: it is an assertion for tests.
+#[track_caller]
+pub fn assert_factor_laws(name: &str) {
+    let entry = catalogue::find(<dyn Factor as Kind>::NAME, name);
+    let entry = entry.unwrap_or_else(|| panic!(
+        "no factor `{name}` is registered: is there a line `register_factor!(\"{name}\", …);`, and is its module part of the crate?"
+    ));
+    catalogue::check_names(&catalogue::all()).unwrap_or_else(|e| panic!("{e}"));
+    documentation_law(entry).unwrap_or_else(|e| panic!("{e}"));
+    factor_law(entry, 256).unwrap_or_else(|e| panic!("{e}"));
+}
+
+/// The law of every factor, a test for each, by its registered name: that its docs have what the catalogue shows, that
+/// its Jacobian is right, its residual finite, and that what is stated of it holds. `factor_laws! { rests_on, leans }`
+#[macro_export]
+macro_rules! factor_laws {
+    ($($name:ident),+ $(,)?) => {
+        mod factor_laws {
+            $(#[test]
+            fn $name() {
+                $crate::catalogue::assert_factor_laws(stringify!($name));
+            })+
         }
-    }
-    Ok(defined)
+    };
 }
 
 /// Checks [`manifold_laws`] at `cases` random points around a manifold's example.
@@ -88,7 +100,8 @@ fn around(x: &dyn Variable, rng: &mut TestRng) -> Option<Box<dyn Variable>> {
     x.erased().retract(&delta)
 }
 
-fn example_point(of: &'static Entry, id: TypeId) -> Result<Box<dyn Variable>, LawError> {
+/// The example of a manifold, for a factor of this entry.
+pub(crate) fn example_point(of: &'static Entry, id: TypeId) -> Result<Box<dyn Variable>, LawError> {
     let kind = <dyn Variable as Kind>::NAME;
     let entry = catalogue::entries(kind).into_iter().find(|e| (e.type_id)() == id);
     example(entry.ok_or_else(|| problem(of, "one of its variables is of no registered type".into()))?)
@@ -96,12 +109,24 @@ fn example_point(of: &'static Entry, id: TypeId) -> Result<Box<dyn Variable>, La
 
 /// The fields of the example: the table in it whose `type` is the entry's name.
 fn example_fields(entry: &'static Entry) -> Result<Value, LawError> {
+    let missing = || problem(entry, format!("its example has no table with type = \"{}\"", entry.name));
+    table_of_type(&example_document(entry)?, entry.name).ok_or_else(missing)
+}
+
+fn example_document(entry: &'static Entry) -> Result<Value, LawError> {
     let text = entry.example().ok_or_else(|| problem(entry, "its docs have no ```toml example".into()))?;
     let document: toml::Value =
         toml::from_str(&text).map_err(|e| problem(entry, format!("its example is no TOML: {e}")))?;
-    let document = serde_json::to_value(document).map_err(|e| problem(entry, e.to_string()))?;
-    let missing = || problem(entry, format!("its example has no table with type = \"{}\"", entry.name));
-    table_of_type(&document, entry.name).ok_or_else(missing)
+    serde_json::to_value(document).map_err(|e| problem(entry, e.to_string()))
+}
+
+/// The keys beside a factor in its example; none, where it shows the factor alone.
+pub(crate) fn example_keys(entry: &'static Entry) -> Vec<String> {
+    let document = example_document(entry).unwrap_or_default();
+    let factors = document.get("factors").and_then(Value::as_array).cloned().unwrap_or_default();
+    let this = |f: &&Value| f.pointer("/factor/type").and_then(Value::as_str) == Some(entry.name);
+    let keys = factors.iter().find(this).and_then(|f| f.get("keys")).and_then(Value::as_array).cloned();
+    keys.unwrap_or_default().iter().filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
 fn table_of_type(value: &Value, name: &str) -> Option<Value> {

@@ -39,7 +39,7 @@ pub enum LawError {
     },
     /// Two Jacobians that should be equal.
     #[error(
-        "{law}: row {row} by `{direction}` of variable {variable} is {found} and should be {expected}\n  \
+        "{law}: row {row} by `{of}.{direction}`, variable {variable}, is {found} and should be {expected}\n  \
          factor {factor}\n  at {point}"
     )]
     Jacobian {
@@ -49,12 +49,29 @@ pub enum LawError {
         row: usize,
         /// The variable's position, from 0.
         variable: usize,
+        /// The name of its type.
+        of: &'static str,
         /// The tangent direction's name.
         direction: &'static str,
         /// What the entry is.
         found: f64,
         /// What it should be.
         expected: f64,
+        /// The factor.
+        factor: String,
+        /// The variables.
+        point: String,
+    },
+    /// A residual that is not a number, or infinite, where the factor says that it is defined.
+    #[error(
+        "row {row} of the residual is {found}: keep such points out with `is_defined`, or write it so that it is \
+         finite\n  factor {factor}\n  at {point}"
+    )]
+    NotFinite {
+        /// The row, from 0.
+        row: usize,
+        /// What it is.
+        found: f64,
         /// The factor.
         factor: String,
         /// The variables.

@@ -12,10 +12,20 @@ pub fn invariance_law(
     variables: &[&dyn Variable],
     moved: &[&dyn Variable],
 ) -> Result<(), LawError> {
+    unchanged("invariance", factor, variables, moved)
+}
+
+/// [`invariance_law`], for a motion that has a name.
+pub(crate) fn unchanged(
+    motion: &'static str,
+    factor: &dyn Factor,
+    variables: &[&dyn Variable],
+    moved: &[&dyn Variable],
+) -> Result<(), LawError> {
     let value = |x: &[&dyn Variable]| match factor.erased().is_defined(x) {
         None => Err(LawError::WrongVariables { factor: json_of_factor(factor), point: json_of_all(x) }),
         Some(false) => Err(LawError::NotDefined { factor: json_of_factor(factor), point: json_of_all(x) }),
         Some(true) => Ok(factor.erased().residual(x).unwrap_or_default()),
     };
-    same_residual("invariance", factor, moved, &value(moved)?, &value(variables)?, 1e-9)
+    same_residual(motion, factor, moved, &value(moved)?, &value(variables)?, 1e-9)
 }

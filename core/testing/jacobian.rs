@@ -1,6 +1,7 @@
 //! The Jacobian law: analytic = automatic = numeric.
 use crate::differences::differentiate;
 use crate::error::{LawError, json_of_all, json_of_factor};
+use crate::kink::{Kink, sides};
 use manifactor_graph::{Factor, Linearization, Variable};
 
 /// How the Jacobian law is checked. Tolerances are relative to the largest entry, or to 1.
@@ -12,11 +13,14 @@ pub struct JacobianLaw {
     pub analytic: f64,
     /// Between the automatic Jacobian and differences.
     pub numeric: f64,
+    /// Whether a residual may have a kink or a jump at the point: its derivative there is to lie between those of the
+    /// two sides.
+    pub kinks: bool,
 }
 
 impl Default for JacobianLaw {
     fn default() -> Self {
-        Self { step: 1e-2, analytic: 1e-9, numeric: 1e-6 }
+        Self { step: 1e-2, analytic: 1e-9, numeric: 1e-6, kinks: false }
     }
 }
 
@@ -28,12 +32,38 @@ pub fn jacobian_law(factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<
     JacobianLaw::default().check(factor, variables)
 }
 
-/// One comparison of two Jacobians.
-struct Comparison<'a> {
-    law: &'static str,
+/// What was found at a point where the law holds.
+#[derive(Debug, Clone)]
+pub struct Examined {
+    /// The residual and the Jacobian in use.
+    pub linearization: Linearization,
+    /// The entry that differs most from differences; `None` where there was nothing to compare.
+    pub worst: Option<Entry>,
+    /// Entries that have no derivative here.
+    pub kinks: Vec<Kink>,
+}
+
+/// An entry of a Jacobian, by two ways.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// The variable's position, from 0.
+    pub variable: usize,
+    /// The tangent direction, from 0.
+    pub column: usize,
+    /// The row, from 0.
+    pub row: usize,
+    /// What it is.
+    pub found: f64,
+    /// What it should be.
+    pub expected: f64,
+    /// The difference, relative to the largest entry of the block, or to 1; infinite where one is not a number.
+    pub error: f64,
+}
+
+/// A factor at a point.
+struct At<'a> {
     factor: &'a dyn Factor,
     variables: &'a [&'a dyn Variable],
-    tolerance: f64,
 }
 
 impl JacobianLaw {
@@ -46,87 +76,129 @@ impl JacobianLaw {
     /// The entry that is off most. [`LawError::NotDefined`] where the factor is not defined, so that
     /// there was nothing to check.
     pub fn check(&self, factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<(), LawError> {
-        let (residual, point) = (factor.erased(), || json_of_all(variables));
+        self.examine(factor, variables).map(|_| ())
+    }
+
+    /// [`JacobianLaw::check`], and what there is to say of a point where the law holds.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn examine(&self, factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<Examined, LawError> {
+        let (residual, point, at) = (factor.erased(), || json_of_all(variables), At { factor, variables });
         let wrong = || LawError::WrongVariables { factor: json_of_factor(factor), point: point() };
         if !residual.is_defined(variables).ok_or_else(wrong)? {
             return Err(LawError::NotDefined { factor: json_of_factor(factor), point: point() });
         }
         let value = residual.residual(variables).ok_or_else(wrong)?;
+        if let Some(row) = value.iter().position(|r| !r.is_finite()) {
+            let found = value[row];
+            return Err(LawError::NotFinite { row, found, factor: json_of_factor(factor), point: point() });
+        }
         let used = residual.linearize(variables).ok_or_else(wrong)?;
         let automatic = residual.autodiff(variables).ok_or_else(wrong)?;
         same_residual("residual of autodiff", factor, variables, &automatic.residual, &value, self.analytic)?;
         same_residual("residual of linearize", factor, variables, &used.residual, &value, self.analytic)?;
 
-        let law = "analytic against automatic Jacobian";
-        let comparison = Comparison { law, factor, variables, tolerance: self.analytic };
-        comparison.check(&used, |v, c, r| Some(automatic.jacobians[v][(r, c)]))?;
+        let entries = compare(&used, |v, c, r| Some(automatic.jacobians[v][(r, c)]));
+        at.require("analytic against automatic Jacobian", &entries, self.analytic)?;
 
         let numeric: Vec<Vec<_>> = (0..variables.len())
             .map(|v| {
                 let dim = variables[v].erased().dim();
-                (0..dim).map(|c| self.numeric(factor, variables, v, c, value.len())).collect()
+                (0..dim).map(|c| differentiate(value.len(), self.step, |h| at.along(v, c, h))).collect()
             })
             .collect();
-        let law = "automatic Jacobian against differences";
-        let comparison = Comparison { law, factor, variables, tolerance: self.numeric };
-        comparison.check(&automatic, |v, c, r| numeric[v][c].as_ref().map(|column| column[r].value))
+        let entries = compare(&automatic, |v, c, r| numeric[v][c].as_ref().map(|column| column[r].value));
+        let (entries, kinks) = if self.kinks {
+            // near a pole the steps are too long for their own good, and know it
+            let inexact = |e: &Entry| {
+                numeric[e.variable][e.column].as_ref().is_some_and(|c| {
+                    10.0 * c[e.row].error > (e.found - e.expected).abs() && c[e.row].error.is_finite()
+                })
+            };
+            let told = |e: &Entry| e.error <= self.numeric || !inexact(e);
+            self.set_aside(&at, entries.into_iter().filter(told).collect())
+        } else {
+            (entries, vec![])
+        };
+        let worst = at.require("automatic Jacobian against differences", &entries, self.numeric)?;
+        Ok(Examined { linearization: used, worst, kinks })
     }
 
-    fn numeric(
-        &self,
-        factor: &dyn Factor,
-        variables: &[&dyn Variable],
-        variable: usize,
-        column: usize,
-        rows: usize,
-    ) -> Option<Vec<crate::Derivative>> {
-        differentiate(rows, self.step, |h| {
-            let mut delta = vec![0.0; variables[variable].erased().dim()];
-            delta[column] = h;
-            let moved = variables[variable].erased().retract(&delta)?;
-            let mut variables = variables.to_vec();
-            variables[variable] = &*moved;
-            let residual = factor.erased();
-            if residual.is_defined(&variables)? { residual.residual(&variables) } else { None }
-        })
+    /// Takes out the entries that differ because there is no derivative: kinks and jumps.
+    fn set_aside(&self, at: &At<'_>, entries: Vec<Entry>) -> (Vec<Entry>, Vec<Kink>) {
+        let rows = entries.iter().map(|e| e.row + 1).max().unwrap_or(0);
+        let mut kinks = vec![];
+        let kept = entries.into_iter().filter(|entry| {
+            if entry.error <= self.numeric || entry.found.is_nan() {
+                return true;
+            }
+            let of = |h: f64| at.along(entry.variable, entry.column, h);
+            let kink = sides(rows, self.step, of).and_then(|sides| sides.kink(entry));
+            kinks.extend(kink);
+            kink.is_none()
+        });
+        (kept.collect(), kinks)
     }
 }
 
-impl Comparison<'_> {
-    /// Compares each entry with `expected(variable, column, row)`; one that cannot be had is left out.
-    fn check(
+impl At<'_> {
+    /// The residual `h` along a tangent direction; `None` where it is not defined.
+    fn along(&self, variable: usize, column: usize, h: f64) -> Option<Vec<f64>> {
+        let mut delta = vec![0.0; self.variables[variable].erased().dim()];
+        delta[column] = h;
+        let moved = self.variables[variable].erased().retract(&delta)?;
+        let mut variables = self.variables.to_vec();
+        variables[variable] = &*moved;
+        let residual = self.factor.erased();
+        if residual.is_defined(&variables)? { residual.residual(&variables) } else { None }
+    }
+
+    /// The entry that differs most, if by no more than `tolerance`.
+    fn require(
         &self,
-        found: &Linearization,
-        expected: impl Fn(usize, usize, usize) -> Option<f64>,
-    ) -> Result<(), LawError> {
-        let mut worst = None;
-        for (variable, block) in found.jacobians.iter().enumerate() {
-            let scale = block.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
-            for column in 0..block.ncols() {
-                for row in 0..block.nrows() {
-                    let found = block[(row, column)];
-                    let Some(expected) = expected(variable, column, row) else { continue };
-                    let error = (found - expected).abs() / scale;
-                    // so written that NaN is the worst of all
-                    let error = if error.is_nan() { f64::INFINITY } else { error };
-                    if error > self.tolerance && worst.as_ref().is_none_or(|(e, _)| error > *e) {
-                        worst = Some((error, (variable, column, row, found, expected)));
-                    }
-                }
+        law: &'static str,
+        entries: &[Entry],
+        tolerance: f64,
+    ) -> Result<Option<Entry>, LawError> {
+        let worst = entries.iter().max_by(|a, b| a.error.total_cmp(&b.error)).copied();
+        match worst {
+            Some(Entry { variable, column, row, found, expected, error }) if error > tolerance => {
+                let of = self.variables[variable];
+                Err(LawError::Jacobian {
+                    law,
+                    row,
+                    variable,
+                    of: of.typetag_name(),
+                    direction: of.erased().tangent().get(column).copied().unwrap_or("?"),
+                    found,
+                    expected,
+                    factor: json_of_factor(self.factor),
+                    point: json_of_all(self.variables),
+                })
+            }
+            worst => Ok(worst),
+        }
+    }
+}
+
+/// Each entry beside `expected(variable, column, row)`; one that cannot be had is left out.
+fn compare(found: &Linearization, expected: impl Fn(usize, usize, usize) -> Option<f64>) -> Vec<Entry> {
+    let mut entries = vec![];
+    for (variable, block) in found.jacobians.iter().enumerate() {
+        let scale = block.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
+        for column in 0..block.ncols() {
+            for row in 0..block.nrows() {
+                let found = block[(row, column)];
+                let Some(expected) = expected(variable, column, row) else { continue };
+                let error = (found - expected).abs() / scale;
+                // so written that NaN is the worst of all
+                let error = if error.is_nan() { f64::INFINITY } else { error };
+                entries.push(Entry { variable, column, row, found, expected, error });
             }
         }
-        let Some((_, (variable, column, row, found, expected))) = worst else { return Ok(()) };
-        Err(LawError::Jacobian {
-            law: self.law,
-            row,
-            variable,
-            direction: self.variables[variable].erased().tangent().get(column).copied().unwrap_or("?"),
-            found,
-            expected,
-            factor: json_of_factor(self.factor),
-            point: json_of_all(self.variables),
-        })
     }
+    entries
 }
 
 /// Fails where two residuals differ by more than `tolerance`, relative to the larger of their norm and 1.

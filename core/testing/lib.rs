@@ -4,22 +4,40 @@
 //! them through [`jacobian_laws!`] and [`manifold_laws!`], the command line on whatever is linked
 //! (see [`catalogue`]).
 //!
-//! A plugin's test is a line. The strategy yields a factor and its variables:
+//! A plugin's test is a line. By the name of a factor, from its example in the catalogue and its manifolds' points; or
+//! for a strategy of one's own, that yields a factor and its variables:
 //! ```text
+//! factor_laws! { rests_on }
 //! jacobian_laws! { agrees_with_differences: (any_factor(), any_se3(), any_se3()) }
 //! ```
 pub mod catalogue;
 mod check;
 mod differences;
 mod error;
+mod factor_check;
+mod freedom;
 mod invariance;
 mod jacobian;
+mod kink;
 mod manifold;
+pub mod points;
 pub mod strategies;
 
 pub use check::{Case, Each, check, check_jacobians, check_manifolds};
-pub use differences::{Derivative, differentiate};
+pub use differences::{Derivative, differentiate, differentiate_from, jumps};
 pub use error::LawError;
+pub use factor_check::{
+    Broken, FactorCheck, FactorReport, FreeDirections, NamedEntry, NamedKink, Subject, Unchanged,
+};
+pub use freedom::{Free, Freedom, freedom};
 pub use invariance::invariance_law;
-pub use jacobian::{JacobianLaw, jacobian_law};
+pub use jacobian::{Entry, Examined, JacobianLaw, jacobian_law};
+pub use kink::Kink;
 pub use manifold::manifold_laws;
+
+#[doc(hidden)]
+pub mod __private {
+    pub use manifactor_graph::__private::inventory;
+    pub use manifactor_graph::Variable;
+    pub use proptest::strategy::{BoxedStrategy, Strategy};
+}

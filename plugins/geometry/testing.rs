@@ -1,11 +1,28 @@
 //! Strategies for rotations, poses and points, with the places where formulas tend to break.
 use crate::{BalCamera, Point2, Point3, Rn, Se2, Se3, So2, So3};
+use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
 use nalgebra::{Vector1, Vector2, Vector3, Vector6};
 use proptest::prelude::*;
+use std::f64::consts::PI;
 
 /// How far from the origin the points and poses are, in metres.
 const SIZE: f64 = 10.0;
+
+// what the checks of all factors draw from; singular: no turn at all, and half a turn
+register_points!(So2, any_so2(), [So2::identity(), So2::exp(PI)]);
+register_points!(So3, any_so3(), [So3::identity(), half_a_turn()]);
+register_points!(Se2, any_se2(), [Se2::identity(), Se2::new(So2::exp(PI), Vector2::zeros())]);
+register_points!(Se3, any_se3(), [Se3::identity(), Se3::new(half_a_turn(), Vector3::zeros())]);
+register_points!(Rn<1>, any_point::<1>(), [Rn::<1>(Vector1::zeros())]);
+register_points!(Point2, any_point2(), [Rn::<2>(Vector2::zeros())]);
+register_points!(Point3, any_point3(), [Rn::<3>(Vector3::zeros())]);
+register_points!(BalCamera, any_bal_camera(), []);
+
+/// The rotation by π about an axis that is none of the coordinates'.
+fn half_a_turn() -> So3 {
+    So3::exp(&(Vector3::new(2.0, -1.0, 2.0) * (PI / 3.0)))
+}
 
 /// Points with coordinates up to 10 m; now and then the origin, or next to it.
 pub fn any_point<const N: usize>() -> impl Strategy<Value = Rn<N>> + Clone {

@@ -2,8 +2,27 @@
 use crate::{Camera, DualQuadric, Ellipsoid};
 use manifactor_geometry::testing::{any_se3, any_so3, se3_tangent};
 use manifactor_geometry::{Se3, So3};
+use manifactor_testing::register_points;
 use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
+
+// what the checks of all factors draw from; singular: along the axes, lying, and two or all of the semi-axes equal
+register_points!(
+    DualQuadric,
+    any_quadric(),
+    [
+        shaped([0.3, 0.2, 0.1]),
+        shaped([0.1, 0.2, 0.3]),
+        shaped([0.3, 0.3, 0.1]),
+        shaped([0.1, 0.3, 0.3]),
+        shaped([0.2, 0.2, 0.2]),
+    ]
+);
+
+/// At the origin, with its axes along the coordinates'.
+fn shaped(semi_axes: [f64; 3]) -> DualQuadric {
+    DualQuadric { pose: Se3::identity(), semi_axes: semi_axes.into() }
+}
 
 /// Semi-axes from 1 cm to 10 m; now and then two or all of them equal.
 pub fn any_semi_axes() -> impl Strategy<Value = Vector3<f64>> + Clone {

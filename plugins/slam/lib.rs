@@ -16,6 +16,7 @@ pub mod refine;
 pub mod report;
 pub mod run;
 pub mod run_document;
+pub mod schema;
 pub mod semantics;
 pub mod sequence;
 pub mod settings;

@@ -1,10 +1,15 @@
 //! The command line, end to end: the binary, its files and its exit codes.
 #![allow(missing_docs, clippy::unwrap_used)]
+mod check_factor;
 mod documents;
 mod evaluate;
+mod graph;
 mod interrupt;
+mod mistakes;
 mod names;
+mod new;
 mod run;
+mod schema;
 mod solve;
 
 use serde_json::Value;

@@ -44,3 +44,14 @@ fn a_wrong_command_line_is_exit_code_2() {
     manifactor("solv graph.toml").ended(2).complains("solve");
     manifactor("list --threads 0").ended(2).complains("threads");
 }
+
+#[test]
+fn the_config_reference_of_the_docs_is_that_of_what_is_linked() {
+    let written = std::fs::read_to_string(crate::root().join("docs/config.md")).unwrap();
+    let now = manifactor("list --markdown").ended(0).stdout;
+    let first = now.lines().zip(written.lines()).find(|(now, written)| now != written);
+    assert!(
+        now == written,
+        "docs/config.md is stale, first at {first:?}: manifactor list --markdown > docs/config.md"
+    );
+}

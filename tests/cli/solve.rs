@@ -282,3 +282,22 @@ fn covariances_are_given_on_request() {
     assert_eq!(json["covariances"].as_array().unwrap().len(), 1);
     manifactor(&format!("solve {file} --covariances=x7")).ended(2).complains("no variable `x7`");
 }
+
+#[test]
+fn things_on_a_desk_come_to_where_their_relations_put_them() {
+    let folder = folder(&[]);
+    let out = path(&folder, "solved.json");
+    let arguments = format!("solve examples/03_relations/graph.toml --out {out} --json");
+    let solved = manifactor(&arguments).ended(0).json();
+    assert!(solved["final_cost"].as_f64().unwrap() < 3.0, "{solved}");
+    let graph: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(out).unwrap()).unwrap();
+    let value = |key: &str| {
+        let all = graph["variables"].as_array().unwrap();
+        all.iter().find(|v| v["key"] == key).unwrap()["value"].clone()
+    };
+    let height = |key: &str| value(key)["translation"][2].as_f64().unwrap();
+    // book and cup on a desk at 0.72 m: half the book above it, and half the cup above that
+    assert!((height("book") - 0.74).abs() < 0.02, "{}", height("book"));
+    assert!((height("cup") - 0.82).abs() < 0.03, "{}", height("cup"));
+    assert!(value("up")["direction"][2].as_f64().unwrap() > 0.999);
+}

@@ -3,6 +3,7 @@
 #[path = "../../examples/01_new_factor/rests_on.rs"]
 mod rests_on;
 
+mod book;
 mod factor;
 mod loss;
 mod manifold;

@@ -77,7 +77,7 @@ register_factor!("test_ratio", Ratio);
 #[test]
 fn it_obeys_the_laws() {
     manifold_law(catalogue::find("variable", "test_scale").unwrap(), 256).unwrap();
-    assert_eq!(factor_law(catalogue::find("factor", "test_ratio").unwrap(), 256).unwrap(), 256);
+    assert_eq!(factor_law(catalogue::find("factor", "test_ratio").unwrap(), 256).unwrap().defined, 256);
 }
 
 #[test]

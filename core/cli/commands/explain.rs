@@ -2,11 +2,13 @@
 use crate::failure::Failure;
 use crate::fields::fields;
 use crate::output;
+use crate::reference::notes;
 use crate::status::Status;
 use crate::text;
 use clap::Args;
 use manifactor::config::nearest;
 use manifactor::graph::catalogue::{self, Entry};
+use manifactor::graph::invariance::invariances_of;
 use serde_json::json;
 
 /// Explain a name: what it means, its fields and their defaults, an example.
@@ -35,6 +37,7 @@ impl Explain {
             let entry = |e: &&&'static Entry| {
                 json!({
                     "kind": e.kind, "name": e.name, "module": e.module, "docs": e.docs(), "schema": (e.schema)(),
+                    "unchanged_by": invariances_of(e).iter().map(|i| i.motion).collect::<Vec<_>>(),
                 })
             };
             output::json(&found.iter().map(entry).collect::<Vec<_>>());
@@ -49,14 +52,8 @@ impl Explain {
 fn explain(entry: &Entry) -> String {
     let mut out =
         format!("{}: a {}, of {}\n\n{}\n", entry.name, entry.kind, entry.module, prose(&entry.docs()));
-    let signature = (entry.signature)();
-    if let Some(rows) = signature.rows {
-        let names: Vec<_> = signature.variables.iter().map(|id| catalogue::manifold_name(*id)).collect();
-        let many = if signature.many { "any number of " } else { "" };
-        out += &format!("\nVariables: {many}{}. Rows of its residual: {rows}.\n", names.join(", "));
-    }
-    if !signature.tangent.is_empty() {
-        out += &format!("\nTangent directions: {}.\n", signature.tangent.join(", "));
+    for note in notes(entry) {
+        out += &format!("\n{note}\n");
     }
     let fields = fields((entry.schema)().as_value());
     if !fields.is_empty() {

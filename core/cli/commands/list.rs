@@ -1,6 +1,7 @@
 //! `manifactor list`: what can be named in a config.
 use crate::failure::Failure;
 use crate::output;
+use crate::reference;
 use crate::status::Status;
 use crate::text;
 use clap::Args;
@@ -16,10 +17,17 @@ pub(crate) struct List {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Print the config reference of all that is linked, as Markdown: `docs/config.md`.
+    #[arg(long, conflicts_with_all = ["json", "kind"])]
+    markdown: bool,
 }
 
 impl List {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
+        if self.markdown {
+            output::print(&reference::markdown());
+            return Ok(Status::Done);
+        }
         let entries = match &self.kind {
             None => catalogue::all(),
             Some(kind) => catalogue::entries(known(kind)?),

@@ -3,27 +3,40 @@ use crate::failure::Failure;
 use crate::output;
 use crate::status::Status;
 use clap::{Args, ValueEnum};
-use manifactor::config::graph_schema;
+use manifactor::config::{Definitions, graph_root};
+use manifactor::slam::schema::run_root;
+use serde_json::json;
 
 /// Print the JSON Schema of a document, for editors to complete and check by.
 #[derive(Debug, Args)]
 pub(crate) struct Schema {
     /// Which kind of document.
-    #[arg(value_enum, default_value = "graph")]
+    #[arg(value_enum, default_value = "any")]
     document: Document,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Document {
+    /// Either of them.
+    Any,
     /// A literal graph: what `solve` takes.
     Graph,
+    /// A run: what `run` takes.
+    Run,
 }
 
 impl Schema {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
-        match self.document {
-            Document::Graph => output::json(&graph_schema()),
-        }
+        let mut definitions = Definitions::new();
+        let root = match self.document {
+            Document::Graph => graph_root(&mut definitions),
+            Document::Run => run_root(&mut definitions),
+            Document::Any => {
+                let either = [graph_root(&mut definitions), run_root(&mut definitions)];
+                json!({ "title": "A document of Manifactor", "anyOf": either })
+            }
+        };
+        output::json(&definitions.document(root));
         Ok(Status::Done)
     }
 }

@@ -5,6 +5,7 @@ use crate::solver::SolverArguments;
 use crate::status::Status;
 use crate::text::seconds;
 use crate::watch::Watch;
+use crate::what_if::WhatIf;
 use crate::{interrupt, output, report};
 use clap::Args;
 use manifactor::geometry::certify;
@@ -22,6 +23,8 @@ pub(crate) struct Solve {
     solver: SolverArguments,
     #[command(flatten)]
     reading: graph_file::Reading,
+    #[command(flatten)]
+    what_if: WhatIf,
     /// Certify the minimum of a pose graph: whether it is the global one, as far as that can be known.
     #[arg(long)]
     certify: bool,
@@ -42,7 +45,8 @@ pub(crate) struct Solve {
 
 impl Solve {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
-        let input = self.reading.open(&self.graph, &self.solver)?;
+        let mut input = self.reading.open(&self.graph, &self.solver)?;
+        input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
             output::note(&note);
         }

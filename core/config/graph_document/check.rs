@@ -1,7 +1,7 @@
 //! What is wrong between the factors and the variables of a document, at its place.
 use super::read::{FactorPlace, Read};
 use crate::diagnostic::{Diagnostic, Errors};
-use crate::problem::Problem;
+use crate::problem::{Problem, quoted_list};
 use crate::source::Place;
 use crate::suggest::nearest;
 use manifactor_graph::{GraphError, Key};
@@ -38,6 +38,17 @@ fn missing(read: &Read, key: &Key, search: bool) -> Problem {
     Problem::UnknownName { what: "variable".into(), name: key.to_string(), known }
 }
 
+/// Which variables a factor could have taken.
+fn of_type(read: &Read, expected: &str) -> String {
+    let fit = read.values.iter().filter(|(_, value)| value.typetag_name() == expected);
+    let keys: Vec<String> = fit.take(LISTED + 1).map(|(key, _)| key.to_string()).collect();
+    match keys.len() {
+        0 => format!("no variable here is of type `{expected}`: add one, or take another factor"),
+        1..=LISTED => format!("of type `{expected}`: {}", quoted_list(&keys)),
+        _ => format!("many others are of type `{expected}`"),
+    }
+}
+
 /// The error as a diagnostic; none, where it has been reported already.
 fn place(read: &Read, factors: &[&FactorPlace], error: &GraphError, root: &Place) -> Option<Diagnostic> {
     let at_key = |factor: usize, position: usize| {
@@ -59,8 +70,9 @@ fn place(read: &Read, factors: &[&FactorPlace], error: &GraphError, root: &Place
         GraphError::WrongType { factor, name, position, key, expected, found } => {
             let message =
                 format!("`{name}` takes a variable of type `{expected}` here, `{key}` is of type `{found}`");
+            let problem = Problem::with_help(message, of_type(read, expected));
             let related = Some((at_variable(key), "it is declared here".into()));
-            Diagnostic { related, ..Diagnostic::new(at_key(*factor, *position), Problem::invalid(message)) }
+            Diagnostic { related, ..Diagnostic::new(at_key(*factor, *position), problem) }
         }
         GraphError::RepeatedVariable { factor, name, position, key } => {
             let message = format!("`{name}` connects `{key}` to itself");

@@ -4,7 +4,7 @@ use crate::toy::*;
 use manifactor_graph::catalogue::find;
 use manifactor_testing::catalogue::{documentation_law, factor_law, manifold_law};
 use manifactor_testing::strategies::vector;
-use manifactor_testing::{Each, LawError, invariance_law, jacobian_law, jacobian_laws};
+use manifactor_testing::{Each, FactorCheck, LawError, Subject, invariance_law, jacobian_law, jacobian_laws};
 use proptest::prelude::*;
 
 fn spot() -> impl Strategy<Value = Spot> {
@@ -30,7 +30,7 @@ fn spots<const S: u8>() -> (Spot<S>, Spot<S>) {
 fn a_wrong_entry_is_named_by_variable_and_direction() {
     let (a, b) = spots::<SOUND>();
     let error = jacobian_law(&Area::<WRONG_SIGN> { area: 0.5 }, &[&a, &b]).unwrap_err();
-    let expected = "analytic against automatic Jacobian: row 0 by `y` of variable 1 is -1 and should be 1\n  \
+    let expected = "analytic against automatic Jacobian: row 0 by `spot.y`, variable 1, is -1 and should be 1\n  \
                     factor {\"type\":\"area_of_wrong_sign\",\"area\":0.5}\n  \
                     at [{\"type\":\"spot\",\"x\":1.0,\"y\":2.0}, {\"type\":\"spot\",\"x\":3.0,\"y\":4.0}]";
     assert_eq!(error.to_string(), expected);
@@ -78,10 +78,33 @@ fn what_changes_the_residual_is_no_invariance() {
 }
 
 #[test]
+fn a_wrong_sign_is_shown_at_the_simplest_point_as_the_book_says() {
+    let around: [Box<dyn manifactor_graph::Variable>; 2] = {
+        let (a, b) = spots::<SOUND>();
+        [Box::new(a), Box::new(b)]
+    };
+    let factor = std::sync::Arc::new(Area::<WRONG_SIGN> { area: 0.5 });
+    let keys = vec!["a".to_owned(), "b".to_owned()];
+    let report = FactorCheck::default().run(&Subject { factor, keys, around: around.into() });
+    let text = report.to_string();
+    let page = include_str!("../../../../docs/mistakes.md");
+    assert!(!report.holds() && page.contains(text.lines().next().unwrap()), "{text}");
+    assert!(text.contains("[[factors]]\nkeys = [\"a\", \"b\"]"), "{text}");
+}
+
+#[test]
+fn what_is_free_and_what_jumps_is_named_by_variable_and_direction() {
+    let report = factor_law(find("factor", "area").unwrap(), 64).unwrap();
+    assert_eq!((report.rank, report.directions, report.free.len()), (2, 4, 1));
+    assert_eq!(report.free[0].count, 2);
+    assert!(report.kinks.is_empty() && report.worst.is_some());
+}
+
+#[test]
 fn the_catalogue_is_enough_to_check_a_type() {
     let factor = |name| find("factor", name).unwrap();
-    assert_eq!(factor_law(factor("area"), 32), Ok(32));
-    assert_eq!(factor_law(factor("spread"), 32), Ok(32));
+    assert_eq!(factor_law(factor("area"), 32).unwrap().defined, 32);
+    assert_eq!(factor_law(factor("spread"), 32).unwrap().defined, 32);
     manifold_law(find("variable", "spot").unwrap(), 32).unwrap();
     documentation_law(factor("area")).unwrap();
     // the flawed ones share a doc comment, whose example names another

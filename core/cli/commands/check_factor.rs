@@ -1,0 +1,106 @@
+//! `manifactor check-factor`: whether a factor keeps the laws, before a solver meets it.
+use crate::choice::named;
+use crate::failure::Failure;
+use crate::output;
+use crate::status::Status;
+use clap::Args;
+use manifactor::config::{Document, Errors, Format, nearest, read_graph};
+use manifactor::graph::Factor;
+use manifactor::graph::catalogue::{Entry, entries, find};
+use manifactor::testing::{FactorCheck, Subject};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Check a factor: its Jacobian against differences, what it leaves free, its kinks, and what is stated of it.
+///
+/// At random points: around the example in its docs or the values of a graph, wherever its manifolds' strategies draw, at
+/// their singular points and near them. Where a law is broken, the worst entry is shown with its variable and direction,
+/// at the simplest point that was found, as a graph that `--config` takes. Exit code 1 where a law is broken.
+#[derive(Debug, Args)]
+pub(crate) struct CheckFactor {
+    /// The factor, one of `manifactor list factors`; all factors of the graph, if not given.
+    #[arg(required_unless_present = "config")]
+    name: Option<String>,
+    /// A literal graph: its factors, with their parameters, around its values.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// The factor's parameters, those of the example in its docs if not given: '{ "up": [0, 0, 1] }'.
+    #[arg(long, value_name = "JSON", conflicts_with = "config")]
+    parameters: Option<String>,
+    /// How many points are drawn.
+    #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    points: u32,
+    /// Where the random numbers begin: the same seed draws the same points.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Print JSON: everything that was found.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl CheckFactor {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let subjects = match (&self.config, &self.name) {
+            (Some(path), name) => in_graph(path, name.as_deref())?,
+            (None, name) => vec![self.alone(name.as_deref().unwrap_or_default())?],
+        };
+        let check = FactorCheck { points: self.points as usize, seed: self.seed, ..FactorCheck::default() };
+        let reports: Vec<_> = subjects.iter().map(|subject| check.run(subject)).collect();
+        let holds = reports.iter().all(|report| report.holds());
+        if self.json {
+            output::json(&json!({ "holds": holds, "factors": reports }));
+        } else {
+            let texts: Vec<_> = reports.iter().map(|r| r.to_string().trim_end().to_owned()).collect();
+            output::print(&(texts.join("\n\n") + "\n"));
+        }
+        Ok(if holds { Status::Done } else { Status::Broken })
+    }
+
+    /// By name, with the parameters of the command line or of its docs.
+    fn alone(&self, name: &str) -> Result<Subject, Failure> {
+        let entry = known(name)?;
+        let Some(text) = &self.parameters else { return Subject::example(entry).map_err(Failure::input) };
+        let document = Document::parse("--parameters", text.as_str(), Format::Json)?;
+        let errors = Errors::new();
+        let root = document.root().clone();
+        let factor = named("factor", name, root, document.source()).read_registered::<dyn Factor>(&errors);
+        let factor = errors.finish(factor)?;
+        Subject::around_examples(entry, factor.into()).map_err(Failure::input)
+    }
+}
+
+fn known(name: &str) -> Result<&'static Entry, Failure> {
+    find("factor", name).ok_or_else(|| {
+        let names = entries("factor");
+        let meant = nearest(name, names.iter().map(|e| e.name));
+        let meant = meant.map(|m| format!("did you mean `{m}`? ")).unwrap_or_default();
+        let help = "`manifactor list factors` prints all that are linked. One of your own needs its line \
+                    `register_factor!(…)`, and a binary that links its crate: `use my_plugin as _;`";
+        Failure::with_help(format!("no factor is called `{name}`"), meant + help)
+    })
+}
+
+/// The factors of a graph, each different one once, around the graph's values.
+fn in_graph(path: &std::path::Path, name: Option<&str>) -> Result<Vec<Subject>, Failure> {
+    let document = Document::open(path)?;
+    let (graph, values) = read_graph(&document)?;
+    let mut subjects: Vec<Subject> = vec![];
+    for entry in graph.factors() {
+        let other = name.is_some_and(|name| entry.factor.typetag_name() != name);
+        let as_json = |factor: &dyn Factor| serde_json::to_string(factor).unwrap_or_default();
+        if other || subjects.iter().any(|s| as_json(&*s.factor) == as_json(&*entry.factor)) {
+            continue;
+        }
+        let around = entry.keys.iter().filter_map(|key| values.find(key.as_str()));
+        subjects.push(Subject {
+            factor: entry.factor.clone(),
+            keys: entry.keys.iter().map(ToString::to_string).collect(),
+            around: around.map(|(_, x)| x.erased().clone_box()).collect(),
+        });
+    }
+    if subjects.is_empty() {
+        let what = name.map_or_else(|| "no factors".to_owned(), |name| format!("no factor of type `{name}`"));
+        return Err(Failure::input(format!("{}: {what}", path.display())));
+    }
+    Ok(subjects)
+}

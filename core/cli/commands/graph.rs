@@ -1,0 +1,69 @@
+//! `manifactor graph`: what is in a graph, and what each factor costs.
+use crate::failure::Failure;
+use crate::graph_file::Reading;
+use crate::inspection::{Inspection, states};
+use crate::output;
+use crate::solver::SolverArguments;
+use crate::status::Status;
+use crate::what_if::WhatIf;
+use clap::{ArgGroup, Args};
+use manifactor::solve::{Silent, solve};
+use std::path::PathBuf;
+
+/// Show a graph: its factors by key, with residual, cost and weight, before and after a solve.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("form").args(["dot", "json", "svg"]))]
+pub(crate) struct ShowGraph {
+    /// A graph, or the folder of a run's variant: its graph.json.
+    graph: PathBuf,
+    /// Solve it, and show what it comes to.
+    #[arg(long)]
+    solve: bool,
+    #[command(flatten)]
+    what_if: WhatIf,
+    #[command(flatten)]
+    solver: SolverArguments,
+    #[command(flatten)]
+    reading: Reading,
+    /// Print the language of Graphviz.
+    #[arg(long)]
+    dot: bool,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print a picture, seen from above.
+    #[arg(long)]
+    svg: bool,
+}
+
+impl ShowGraph {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let path = if self.graph.is_dir() { self.graph.join("graph.json") } else { self.graph.clone() };
+        let mut input = self.reading.open(&path, &self.solver)?;
+        input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
+        for note in &input.notes {
+            eprintln!("note: {note}");
+        }
+        let mut status = Status::Done;
+        let mut after = None;
+        let start = input.start.start(&input.graph, &input.values).map_err(Failure::input)?;
+        let solution;
+        if self.solve {
+            solution = solve(&input.graph, &start, &*input.optimizer, &mut Silent).map_err(Failure::input)?;
+            status = Status::from(&solution.outcome.termination);
+            let problem = solution.problem(&input.graph).map_err(Failure::input)?;
+            after = Some((&solution.values, states(&problem, &input.graph)));
+        }
+        let inspection = Inspection::new(&input.graph, &start, after)?;
+        if self.json {
+            output::json(&inspection);
+        } else if self.dot {
+            output::print(&inspection.dot());
+        } else if self.svg {
+            output::print(&inspection.svg());
+        } else {
+            output::print(&inspection.table());
+        }
+        Ok(status)
+    }
+}

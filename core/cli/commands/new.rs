@@ -1,0 +1,178 @@
+//! `manifactor new`: the files to begin with.
+use crate::failure::Failure;
+use crate::output;
+use crate::status::Status;
+use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
+
+/// Write the files of something new.
+#[derive(Debug, Args)]
+pub(crate) struct New {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    Plugin(Plugin),
+}
+
+/// A crate with one factor, its tests, an example graph, a binary that knows the factor, and a README.
+#[derive(Debug, Args)]
+struct Plugin {
+    /// Its name, in snake case or with hyphens: of the folder, of the crate and of its factor.
+    name: String,
+    /// The checkout of Manifactor to build on; its repository, if not given.
+    #[arg(long, value_name = "PATH")]
+    manifactor: Option<PathBuf>,
+}
+
+const FILES: [(&str, &str); 7] = [
+    ("Cargo.toml", include_str!("../plugin_template/Cargo.toml.in")),
+    ("README.md", include_str!("../plugin_template/README.md.in")),
+    ("graph.toml", include_str!("../plugin_template/graph.toml.in")),
+    ("src/lib.rs", include_str!("../plugin_template/lib.rs.in")),
+    ("src/main.rs", include_str!("../plugin_template/main.rs.in")),
+    ("src/{name}.rs", include_str!("../plugin_template/factor.rs.in")),
+    ("tests/graph.rs", include_str!("../plugin_template/graph_test.rs.in")),
+];
+
+impl New {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let What::Plugin(plugin) = &self.what;
+        plugin.write()
+    }
+}
+
+impl Plugin {
+    fn write(&self) -> Result<Status, Failure> {
+        let folder = Path::new(&self.name);
+        let crate_name = folder.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        let names = Names::of(crate_name)?;
+        let (source, cli_source) = self.sources()?;
+        if folder.exists() {
+            let there = format!("{} is there already", folder.display());
+            return Err(Failure::with_help(there, "choose another name, or remove the folder first"));
+        }
+        for (path, text) in FILES {
+            let fill = |text: &str| {
+                text.replace("{crate}", &names.of_crate)
+                    .replace("{crate_ident}", &names.of_crate.replace('-', "_"))
+                    .replace("{name}", &names.factor)
+                    .replace("{type}", &names.of_type)
+                    .replace("{source}", &source)
+                    .replace("{cli_source}", &cli_source)
+            };
+            let path = folder.join(fill(path));
+            let parent = path.parent().unwrap_or(folder);
+            std::fs::create_dir_all(parent).map_err(Failure::at(parent))?;
+            std::fs::write(&path, fill(text)).map_err(Failure::at(&path))?;
+        }
+        output::print(&format!("{0} is written. Next:\n  cd {0}\n  cargo test\n", folder.display()));
+        Ok(Status::Done)
+    }
+
+    /// Where the two crates come from that a plugin depends on, for its manifest.
+    fn sources(&self) -> Result<(String, String), Failure> {
+        let Some(path) = &self.manifactor else {
+            let git = format!("git = \"{}\"", env!("CARGO_PKG_REPOSITORY"));
+            return Ok((git.clone(), git));
+        };
+        let root = path.canonicalize().map_err(Failure::at(path))?;
+        let cli = root.join("core").join("cli");
+        if !cli.join("Cargo.toml").is_file() {
+            let what =
+                format!("{} is no checkout of Manifactor: it has no core/cli/Cargo.toml", root.display());
+            return Err(Failure::with_help(what, "give the folder that has Manifactor's README in it"));
+        }
+        // a literal string of TOML takes backslashes as they are
+        Ok((format!("path = '{}'", root.display()), format!("path = '{}'", cli.display())))
+    }
+}
+
+/// What things are called.
+struct Names {
+    of_crate: String,
+    factor: String,
+    of_type: String,
+}
+
+impl Names {
+    fn of(name: &str) -> Result<Self, Failure> {
+        let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '-';
+        let words: Vec<&str> = name.split(['_', '-']).collect();
+        let begins = |w: &&str| w.starts_with(|c: char| c.is_ascii_lowercase());
+        if !(name.chars().all(plain) && words.iter().all(begins)) || KEYWORDS.contains(&name) {
+            return Err(Failure::with_help(
+                format!("`{name}` cannot be the name of a crate and of a factor"),
+                "use words of small letters and digits, joined by `_` or `-`, such as `on_the_shelf`; no keyword of Rust",
+            ));
+        }
+        let capital = |w: &&str| w[..1].to_ascii_uppercase() + &w[1..];
+        Ok(Self {
+            of_crate: name.to_owned(),
+            factor: name.replace('-', "_"),
+            of_type: words.iter().map(capital).collect(),
+        })
+    }
+}
+
+/// Words that cannot be the name of a module, and crates that a plugin depends on.
+const KEYWORDS: [&str; 42] = [
+    "as",
+    "async",
+    "await",
+    "break",
+    "const",
+    "continue",
+    "crate",
+    "dyn",
+    "else",
+    "enum",
+    "extern",
+    "false",
+    "fn",
+    "for",
+    "gen",
+    "if",
+    "impl",
+    "in",
+    "let",
+    "loop",
+    "match",
+    "mod",
+    "move",
+    "mut",
+    "pub",
+    "ref",
+    "return",
+    "self",
+    "static",
+    "struct",
+    "super",
+    "trait",
+    "true",
+    "type",
+    "unsafe",
+    "use",
+    "where",
+    "while",
+    "test",
+    "manifactor",
+    "serde",
+    "schemars",
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_follow_the_conventions_of_rust() {
+        let names = Names::of("on-the_shelf2").unwrap();
+        assert_eq!((names.factor.as_str(), names.of_type.as_str()), ("on_the_shelf2", "OnTheShelf2"));
+        for bad in ["", "Shelf", "2shelf", "on__shelf", "the shelf", "match", "shelf-", "../é"] {
+            assert!(Names::of(bad).is_err(), "{bad}");
+        }
+    }
+}

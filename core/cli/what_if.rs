@@ -1,0 +1,87 @@
+//! What if: variables that are held, and factors that are left out.
+use crate::failure::Failure;
+use clap::Args;
+use manifactor::config::nearest;
+use manifactor::graph::{Graph, Values};
+
+/// `--freeze` and `--drop`.
+#[derive(Debug, Args)]
+pub(crate) struct WhatIf {
+    /// Hold a variable where it is: `x0`, or directions of it: `q0.log_a`. May be given again.
+    #[arg(long, value_name = "KEY")]
+    freeze: Vec<String>,
+    /// Leave factors out: by number, as reports have it, or all of a type: `bounding_box`. May be given again.
+    #[arg(long, value_name = "FACTOR")]
+    drop: Vec<String>,
+}
+
+impl WhatIf {
+    /// Changes the graph, and says how.
+    pub(crate) fn apply(&self, graph: &mut Graph, values: &Values) -> Result<Vec<String>, Failure> {
+        let mut notes = vec![];
+        for key in &self.freeze {
+            freeze(graph, values, key)?;
+            notes.push(format!("held {key}"));
+        }
+        let mut dropped = vec![false; graph.factors().len()];
+        for which in &self.drop {
+            let before = dropped.iter().filter(|d| **d).count();
+            mark(graph, which, &mut dropped)?;
+            let n = dropped.iter().filter(|d| **d).count() - before;
+            notes.push(format!("left out {n} by `{which}`"));
+        }
+        let mut places = dropped.iter();
+        graph.factors_mut().retain(|_| !places.next().copied().unwrap_or(false));
+        Ok(notes)
+    }
+}
+
+fn freeze(graph: &mut Graph, values: &Values, key: &str) -> Result<(), Failure> {
+    if values.contains(key) {
+        graph.fix(key);
+        return Ok(());
+    }
+    let direction =
+        key.rsplit_once('.').and_then(|(key, direction)| Some((key, direction, values.variable(key)?)));
+    let Some((whole, direction, variable)) = direction else {
+        let names = values.iter().map(|(key, _)| key.as_str());
+        let meant = nearest(key, names).map(|k| format!("did you mean `{k}`? ")).unwrap_or_default();
+        let help = format!("{meant}expected a key of the graph, or a key and a direction such as `q0.log_a`");
+        return Err(Failure::with_help(format!("--freeze {key}: no variable is called so"), help));
+    };
+    let tangent = variable.erased().tangent();
+    if !tangent.contains(&direction) {
+        let what = format!("--freeze {key}: `{whole}` has no direction `{direction}`");
+        return Err(Failure::with_help(what, format!("its directions are {}", tangent.join(", "))));
+    }
+    let held = match graph.fixed().get(whole) {
+        Some(manifactor::graph::Fixed::Directions(held)) => held.clone(),
+        _ => vec![],
+    };
+    let held: Vec<&str> = held.iter().map(String::as_str).chain([direction]).collect();
+    graph.fix_directions(whole, &held);
+    Ok(())
+}
+
+fn mark(graph: &Graph, which: &str, dropped: &mut [bool]) -> Result<(), Failure> {
+    let count = dropped.len();
+    if let Ok(number) = which.parse::<usize>() {
+        let Some(place) = dropped.get_mut(number) else {
+            let what = format!("--drop {which}: the graph has {count} factors");
+            return Err(Failure::with_help(what, "they are counted from 0; `manifactor graph` lists them"));
+        };
+        *place = true;
+        return Ok(());
+    }
+    let names = || graph.factors().iter().map(|f| f.factor.typetag_name());
+    if !names().any(|name| name == which) {
+        let meant = nearest(which, names()).map(|n| format!("did you mean `{n}`? ")).unwrap_or_default();
+        let help = format!("{meant}expected a number or a type, as `manifactor graph` lists them");
+        return Err(Failure::with_help(
+            format!("--drop {which}: no factor of that type is in the graph"),
+            help,
+        ));
+    }
+    dropped.iter_mut().zip(names()).for_each(|(dropped, name)| *dropped |= name == which);
+    Ok(())
+}

@@ -1,0 +1,285 @@
+//! What a check found, in the names of the factor's variables and directions.
+use super::Subject;
+use crate::error::LawError;
+use crate::freedom::Freedom;
+use crate::jacobian::Entry;
+use crate::kink::Kink;
+use crate::points::Drawn;
+use manifactor_graph::Linearization;
+use manifactor_graph::invariance::invariances;
+use serde::Serialize;
+use serde_json::Value;
+use std::fmt::{self, Display, Formatter};
+
+/// What a check found.
+#[derive(Debug, Clone, Serialize)]
+pub struct FactorReport {
+    /// The factor, as a document writes it.
+    pub factor: Value,
+    /// Where the random numbers began.
+    pub seed: u64,
+    /// How many points were looked at.
+    pub drawn: usize,
+    /// At how many of them the factor is defined.
+    pub defined: usize,
+    /// How many of those were at or near a singular point of a manifold.
+    pub singular: usize,
+    /// The entry of the Jacobian that is furthest from differences, though not too far.
+    pub worst: Option<NamedEntry>,
+    /// How many directions the variables have, and how many of them the residual sees.
+    pub directions: usize,
+    /// The largest rank of the Jacobian at any point that is neither singular nor at a kink.
+    pub rank: usize,
+    /// Directions that the residual does not see, to first order.
+    pub free: Vec<FreeDirections>,
+    /// Where the residual has no derivative, the largest for each entry.
+    pub kinks: Vec<NamedKink>,
+    /// What its author says leaves it unchanged, and did.
+    pub unchanged: Vec<Unchanged>,
+    /// The law that does not hold.
+    pub broken: Option<Broken>,
+}
+
+/// An entry of a Jacobian, by two ways.
+#[derive(Debug, Clone, Serialize)]
+pub struct NamedEntry {
+    /// Variable and direction: `q0.rx`.
+    pub direction: String,
+    /// The row, from 0.
+    pub row: usize,
+    /// By automatic differentiation.
+    pub automatic: f64,
+    /// By differences.
+    pub numeric: f64,
+    /// How far they are apart, relative to the largest entry of the block, or to 1.
+    pub error: f64,
+}
+
+/// Directions that are free, alone or in so many combinations.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FreeDirections {
+    /// How many combinations are free.
+    pub count: usize,
+    /// Of which directions.
+    pub among: Vec<String>,
+}
+
+/// A kink or a jump.
+#[derive(Debug, Clone, Serialize)]
+pub struct NamedKink {
+    /// Variable and direction: `q0.rx`.
+    pub direction: String,
+    /// The row, from 0.
+    pub row: usize,
+    /// The derivative from below.
+    pub before: f64,
+    /// The derivative from above.
+    pub after: f64,
+    /// How far the residual itself jumps; 0 at a kink.
+    pub jump: f64,
+    /// At how many points it was met.
+    pub points: usize,
+    /// One of them, as a literal graph.
+    pub at: Value,
+}
+
+/// A motion that leaves the residual unchanged.
+#[derive(Debug, Clone, Serialize)]
+pub struct Unchanged {
+    /// The motion, in its author's words.
+    pub motion: &'static str,
+    /// At how many points it was tried.
+    pub points: usize,
+}
+
+/// A law that does not hold.
+#[derive(Debug, Clone, Serialize)]
+pub struct Broken {
+    /// What is wrong, and where.
+    pub message: String,
+    /// The point, as a literal graph that reproduces it.
+    pub at: Value,
+}
+
+impl FactorReport {
+    /// Whether every law holds, at one point at least.
+    pub fn holds(&self) -> bool {
+        self.broken.is_none() && self.defined > 0
+    }
+}
+
+/// What a check has found so far.
+pub(super) struct Gathered {
+    pub seed: u64,
+    pub drawn: usize,
+    pub defined: usize,
+    pub singular: usize,
+    pub worst: Option<NamedEntry>,
+    pub kinks: Vec<NamedKink>,
+    pub unchanged: Vec<Unchanged>,
+    pub linearizations: Vec<Linearization>,
+    pub freedom: Option<Freedom>,
+}
+
+impl Gathered {
+    pub(super) fn new(subject: &Subject, seed: u64) -> Self {
+        let stated = invariances(subject.factor.erased().as_any().type_id());
+        let unchanged = stated.iter().map(|i| Unchanged { motion: i.motion, points: 0 }).collect();
+        Self {
+            seed,
+            drawn: 0,
+            defined: 0,
+            singular: 0,
+            worst: None,
+            kinks: vec![],
+            unchanged,
+            linearizations: vec![],
+            freedom: None,
+        }
+    }
+
+    /// Keeps an entry, if it is the worst so far.
+    pub(super) fn entry(&mut self, subject: &Subject, entry: Option<Entry>) {
+        let Some(Entry { variable, column, row, found, expected, error }) = entry else { return };
+        if self.worst.as_ref().is_none_or(|worst| error > worst.error) {
+            let direction = subject.direction(variable, column);
+            self.worst = Some(NamedEntry { direction, row, automatic: found, numeric: expected, error });
+        }
+    }
+
+    /// Keeps a kink, if it is the largest of its entry.
+    pub(super) fn kink(&mut self, subject: &Subject, kink: &Kink, drawn: &Drawn) {
+        let &Kink { variable, column, row, before, after, jump } = kink;
+        let direction = subject.direction(variable, column);
+        let size = |before: f64, after: f64, jump: f64| (jump, (after - before).abs());
+        match self.kinks.iter_mut().find(|k| k.direction == direction && k.row == row) {
+            None => {
+                let at = subject.graph(&drawn.variables);
+                self.kinks.push(NamedKink { direction, row, before, after, jump, points: 1, at });
+            }
+            Some(known) => {
+                known.points += 1;
+                if size(before, after, jump) > size(known.before, known.after, known.jump) {
+                    (known.before, known.after, known.jump) = (before, after, jump);
+                    known.at = subject.graph(&drawn.variables);
+                }
+            }
+        }
+    }
+
+    pub(super) fn broken(self, subject: &Subject, error: &LawError, at: &Drawn) -> FactorReport {
+        let message = match error {
+            LawError::Jacobian { law, row, variable, direction, found, expected, .. } => {
+                let key = subject.keys.get(*variable).map_or("?", String::as_str);
+                format!("{law}: row {row} by `{key}.{direction}` is {found} and should be {expected}")
+            }
+            LawError::Residual { law, row, found, expected, .. }
+                if self.unchanged.iter().any(|u| u.motion == *law) =>
+            {
+                format!("not unchanged by {law}: row {row} is {found} after it, and was {expected}")
+            }
+            // the rest of it is the point, which is shown in full
+            other => other.to_string().lines().next().unwrap_or_default().to_owned(),
+        };
+        let broken = Some(Broken { message, at: subject.graph(&at.variables) });
+        FactorReport { broken, ..self.finish(subject) }
+    }
+
+    pub(super) fn finish(self, subject: &Subject) -> FactorReport {
+        let names = subject.directions();
+        let freedom = self.freedom.unwrap_or(Freedom { directions: names.len(), rank: 0, free: vec![] });
+        let named = |i: &usize| names.get(*i).cloned().unwrap_or_default();
+        let free = freedom
+            .free
+            .iter()
+            .map(|f| FreeDirections { count: f.count, among: f.among.iter().map(named).collect() });
+        FactorReport {
+            factor: serde_json::to_value(&*subject.factor).unwrap_or_default(),
+            seed: self.seed,
+            drawn: self.drawn,
+            defined: self.defined,
+            singular: self.singular,
+            worst: self.worst,
+            directions: freedom.directions,
+            rank: freedom.rank,
+            free: free.collect(),
+            kinks: self.kinks,
+            unchanged: self.unchanged,
+            broken: None,
+        }
+    }
+}
+
+impl Display for FactorReport {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let name = self.factor.get("type").and_then(Value::as_str).unwrap_or("?");
+        if let Some(broken) = &self.broken {
+            writeln!(f, "{name} is broken: {}", broken.message)?;
+            return write!(f, "There (seed {}), as a graph:\n\n{}", self.seed, toml(&broken.at));
+        }
+        if self.defined == 0 {
+            return write!(f, "{name} is defined at none of {} points: nothing was checked", self.drawn);
+        }
+        let Self { drawn, defined, singular, seed, .. } = self;
+        writeln!(
+            f,
+            "{name}: defined at {defined} of {drawn} points, {singular} of them singular or nearly so (seed {seed})"
+        )?;
+        if let Some(NamedEntry { direction, row, automatic, numeric, error }) = &self.worst {
+            writeln!(
+                f,
+                "Jacobian: right; the worst entry, row {row} by {direction}, is {automatic} against {numeric} ({error:.0e})"
+            )?;
+        }
+        let free: usize = self.free.iter().map(|f| f.count).sum();
+        match self.rank {
+            0 => writeln!(f, "Free: not known, as every point was singular or at a kink")?,
+            _ => writeln!(f, "Free: {free} of {} directions{}", self.directions, list(&self.free))?,
+        }
+        for Unchanged { motion, points } in &self.unchanged {
+            writeln!(f, "Unchanged by {motion}: at {}", points_in_words(*points))?;
+        }
+        for kink in &self.kinks {
+            let NamedKink { direction, row, before, after, jump, points, .. } = kink;
+            let what = match *jump {
+                0.0 => format!("the derivative goes from {before:.3} to {after:.3}"),
+                jump => format!("the residual jumps by {jump:.3}"),
+            };
+            writeln!(f, "Kink: row {row} by {direction}: {what} (at {})", points_in_words(*points))?;
+        }
+        Ok(())
+    }
+}
+
+fn points_in_words(n: usize) -> String {
+    format!("{n} point{}", if n == 1 { "" } else { "s" })
+}
+
+/// `: q0.x, q0.y, 2 combinations of q0.rx, q0.ry, q0.rz`.
+fn list(free: &[FreeDirections]) -> String {
+    let part = |f: &FreeDirections| match f.count == f.among.len() {
+        true => f.among.join(", "),
+        false => {
+            let noun = if f.count == 1 { "combination" } else { "combinations" };
+            format!("{} {noun} of ({})", f.count, f.among.join(", "))
+        }
+    };
+    let parts: Vec<_> = free.iter().map(part).collect();
+    if parts.is_empty() { String::new() } else { format!(": {}", parts.join(", ")) }
+}
+
+/// A literal graph in TOML, to paste into a file.
+fn toml(graph: &Value) -> String {
+    let inline = |value: &Value| toml::Value::try_from(value).map(|v| v.to_string()).unwrap_or_default();
+    let mut out = String::new();
+    for table in ["variables", "factors"] {
+        for item in graph.get(table).and_then(Value::as_array).into_iter().flatten() {
+            out += &format!("[[{table}]]\n");
+            for (key, value) in item.as_object().into_iter().flatten() {
+                out += &format!("{key} = {}\n", inline(value));
+            }
+            out.push('\n');
+        }
+    }
+    out
+}

@@ -1,0 +1,67 @@
+//! A factor to check, with a point where it means something.
+use crate::catalogue::{example, example_keys, example_point};
+use crate::error::LawError;
+use manifactor_graph::catalogue::{Entry, manifold_name};
+use manifactor_graph::{Factor, Variable};
+use serde_json::{Value, json};
+use std::sync::Arc;
+
+/// A factor, what its variables are called, and a point around which others are drawn.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// The factor.
+    pub factor: Arc<dyn Factor>,
+    /// The names of its variables.
+    pub keys: Vec<String>,
+    /// Its variables, where the factor is defined.
+    pub around: Vec<Box<dyn Variable>>,
+}
+
+impl Subject {
+    /// The example in the docs of a registered factor, at the examples of its manifolds.
+    ///
+    /// # Errors
+    /// What the catalogue lacks.
+    pub fn example(entry: &'static Entry) -> Result<Self, LawError> {
+        Self::around_examples(entry, example::<dyn Factor>(entry)?.into())
+    }
+
+    /// A factor of that entry, at the examples of its manifolds.
+    ///
+    /// # Errors
+    /// What the catalogue lacks.
+    pub fn around_examples(entry: &'static Entry, factor: Arc<dyn Factor>) -> Result<Self, LawError> {
+        let signature = factor.erased().signature();
+        let named = example_keys(entry);
+        let mut types = signature.variables;
+        if signature.many
+            && let Some(first) = types.first().copied()
+        {
+            types.resize(if named.is_empty() { 3 } else { named.len() }, first);
+        }
+        let around: Vec<_> = types.iter().map(|id| example_point(entry, *id)).collect::<Result<_, _>>()?;
+        let by_type = || types.iter().enumerate().map(|(i, id)| format!("{}_{i}", manifold_name(*id)));
+        let keys = if named.len() == types.len() { named } else { by_type().collect() };
+        Ok(Self { factor, keys, around })
+    }
+
+    /// `q0.rx`: a direction by variable and column.
+    pub(super) fn direction(&self, variable: usize, column: usize) -> String {
+        let key = self.keys.get(variable).map_or("?", String::as_str);
+        let tangent = self.around.get(variable).map(|x| x.erased().tangent()).unwrap_or_default();
+        format!("{key}.{}", tangent.get(column).copied().unwrap_or("?"))
+    }
+
+    /// The names of all directions of all variables.
+    pub(super) fn directions(&self) -> Vec<String> {
+        let columns = |v: usize| self.around[v].erased().dim();
+        (0..self.around.len()).flat_map(|v| (0..columns(v)).map(move |c| self.direction(v, c))).collect()
+    }
+
+    /// The literal graph of this factor alone at a point, which reproduces what was found there.
+    pub(super) fn graph(&self, point: &[Box<dyn Variable>]) -> Value {
+        let variables: Vec<_> =
+            self.keys.iter().zip(point).map(|(key, value)| json!({ "key": key, "value": value })).collect();
+        json!({ "variables": variables, "factors": [{ "keys": self.keys, "factor": self.factor }] })
+    }
+}

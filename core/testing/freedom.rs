@@ -1,0 +1,124 @@
+//! What a factor leaves free: the directions that its residual does not see.
+use manifactor_graph::Linearization;
+use nalgebra::DMatrix;
+
+/// Below this share of the largest singular value a direction is not seen.
+const UNSEEN: f64 = 1e-9;
+
+/// The rank of a Jacobian over all variables, and what its null space is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Freedom {
+    /// Directions of all variables together.
+    pub directions: usize,
+    /// Directions that the residual sees.
+    pub rank: usize,
+    /// Free directions: alone, or so many combinations of several. Positions are over all variables, in order.
+    pub free: Vec<Free>,
+}
+
+/// A part of a null space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Free {
+    /// How many combinations of the directions are free; all of them, where it is as many as there are.
+    pub count: usize,
+    /// Directions, by position over all variables.
+    pub among: Vec<usize>,
+}
+
+impl Freedom {
+    /// How many are free.
+    pub fn count(&self) -> usize {
+        self.directions - self.rank
+    }
+}
+
+/// What a residual leaves free, to first order, as far as Jacobians at several points agree on it.
+///
+/// The rank is the largest at any of the points: elsewhere something vanishes. Directions go together where the null space mixes them at one of those.
+pub fn freedom(linearizations: &[Linearization]) -> Option<Freedom> {
+    let spaces: Vec<_> = linearizations.iter().filter_map(null_space).collect();
+    let usual = spaces.iter().map(|(rank, _)| *rank).max()?;
+    let projections: Vec<_> = spaces.into_iter().filter(|(rank, _)| *rank == usual).map(|(_, p)| p).collect();
+    let first = projections.first()?;
+    let directions = first.nrows();
+    let mixed = |i: usize, j: usize| projections.iter().any(|p| p[(i, j)].abs() > 1e-6);
+    let mut free: Vec<Free> = vec![];
+    let mut seen = vec![false; directions];
+    for start in 0..directions {
+        let mut among = vec![];
+        let mut open = vec![start];
+        while let Some(i) = open.pop() {
+            if !seen[i] && mixed(i, i) {
+                seen[i] = true;
+                among.push(i);
+                open.extend((0..directions).filter(|j| mixed(i, *j)));
+            }
+        }
+        among.sort_unstable();
+        let count = among.iter().map(|i| first[(*i, *i)]).sum::<f64>().round() as usize;
+        if count > 0 {
+            free.push(Free { count, among });
+        }
+    }
+    Some(Freedom { directions, rank: usual, free })
+}
+
+/// The rank, and the projection onto the null space; `None` where an entry is not finite.
+fn null_space(linearization: &Linearization) -> Option<(usize, DMatrix<f64>)> {
+    let blocks = &linearization.jacobians;
+    let columns: usize = blocks.iter().map(DMatrix::ncols).sum();
+    let rows = linearization.residual.len();
+    // rows of zeros, so that all right singular vectors come out
+    let mut j = DMatrix::zeros(rows.max(columns), columns);
+    let mut at = 0;
+    for block in blocks {
+        j.view_mut((0, at), block.shape()).copy_from(block);
+        at += block.ncols();
+    }
+    if j.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let svd = j.svd(false, true);
+    let v_t = svd.v_t?;
+    let largest = svd.singular_values.max();
+    let seen = |i: usize| svd.singular_values[i] > UNSEEN * largest;
+    let rank = (0..columns).filter(|i| seen(*i)).count();
+    let mut projection = DMatrix::zeros(columns, columns);
+    for row in (0..columns).filter(|i| !seen(*i)).map(|i| v_t.row(i)) {
+        projection += row.transpose() * row;
+    }
+    Some((rank, projection))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn jacobian(rows: usize, entries: &[f64]) -> Linearization {
+        let j = DMatrix::from_row_slice(rows, entries.len() / rows, entries);
+        Linearization { residual: vec![0.0; rows], jacobians: vec![j] }
+    }
+
+    #[test]
+    fn a_direction_that_no_row_sees_is_free_alone_and_a_sum_leaves_a_combination() {
+        let j = jacobian(1, &[1.0, 1.0, 0.0, 2.0]);
+        let found = freedom(&[j]).unwrap();
+        assert_eq!((found.rank, found.directions), (1, 4));
+        let expected = [Free { count: 2, among: vec![0, 1, 3] }, Free { count: 1, among: vec![2] }];
+        assert_eq!(found.free, expected);
+    }
+
+    #[test]
+    fn the_rank_is_the_largest_at_any_point() {
+        let flat = jacobian(2, &[0.0, 0.0, 0.0, 0.0]);
+        let sound = jacobian(2, &[1.0, 0.0, 0.0, 3.0]);
+        let found = freedom(&[flat.clone(), sound, flat]).unwrap();
+        assert_eq!((found.rank, found.count(), found.free.len()), (2, 0, 0));
+    }
+
+    #[test]
+    fn a_combination_that_turns_from_point_to_point_keeps_its_directions_together() {
+        let found = freedom(&[jacobian(1, &[1.0, 0.0]), jacobian(1, &[1.0, 0.5])]).unwrap();
+        assert_eq!(found.free, [Free { count: 1, among: vec![0, 1] }]);
+    }
+}

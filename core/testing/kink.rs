@@ -1,0 +1,63 @@
+//! Places where a residual has no derivative: kinks, where the two sides have different ones, and jumps.
+use crate::differences::{Derivative, differentiate_from, jumps};
+use crate::jacobian::Entry;
+
+/// How far the derivatives of the two sides are apart, relative to their size, to make a kink.
+const APART: f64 = 1e-3;
+
+/// An entry of a Jacobian at a kink or at a jump.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kink {
+    /// The variable's position, from 0.
+    pub variable: usize,
+    /// The tangent direction, from 0.
+    pub column: usize,
+    /// The row, from 0.
+    pub row: usize,
+    /// The derivative from below.
+    pub before: f64,
+    /// The derivative from above.
+    pub after: f64,
+    /// How far the residual itself jumps; 0 at a kink.
+    pub jump: f64,
+}
+
+impl Kink {
+    /// How far the derivative jumps.
+    pub fn size(&self) -> f64 {
+        (self.after - self.before).abs()
+    }
+}
+
+/// The two sides of a point along one direction.
+pub(crate) struct Sides {
+    before: Vec<Derivative>,
+    after: Vec<Derivative>,
+    jumps: Vec<f64>,
+}
+
+/// Looks at both sides; `None` where the residual is not defined on one of them.
+pub(crate) fn sides(rows: usize, step: f64, f: impl Fn(f64) -> Option<Vec<f64>>) -> Option<Sides> {
+    let (down, up) = (jumps(-1.0, rows, step, &f)?, jumps(1.0, rows, step, &f)?);
+    Some(Sides {
+        before: differentiate_from(-1.0, rows, step, &f)?,
+        after: differentiate_from(1.0, rows, step, &f)?,
+        jumps: down.iter().zip(up).map(|(d, u)| d.abs().max(u.abs())).collect(),
+    })
+}
+
+impl Sides {
+    /// The kink or jump that excuses an entry for having no derivative. At a kink the entry is to be that of one of
+    /// the sides, or between them.
+    pub(crate) fn kink(&self, entry: &Entry) -> Option<Kink> {
+        let &Entry { variable, column, row, found, .. } = entry;
+        let (before, after, jump) = (self.before[row].value, self.after[row].value, self.jumps[row]);
+        let kink = Kink { variable, column, row, before, after, jump };
+        if jump > 0.0 {
+            return Some(kink);
+        }
+        let slack = APART * before.abs().max(after.abs()).max(1.0);
+        let between = (before.min(after) - slack / 10.0..=before.max(after) + slack / 10.0).contains(&found);
+        (kink.size() > slack && between).then_some(kink)
+    }
+}

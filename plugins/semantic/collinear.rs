@@ -1,0 +1,64 @@
+//! Three objects stand in a row.
+use manifactor_graph::{Lifted, Refs, Residual, Scalar, register_factor, register_invariance};
+use manifactor_quadric::DualQuadric;
+use nalgebra::{U3, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The second of three objects is on the line through the other two: r = (c₁ - c₀) × u, u = (c₂ - c₀)/|c₂ - c₀|, in metres.
+///
+/// Its length is the distance of the middle centroid from the line. Give the two that are furthest apart first and last. Moving
+/// the second along the line, turning and growing leave it unchanged. Smooth wherever the outer two are apart; within a
+/// micrometre they make no line, and it is not defined.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["chair0", "chair1", "chair2"]
+/// factor = { type = "collinear" }
+/// noise  = { sigma = 0.1 }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Collinear {}
+
+/// Below this distance, in metres, two points make no line.
+const SAME_PLACE: f64 = 1e-6;
+
+impl Residual for Collinear {
+    type Variables = (DualQuadric, DualQuadric, DualQuadric);
+    type Dim = U3;
+
+    fn residual<T: Scalar>(&self, (a, b, c): Lifted<Self::Variables, T>) -> Vector3<T> {
+        let line = c.centroid() - a.centroid();
+        (b.centroid() - a.centroid()).cross(&(line / line.norm_squared().sqrt()))
+    }
+    fn is_defined(&self, (a, _, c): Refs<'_, Self::Variables>) -> bool {
+        (c.centroid() - a.centroid()).norm() > SAME_PLACE
+    }
+}
+register_factor!("collinear", Collinear);
+register_invariance!(Collinear, "moving the second along the line", |_, (a, b, c), random| {
+    let mut moved = *b;
+    moved.pose.translation += (c.centroid() - a.centroid()) * random(3.0);
+    (*a, moved, *c)
+});
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_geometry::{Se3, So3};
+    use manifactor_testing::factor_laws;
+
+    factor_laws! { collinear }
+
+    #[test]
+    fn the_error_is_the_distance_from_the_line() {
+        let at = |x: f64, y: f64| DualQuadric {
+            pose: Se3::new(So3::identity(), Vector3::new(x, y, 0.0)),
+            semi_axes: Vector3::repeat(0.1),
+        };
+        let r = Collinear {}.residual::<f64>((at(0.0, 0.0), at(3.0, 0.25), at(4.0, 0.0)));
+        assert!((r.norm() - 0.25).abs() < 1e-12);
+        assert!(!Collinear {}.is_defined((&at(1.0, 0.0), &at(0.0, 0.0), &at(1.0, 0.0))));
+    }
+}

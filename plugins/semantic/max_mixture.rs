@@ -1,0 +1,272 @@
+//! An object that may be one thing or another: the best of several factors.
+use manifactor_graph::catalogue::{self, Kind};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::noise::NoiseError;
+use manifactor_graph::{
+    AsVariable, Dynamic, DynamicBlocks, DynamicResidual, ErasedResidual, Factor, Noise, Variable, WrongRows,
+    as_variable, register,
+};
+use nalgebra::{DMatrix, DVector};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use std::any::{Any, TypeId};
+use std::sync::Arc;
+
+/// The factor that fits best, of several: ½|r|² = minₖ ½|Wₖ rₖ|² + ln(w_max / wₖ)   (Olson and Agarwal 2013).
+///
+/// A detection that may be a chair or a box brings the factors of both, weighted by the detector's scores; the estimate
+/// decides, and decides again at each step. A component without a factor means none of them, at a price: an outlier. wₖ is the factor before
+/// exp(-½|Wₖ rₖ|²), so components of different dimensions are compared by what they cost, not by how narrow they are. Rows: √(2 ln(w_max/wₖ)),
+/// then the whitened rows of the component; zeros, where it has fewer than another.
+///
+/// The cost is continuous; where the best component changes, the rows jump. A component that is not defined takes no
+/// part; where none is, the mixture is not defined. It has noise of its own in each component: leave out `noise` beside it.
+/// Evaluating allocates a little for each component: it is for a prior on an object, not for each measurement.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["q0"]
+///
+/// [factors.factor]
+/// type = "max_mixture"
+/// components = [
+///     { weight = 0.6, factor = { type = "vertical_orientation_smooth" }, noise = { sigma = 0.1 } },
+///     { weight = 0.3, factor = { type = "horizontal_orientation_smooth" }, noise = { sigma = 0.1 } },
+///     { weight = 0.1 },
+/// ]
+/// ```
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Document", into = "Document")]
+#[schemars(with = "Document")]
+pub struct MaxMixture {
+    document: Document,
+    mixture: Dynamic<Mixture>,
+}
+
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "MaxMixture")]
+struct Document {
+    /// What it may be: two or more.
+    components: Vec<Component>,
+}
+
+/// One of the things that it may be.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Component {
+    /// How likely it is, relative to the others.
+    pub weight: Positive,
+    /// The factor that holds then; none, where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "any_factor")]
+    pub factor: Option<Arc<dyn Factor>>,
+    /// What the factor's residual is measured in.
+    #[serde(default, skip_serializing_if = "Noise::is_default")]
+    pub noise: Noise,
+}
+
+/// The definition that a document's schema has of all factors.
+fn any_factor(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "$ref": "#/$defs/factor", "description": "The factor that holds then; none, where nothing is said." })
+}
+
+/// Why components make no mixture.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MixtureError {
+    /// Nothing to choose from.
+    #[error("expected two components or more, got {0}; one alone is a factor")]
+    TooFew(usize),
+    /// None of them says anything.
+    #[error("none of the components has a factor")]
+    NoFactor,
+    /// Components of different variables.
+    #[error(
+        "component {component} is over {found}, the first factor over {expected}: all have to be over the same"
+    )]
+    Variables {
+        /// Which one, from 0.
+        component: usize,
+        /// Its variables.
+        found: String,
+        /// Those of the first.
+        expected: String,
+    },
+    /// Noise of another size than its factor.
+    #[error("component {component}: {error}")]
+    Noise {
+        /// Which one, from 0.
+        component: usize,
+        /// What is wrong.
+        error: NoiseError,
+    },
+    /// Too many rows.
+    #[error("{0}; a mixture has one row more than its longest component")]
+    Rows(#[from] WrongRows),
+}
+
+impl MaxMixture {
+    /// # Errors
+    /// Where the components do not fit together.
+    pub fn new(components: Vec<Component>) -> Result<Self, MixtureError> {
+        let mixture = Dynamic::new(Mixture::new(&components)?)?;
+        Ok(Self { document: Document { components }, mixture })
+    }
+}
+
+impl TryFrom<Document> for MaxMixture {
+    type Error = MixtureError;
+    fn try_from(document: Document) -> Result<Self, MixtureError> {
+        Self::new(document.components)
+    }
+}
+
+impl From<MaxMixture> for Document {
+    fn from(mixture: MaxMixture) -> Self {
+        mixture.document
+    }
+}
+
+#[typetag::serde(name = "max_mixture")]
+impl Factor for MaxMixture {
+    fn erased(&self) -> &dyn ErasedResidual {
+        &self.mixture
+    }
+}
+register!(dyn Factor, "max_mixture", MaxMixture);
+
+/// What runs.
+#[derive(Debug, Clone)]
+struct Mixture {
+    parts: Arc<[Part]>,
+    types: Vec<TypeId>,
+    dimensions: Vec<usize>,
+    casts: Vec<&'static AsVariable>,
+    rows: usize,
+}
+
+#[derive(Debug)]
+struct Part {
+    /// √(2 ln(w_max / w)).
+    price: f64,
+    /// With its whitening.
+    factor: Option<(Arc<dyn Factor>, DMatrix<f64>)>,
+}
+
+impl Mixture {
+    fn new(components: &[Component]) -> Result<Self, MixtureError> {
+        if components.len() < 2 {
+            return Err(MixtureError::TooFew(components.len()));
+        }
+        let signatures = || components.iter().map(|c| c.factor.as_ref().map(|f| f.erased().signature()));
+        let first = signatures().flatten().next().ok_or(MixtureError::NoFactor)?;
+        let names = |types: &[TypeId]| {
+            types.iter().map(|id| catalogue::manifold_name(*id)).collect::<Vec<_>>().join(", ")
+        };
+        let mut parts = vec![];
+        let largest = components.iter().map(|c| c.weight.get()).fold(0.0, f64::max);
+        for (component, (of, signature)) in components.iter().zip(signatures()).enumerate() {
+            let mut factor = None;
+            if let (Some(f), Some(signature)) = (&of.factor, signature) {
+                if signature.variables != first.variables || signature.many {
+                    let (found, expected) = (names(&signature.variables), names(&first.variables));
+                    return Err(MixtureError::Variables { component, found, expected });
+                }
+                let rows = signature.rows.unwrap_or(0);
+                let whitener = of.noise.whitener(rows);
+                let whitener = whitener.map_err(|error| MixtureError::Noise { component, error })?;
+                factor = Some((f.clone(), whitener.matrix(rows)));
+            }
+            parts.push(Part { price: (2.0 * (largest / of.weight.get()).ln()).sqrt(), factor });
+        }
+        let manifolds = catalogue::entries(<dyn Variable as Kind>::NAME);
+        let dimension = |id: &TypeId| {
+            let entry = manifolds.iter().find(|entry| (entry.type_id)() == *id)?;
+            Some(((entry.signature)().tangent.len(), as_variable(*id)?))
+        };
+        let known: Option<Vec<_>> = first.variables.iter().map(dimension).collect();
+        // what is registered as a factor is over registered manifolds
+        let (dimensions, casts) = known.unwrap_or_default().into_iter().unzip();
+        let rows = parts.iter().filter_map(|part| part.factor.as_ref()).map(|(_, w)| w.nrows());
+        let rows = 1 + rows.max().unwrap_or(0);
+        Ok(Self { parts: parts.into(), types: first.variables, dimensions, casts, rows })
+    }
+
+    fn variables<'a>(&self, variables: &[&'a dyn Any]) -> Vec<&'a dyn Variable> {
+        variables.iter().zip(&self.casts).filter_map(|(x, to)| (to.cast)(*x)).collect()
+    }
+
+    /// The component that costs the least, with its whitened residual; `None` where none is defined.
+    fn best(&self, x: &[&dyn Variable]) -> Option<(&Part, DVector<f64>)> {
+        let costs = self.parts.iter().filter_map(|part| {
+            let residual = match &part.factor {
+                None => DVector::zeros(0),
+                Some((factor, whitening)) => {
+                    let factor = factor.erased();
+                    let defined = factor.is_defined(x)?;
+                    whitening * DVector::from(factor.residual(x).filter(|_| defined)?)
+                }
+            };
+            Some((part, residual))
+        });
+        let cost = |(part, r): &(&Part, DVector<f64>)| part.price * part.price + r.norm_squared();
+        costs.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+    }
+
+    fn write(&self, (part, rows): (&Part, &DVector<f64>), residual: &mut [f64]) {
+        residual.fill(0.0);
+        residual[0] = part.price;
+        residual[1..=rows.len()].copy_from_slice(rows.as_slice());
+    }
+}
+
+impl DynamicResidual for Mixture {
+    fn rows(&self) -> usize {
+        self.rows
+    }
+    fn variables(&self) -> &[TypeId] {
+        &self.types
+    }
+    fn dimensions(&self) -> &[usize] {
+        &self.dimensions
+    }
+    fn is_defined(&self, variables: &[&dyn Any]) -> bool {
+        self.best(&self.variables(variables)).is_some()
+    }
+    fn residual(&self, variables: &[&dyn Any], residual: &mut [f64]) {
+        match self.best(&self.variables(variables)) {
+            Some((part, rows)) => self.write((part, &rows), residual),
+            None => residual.fill(0.0),
+        }
+    }
+    fn linearize(
+        &self,
+        variables: &[&dyn Any],
+        free: &[bool],
+        residual: &mut [f64],
+        blocks: &mut DynamicBlocks,
+    ) {
+        for variable in (0..self.types.len()).filter(|v| free[*v]) {
+            blocks.block_mut(variable).fill(0.0);
+        }
+        let x = self.variables(variables);
+        let Some((part, rows)) = self.best(&x) else { return residual.fill(0.0) };
+        self.write((part, &rows), residual);
+        let Some((factor, whitening)) = &part.factor else { return };
+        let Some(linearization) = factor.erased().linearize(&x) else { return };
+        for (variable, jacobian) in linearization.jacobians.iter().enumerate().filter(|(v, _)| free[*v]) {
+            let whitened = whitening * jacobian;
+            let block = blocks.block_mut(variable);
+            for (column, of) in whitened.column_iter().enumerate() {
+                for (row, entry) in of.iter().enumerate() {
+                    block[column * self.rows + 1 + row] = *entry;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "max_mixture_tests.rs"]
+mod tests;

@@ -1,0 +1,71 @@
+use super::*;
+use manifactor_geometry::{Se3, So3};
+use manifactor_graph::{Graph, Values};
+use manifactor_quadric::testing::tilted;
+use manifactor_quadric::{DualQuadric, HorizontalOrientationSmooth, VerticalOrientationSmooth};
+use manifactor_solve::{LevenbergMarquardt, Silent, solve};
+use manifactor_testing::factor_laws;
+use nalgebra::Vector3;
+
+factor_laws! { max_mixture }
+
+fn component(weight: f64, factor: impl Factor + 'static) -> Component {
+    let noise = Noise::sigma(0.1).unwrap();
+    Component { weight: Positive::new(weight).unwrap(), factor: Some(Arc::new(factor)), noise }
+}
+fn upright_or_flat() -> MaxMixture {
+    let none = Component { weight: Positive::literal(1e-3), factor: None, noise: Noise::default() };
+    let (upright, flat) = (
+        component(0.6, VerticalOrientationSmooth::default()),
+        component(0.3, HorizontalOrientationSmooth::default()),
+    );
+    MaxMixture::new(vec![upright, flat, none]).unwrap()
+}
+
+/// The tilt that a start at some tilt ends at.
+fn solved(tilt: f64) -> f64 {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("q", tilted(tilt));
+    graph.add(["q"], upright_or_flat());
+    graph.fix_directions("q", &["x", "y", "z", "log_a", "log_b", "log_c", "rz"]);
+    let solution = solve(&graph, &values, &LevenbergMarquardt::default(), &mut Silent).unwrap();
+    let quadric: &DualQuadric = solution.values.get("q").unwrap();
+    quadric.major_axis().z.abs().acos()
+}
+
+#[test]
+fn the_estimate_decides_which_it_is() {
+    assert!(solved(0.3) < 1e-6);
+    assert!((solved(1.3) - std::f64::consts::FRAC_PI_2).abs() < 1e-6);
+}
+
+#[test]
+fn what_fits_none_of_them_is_left_where_it_is() {
+    // at 45° either costs 25, and none of them ln(600)
+    assert!((solved(std::f64::consts::FRAC_PI_4) - std::f64::consts::FRAC_PI_4).abs() < 1e-9);
+}
+
+#[test]
+fn the_cost_is_that_of_the_best_and_of_being_unlikely() {
+    let flat = DualQuadric {
+        pose: Se3::new(So3::identity(), Vector3::zeros()),
+        semi_axes: Vector3::new(0.3, 0.2, 0.1),
+    };
+    let r = upright_or_flat().mixture.residual(&[&flat]).unwrap();
+    assert!((0.5 * r.iter().map(|r| r * r).sum::<f64>() - 2f64.ln()).abs() < 1e-12, "{r:?}");
+}
+
+#[test]
+fn components_that_do_not_fit_together_are_refused() {
+    let read = |text: &str| serde_json::from_str::<MaxMixture>(text).unwrap_err().to_string();
+    let upright = r#"{"weight": 1, "factor": {"type": "vertical_orientation"}}"#;
+    assert!(read(&format!(r#"{{"components": [{upright}]}}"#)).contains("two components or more"));
+    assert!(read(r#"{"components": [{"weight": 1}, {"weight": 2}]}"#).contains("none of the components"));
+    let other = r#"{"weight": 1, "factor": {"type": "supporting_plane"}}"#;
+    let error = read(&format!(r#"{{"components": [{upright}, {other}]}}"#));
+    assert!(error.contains("component 1 is over dual_quadric, plane"), "{error}");
+    let noise = r#"{"weight": 1, "factor": {"type": "vertical_orientation"}, "noise": {"sigmas": [1, 2]}}"#;
+    assert!(read(&format!(r#"{{"components": [{upright}, {noise}]}}"#)).contains("component 1"), "{error}");
+    let text = serde_json::to_string(&upright_or_flat()).unwrap();
+    assert_eq!(serde_json::to_string(&serde_json::from_str::<MaxMixture>(&text).unwrap()).unwrap(), text);
+}

@@ -1,0 +1,73 @@
+//! Two objects are aligned.
+use crate::Axis;
+use manifactor_graph::{Lifted, Residual, Scalar, register_factor, register_invariance};
+use manifactor_quadric::DualQuadric;
+use nalgebra::{U3, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// An axis of an object is parallel to an axis of another: r = a₀ × a₁, of length sin(angle).
+///
+/// Which way the axes point does not matter. σ is in radians, near alignment. Moving either of them, and turning both
+/// together, leave it unchanged, and so does turning either about its axis. Smooth, except that `longest` and `shortest` jump where
+/// another axis takes the place; perpendicular axes are a maximum, where the derivative of the cost vanishes. Defined
+/// everywhere.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["book0", "book1"]
+/// factor = { type = "parallel", axes = ["longest", "longest"] }
+/// noise  = { sigma = 0.1 }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Parallel {
+    /// The axis of each: longest, shortest, x, y or z; the longest of both, where nothing is said.
+    #[serde(default)]
+    pub axes: [Axis; 2],
+}
+
+impl Residual for Parallel {
+    type Variables = (DualQuadric, DualQuadric);
+    type Dim = U3;
+
+    fn residual<T: Scalar>(&self, (a, b): Lifted<Self::Variables, T>) -> Vector3<T> {
+        self.axes[0].of(&a).cross(&self.axes[1].of(&b))
+    }
+}
+register_factor!("parallel", Parallel);
+register_invariance!(
+    Parallel,
+    "turning an object about its axis, and moving it",
+    |factor, (a, b), random| {
+        let mut moved = *b;
+        let turn = manifactor_geometry::So3::exp(&(factor.axes[1].of(b) * random(3.0)));
+        moved.pose.rotation = turn.compose(&b.pose.rotation);
+        moved.pose.translation += Vector3::new(random(5.0), random(5.0), random(5.0));
+        (*a, moved)
+    }
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_quadric::testing::tilted;
+    use manifactor_testing::factor_laws;
+
+    factor_laws! { parallel }
+
+    #[test]
+    fn the_error_is_the_sine_of_the_angle() {
+        let r = Parallel::default().residual::<f64>((tilted(0.1), tilted(0.5)));
+        assert!((r.norm() - 0.4f64.sin()).abs() < 1e-12);
+        let other = Parallel { axes: [Axis::Longest, Axis::Shortest] };
+        assert!((other.residual::<f64>((tilted(0.0), tilted(0.0))).norm() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_axis_that_is_none_is_refused_with_those_that_are() {
+        let error =
+            serde_json::from_str::<Parallel>(r#"{"axes": ["longest", "w"]}"#).unwrap_err().to_string();
+        assert!(error.contains("`longest`, `shortest`, `x`, `y`, `z`"), "{error}");
+    }
+}

@@ -1,0 +1,116 @@
+//! Planes as variables.
+use crate::S2;
+use manifactor_graph::{Direction, Jet, JetOf, Lifted, Manifold, Residual, Scalar};
+use manifactor_graph::{register_factor, register_manifold};
+use nalgebra::{U3, Vector2, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A plane in Hessian normal form, S² × R: the points x with n · x = offset.
+///
+/// Tangent (a, b, offset): the normal n turns as an `s2` does, the offset adds. n points to the side where things stand;
+/// (n, offset) and (-n, -offset) are the same points, seen from the two sides.
+///
+/// ```toml
+/// [values]
+/// table = { type = "plane", normal = [0.0, 0.0, 1.0], offset = 0.7 }
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// The side where things stand, of any length but zero.
+    pub normal: Direction,
+    /// How far it is from the origin along its normal, in metres.
+    pub offset: f64,
+}
+
+/// A plane over another scalar.
+#[derive(Debug, Clone, Copy)]
+pub struct PlaneOf<T: Scalar> {
+    /// Unit vector.
+    pub normal: Vector3<T>,
+    /// Distance from the origin.
+    pub offset: T,
+}
+
+impl<T: Scalar> PlaneOf<T> {
+    /// How far a point is above it; negative below.
+    pub fn height(&self, point: &Vector3<T>) -> T {
+        self.normal.dot(point) - self.offset
+    }
+}
+
+impl Manifold for Plane {
+    type Dim = U3;
+    type Of<T: Scalar> = PlaneOf<T>;
+    const TANGENT: &'static [&'static str] = &["a", "b", "offset"];
+
+    fn lift<T: Scalar>(&self) -> PlaneOf<T> {
+        PlaneOf { normal: self.normal.map(T::from), offset: T::from(self.offset) }
+    }
+    fn seed(&self) -> PlaneOf<JetOf<U3>> {
+        let basis = S2::new(self.normal).basis();
+        let normal =
+            Vector3::from_fn(|i, _| Jet::with_gradient(self.normal[i], &[basis[(i, 0)], basis[(i, 1)], 0.0]));
+        PlaneOf { normal, offset: Jet::with_gradient(self.offset, &[0.0, 0.0, 1.0]) }
+    }
+    fn retract(&self, delta: &Vector3<f64>) -> Self {
+        let normal = S2::new(self.normal).retract(&Vector2::new(delta.x, delta.y)).direction;
+        Self { normal, offset: self.offset + delta.z }
+    }
+    fn local(&self, other: &Self) -> Vector3<f64> {
+        S2::new(self.normal).local(&S2::new(other.normal)).push(other.offset - self.offset)
+    }
+    fn is_finite(&self) -> bool {
+        self.offset.is_finite() && self.normal.iter().all(|x| x.is_finite())
+    }
+}
+register_manifold!("plane", Plane);
+
+/// A plane is known beforehand: r = (n × n₀, offset - offset₀), in radians and metres.
+///
+/// Four rows: the sine of the angle between the normals, and the distance. Turning the normal over by half a turn is a
+/// maximum, where the derivative of the cost vanishes. Defined everywhere.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["table"]
+/// factor = { type = "prior_plane", value = { normal = [0.0, 0.0, 1.0], offset = 0.7 } }
+/// noise  = { sigmas = [0.02, 0.02, 0.02, 0.1] }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanePrior {
+    /// The plane that is expected.
+    pub value: Plane,
+}
+
+impl Residual for PlanePrior {
+    type Variables = (Plane,);
+    type Dim = nalgebra::U4;
+
+    fn residual<T: Scalar>(&self, (plane,): Lifted<Self::Variables, T>) -> nalgebra::Vector4<T> {
+        let expected = self.value.lift::<T>();
+        plane.normal.cross(&expected.normal).push(plane.offset - expected.offset)
+    }
+}
+register_factor!("prior_plane", PlanePrior);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::any_plane;
+    use manifactor_testing::strategies::vector;
+    use manifactor_testing::{factor_laws, manifold_laws};
+
+    manifold_laws! { retract_and_local_are_inverse: (any_plane(), any_plane(), vector::<3>(1.8)) }
+    factor_laws! { prior_plane }
+
+    #[test]
+    fn points_of_the_plane_are_at_no_height() {
+        let table = Plane { normal: Direction::new(Vector3::new(0.0, 3.0, 4.0)).unwrap(), offset: 2.0 };
+        let plane = table.lift::<f64>();
+        assert!(plane.height(&Vector3::new(7.0, 1.2, 1.6)).abs() < 1e-12);
+        assert!((plane.height(&Vector3::new(0.0, 1.8, 2.4)) - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,123 @@
+//! A box whose sides bound an object, in space: from starts that have no box yet.
+use manifactor_geometry::{Camera, Se3};
+use manifactor_graph::{Lifted, Residual, Scalar, register_factor};
+use manifactor_quadric::{BoundingBox, DualQuadric, Ellipsoid};
+use nalgebra::{RowVector3, U4, Vector3, Vector4};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The planes through a camera and the sides of a box touch the object: rₖ = nₖ · c - eₖ, in metres.
+///
+/// Variables: the pose of the camera and the object, with its centroid c in the camera's frame. nₖ is the unit normal of
+/// plane πₖ = Pᵀlₖ towards the inside of the box, eₖ half the object's extent along it. The algebraic form of the same
+/// constraint, πₖᵀ Q* πₖ = eₖ² - (nₖ · c)² = 0 (Rubino et al., *3D Object Localisation from Multi-View Object Detections*, 2018),
+/// is zero for an object on the wrong side too; this root of it is not. Rows: left, top, right, bottom.
+///
+/// It is smooth and defined everywhere, where `bounding_box` is not: behind the camera, around it, across its plane. So it pulls an
+/// object into view from a bad start; then `bounding_box`, whose noise is that of a detector, should take over. An object as small
+/// as a point at the camera satisfies it exactly: two views or a size prior keep it from there. σ is in metres at the
+/// object: σ pixels at depth z are about σ z / f.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["x0", "q0"]
+/// factor = { type = "tangent_planes", box = [120.0, 80.0, 260.0, 310.0], camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
+/// noise  = { sigma = 0.1 }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TangentPlanes {
+    /// The box that was measured: xmin, ymin, xmax, ymax, in pixels.
+    #[serde(rename = "box")]
+    pub bounding_box: BoundingBox,
+    /// The camera that saw it.
+    pub camera: Camera,
+}
+
+impl TangentPlanes {
+    /// Unit normals of the planes through the sides, towards the inside, in the camera's frame.
+    fn normals(&self) -> [Vector3<f64>; 4] {
+        let [left, top, right, bottom] = self.bounding_box.lines();
+        // Kᵀl, the plane of a line in the image; right and bottom lie on the other side of it
+        [left, top, -right, -bottom].map(|line| (self.camera.matrix().transpose() * line).normalize())
+    }
+}
+
+impl Residual for TangentPlanes {
+    type Variables = (Se3, DualQuadric);
+    type Dim = U4;
+
+    fn residual<T: Scalar>(&self, (pose, quadric): Lifted<Self::Variables, T>) -> Vector4<T> {
+        let seen = Ellipsoid::seen(&pose, &quadric);
+        let normals = self.normals();
+        Vector4::from_fn(|k, _| {
+            let n: RowVector3<T> = normals[k].map(T::from).transpose();
+            (n * seen.centroid).x - (n * seen.axes).norm_squared().sqrt()
+        })
+    }
+}
+register_factor!("tangent_planes", TangentPlanes);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_geometry::So3;
+    use manifactor_graph::{Graph, Noise, Values};
+    use manifactor_quadric::testing::any_view;
+    use manifactor_quadric::{BoundingBoxFactor, BoxModel};
+    use manifactor_solve::{LevenbergMarquardt, Silent, solve};
+    use manifactor_testing::{check, factor_laws};
+
+    factor_laws! { tangent_planes }
+
+    fn factor(bounding_box: BoundingBox, camera: Camera) -> BoundingBoxFactor {
+        BoundingBoxFactor { bounding_box, camera, model: BoxModel::Standard }
+    }
+
+    #[test]
+    fn it_is_zero_exactly_where_the_box_is_that_of_the_outline() {
+        check(any_view(), |(camera, pose, quadric)| {
+            let any = BoundingBox::new([0.0, 0.0, 1.0, 1.0]).unwrap();
+            let Some(bounding_box) = factor(any, camera).predict(&pose, &quadric) else { return Ok(()) };
+            let r = TangentPlanes { bounding_box, camera }.residual::<f64>((pose, quadric));
+            let distance = pose.inverse_act(&quadric.centroid()).norm();
+            assert!(r.norm() < 1e-7 * distance, "{r}");
+            Ok(())
+        });
+    }
+
+    #[test]
+    fn an_object_behind_all_cameras_comes_to_where_it_was_seen() {
+        let camera = Camera::new([525.0, 525.0, 320.0, 240.0], 640, 480).unwrap();
+        let truth = DualQuadric {
+            pose: Se3::new(So3::identity(), Vector3::new(0.1, -0.1, 3.0)),
+            semi_axes: Vector3::new(0.2, 0.3, 0.25),
+        };
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        for i in 0..5 {
+            let angle = -0.5 + 0.25 * f64::from(i);
+            let turn = So3::exp(&Vector3::new(0.2 * angle, angle, 0.0));
+            // around the object, looking at it
+            let pose = Se3::new(turn, truth.centroid() - turn.act(&Vector3::z()) * 3.0);
+            let any = BoundingBox::new([0.0, 0.0, 1.0, 1.0]).unwrap();
+            let bounding_box = factor(any, camera).predict(&pose, &truth).unwrap();
+            let key = format!("x{i}");
+            graph.fix(key.as_str());
+            values.insert(key.as_str(), pose);
+            graph
+                .add([key.as_str(), "q"], TangentPlanes { bounding_box, camera })
+                .noise(Noise::sigma(0.1).unwrap());
+        }
+        graph.fix_directions("q", &["rx", "ry", "rz"]);
+        let behind = DualQuadric {
+            pose: Se3::new(So3::identity(), Vector3::new(2.0, 1.0, -6.0)),
+            semi_axes: Vector3::repeat(1.0),
+        };
+        values.insert("q", behind);
+        let solution = solve(&graph, &values, &LevenbergMarquardt::default(), &mut Silent).unwrap();
+        let found: &DualQuadric = solution.values.get("q").unwrap();
+        assert!(solution.outcome.termination.is_converged() && solution.outcome.final_cost < 1e-9);
+        assert!((found.centroid() - truth.centroid()).norm() < 1e-4, "{found:?}");
+        assert!((found.semi_axes - truth.semi_axes).norm() < 1e-4, "{found:?}");
+    }
+}

@@ -1,0 +1,71 @@
+use crate::{folder, manifactor, path, run};
+
+#[test]
+fn a_sound_factor_is_told_what_it_leaves_free() {
+    let ran = manifactor("check-factor vertical_orientation").ended(0);
+    let text = &ran.stdout;
+    assert!(text.contains("Free: 8 of 9 directions: "), "{text}");
+    assert!(text.contains("2 combinations of (q0.rx, q0.ry, q0.rz), q0.x, q0.y, q0.z, q0.log_a"), "{text}");
+    // |m · up| has a kink where the axis lies flat, and its own jump where another becomes the longest
+    assert!(text.contains("Kink: row 0 by q0.r"), "{text}");
+    assert!(
+        manifactor("check-factor supporting_plane")
+            .ended(0)
+            .stdout
+            .contains("Unchanged by sliding along the plane")
+    );
+}
+
+#[test]
+fn one_seed_draws_the_same_points_and_all_is_in_the_json() {
+    let json = || manifactor("check-factor bounding_box --seed 5 --points 64 --json").ended(0).json();
+    let report = json();
+    assert_eq!(report, json());
+    let factor = &report["factors"][0];
+    assert_eq!((report["holds"].as_bool(), factor["directions"].as_u64()), (Some(true), Some(15)));
+    assert!(factor["worst"]["error"].as_f64().unwrap() < 1e-6 && factor["rank"] == 4, "{factor}");
+}
+
+const FORMULA: &str = r#"
+[[variables]]
+key = "q3"
+value = { type = "dual_quadric", translation = [1.0, 0.0, 0.5], rotation = [0.1, 0.2, 0.3, 0.9], semi_axes = [0.1, 0.2, 0.3] }
+
+[[factors]]
+keys = ["q3"]
+factor = { type = "expression", variables = { q = "dual_quadric" }, residual = ["RESIDUAL"] }
+"#;
+
+#[test]
+fn a_formula_of_a_graph_is_checked_around_its_values() {
+    let text = FORMULA
+        .replace("RESIDUAL", "1 - abs(dot(major_axis(q), up))")
+        .replace("[0.1, 0.2, 0.3, 0.9]", "[0.0, 0.0, 0.6, 0.8]");
+    let folder = folder(&[("graph.toml", &text)]);
+    let ran = manifactor(&format!("check-factor --config {}", path(&folder, "graph.toml"))).ended(0);
+    assert!(ran.stdout.contains("Free: 8 of 9 directions"), "{}", ran.stdout);
+}
+
+#[test]
+fn what_is_not_finite_is_broken_and_the_point_reproduces_it() {
+    let text = FORMULA
+        .replace("RESIDUAL", "sqrt(dot(centroid(q), up) - 0.5)")
+        .replace("[0.1, 0.2, 0.3, 0.9]", "[0.0, 0.0, 0.6, 0.8]");
+    let files = folder(&[("graph.toml", &text)]);
+    let ran = manifactor(&format!("check-factor --config {}", path(&files, "graph.toml"))).ended(1);
+    assert!(ran.stdout.contains("expression is broken: "), "{}", ran.stdout);
+    let (_, graph) = ran.stdout.split_once("as a graph:\n").unwrap();
+    let again = folder(&[("again.toml", graph)]);
+    let arguments = format!("check-factor expression --points 1 --config {}", path(&again, "again.toml"));
+    assert!(manifactor(&arguments).ended(1).stdout.contains("expression is broken: "));
+}
+
+#[test]
+fn parameters_are_checked_like_those_of_a_document() {
+    let check = |json| run(["check-factor", "rests", "--parameters", json], &[]);
+    check("{}").ended(2).complains("no factor is called `rests`");
+    let check = |json| run(["check-factor", "vertical_orientation", "--parameters", json], &[]);
+    check(r#"{ "up": [0, 1, 0] }"#).ended(0);
+    check(r#"{ "upp": [0, 1, 0] }"#).ended(2).complains("did you mean `up`?");
+    check(r#"{ "up": [0, 0, 0] }"#).ended(2).complains("expected a direction");
+}

@@ -1,0 +1,47 @@
+use crate::{folder, manifactor, root, run};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The folder that this test was built into: what is there need not be built again.
+fn target() -> PathBuf {
+    let binary = Path::new(env!("CARGO_BIN_EXE_manifactor"));
+    binary.ancestors().nth(2).unwrap().to_owned()
+}
+
+#[test]
+fn a_new_plugin_compiles_and_passes_outside_of_the_workspace() {
+    let folder = folder(&[]);
+    let name = folder.path().join("on_the_shelf").display().to_string();
+    let checkout = root().display().to_string();
+    let said = run(["new", "plugin", &name, "--manifactor", &checkout], &[]).ended(0).stdout;
+    assert!(said.contains("cargo test"), "{said}");
+    // the versions that are built already
+    std::fs::copy(root().join("Cargo.lock"), folder.path().join("on_the_shelf/Cargo.lock")).unwrap();
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["test", "--offline", "--quiet"]).current_dir(&name).env("CARGO_TARGET_DIR", target());
+    // all of ours are built anew for a crate outside: quickly, rather than well
+    cargo.env("CARGO_INCREMENTAL", "0").args(["--config", "profile.dev.opt-level=0"]);
+    for part in ["", "-graph", "-solve", "-config", "-testing", "-cli", "-geometry", "-quadric", "-semantic"]
+        .iter()
+        .chain(&["-formats", "-slam", "-viz", "-expression"])
+    {
+        cargo.args(["--config", &format!("profile.dev.package.manifactor{part}.opt-level=0")]);
+    }
+    let output = cargo.output().unwrap();
+    let text =
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{text}");
+    assert!(text.contains("2 passed") && text.contains("1 passed"), "{text}");
+}
+
+#[test]
+fn a_plugin_is_not_written_over_another_nor_under_a_bad_name() {
+    let folder = folder(&[("there", "")]);
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    run(["new", "plugin", &path("there")], &[]).ended(2).complains("is there already");
+    run(["new", "plugin", &path("On-Shelf")], &[]).ended(2).complains("such as `on_the_shelf`");
+    let nowhere = folder.path().display().to_string();
+    run(["new", "plugin", &path("new_one"), "--manifactor", &nowhere], &[]).ended(2).complains("no checkout");
+    assert!(!folder.path().join("new_one").exists());
+    manifactor("new").ended(2).complains("plugin");
+}

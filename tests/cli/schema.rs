@@ -1,0 +1,76 @@
+use crate::{manifactor, root};
+use jsonschema::Validator;
+use manifactor::config::{Document, Format};
+use manifactor::graph::catalogue;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+fn validator(document: &str) -> Validator {
+    jsonschema::validator_for(&manifactor(&format!("schema {document}")).ended(0).json()).unwrap()
+}
+
+/// All documents in a folder and below.
+fn documents(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
+        if entry.is_dir() {
+            documents(&entry, found);
+        } else if entry.extension().is_some_and(|e| e == "toml") {
+            found.push(entry);
+        }
+    }
+}
+
+fn complaints(schema: &Validator, document: &Value) -> Vec<String> {
+    schema.iter_errors(document).map(|e| format!("{} at {}", e, e.instance_path)).collect()
+}
+
+#[test]
+fn the_schema_accepts_every_example_and_refuses_a_misspelt_one() {
+    let (any, graph) = (validator(""), validator("graph"));
+    let mut found = vec![];
+    documents(&root().join("examples"), &mut found);
+    assert!(found.len() >= 8, "{found:?}");
+    for path in &found {
+        // the factor of an example that is a program of its own
+        if path.ends_with("01_new_factor/desk.toml") {
+            continue;
+        }
+        let document = Document::open(path).unwrap().root().to_json().unwrap();
+        // an experiment is neither: it has runs
+        if document.get("source").is_none() && document.get("variables").is_none() {
+            continue;
+        }
+        assert_eq!(complaints(&any, &document), [""; 0], "{}", path.display());
+        let mut wrong = document.clone();
+        wrong["sover"] = Value::Null;
+        assert!(!any.is_valid(&wrong), "{}", path.display());
+    }
+    let wrong = r#"{ "variables": [{ "key": "x0", "value": { "type": "se2", "translation": [0, 0], "angel": 0 } }] }"#;
+    assert!(!graph.is_valid(&serde_json::from_str(wrong).unwrap()));
+}
+
+#[test]
+fn every_registered_type_is_in_the_schema_and_its_example_fits() {
+    let schema = manifactor("schema").ended(0).json();
+    let definitions = &schema["$defs"];
+    for entry in catalogue::all() {
+        let name = format!("{}.{}", entry.kind, entry.name);
+        assert!(definitions[&name].is_object(), "{name} is not in the schema");
+        let example = entry.example().unwrap();
+        let example = Document::parse("example", example, Format::Toml).unwrap().root().to_json().unwrap();
+        let one = serde_json::json!({ "$ref": format!("#/$defs/{name}"), "$defs": definitions });
+        let one = jsonschema::validator_for(&one).unwrap();
+        for table in tables_of_type(&example, entry.name) {
+            assert_eq!(complaints(&one, table), [""; 0], "{name}: {table}");
+        }
+    }
+}
+
+fn tables_of_type<'a>(value: &'a Value, name: &str) -> Vec<&'a Value> {
+    match value {
+        Value::Object(table) if table.get("type").is_some_and(|t| t == name) => vec![value],
+        Value::Object(table) => table.values().flat_map(|v| tables_of_type(v, name)).collect(),
+        Value::Array(items) => items.iter().flat_map(|v| tables_of_type(v, name)).collect(),
+        _ => vec![],
+    }
+}

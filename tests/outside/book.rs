@@ -1,0 +1,91 @@
+//! The blocks of TOML in the book, as a reader would paste them.
+use manifactor::config::{Document, Format, Node, Value};
+use manifactor::graph::catalogue::{self, Entry};
+use std::path::{Path, PathBuf};
+
+fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
+        match entry.is_dir() {
+            true => pages(&entry, found),
+            false if entry.extension().is_some_and(|e| e == "md") => found.push(entry),
+            false => {}
+        }
+    }
+}
+
+/// The TOML blocks of a page, with the line that each begins at.
+fn blocks(page: &str) -> Vec<(usize, String)> {
+    let (mut blocks, mut open) = (vec![], None);
+    for (i, line) in page.lines().enumerate() {
+        match (line, open.take()) {
+            ("```toml", None) => open = Some((i + 2, String::new())),
+            (_, None) => {}
+            ("```", Some(block)) => blocks.push(block),
+            (line, Some((at, text))) => open = Some((at, text + line + "\n")),
+        }
+    }
+    blocks
+}
+
+/// Reads all tables that name a registered type; returns the names that nothing has.
+fn read_all(node: &Node, place: &str) -> Vec<String> {
+    let mut unknown = vec![];
+    match &node.value {
+        Value::Table(table) => {
+            if let Some(Value::String(name)) = table.get("type").map(|field| &field.node.value) {
+                let entries: Vec<&Entry> = catalogue::all().into_iter().filter(|e| e.name == *name).collect();
+                let mut fields = node.to_json().unwrap();
+                fields.as_object_mut().unwrap().shift_remove("type");
+                match entries.first() {
+                    Some(entry) => {
+                        drop((entry.parse)(fields).unwrap_or_else(|e| panic!("{place}: {name}: {e}")))
+                    }
+                    None => unknown.push(name.clone()),
+                }
+            }
+            unknown.extend(table.values().flat_map(|field| read_all(&field.node, place)));
+        }
+        Value::Array(items) => unknown.extend(items.iter().flat_map(|item| read_all(item, place))),
+        _ => {}
+    }
+    unknown
+}
+
+#[test]
+fn every_block_of_toml_is_read() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let (mut found, mut count) = (vec![], 0);
+    pages(&docs, &mut found);
+    for page in found {
+        // its blocks are wrong on purpose, and have a test of their own
+        if page.ends_with("mistakes.md") {
+            continue;
+        }
+        for (line, text) in blocks(&std::fs::read_to_string(&page).unwrap()) {
+            let place = format!("{}:{line}", page.display());
+            let document = Document::parse(&place, text, Format::Toml).unwrap_or_else(|e| panic!("{e}"));
+            let unknown = read_all(document.root(), &place);
+            assert_eq!(unknown, [""; 0], "{place} names what is not registered");
+            count += 1;
+        }
+    }
+    assert!(count > 20, "{count} blocks");
+}
+
+#[test]
+fn the_summary_has_every_page_and_no_other() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).unwrap();
+    let mut found = vec![];
+    pages(&docs, &mut found);
+    for page in &found {
+        let name = page.strip_prefix(&docs).unwrap().display().to_string();
+        assert!(
+            name == "SUMMARY.md" || summary.contains(&format!("({name})")),
+            "{name} is not in SUMMARY.md"
+        );
+    }
+    for link in summary.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        assert!(docs.join(link).is_file(), "SUMMARY.md leads to {link}, which is not there");
+    }
+}
