@@ -61,3 +61,39 @@ impl Sides {
         (kink.size() > slack && between).then_some(kink)
     }
 }
+
+/// The kink that excuses an entry which is among those that it has nearby, where those differ: a generalized gradient in
+/// Clarke's sense.
+pub(crate) fn hull(nearby: &[f64], entry: &Entry) -> Option<Kink> {
+    let &Entry { variable, column, row, found, .. } = entry;
+    let before = nearby.iter().copied().reduce(f64::min)?;
+    let after = nearby.iter().copied().reduce(f64::max)?;
+    let kink = Kink { variable, column, row, before, after, jump: 0.0 };
+    let slack = APART * before.abs().max(after.abs()).max(1.0);
+    let among = (before - slack..=after + slack).contains(&found);
+    (kink.size() > 10.0 * slack && among).then_some(kink)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(found: f64) -> Entry {
+        Entry { variable: 0, column: 0, row: 0, found, expected: 0.0, error: 1.0 }
+    }
+
+    #[test]
+    fn an_entry_at_a_kink_is_that_of_a_side_or_between() {
+        let sides = sides(1, 1e-2, |h| Some(vec![h.abs() * 2.0])).unwrap();
+        assert_eq!(sides.kink(&entry(2.0)).map(|k| k.size().round()), Some(4.0));
+        assert!(sides.kink(&entry(0.0)).is_some() && sides.kink(&entry(3.0)).is_none());
+    }
+
+    #[test]
+    fn a_wrong_derivative_of_a_smooth_residual_is_no_kink() {
+        let sides = sides(1, 1e-2, |h| Some(vec![h.sin()])).unwrap();
+        assert!(sides.kink(&entry(0.0)).is_none());
+        assert!(hull(&[1.0, 1.0, 0.9999], &entry(0.0)).is_none());
+        assert!(hull(&[0.0, 1.0, 0.0], &entry(1.0)).is_some() && hull(&[0.0, 1.0], &entry(2.0)).is_none());
+    }
+}

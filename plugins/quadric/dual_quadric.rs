@@ -3,6 +3,7 @@ use crate::box3::Box3;
 use crate::ellipsoid;
 use crate::semi_axes::{self, SemiAxes};
 use manifactor_geometry::{Coordinates, NotARotation, Se3, So3};
+use manifactor_graph::invariance::Random;
 use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
 use nalgebra::{Matrix4, SVector, U9, Vector3, Vector6};
@@ -97,6 +98,14 @@ impl DualQuadric {
     pub fn contains(&self, point: &Vector3<f64>) -> bool {
         self.pose.inverse_act(point).component_div(&self.semi_axes).norm_squared() <= 1.0
     }
+}
+
+/// Turned about a direction, moved and grown, at random: what orientations do not see.
+pub(crate) fn turned(quadric: &DualQuadric, up: &Vector3<f64>, random: Random<'_>) -> DualQuadric {
+    let turn = So3::exp(&(up * random(3.0)));
+    let moved = quadric.centroid() + Vector3::new(random(5.0), random(5.0), random(5.0));
+    let pose = Se3::new(turn.compose(&quadric.pose.rotation), moved);
+    DualQuadric { pose, semi_axes: quadric.semi_axes * random(2.0).exp() }
 }
 
 /// The pose, then the semi-axes.

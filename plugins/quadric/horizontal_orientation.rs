@@ -1,6 +1,7 @@
 //! An object lies flat.
 use crate::DualQuadric;
-use manifactor_graph::{Direction, Lift, Lifted, Residual, Scalar, register_factor};
+use crate::dual_quadric::turned;
+use manifactor_graph::{Direction, Lift, Lifted, Residual, Scalar, register_factor, register_invariance};
 use nalgebra::{U1, Vector1};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -37,6 +38,11 @@ impl Residual for HorizontalOrientation {
     }
 }
 register_factor!("horizontal_orientation", HorizontalOrientation);
+register_invariance!(
+    HorizontalOrientation,
+    "turning about up, moving and growing",
+    |factor, (quadric,), random| { (turned(quadric, &factor.up, random),) }
+);
 
 /// The major semi-axis m of an object is horizontal: r = m · up, the sine of its elevation.
 ///
@@ -67,6 +73,11 @@ impl Residual for HorizontalOrientationSmooth {
     }
 }
 register_factor!("horizontal_orientation_smooth", HorizontalOrientationSmooth);
+register_invariance!(
+    HorizontalOrientationSmooth,
+    "turning about up, moving and growing",
+    |factor, (quadric,), random| { (turned(quadric, &factor.up, random),) }
+);
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,7 @@
 //! An object stands upright.
 use crate::DualQuadric;
-use manifactor_graph::{Direction, Lift, Lifted, Residual, Scalar, register_factor};
+use crate::dual_quadric::turned;
+use manifactor_graph::{Direction, Lift, Lifted, Residual, Scalar, register_factor, register_invariance};
 use nalgebra::{U1, U3, Vector1, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,11 @@ impl Residual for VerticalOrientation {
     }
 }
 register_factor!("vertical_orientation", VerticalOrientation);
+register_invariance!(
+    VerticalOrientation,
+    "turning about up, moving and growing",
+    |factor, (quadric,), random| { (turned(quadric, &factor.up, random),) }
+);
 
 /// The major semi-axis m of an object is vertical: r = m × up, of length sin(tilt).
 ///
@@ -69,6 +75,11 @@ impl Residual for VerticalOrientationSmooth {
     }
 }
 register_factor!("vertical_orientation_smooth", VerticalOrientationSmooth);
+register_invariance!(
+    VerticalOrientationSmooth,
+    "moving, growing and turning about the axis",
+    |_, (quadric,), random| { (turned(quadric, &quadric.major_axis(), random),) }
+);
 
 #[cfg(test)]
 mod tests {

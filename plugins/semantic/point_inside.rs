@@ -71,7 +71,7 @@ mod tests {
 
     fn error(x: f64, surface: bool) -> f64 {
         let quadric = DualQuadric { pose: Se3::identity(), semi_axes: Vector3::new(2.0, 1.0, 1.0) };
-        let point = Coordinates::new([x, 0.0, 0.0]).unwrap();
+        let point = Coordinates::new(Vector3::new(x, 0.0, 0.0)).unwrap();
         PointInside { point, surface }.residual::<f64>((Se3::identity(), quadric)).x
     }
 
@@ -86,7 +86,7 @@ mod tests {
         check((any_se3(), any_quadric(), vector::<3>(3.0)), |(pose, quadric, p)| {
             // around the object, as far in and out as it is large
             let seen = pose.inverse_act(&quadric.pose.act(&p.component_mul(&quadric.semi_axes)));
-            let point = Coordinates::new(seen.into()).unwrap();
+            let point = Coordinates::new(seen).unwrap();
             jacobian_law(&PointInside { point, surface: true }, &[&pose, &quadric])
         });
     }

@@ -36,10 +36,13 @@ fn read_all(node: &Node, place: &str) -> Vec<String> {
                 let entries: Vec<&Entry> = catalogue::all().into_iter().filter(|e| e.name == *name).collect();
                 let mut fields = node.to_json().unwrap();
                 fields.as_object_mut().unwrap().shift_remove("type");
-                match entries.first() {
-                    Some(entry) => {
-                        drop((entry.parse)(fields).unwrap_or_else(|e| panic!("{place}: {name}: {e}")))
+                // a factor and a gravity may have one name
+                let read: Vec<_> = entries.iter().map(|entry| (entry.parse)(fields.clone()).err()).collect();
+                match read.first() {
+                    Some(Some(error)) if read.iter().all(Option::is_some) => {
+                        panic!("{place}: {name}: {error}")
                     }
+                    Some(_) => {}
                     None => unknown.push(name.clone()),
                 }
             }

@@ -142,7 +142,7 @@ factor = { type = "offset", measured = [0.5, 1] }
          graph:30:15: unknown variable `x9` (there are `x0`, `x1`, `x2`, `x3` and `h`)\n\
          graph:31:53: unknown field `weight` (there is only `measured`)\n\
          graph:34:15: `offset` takes a variable of type `plane` here, `h` is of type `real`; \
-         it is declared here: graph:25:7 (of type `plane`: `x0`, `x1`, `x2` and `x3`)\n\
+         it is declared here: graph:25:7 (of type `plane`: `x3`)\n\
          graph:36:9: the noise has 3 rows, the residual 2\n\
          graph:37:17: unknown loss `hubert` (did you mean `huber`? there are {losses})\n\
          graph:40:8: `height` connects 2 variables, found 1 key\n\
