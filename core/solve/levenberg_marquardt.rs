@@ -65,7 +65,7 @@ impl Default for LevenbergMarquardt {
 /// Least share of the predicted decrease that makes a step good enough to take.
 const GAIN: f64 = 1e-4;
 /// Damping that changes a step by next to nothing: one that is refused with less calls for more than twice as much.
-const NEGLIGIBLE: f64 = 1e-6;
+const NEGLIGIBLE: f64 = 1e-3;
 /// Damping above which a small step is no sign of a minimum, as a share of the diagonal.
 const TRUSTED: f64 = 1.0;
 
