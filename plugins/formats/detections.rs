@@ -192,7 +192,7 @@ mod tests {
         assert_eq!(
             text,
             "d.csv:2: expected 8 fields as in the header, got 5\n\
-             d.csv:3: field 3: invalid float literal\n\
+             d.csv:3: column `score`, the 3. of the row: invalid float literal\n\
              d.csv:5: expected a score from 0 to 1, got 1.5\n\
              d.csv:6: expected a box with xmin < xmax and ymin < ymax, got [3.0, 2.0, 3.0, 4.0]"
         );
