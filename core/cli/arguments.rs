@@ -1,5 +1,5 @@
 //! The command line.
-use crate::commands::{Check, Evaluate, Explain, List, Run, Schema, Simulate, Solve};
+use crate::commands::{Check, Evaluate, Experiment, Explain, List, Run, Schema, Simulate, Solve};
 use crate::failure::Failure;
 use crate::status::Status;
 use clap::{Parser, Subcommand};
@@ -21,6 +21,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Run),
+    Experiment(Experiment),
     Solve(Solve),
     Check(Check),
     List(List),
@@ -42,6 +43,7 @@ impl Cli {
         }
         match &self.command {
             Command::Run(command) => command.run(),
+            Command::Experiment(command) => command.run(),
             Command::Solve(command) => command.run(),
             Command::Check(command) => command.run(),
             Command::List(command) => command.run(),
@@ -56,6 +58,7 @@ impl Cli {
     pub fn json(&self) -> bool {
         match &self.command {
             Command::Run(command) => command.json,
+            Command::Experiment(command) => command.json,
             Command::Solve(command) => command.json,
             Command::Check(command) => command.json,
             Command::List(command) => command.json,

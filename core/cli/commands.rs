@@ -1,6 +1,7 @@
 //! The commands, a file each: what it takes, and what it does.
 mod check;
 mod evaluate;
+mod experiment;
 mod explain;
 mod list;
 mod run;
@@ -10,6 +11,7 @@ mod solve;
 
 pub(crate) use check::Check;
 pub(crate) use evaluate::Evaluate;
+pub(crate) use experiment::Experiment;
 pub(crate) use explain::Explain;
 pub(crate) use list::List;
 pub(crate) use run::Run;

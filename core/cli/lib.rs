@@ -22,6 +22,7 @@ mod report;
 mod run_file;
 mod solver;
 mod status;
+mod summary_table;
 mod table;
 mod text;
 mod watch;

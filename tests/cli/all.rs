@@ -3,6 +3,7 @@
 mod documents;
 mod evaluate;
 mod interrupt;
+mod experiment;
 mod names;
 mod run;
 mod solve;
