@@ -1,7 +1,7 @@
 //! The scenes of the simulated experiment, as they were settled before anything was tuned.
 #![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_config::Document;
-use manifactor_slam::experiment::Experiment;
+use manifactor_slam::experiment::{Experiment, Trial};
 use manifactor_slam::sequence::Sequence;
 use manifactor_slam::source::Folders;
 use std::collections::BTreeMap;
@@ -14,6 +14,12 @@ fn folder() -> PathBuf {
 
 fn experiment(name: &str) -> Experiment {
     Experiment::read(&Document::open(folder().join(name)).unwrap()).unwrap()
+}
+
+/// The scene of a trial.
+fn scene<'a>(experiment: &Experiment, trial: &'a Trial) -> &'a str {
+    let column = experiment.columns.iter().position(|column| column == "scene").unwrap();
+    &trial.labels[column]
 }
 
 /// A line for each object: the scene, the object, its class, its place and the extents of the box around it, in mm.
@@ -34,10 +40,10 @@ fn the_scenes_are_those_that_were_settled() {
     assert_eq!(experiment.trials.iter().filter(|t| t.labels.last().unwrap() == "QuadricSLAM").count(), 250);
     let mut scenes = BTreeMap::new();
     for trial in &experiment.trials {
-        let scene: u32 = trial.labels[0].parse().unwrap();
-        scenes.entry(scene).or_insert_with(|| {
-            objects(&trial.labels[0], &trial.settings.source.load(&Folders::default()).unwrap())
-        });
+        let label = scene(&experiment, trial);
+        scenes
+            .entry(label.parse::<u32>().unwrap())
+            .or_insert_with(|| objects(label, &trial.settings.source.load(&Folders::default()).unwrap()));
     }
     assert_eq!(scenes.len(), 10);
     let header = "scene,object,class,x_mm,y_mm,z_mm,width_mm,depth_mm,height_mm\n".to_owned();
@@ -52,8 +58,8 @@ fn the_scenes_are_those_that_were_settled() {
 #[test]
 fn nothing_is_tuned_on_the_scenes_that_are_reported() {
     let seeds = |name: &str| -> Vec<u64> {
-        let labels = experiment(name).trials.into_iter().map(|trial| trial.labels[0].parse().unwrap());
-        labels.collect()
+        let experiment = experiment(name);
+        experiment.trials.iter().map(|trial| scene(&experiment, trial).parse().unwrap()).collect()
     };
     let reported = seeds("simulation.toml");
     assert!(seeds("tuning.toml").iter().all(|scene| !reported.contains(scene)));
