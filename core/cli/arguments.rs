@@ -1,6 +1,6 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, Evaluate, Explain, List, New, Run, Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Run, Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
 use crate::status::Status;
@@ -24,6 +24,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Run),
+    Experiment(Experiment),
     Solve(Solve),
     Check(Check),
     CheckFactor(CheckFactor),
@@ -49,6 +50,7 @@ impl Cli {
         check_names(&all()).map_err(Failure::input)?;
         match &self.command {
             Command::Run(command) => command.run(),
+            Command::Experiment(command) => command.run(),
             Command::Solve(command) => command.run(),
             Command::Check(command) => command.run(),
             Command::CheckFactor(command) => command.run(),
@@ -66,6 +68,7 @@ impl Cli {
     pub fn json(&self) -> bool {
         match &self.command {
             Command::Run(command) => command.json,
+            Command::Experiment(command) => command.json,
             Command::Solve(command) => command.json,
             Command::Check(command) => command.json,
             Command::CheckFactor(command) => command.json,

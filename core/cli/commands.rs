@@ -2,6 +2,7 @@
 mod check;
 mod check_factor;
 mod evaluate;
+mod experiment;
 mod explain;
 mod graph;
 mod list;
@@ -14,6 +15,7 @@ mod solve;
 pub(crate) use check::Check;
 pub(crate) use check_factor::CheckFactor;
 pub(crate) use evaluate::Evaluate;
+pub(crate) use experiment::Experiment;
 pub(crate) use explain::Explain;
 pub(crate) use graph::ShowGraph;
 pub(crate) use list::List;

@@ -2,6 +2,7 @@
 use crate::{output, text};
 use manifactor::config::{Diagnostic, Diagnostics, Problem, Source};
 use manifactor::formats::{FormatError, Malformed};
+use manifactor::slam::experiment::JournalError;
 use manifactor::slam::output::OutputError;
 use manifactor::slam::run::RunError;
 use manifactor::slam::source::SourceError;
@@ -115,6 +116,15 @@ impl From<OutputError> for Failure {
     fn from(error: OutputError) -> Self {
         match error {
             OutputError::Io { path, source } => Self::File { path, source },
+            other => Self::input(other),
+        }
+    }
+}
+
+impl From<JournalError> for Failure {
+    fn from(error: JournalError) -> Self {
+        match error {
+            JournalError::Io { path, source } => Self::File { path, source },
             other => Self::input(other),
         }
     }

@@ -24,6 +24,7 @@ mod report;
 mod run_file;
 mod solver;
 mod status;
+mod summary_table;
 mod table;
 mod text;
 mod watch;

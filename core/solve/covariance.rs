@@ -137,7 +137,7 @@ impl Problem {
         Ok(joint)
     }
 
-    fn out_of_memory(&self) -> CovarianceError {
+    pub(crate) fn out_of_memory(&self) -> CovarianceError {
         CovarianceError::OutOfMemory { unknowns: self.dim() }
     }
 

@@ -15,6 +15,7 @@ mod gauss_newton;
 mod gnc;
 mod layout;
 mod levenberg_marquardt;
+mod leverage;
 mod linear;
 mod linear_solver;
 mod linear_system;

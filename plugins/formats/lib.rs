@@ -1,4 +1,4 @@
-//! File formats: g2o, TORO, BAL, TUM trajectories, detections.
+//! File formats: g2o, TORO, BAL, TUM trajectories, detections, tables.
 //!
 //! All readers keep one bargain: nothing in a file is passed over in silence. A malformed line is an
 //! error with file and line; all of a file's errors come at once; what is left out on purpose is
@@ -10,6 +10,7 @@ mod error;
 pub mod g2o;
 mod lines;
 pub mod pose_graph;
+pub mod table;
 pub mod timestamps;
 mod toro;
 pub mod tum;

@@ -3,6 +3,7 @@ use crate::mapping::{MappedObject, Mapping, pose_key};
 use crate::refine::Refiner;
 use crate::sequence::{Sequence, TrueObject};
 use crate::settings::Settings;
+use crate::variance::{Components, VarianceError};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};
@@ -24,6 +25,20 @@ pub struct Estimate {
     pub solution: Solution,
     /// Time spent on objects alone.
     pub refinement_seconds: f64,
+    /// The noise as it was estimated, round by round; empty, where it is as given.
+    pub components: Vec<Components>,
+}
+
+/// Why there is no estimate.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EstimateError {
+    /// Graph and values do not fit each other.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+    /// The noise cannot be estimated.
+    #[error(transparent)]
+    Variance(#[from] VarianceError),
 }
 
 /// The graph with the shapes of all objects held that have an orientation to keep; `None` where no object has.
@@ -108,7 +123,39 @@ pub struct Landmark<'a> {
 const SETTLED: f64 = 1e-3;
 
 impl Estimate {
-    /// Solves a graph that was made of a sequence.
+    /// Solves a graph that was made of a sequence, as often as it takes to know its noise; see
+    /// [`variance`](crate::variance). The graph of the estimate has the noise of its last solve.
+    ///
+    /// # Errors
+    /// Where graph and values do not fit each other, or the noise cannot be estimated.
+    pub fn new(
+        sequence: Arc<Sequence>,
+        mapping: Mapping,
+        settings: &Settings,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, EstimateError> {
+        let most = settings.objects.refinements;
+        let start = mapping.values.clone();
+        let mut estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
+        let Some(variance) = &settings.variance_components else { return Ok(estimate) };
+        let (mut components, mut settled): (Vec<Components>, bool) = (vec![], false);
+        let interrupted = |of: &Self| of.solution.outcome.termination == Termination::Interrupted;
+        while !(settled || interrupted(&estimate) || estimate.mapping.mapped().next().is_none()) {
+            let found = Components::of(&estimate, variance)?;
+            settled = components.len() + 1 >= variance.rounds
+                || components.last().is_some_and(|before| found.change(before) < variance.tolerance);
+            found.apply(&mut estimate.mapping, variance, settings.detections.loss.as_ref())?;
+            components.push(found);
+            let Self { sequence, mapping, solution, .. } = estimate;
+            // near enough to go on from, until the last
+            let refinements = if settled { most } else { 0 };
+            estimate = Self::solve(sequence, mapping, solution.values, refinements, settings, observer)?;
+            estimate.components.clone_from(&components);
+        }
+        Ok(estimate)
+    }
+
+    /// Solves once, beginning at `values`, with at most so many refinements.
     ///
     /// Objects are [refined](Refiner) alone before the joint solve. That may leave one on the edge of a valley of its
     /// orientation factor, where no joint step is possible: so poses are solved with the shapes of such objects held,
@@ -117,16 +164,17 @@ impl Estimate {
     ///
     /// # Errors
     /// Where graph and values do not fit each other.
-    pub fn solve(
+    fn solve(
         sequence: Arc<Sequence>,
         mapping: Mapping,
+        mut values: Values,
+        most: usize,
         settings: &Settings,
         observer: &mut dyn Observer,
     ) -> Result<Self, CompileError> {
-        let most = settings.objects.refinements;
         let (refiner, held) = (Refiner::new(&mapping), with_shapes_held(&mapping));
-        let initial_cost = Problem::compile(&mapping.graph, &mapping.values)?.linearize().cost;
-        let (mut values, mut rounds) = (mapping.values.clone(), Rounds::default());
+        let initial_cost = Problem::compile(&mapping.graph, &values)?.linearize().cost;
+        let mut rounds = Rounds::default();
         loop {
             if most > 0 {
                 rounds.refine(&refiner, &mut values);
@@ -140,7 +188,7 @@ impl Estimate {
             let refinement_seconds = rounds.refinement_seconds;
             rounds.sum_into(&mut joint.outcome);
             joint.outcome.initial_cost = initial_cost;
-            return Ok(Self { sequence, mapping, solution: joint, refinement_seconds });
+            return Ok(Self { sequence, mapping, solution: joint, refinement_seconds, components: vec![] });
         }
     }
 

@@ -5,6 +5,7 @@
 //! [`Estimate`](estimate::Estimate), which is compared with the truth in a [`report`].
 pub mod class;
 pub mod estimate;
+pub mod experiment;
 pub mod fusion;
 pub mod gravity;
 pub mod mapping;
@@ -22,3 +23,4 @@ pub mod sequence;
 pub mod settings;
 pub mod simulator;
 pub mod source;
+pub mod variance;

@@ -7,6 +7,7 @@ use crate::estimate::Estimate;
 use crate::report::{RunReport, VariantReport};
 use crate::run_document::{RunDocument, Variant, slug};
 use manifactor_config::{Format, WriteError, to_json, to_toml, write_graph};
+use manifactor_formats::table::TableError;
 use manifactor_formats::tum;
 use manifactor_solve::{CovarianceError, IterationRecord};
 use serde::Serialize;
@@ -29,6 +30,14 @@ pub enum OutputError {
     /// Covariances that are asked for, and infinite or out of reach.
     #[error("covariances.json: {0}")]
     Covariance(#[from] CovarianceError),
+    /// A table that no format can hold.
+    #[error("{}: {source}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: TableError,
+    },
     /// A result that no document can hold.
     #[error("{}: {source}", path.display())]
     Document {
@@ -48,14 +57,14 @@ pub fn variant_folder(output: &Path, variant: &str) -> PathBuf {
 ///
 /// # Errors
 /// Where the folder or the file cannot be written.
-pub fn write_whole(path: &Path, text: &str) -> Result<(), OutputError> {
+pub fn write_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputError> {
     let fail = |source| OutputError::Io { path: path.to_owned(), source };
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(fail)?;
     }
     let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
     let unfinished = path.with_file_name(format!(".{name}.{}", std::process::id()));
-    let written = std::fs::write(&unfinished, text).and_then(|()| std::fs::rename(&unfinished, path));
+    let written = std::fs::write(&unfinished, content).and_then(|()| std::fs::rename(&unfinished, path));
     written.map_err(|source| {
         // nothing better can be done about a leftover than about the failure itself
         let _ = std::fs::remove_file(&unfinished);
@@ -97,7 +106,8 @@ pub fn write_variant(
     Ok(folder)
 }
 
-fn write_document(path: &Path, text: Result<String, WriteError>) -> Result<(), OutputError> {
+/// Writes a document, if there is one.
+pub(crate) fn write_document(path: &Path, text: Result<String, WriteError>) -> Result<(), OutputError> {
     let text = text.map_err(|source| OutputError::Document { path: path.to_owned(), source })?;
     write_whole(path, &text)
 }

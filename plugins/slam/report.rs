@@ -2,6 +2,7 @@
 use crate::estimate::{Estimate, Landmark};
 use crate::mapping::{MappedObject, Rejection, Warning};
 use crate::settings::Settings;
+use crate::variance::Components;
 use manifactor_graph::Direction;
 use manifactor_quadric::{DualQuadric, LandmarkError};
 use manifactor_solve::{Diagnosis, Outcome, Rejected, Termination, Times};
@@ -13,7 +14,8 @@ mod trajectory;
 
 pub use landmarks::LandmarkReport;
 pub use table::Row;
-pub use trajectory::TrajectoryReport;
+pub(crate) use trajectory::name as alignment_name;
+pub use trajectory::{TrajectoryError, TrajectoryReport};
 
 /// A run, variant by variant.
 #[derive(Debug, Clone, Serialize)]
@@ -35,6 +37,9 @@ pub struct VariantReport {
     pub counts: Counts,
     /// Up in the map's frame, where it is known.
     pub up: Option<Direction>,
+    /// The noise as it was estimated, round by round.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub variance_components: Vec<Components>,
     /// How the solve went.
     pub solve: SolveReport,
     /// The trajectory against the truth, where there is one: once for each alignment.
@@ -131,8 +136,18 @@ impl VariantReport {
         let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
         let objects = objects(estimate, &after);
         let landmarks = LandmarkReport::new(&before, &after);
-        let (counts, up) = (Counts::of(estimate), mapping.frame.up);
-        Self { name: name.to_owned(), counts, up, solve, trajectory, landmarks, objects, warnings, seconds }
+        Self {
+            name: name.to_owned(),
+            counts: Counts::of(estimate),
+            up: mapping.frame.up,
+            variance_components: estimate.components.clone(),
+            solve,
+            trajectory,
+            landmarks,
+            objects,
+            warnings,
+            seconds,
+        }
     }
 }
 

@@ -1,11 +1,12 @@
 //! A run from its document to its report.
-use crate::estimate::Estimate;
+use crate::estimate::{Estimate, EstimateError};
 use crate::mapping::{Mapping, MappingError};
 use crate::report::{RunReport, VariantReport};
 use crate::run_document::{RunDocument, Variant};
 use crate::sequence::Sequence;
+use crate::settings::Settings;
 use crate::source::{Folders, SourceError};
-use manifactor_solve::{CompileError, Observer};
+use manifactor_solve::Observer;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,7 +23,25 @@ pub enum RunError {
     Mapping(#[from] MappingError),
     /// The graph cannot be solved.
     #[error(transparent)]
-    Compile(#[from] CompileError),
+    Estimate(#[from] EstimateError),
+}
+
+/// Maps, solves and evaluates a sequence.
+///
+/// # Errors
+/// Where no graph can be made of it. Numerical trouble is no error: see the report.
+pub fn estimate(
+    name: &str,
+    sequence: Arc<Sequence>,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> Result<(Estimate, VariantReport), RunError> {
+    let clock = Instant::now();
+    let mapping = Mapping::new(&sequence, settings)?;
+    let estimate = Estimate::new(sequence, mapping, settings, observer)?;
+    let mut report = VariantReport::new(name, &estimate, settings, 0.0);
+    report.seconds = clock.elapsed().as_secs_f64();
+    Ok((estimate, report))
 }
 
 /// A run under way: sequences are loaded once for all variants that share them.
@@ -70,11 +89,8 @@ impl<'a> Run<'a> {
         observer: &mut dyn Observer,
     ) -> Result<(Estimate, VariantReport), RunError> {
         let clock = Instant::now();
-        let settings = &variant.settings;
         let sequence = self.sequence(variant)?;
-        let mapping = Mapping::new(&sequence, settings)?;
-        let estimate = Estimate::solve(sequence, mapping, settings, observer)?;
-        let mut report = VariantReport::new(&variant.name, &estimate, settings, 0.0);
+        let (estimate, mut report) = estimate(&variant.name, sequence, &variant.settings, observer)?;
         report.seconds = clock.elapsed().as_secs_f64();
         self.reports.push(report.clone());
         Ok((estimate, report))

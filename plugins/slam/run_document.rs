@@ -63,8 +63,7 @@ impl RunDocument {
         let run = document.section(&errors).and_then(|mut section| {
             let title = section.or_default::<Option<String>>("title").unwrap_or_else(|| stem.clone());
             let output = section.optional("output").unwrap_or_else(|| Path::new("out").join(&stem));
-            let declared: Vec<_> = section.items("variants").into_iter().filter_map(declared).collect();
-            twice(&declared, &errors);
+            let declared = Declared::all(document, &errors);
             let base = common(document.root());
             let variants = read_variants(declared, &base, &folder, &errors);
             // what the settings have read, in each variant, is not unknown here
@@ -76,18 +75,31 @@ impl RunDocument {
 }
 
 /// A variant, as it is written.
-struct Declared {
-    name: String,
+pub(crate) struct Declared {
+    pub(crate) name: String,
     place: Place,
-    set: Option<Node>,
+    /// What it puts over the settings that all variants have in common.
+    pub(crate) set: Option<Node>,
 }
 
-fn declared(mut section: Section<'_>) -> Option<Declared> {
-    let name = section.required::<String>("name");
-    let place = section.place_of("name");
-    let set = section.take("set");
-    section.finish();
-    Some(Declared { name: name?, place, set })
+impl Declared {
+    /// All variants of a run's document. Two of one name are reported.
+    pub(crate) fn all(document: &Document, errors: &Errors) -> Vec<Self> {
+        let Some(mut section) = document.section(errors) else { return vec![] };
+        let declared: Vec<_> = section.items("variants").into_iter().filter_map(Self::read).collect();
+        section.ignore_rest();
+        twice(&declared, errors);
+        declared
+    }
+
+    /// A name, and what it sets.
+    pub(crate) fn read(mut section: Section<'_>) -> Option<Self> {
+        let name = section.required::<String>("name");
+        let place = section.place_of("name");
+        let set = section.take("set");
+        section.finish();
+        Some(Self { name: name?, place, set })
+    }
 }
 
 fn twice(declared: &[Declared], errors: &Errors) {
@@ -102,7 +114,7 @@ fn twice(declared: &[Declared], errors: &Errors) {
 }
 
 /// The document without what is no setting.
-fn common(root: &Node) -> Node {
+pub(crate) fn common(root: &Node) -> Node {
     let mut base = root.clone();
     if let Value::Table(table) = &mut base.value {
         for field in ["title", "output", "variants"] {

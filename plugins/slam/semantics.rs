@@ -7,7 +7,7 @@
 //! noise = { sigma = 0.1 }
 //! loss = { type = "cauchy", scale = 1.0 }
 //! ```
-//! `semantics = "table_one"` stands for the rules of the paper's Table I.
+//! The class `"*"` stands for all. `semantics = "table_one"` stands for the rules of the paper's Table I.
 use crate::class::Aliases;
 use manifactor_config::Section;
 use manifactor_graph::loss::Loss;
@@ -24,10 +24,13 @@ pub use rule_factor::{RuleError, RuleFactor};
 /// The paper's Table I.
 pub const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 
+/// Stands for all classes.
+const ANY: &str = "*";
+
 /// Objects of these classes get this factor.
 #[derive(Debug, Clone, Serialize)]
 pub struct Rule {
-    /// Names of classes, as any detector spells them.
+    /// Names of classes, as any detector spells them; `*` for all.
     pub classes: Vec<String>,
     /// A factor of one object.
     pub factor: RuleFactor,
@@ -45,7 +48,7 @@ pub struct Rule {
 impl Rule {
     /// Whether objects of a class, named as [`Aliases::canonical`] does, get this factor.
     pub fn applies(&self, class: &str, aliases: &Aliases) -> bool {
-        self.classes.iter().any(|name| aliases.canonical(name) == class)
+        self.classes.iter().any(|name| name == ANY || aliases.canonical(name) == class)
     }
 
     /// The factor for an object; `up` fills the field of that name where the rule leaves it open.
@@ -77,7 +80,7 @@ pub fn table_one() -> Result<Vec<Rule>, manifactor_config::Diagnostics> {
 /// Classes that a rule names and the data do not have.
 pub fn unmatched<'a>(rule: &'a Rule, seen: &[String], aliases: &Aliases) -> Vec<&'a str> {
     let classes = rule.classes.iter().map(String::as_str);
-    classes.filter(|name| !seen.contains(&aliases.canonical(name))).collect()
+    classes.filter(|name| *name != ANY && !seen.contains(&aliases.canonical(name))).collect()
 }
 
 /// One `[[semantics]]`.
@@ -108,6 +111,13 @@ mod tests {
         assert_eq!(orientation("tvmonitor"), ["horizontal_orientation"]);
         assert_eq!(orientation("pottedplant"), ["vertical_orientation"]);
         assert_eq!(orientation("sports ball"), [""; 0]);
+    }
+
+    #[test]
+    fn a_star_is_for_all() {
+        let rule = Rule { classes: vec!["*".into()], ..table_one().unwrap().swap_remove(0) };
+        assert!(rule.applies("sports ball", &Aliases::default()) && rule.applies("", &Aliases::default()));
+        assert_eq!(unmatched(&rule, &[], &Aliases::default()), [""; 0]);
     }
 
     #[test]

@@ -3,6 +3,7 @@ use crate::class::Aliases;
 use crate::gravity::{FromSource, Gravity};
 use crate::semantics::{Rule, read_semantics};
 use crate::source::Source;
+use crate::variance::VarianceSettings;
 use manifactor_config::{Diagnostics, Errors, Node, Section};
 use manifactor_graph::Noise;
 use manifactor_graph::loss::Loss;
@@ -42,6 +43,9 @@ pub struct Settings {
     /// Names of classes that mean the same, besides the usual ones.
     #[serde(skip_serializing_if = "no_aliases")]
     pub aliases: Aliases,
+    /// How the noise is estimated; it is as given, where nothing is said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variance_components: Option<VarianceSettings>,
     /// How the graph is solved.
     pub solver: Arc<dyn Optimizer>,
     /// What the estimate is compared with, and how.
@@ -96,6 +100,7 @@ impl Settings {
         let gravity = section.optional_registered::<dyn Gravity>("gravity");
         let semantics = read_semantics(section, folder);
         let aliases = section.or_default("aliases");
+        let variance_components = section.optional("variance_components");
         let solver = section.optional_registered::<dyn Optimizer>("solver");
         let evaluation = section.or_default("evaluation");
         let report = section.or_default("report");
@@ -108,6 +113,7 @@ impl Settings {
             gravity: gravity.map_or_else(|| Arc::new(FromSource {}) as Arc<dyn Gravity>, Arc::from),
             semantics,
             aliases,
+            variance_components,
             solver: solver.map_or_else(default_solver, Arc::from),
             evaluation,
             report,

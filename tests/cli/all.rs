@@ -3,6 +3,7 @@
 mod check_factor;
 mod documents;
 mod evaluate;
+mod experiment;
 mod graph;
 mod interrupt;
 mod mistakes;

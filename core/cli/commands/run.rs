@@ -8,14 +8,14 @@ use clap::Args;
 use manifactor::slam::output::{variant_folder, write_report, write_variant, write_whole};
 use manifactor::slam::run::Run as Running;
 use manifactor::solve::All;
-use manifactor::viz::{Scene, View, plot};
+use manifactor::viz::{RunPage, Scene, View, plot};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 /// Build, solve, evaluate and write what a document describes.
 ///
 /// Each variant of the run gets a folder with its settings, trajectory, objects, graph, iterations, metrics and
-/// pictures (map_top.svg, map_side.svg).
+/// pictures (map_top.svg, map_side.svg); report.html shows all of it, and needs no network.
 #[derive(Debug, Args)]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -38,7 +38,7 @@ impl Run {
             document.output.clone_from(out);
         }
         let mut interrupt = interrupt::on_ctrl_c();
-        let mut status = Status::Done;
+        let (mut status, mut page) = (Status::Done, RunPage::default());
         let mut run = Running::new(&document, self.run.data());
         for variant in &document.variants {
             if self.verbose {
@@ -52,8 +52,10 @@ impl Run {
             let folder = write_variant(&document, variant, &estimate, &report)?;
             let title = format!("{}: {}", document.title, variant.name);
             let scene = Scene::of_estimate(title, &estimate, variant.settings.evaluation.max_time_difference);
-            write_whole(&folder.join("map_top.svg"), &plot(&scene, View::Top))?;
-            write_whole(&folder.join("map_side.svg"), &plot(&scene, View::Side))?;
+            write_whole(&folder.join("map_top.svg"), plot(&scene, View::Top))?;
+            write_whole(&folder.join("map_side.svg"), plot(&scene, View::Side))?;
+            let config = std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?;
+            page.variant(&estimate, &report, &variant.settings.evaluation, &config);
             if interrupt.0.load(Ordering::Relaxed) {
                 status = Status::Interrupted;
                 break;
@@ -61,6 +63,7 @@ impl Run {
         }
         let report = run.finish();
         write_report(&document.output, &report)?;
+        write_whole(&document.output.join("report.html"), page.html(&report))?;
         if self.json {
             output::json(&report);
         } else {

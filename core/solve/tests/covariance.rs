@@ -66,3 +66,37 @@ fn nothing_to_hold_it_is_an_error_with_a_name() {
     let error = Problem::compile(&loose, &values).unwrap().marginals().unwrap_err();
     assert!(matches!(error, CovarianceError::Indeterminate(_)), "{error}");
 }
+
+#[test]
+fn leverages_add_up_to_the_number_of_unknowns() {
+    let (mut graph, values) = chain(6);
+    // a chain alone has nothing to spare; a second opinion on its second step shares that step
+    let (by, noise) = ([1.0, 0.0], Noise::sigma(0.1).unwrap());
+    graph.add(["p1", "p2"], Apart { by }).noise(noise);
+    let leverages = Problem::compile(&graph, &values).unwrap().leverages().unwrap();
+    for (i, rows) in leverages.iter().enumerate() {
+        let expected = if [2, 6].contains(&i) { 0.5 } else { 1.0 };
+        assert!(rows.iter().all(|h| (h - expected).abs() < 1e-8), "{i}: {rows:?}");
+    }
+    let total: f64 = leverages.iter().flatten().sum();
+    assert!((total - 12.0).abs() < 1e-8);
+}
+
+#[test]
+fn what_is_held_takes_nothing_up() {
+    let (mut graph, values) = chain(3);
+    graph.fix_directions("p1", &["x"]);
+    let leverages = Problem::compile(&graph, &values).unwrap().leverages().unwrap();
+    // along x the first point is measured twice: by itself, and by the one that is held
+    let total: f64 = leverages.iter().flatten().sum();
+    assert!((total - 5.0).abs() < 1e-8, "{leverages:?}");
+}
+
+#[test]
+fn what_nothing_constrains_takes_nothing_up() {
+    let (graph, mut values) = chain(3);
+    values.insert("alone", Plane { x: 0.0, y: 0.0 });
+    let leverages = Problem::compile(&graph, &values).unwrap().leverages().unwrap();
+    let total: f64 = leverages.iter().flatten().sum();
+    assert!((total - 6.0).abs() < 1e-8, "{leverages:?}");
+}

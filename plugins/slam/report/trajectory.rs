@@ -68,7 +68,7 @@ fn worse(report: &TrajectoryReport) -> Option<Warning> {
 }
 
 /// As documents write it.
-pub(super) fn name(alignment: Alignment) -> String {
+pub(crate) fn name(alignment: Alignment) -> String {
     let json = serde_json::to_value(alignment).unwrap_or_default();
     json.as_str().unwrap_or_default().to_owned()
 }

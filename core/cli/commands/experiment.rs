@@ -1,0 +1,134 @@
+//! `manifactor experiment`: a sweep from its document to its tables.
+use crate::failure::Failure;
+use crate::status::Status;
+use crate::text::count;
+use crate::{interrupt, output, summary_table};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use manifactor::config::Document;
+use manifactor::slam::experiment::{self, Experiment as Sweep, Journal, Progress, Summary};
+use manifactor::slam::output::write_whole;
+use manifactor::slam::source::Folders;
+use manifactor::viz::experiment_page;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Run a base config once for each cell of a grid, and put what is measured into tables.
+///
+/// One trial a core at a time. Each trial that is done is kept in trials.jsonl: after a kill or Ctrl-C, the same command
+/// goes on where it was. Written are trials.csv and trials.parquet (a row a trial), summary.csv, summary.md and
+/// summary.json (means, and paired differences with 95 % bootstrap intervals), times.csv, and report.html, which needs no
+/// network.
+#[derive(Debug, Args)]
+pub(crate) struct Experiment {
+    /// The document that describes the experiment.
+    config: PathBuf,
+    /// Set a value of the document, such as `set.solver.stop.max_iterations=50` or `summary.seed=2`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// The folder where public data sets lie.
+    #[arg(long, value_name = "DIR", env = "MANIFACTOR_DATA")]
+    data: Option<PathBuf>,
+    /// The folder for the results; that of the document, where nothing is said.
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Run the trials again that failed before.
+    #[arg(long)]
+    retry_failed: bool,
+    /// Print JSON: the summary that is also written.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl Experiment {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let mut document = Document::open(&self.config)?;
+        document.set(&self.set)?;
+        let mut sweep = Sweep::read(&document)?;
+        if let Some(out) = &self.out {
+            sweep.output.clone_from(out);
+        }
+        let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
+        let mut journal = Journal::open(&sweep.output.join("trials.jsonl"))?;
+        if self.retry_failed {
+            journal.retry_failed();
+        }
+        let interrupt = interrupt::on_ctrl_c();
+        let bar = Bar::new(&sweep.title);
+        let threads = rayon::current_num_threads();
+        let show = |progress| bar.show(progress);
+        let complete = experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show)?;
+        drop(bar);
+        let summary = experiment::write(&sweep, &journal)?;
+        let trials = experiment::trials_table(&sweep, &journal);
+        let page = experiment_page(&sweep, &summary, &trials, document.source().text());
+        write_whole(&sweep.output.join("report.html"), page)?;
+        self.tell(&sweep, &summary);
+        Ok(if complete { Status::Done } else { Status::Interrupted })
+    }
+
+    fn tell(&self, sweep: &Sweep, summary: &Summary) {
+        if self.json {
+            output::json(summary);
+        } else {
+            output::print(&summary_table::of(summary));
+            output::print(&format!("\nWritten to {}.\n", sweep.output.display()));
+        }
+        if summary.open > 0 {
+            eprintln!("{} still to be run: the same command goes on.", count(summary.open, "trial"));
+        }
+    }
+}
+
+/// How far it is: a bar on a terminal, a line now and then in a file.
+enum Bar {
+    Terminal(ProgressBar),
+    Lines,
+}
+
+impl Bar {
+    fn new(title: &str) -> Self {
+        if !std::io::stderr().is_terminal() {
+            return Self::Lines;
+        }
+        let bar = ProgressBar::new(0).with_prefix(title.to_owned());
+        let template = "{prefix} {wide_bar} {pos}/{len} trials, {elapsed} gone, {eta} left {msg}";
+        // the template is a literal: without it the default style is as good
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self::Terminal(bar)
+    }
+
+    fn show(&self, Progress { done, kept, trials }: Progress) {
+        match self {
+            Self::Terminal(bar) => {
+                if done == kept {
+                    // what was kept took no time now, and says nothing of the time left
+                    bar.set_length(trials as u64);
+                    bar.set_position(kept as u64);
+                    bar.reset_eta();
+                    if kept > 0 {
+                        bar.set_message(format!("({kept} kept)"));
+                    }
+                }
+                bar.set_position(done as u64);
+            }
+            // twenty lines or so
+            Self::Lines if done == kept || done == trials || done % trials.div_ceil(20) == 0 => {
+                eprintln!("{done} of {} done, {kept} of them before", count(trials, "trial"));
+            }
+            Self::Lines => {}
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        if let Self::Terminal(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Tables of texts and numbers: CSV for people and spreadsheets, [Parquet](to_parquet) for data frames.
+mod parquet;
+
+pub use parquet::to_parquet;
+
+/// A table, column by column.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Table {
+    /// Names and cells; all columns are of one length.
+    pub columns: Vec<(String, Column)>,
+}
+
+/// The cells of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Column {
+    /// Words.
+    Text(Vec<String>),
+    /// Numbers, where there are any.
+    Number(Vec<Option<f64>>),
+}
+
+/// Why a table could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// Columns of different lengths.
+    #[error("column `{column}` has {found} cells where the first has {expected}")]
+    Ragged {
+        /// The column that differs.
+        column: String,
+        /// Cells of the first.
+        expected: usize,
+        /// Its own.
+        found: usize,
+    },
+    /// The writer's own words.
+    #[error("the table cannot be written: {0}")]
+    Writer(String),
+}
+
+impl Column {
+    /// How many cells there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Text(cells) => cells.len(),
+            Self::Number(cells) => cells.len(),
+        }
+    }
+
+    /// Whether there is no cell.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// A cell as CSV has it; numbers read back as the same bits.
+    fn cell(&self, row: usize) -> String {
+        match self {
+            Self::Text(cells) => cells.get(row).cloned().unwrap_or_default(),
+            Self::Number(cells) => cells.get(row).copied().flatten().map_or(String::new(), |x| x.to_string()),
+        }
+    }
+}
+
+impl Table {
+    /// How many rows there are.
+    ///
+    /// # Errors
+    /// Where columns differ in length.
+    pub fn rows(&self) -> Result<usize, TableError> {
+        let expected = self.columns.first().map_or(0, |(_, column)| column.len());
+        match self.columns.iter().find(|(_, column)| column.len() != expected) {
+            Some((name, column)) => {
+                Err(TableError::Ragged { column: name.clone(), expected, found: column.len() })
+            }
+            None => Ok(expected),
+        }
+    }
+
+    /// As CSV with a header. What is not there is an empty cell.
+    ///
+    /// # Errors
+    /// Where columns differ in length.
+    pub fn to_csv(&self) -> Result<String, TableError> {
+        let fail = |error: &dyn std::fmt::Display| TableError::Writer(error.to_string());
+        let rows = self.rows()?;
+        let mut writer = csv::Writer::from_writer(vec![]);
+        writer.write_record(self.columns.iter().map(|(name, _)| name)).map_err(|e| fail(&e))?;
+        for row in 0..rows {
+            let cells = self.columns.iter().map(|(_, column)| column.cell(row));
+            writer.write_record(cells).map_err(|e| fail(&e))?;
+        }
+        let bytes = writer.into_inner().map_err(|e| fail(&e))?;
+        String::from_utf8(bytes).map_err(|e| fail(&e))
+    }
+}
+
+#[cfg(test)]
+pub(crate) fn sample() -> Table {
+    let text = ["plain", "with, comma", "with \"quotes\""].map(str::to_owned).to_vec();
+    let numbers = vec![Some(0.1 + 0.2), None, Some(-1e-300)];
+    Table { columns: vec![("name".into(), Column::Text(text)), ("x".into(), Column::Number(numbers))] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn csv_reads_back_as_the_same_bits() {
+        let text = sample().to_csv().unwrap();
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let rows: Vec<(String, Option<f64>)> = reader.deserialize().map(Result::unwrap).collect();
+        let Column::Number(numbers) = &sample().columns[1].1 else { unreachable!() };
+        assert_eq!(rows.iter().map(|row| row.1).collect::<Vec<_>>(), *numbers);
+        assert_eq!(rows[2].0, "with \"quotes\"");
+    }
+
+    #[test]
+    fn ragged_columns_are_refused() {
+        let mut table = sample();
+        table.columns[1].1 = Column::Number(vec![]);
+        assert!(matches!(table.to_csv(), Err(TableError::Ragged { expected: 3, found: 0, .. })));
+        assert!(matches!(to_parquet(&table), Err(TableError::Ragged { .. })));
+    }
+}

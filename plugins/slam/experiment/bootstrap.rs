@@ -1,0 +1,84 @@
+//! Confidence intervals by the bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, chapter 13).
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use serde::Serialize;
+
+/// A mean, and where it lies with 95 % confidence.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interval {
+    /// Of the sample.
+    pub mean: f64,
+    /// 2.5 % of the means of samples drawn anew are below.
+    pub low: f64,
+    /// 2.5 % are above.
+    pub high: f64,
+}
+
+impl Interval {
+    /// Whether zero lies outside.
+    pub fn excludes_zero(&self) -> bool {
+        self.low > 0.0 || self.high < 0.0
+    }
+}
+
+/// The mean over all values, and its percentile interval: whole clusters are drawn, as many as there are, with
+/// replacement. `None` for no values. The same for the same seed.
+pub fn bootstrap(clusters: &[Vec<f64>], resamples: usize, seed: u64) -> Option<Interval> {
+    // sums are all that a mean needs of a cluster
+    let sums: Vec<(f64, usize)> =
+        clusters.iter().filter(|c| !c.is_empty()).map(|c| (c.iter().sum(), c.len())).collect();
+    let mean_of = |(sum, count): (f64, usize)| sum / count as f64;
+    let add = |a: (f64, usize), b: &(f64, usize)| (a.0 + b.0, a.1 + b.1);
+    let mean = mean_of(sums.iter().fold((0.0, 0), add));
+    if sums.is_empty() {
+        return None;
+    }
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut drawn =
+        || mean_of((0..sums.len()).fold((0.0, 0), |a, _| add(a, &sums[rng.random_range(0..sums.len())])));
+    let mut means: Vec<f64> = (0..resamples.max(1)).map(|_| drawn()).collect();
+    means.sort_by(f64::total_cmp);
+    let quantile = |q: f64| means[((means.len() - 1) as f64 * q).round() as usize];
+    Some(Interval { mean, low: quantile(0.025), high: quantile(0.975) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn alone(values: impl IntoIterator<Item = f64>) -> Vec<Vec<f64>> {
+        values.into_iter().map(|x| vec![x]).collect()
+    }
+
+    #[test]
+    fn an_interval_is_that_of_the_normal_law_for_many_values() {
+        // 1 to 400: the mean's standard error is 400 / √12 / √400
+        let interval = bootstrap(&alone((1..=400).map(f64::from)), 4000, 1).unwrap();
+        let expected = 1.96 * 400.0 / 12f64.sqrt() / 20.0;
+        assert_eq!(interval.mean, 200.5);
+        assert!((interval.high - 200.5 - expected).abs() < 0.1 * expected, "{interval:?}");
+        assert!((200.5 - interval.low - expected).abs() < 0.1 * expected, "{interval:?}");
+    }
+
+    #[test]
+    fn what_is_alike_within_a_cluster_counts_once() {
+        let apart = bootstrap(&alone([1.0, 2.0, 3.0, 4.0]), 2000, 7).unwrap();
+        let tenfold: Vec<Vec<f64>> = [1.0, 2.0, 3.0, 4.0].map(|x| vec![x; 10]).into();
+        assert_eq!(bootstrap(&tenfold, 2000, 7).unwrap(), apart);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_bits() {
+        let values = alone((0..50).map(|i| f64::from(i * i)));
+        assert_eq!(bootstrap(&values, 500, 3), bootstrap(&values, 500, 3));
+        assert_ne!(bootstrap(&values, 500, 3), bootstrap(&values, 500, 4));
+        assert_eq!(bootstrap(&[], 500, 3), None);
+    }
+
+    #[test]
+    fn one_value_has_no_spread() {
+        let interval = bootstrap(&alone([2.0]), 100, 1).unwrap();
+        assert_eq!((interval.low, interval.high), (2.0, 2.0));
+        assert!(interval.excludes_zero());
+    }
+}

@@ -1,0 +1,166 @@
+//! The document that describes an experiment.
+use super::axis::{Axis, Choice};
+use super::{SummarySettings, Trial};
+use crate::run_document::{Declared, common};
+use crate::settings::Settings;
+use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Node, Problem, Section, merge};
+use std::path::{Path, PathBuf};
+
+/// An experiment: all its trials, in the order of the table.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// What it is called in reports.
+    pub title: String,
+    /// Where its results go; `out/` and the document's name, where nothing is said.
+    pub output: PathBuf,
+    /// What tells trials apart.
+    pub columns: Vec<String>,
+    /// At least one.
+    pub trials: Vec<Trial>,
+    /// What is averaged and compared.
+    pub summary: SummarySettings,
+    /// The folder from which the base's files are named.
+    pub folder: PathBuf,
+}
+
+/// What the column of the base's variants is called.
+const VARIANT: &str = "variant";
+/// More than this is a mistake in a list.
+const MOST: usize = 1_000_000;
+
+impl Experiment {
+    /// Reads an experiment and its base. Files are found from the folder of the base.
+    ///
+    /// # Errors
+    /// Everything that is wrong with either; of the settings of the trials, what is wrong with the first that has errors.
+    pub fn read(document: &Document) -> Result<Self, Diagnostics> {
+        let path = Path::new(document.source().name());
+        let stem = path.file_stem().map_or_else(|| "experiment".into(), |s| s.to_string_lossy().into_owned());
+        let errors = Errors::new();
+        let read = document.section(&errors).and_then(|mut section| {
+            let title = section.or_default::<Option<String>>("title").unwrap_or_else(|| stem.clone());
+            let output = section.optional("output").unwrap_or_else(|| Path::new("out").join(&stem));
+            let base = open_base(&mut section, path.parent().unwrap_or(Path::new("")));
+            let set = section.take("set");
+            let mut axes: Vec<Axis> = section.items("axes").into_iter().filter_map(Axis::read).collect();
+            let summary_place = section.place_of("summary");
+            let summary = section.or_default::<SummarySettings>("summary");
+            section.finish();
+            let base = base?;
+            let folder = Path::new(base.source().name()).parent().unwrap_or(Path::new("")).to_owned();
+            let variants = Declared::all(&base, &errors);
+            let has_variants = |axis: &Axis| axis.columns.iter().any(|column| column == VARIANT);
+            if !variants.is_empty() && !axes.iter().any(has_variants) {
+                let place = base.source().place(0..0);
+                axes.push(Axis::of_options(VARIANT.to_owned(), variants, place));
+            }
+            let columns = columns(&axes, &errors);
+            for problem in problems(&summary, &columns, &axes) {
+                errors.report(summary_place.clone(), problem);
+            }
+            let mut node = common(base.root());
+            if let Some(set) = set {
+                merge(&mut node, set);
+            }
+            let trials = if errors.is_empty() { trials(&node, &axes, &folder, &errors)? } else { vec![] };
+            Some(Self { title, output, columns, trials, summary, folder })
+        });
+        errors.finish(read)
+    }
+}
+
+/// The run that `base` names, with an error of its own where it cannot be read.
+fn open_base(section: &mut Section<'_>, folder: &Path) -> Option<Document> {
+    let name = section.required::<String>("base")?;
+    match Document::open(folder.join(name)) {
+        Ok(base) => Some(base),
+        Err(diagnostics) => {
+            section.errors().extend(diagnostics);
+            None
+        }
+    }
+}
+
+fn columns(axes: &[Axis], errors: &Errors) -> Vec<String> {
+    let mut columns: Vec<String> = vec![];
+    for axis in axes {
+        for column in &axis.columns {
+            if columns.contains(column) {
+                let what = format!("there are two columns `{column}`: name one of them otherwise");
+                errors.push(Diagnostic::new(axis.place.clone(), Problem::invalid(what)));
+            }
+            columns.push(column.clone());
+        }
+    }
+    columns
+}
+
+/// What the summary names and is not there.
+fn problems(summary: &SummarySettings, columns: &[String], axes: &[Axis]) -> Vec<Problem> {
+    let named =
+        summary.by.iter().chain(&summary.clusters).chain(&summary.curve).chain(summary.baseline.keys());
+    let unknown = |what: &str, name: &str, known: &[String]| {
+        let (what, name, known) = (what.to_owned(), name.to_owned(), known.to_vec());
+        Problem::UnknownName { what, name, known }
+    };
+    let mut problems: Vec<Problem> =
+        named.filter(|name| !columns.contains(name)).map(|name| unknown("column", name, columns)).collect();
+    if let Some((column, value)) = summary.compared() {
+        let options = axes.iter().filter_map(|axis| {
+            let place = axis.columns.iter().position(|c| c == column)?;
+            Some(axis.options.iter().filter_map(move |option| option.labels.get(place).cloned()))
+        });
+        let known: Vec<String> = options.flatten().collect();
+        if !known.is_empty() && !known.iter().any(|label| label == value) {
+            problems.push(unknown(column, value, &known));
+        }
+    }
+    if summary.baseline.len() > 1 {
+        problems.push(Problem::invalid("`baseline` is one column and one of its values"));
+    }
+    problems
+}
+
+/// All combinations, the last axis changing fastest.
+fn trials(base: &Node, axes: &[Axis], folder: &Path, errors: &Errors) -> Option<Vec<Trial>> {
+    let count = axes.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.options.len()));
+    if count.is_none_or(|count| count > MOST) {
+        let message = format!("the axes make more than {MOST} trials");
+        errors.report(base.place.clone(), Problem::invalid(message));
+        return None;
+    }
+    let mut trials = vec![];
+    let mut place = vec![0; axes.len()];
+    loop {
+        let choices = || axes.iter().zip(&place).filter_map(|(axis, i)| axis.options.get(*i));
+        match trial(base, choices(), folder) {
+            Ok(trial) => trials.push(trial),
+            Err(diagnostics) => {
+                // the others have the same errors, as a rule
+                errors.extend(diagnostics);
+                return None;
+            }
+        }
+        let Some(turn) = (0..axes.len()).rev().find(|axis| place[*axis] + 1 < axes[*axis].options.len())
+        else {
+            return Some(trials);
+        };
+        place[turn] += 1;
+        place[turn + 1..].fill(0);
+    }
+}
+
+fn trial<'a>(
+    base: &Node,
+    choices: impl Iterator<Item = &'a Choice>,
+    folder: &Path,
+) -> Result<Trial, Diagnostics> {
+    let (mut node, mut labels) = (base.clone(), vec![]);
+    for choice in choices {
+        labels.extend(choice.labels.iter().cloned());
+        if let Some(set) = &choice.set {
+            merge(&mut node, set.clone());
+        }
+    }
+    Ok(Trial { labels, settings: Settings::read(node, folder)? })
+}

@@ -1,0 +1,99 @@
+//! The files that an experiment leaves.
+use super::{Comparison, Experiment, Interval, Journal, Summary, times_table, trials_table};
+use crate::output::{OutputError, write_document, write_whole};
+use manifactor_config::to_json;
+use manifactor_formats::table::{Column, Table, TableError, to_parquet};
+use std::fmt;
+
+/// Writes all tables, and returns the summary.
+///
+/// # Errors
+/// Where one cannot be written; those before it are there.
+pub fn write(experiment: &Experiment, journal: &Journal) -> Result<Summary, OutputError> {
+    let file = |name: &str| experiment.output.join(name);
+    let write = |name: &str, content: Result<Vec<u8>, TableError>| {
+        let content = content.map_err(|source| OutputError::Table { path: file(name), source })?;
+        write_whole(&file(name), content)
+    };
+    let csv = |table: &Table| table.to_csv().map(String::into_bytes);
+    let trials = trials_table(experiment, journal);
+    write("trials.csv", csv(&trials))?;
+    write("trials.parquet", to_parquet(&trials))?;
+    write("times.csv", csv(&times_table(experiment, journal)))?;
+    let summary = Summary::new(experiment, journal);
+    write("summary.csv", csv(&summary.table()))?;
+    write_whole(&file("summary.md"), summary.markdown())?;
+    write_document(&file("summary.json"), to_json(&summary))?;
+    Ok(summary)
+}
+
+impl Summary {
+    /// A row for each group and metric.
+    pub fn table(&self) -> Table {
+        let mut table = Table::default();
+        let mut rows = vec![];
+        for group in &self.groups {
+            for metric in &self.metrics {
+                rows.push((group, metric, group.means.get(metric), group.comparisons.get(metric)));
+            }
+        }
+        for (i, column) in self.columns.iter().enumerate() {
+            let labels = rows.iter().map(|row| row.0.labels.get(i).cloned().unwrap_or_default()).collect();
+            table.columns.push((column.clone(), Column::Text(labels)));
+        }
+        let names = rows.iter().map(|row| row.1.clone()).collect();
+        table.columns.push(("metric".into(), Column::Text(names)));
+        let mut number = |name: &str, cells: Vec<Option<f64>>| {
+            table.columns.push((name.to_owned(), Column::Number(cells)));
+        };
+        number("trials", rows.iter().map(|row| Some(row.0.trials as f64)).collect());
+        number("failed", rows.iter().map(|row| Some(row.0.failed as f64)).collect());
+        for (name, of) in BOUNDS {
+            number(name, rows.iter().map(|row| row.2.map(of)).collect());
+        }
+        number("pairs", rows.iter().map(|row| Some(row.3?.pairs as f64)).collect());
+        for (name, of) in BOUNDS {
+            let difference = |c: &Comparison| of(&c.difference);
+            number(&format!("difference_{name}"), rows.iter().map(|row| row.3.map(difference)).collect());
+        }
+        number("relative", rows.iter().map(|row| Some(row.3?.relative())).collect());
+        table
+    }
+
+    /// A table of means for people, with the difference from the baseline under each that is compared.
+    pub fn markdown(&self) -> String {
+        let cells = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let counts = ["trials", "failed"].map(str::to_owned);
+        let header: Vec<String> =
+            self.columns.iter().cloned().chain(counts).chain(self.metrics.clone()).collect();
+        let rules = self.columns.iter().map(|_| "---".to_owned());
+        let rules = rules.chain(std::iter::repeat_n("---:".to_owned(), header.len() - self.columns.len()));
+        let mut text = cells(header.clone()) + &cells(rules.collect());
+        for group in &self.groups {
+            let metric = |metric: &String| {
+                let mean = group.means.get(metric).map_or("-".to_owned(), |mean| format!("{:.5}", mean.mean));
+                group.comparisons.get(metric).map_or(mean.clone(), |c| format!("{mean} ({c})"))
+            };
+            let counts = [group.trials, group.failed].map(|n| n.to_string());
+            let metrics = self.metrics.iter().map(metric);
+            text += &cells(group.labels.iter().cloned().chain(counts).chain(metrics).collect());
+        }
+        text
+    }
+}
+
+type Bound = (&'static str, fn(&Interval) -> f64);
+const BOUNDS: [Bound; 3] = [("mean", |i| i.mean), ("low", |i| i.low), ("high", |i| i.high)];
+
+/// `-1.4 % [-1.9, -0.8]`: as shares of the baseline.
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Interval { mean, low, high } = self.difference;
+        let percent = 100.0 / self.baseline.abs();
+        if percent.is_finite() {
+            write!(f, "{:+.1} % [{:+.1}, {:+.1}]", mean * percent, low * percent, high * percent)
+        } else {
+            write!(f, "{mean:+.4} [{low:+.4}, {high:+.4}]")
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! All trials that are done, in the order of the experiment.
+use super::{Experiment, Journal, Outcome, Record};
+use indexmap::IndexSet;
+use manifactor_formats::table::{Column, Table};
+
+/// A row for each trial that is done: its columns, `status` (`failed`, or how the solve ended), the `reason` of a
+/// failure, and every measure that any trial has.
+///
+/// The order is that of the experiment, and no time is in it: it is the same however often the experiment was
+/// interrupted, and whatever number of threads it ran on.
+pub fn trials_table(experiment: &Experiment, journal: &Journal) -> Table {
+    let records: Vec<&Record> = records(experiment, journal).collect();
+    let measures: IndexSet<&str> =
+        records.iter().flat_map(|r| r.outcome.measures()).map(|(name, _)| name).collect();
+    let mut columns = labels(experiment, &records);
+    let text = |of: fn(&Outcome) -> &str| {
+        Column::Text(records.iter().map(|record| of(&record.outcome).to_owned()).collect())
+    };
+    columns.push(("status".to_owned(), text(Outcome::status)));
+    columns.push(("reason".to_owned(), text(Outcome::reason)));
+    for measure in measures {
+        let cells = records.iter().map(|record| record.outcome.measure(measure)).collect();
+        columns.push((measure.to_owned(), Column::Number(cells)));
+    }
+    Table { columns }
+}
+
+/// How long each trial took, in seconds.
+pub fn times_table(experiment: &Experiment, journal: &Journal) -> Table {
+    let records: Vec<&Record> = records(experiment, journal).collect();
+    let mut columns = labels(experiment, &records);
+    let seconds = records.iter().map(|record| Some(record.seconds)).collect();
+    columns.push(("seconds".to_owned(), Column::Number(seconds)));
+    Table { columns }
+}
+
+/// The trials that are done, in the order of the experiment.
+pub(super) fn records<'a>(
+    experiment: &'a Experiment,
+    journal: &'a Journal,
+) -> impl Iterator<Item = &'a Record> {
+    experiment.trials.iter().filter_map(|trial| journal.find(trial))
+}
+
+fn labels(experiment: &Experiment, records: &[&Record]) -> Vec<(String, Column)> {
+    let label =
+        |i: usize| records.iter().map(|record| record.labels.get(i).cloned().unwrap_or_default()).collect();
+    let columns = experiment.columns.iter().enumerate();
+    columns.map(|(i, name)| (name.clone(), Column::Text(label(i)))).collect()
+}
+
+impl Outcome {
+    /// `failed`, or how the solve ended.
+    pub fn status(&self) -> &str {
+        match self {
+            Self::Solved { termination, .. } => termination,
+            Self::Failed { .. } => "failed",
+        }
+    }
+
+    /// Why it failed; nothing, where it did not.
+    pub fn reason(&self) -> &str {
+        match self {
+            Self::Solved { .. } => "",
+            Self::Failed { reason } => reason,
+        }
+    }
+
+    /// What is measured, in order.
+    pub fn measures(&self) -> impl Iterator<Item = (&str, f64)> {
+        let measures = match self {
+            Self::Solved { measures, .. } => Some(measures),
+            Self::Failed { .. } => None,
+        };
+        measures.into_iter().flatten().map(|(name, value)| (name.as_str(), *value))
+    }
+
+    /// One measure; `None` where it is not known.
+    pub fn measure(&self, name: &str) -> Option<f64> {
+        match self {
+            Self::Solved { measures, .. } => measures.get(name).copied(),
+            Self::Failed { .. } => None,
+        }
+    }
+}

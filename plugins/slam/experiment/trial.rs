@@ -1,0 +1,90 @@
+//! One trial, and what it came to.
+use super::measures::measures;
+use crate::run::{RunError, estimate};
+use crate::settings::Settings;
+use crate::source::Folders;
+use indexmap::IndexMap;
+use manifactor_solve::{Observer, Termination};
+use serde::{Deserialize, Serialize};
+use std::hash::Hasher;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// One cell of an experiment.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    /// By column of the experiment.
+    pub labels: Vec<String>,
+    /// Its settings, complete.
+    pub settings: Settings,
+}
+
+/// What a trial came to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "status", rename_all = "snake_case")]
+pub enum Outcome {
+    /// It was solved, to a minimum or not: see `termination`.
+    Solved {
+        /// How the solve ended: `converged`, `stalled`, `max_iterations` and so on.
+        termination: String,
+        /// What is measured of it, by name; finite numbers.
+        measures: IndexMap<String, f64>,
+    },
+    /// There is no estimate.
+    Failed {
+        /// Why.
+        reason: String,
+    },
+}
+
+/// A trial that is done: a line of the journal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// By column of the experiment.
+    pub labels: Vec<String>,
+    /// Of the settings; other settings are another trial.
+    pub fingerprint: String,
+    /// What it came to.
+    pub outcome: Outcome,
+    /// How long it took. No two runs agree in it, so it is in no table of results.
+    pub seconds: f64,
+}
+
+impl Trial {
+    /// Tells these settings from others, and this program's version from others; the same on all machines.
+    pub fn fingerprint(&self) -> String {
+        let mut hash = fnv::FnvHasher::default();
+        // what cannot be written is told from other trials by its labels alone
+        hash.write(serde_json::to_string(&self.settings).unwrap_or_default().as_bytes());
+        hash.write(env!("CARGO_PKG_VERSION").as_bytes());
+        format!("{:016x}", hash.finish())
+    }
+
+    /// Runs it; `None` where the observer stopped it. Whatever goes wrong is an outcome.
+    pub fn run(&self, folders: &Folders, observer: &mut dyn Observer) -> Option<Record> {
+        let clock = Instant::now();
+        let outcome = match self.solve(folders, observer) {
+            Ok(outcome) => outcome?,
+            Err(error) => Outcome::Failed { reason: error.to_string() },
+        };
+        let (labels, fingerprint) = (self.labels.clone(), self.fingerprint());
+        Some(Record { labels, fingerprint, outcome, seconds: clock.elapsed().as_secs_f64() })
+    }
+
+    fn solve(&self, folders: &Folders, observer: &mut dyn Observer) -> Result<Option<Outcome>, RunError> {
+        let sequence = Arc::new(self.settings.source.load(folders)?);
+        let (estimate, report) = estimate("trial", sequence, &self.settings, observer)?;
+        let termination = &report.solve.termination;
+        if *termination == Termination::Interrupted {
+            return Ok(None);
+        }
+        let measures = measures(&estimate, &report);
+        Ok(Some(Outcome::Solved { termination: status(termination), measures }))
+    }
+}
+
+/// The name of an ending, as documents write it.
+fn status(termination: &Termination) -> String {
+    let json = serde_json::to_value(termination).unwrap_or_default();
+    json.get("status").and_then(|s| s.as_str()).unwrap_or("unknown").to_owned()
+}

@@ -1,0 +1,269 @@
+//! The noise of each group of measurements.
+use super::correlation::autocorrelation_time;
+use super::{BoxGroups, VarianceSettings};
+use crate::estimate::Estimate;
+use crate::mapping::{MappedObject, Mapping, pose_key};
+use indexmap::IndexMap;
+use manifactor_geometry::Se3;
+use manifactor_graph::batch::FactorState;
+use manifactor_graph::loss::Loss;
+use manifactor_graph::noise::NoiseError;
+use manifactor_graph::{FactorEntry, Key, Noise};
+use manifactor_quadric::DualQuadric;
+use manifactor_solve::CovarianceError;
+use serde::Serialize;
+use std::any::TypeId;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Standard deviations, as they are estimated.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Components {
+    /// Of odometry: rotation in rad, translation in m, in each direction; `None` where it is as given.
+    pub odometry: Option<[f64; 2]>,
+    /// Of boxes, by group.
+    pub boxes: IndexMap<String, BoxComponent>,
+}
+
+/// The noise of a group of boxes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BoxComponent {
+    /// Of each side of a box, in pixels.
+    pub sigma_px: f64,
+    /// How many consecutive boxes say as much as one alone.
+    pub correlation_time: f64,
+    /// What the graph is given: √(correlation_time) · sigma_px.
+    pub effective_px: f64,
+}
+
+/// Why the noise could not be estimated.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VarianceError {
+    /// The estimate has no covariance.
+    #[error("the variance components cannot be estimated: {0}")]
+    Covariance(#[from] CovarianceError),
+    /// A standard deviation that is zero or not finite.
+    #[error("the variance components cannot be estimated: {0}")]
+    Noise(#[from] NoiseError),
+}
+
+/// What a factor measures.
+enum Measures {
+    Motion,
+    Box { object: Key, frame: usize },
+    Other,
+}
+
+/// Half of all normal deviates are below this.
+const MEDIAN: f64 = 0.674_489_750_196_081_7;
+/// Rows that are controlled less than this say nothing of their noise.
+const LEAST_REDUNDANCY: f64 = 1e-9;
+/// Fewer rows than this have no noise of their own.
+const LEAST_ROWS: usize = 40;
+
+impl Components {
+    /// Out of the residuals of an estimate.
+    ///
+    /// # Errors
+    /// Where the estimate has no covariance.
+    pub fn of(estimate: &Estimate, settings: &VarianceSettings) -> Result<Self, VarianceError> {
+        let graph = &estimate.mapping.graph;
+        let leverages = estimate.solution.problem(graph).map_err(CovarianceError::from)?.leverages()?;
+        let frames = frames(estimate);
+        let mut motion = [Motion::default(); 2];
+        let mut boxes: IndexMap<Key, Rows> = IndexMap::new();
+        for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
+            let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
+            match measures(entry, &frames) {
+                Measures::Motion => {
+                    for (row, h) in leverage.iter().enumerate() {
+                        if let Some(part) = motion.get_mut(row / 3) {
+                            part.add(state, row, *h);
+                        }
+                    }
+                }
+                Measures::Box { object, frame } => {
+                    boxes.entry(object).or_default().add(frame, state, leverage, entry.noise.observed());
+                }
+                Measures::Other => {}
+            }
+        }
+        let before = estimate.components.last().and_then(|components| components.odometry);
+        let odometry = if settings.odometry { odometry(&motion).or(before) } else { None };
+        Ok(Self { odometry, boxes: groups(&estimate.mapping, boxes, settings) })
+    }
+
+    /// Gives the graph this noise, and boxes a loss whose scale is in units of their own σ: ρ(τs)/τ, so that an outlier
+    /// is one among boxes, and not among averages of τ of them.
+    ///
+    /// # Errors
+    /// A standard deviation that is zero or not finite.
+    pub fn apply(
+        &self,
+        mapping: &mut Mapping,
+        settings: &VarianceSettings,
+        loss: Option<&Arc<dyn Loss>>,
+    ) -> Result<(), VarianceError> {
+        let groups: HashMap<Key, &BoxComponent> = mapping
+            .mapped()
+            .filter_map(|object| Some((object.key.clone(), self.boxes.get(&group(object, settings.boxes))?)))
+            .collect();
+        for entry in mapping.graph.factors_mut() {
+            let noise = match (measures(entry, &HashMap::new()), self.odometry) {
+                (Measures::Motion, Some([turn, shift])) => {
+                    Noise::sigmas(&[turn, turn, turn, shift, shift, shift])?
+                }
+                (Measures::Box { object, .. }, _) => match groups.get(&object) {
+                    Some(component) => {
+                        entry.loss = loss.map(|loss| shared(loss, component.correlation_time));
+                        Noise::sigma(component.effective_px)?
+                    }
+                    None => continue,
+                },
+                _ => continue,
+            };
+            entry.noise = match entry.noise.observed() {
+                Some(observed) => noise.observing(observed),
+                None => noise,
+            };
+        }
+        Ok(())
+    }
+
+    /// The largest change of any standard deviation, as a share of it.
+    pub fn change(&self, before: &Self) -> f64 {
+        let motion = self.odometry.iter().flatten().zip(before.odometry.iter().flatten());
+        let boxes = self.boxes.iter().filter_map(|(name, now)| {
+            before.boxes.get(name).map(|before| (&now.effective_px, &before.effective_px))
+        });
+        motion.chain(boxes).map(|(now, before)| (now / before).ln().abs()).fold(0.0, f64::max)
+    }
+}
+
+/// ρ(τs)/τ, for a loss that has a scale; one without is as it is.
+fn shared(loss: &Arc<dyn Loss>, time: f64) -> Arc<dyn Loss> {
+    let rescaled = || {
+        let mut fields = serde_json::to_value(loss).ok()?;
+        let scale = fields.get("scale")?.as_f64()? / time.sqrt();
+        *fields.get_mut("scale")? = scale.into();
+        serde_json::from_value::<Box<dyn Loss>>(fields).ok()
+    };
+    rescaled().map_or_else(|| loss.clone(), Arc::from)
+}
+
+fn frames(estimate: &Estimate) -> HashMap<Key, usize> {
+    (0..estimate.sequence.frames.len()).map(|frame| (pose_key(frame), frame)).collect()
+}
+
+fn measures(entry: &FactorEntry, frames: &HashMap<Key, usize>) -> Measures {
+    let (pose, object) = (TypeId::of::<Se3>(), TypeId::of::<DualQuadric>());
+    let variables = entry.factor.erased().signature().variables;
+    match (&entry.keys[..], &variables[..]) {
+        ([_, _], [a, b]) if *a == pose && *b == pose => Measures::Motion,
+        ([camera, seen], [a, b]) if *a == pose && *b == object => {
+            Measures::Box { object: seen.clone(), frame: frames.get(camera).copied().unwrap_or_default() }
+        }
+        _ => Measures::Other,
+    }
+}
+
+/// Three rows of odometry, over all motions.
+#[derive(Clone, Copy, Default)]
+struct Motion {
+    squares: f64,
+    redundancy: f64,
+}
+
+impl Motion {
+    fn add(&mut self, state: &FactorState, row: usize, leverage: f64) {
+        let Some(residual) = state.residual.get(row) else { return };
+        self.squares += state.weight * residual * residual;
+        self.redundancy += (1.0 - leverage).max(0.0);
+    }
+}
+
+/// σ² = Σ r² / Σ (1 - h): unbiased where σ is right, and repeated until it is. `None` for an odometry of which the boxes
+/// control less than a single row: it is better than they can tell.
+fn odometry(parts: &[Motion; 2]) -> Option<[f64; 2]> {
+    let enough = parts.iter().all(|part| part.redundancy > 1.0 && part.squares > 0.0);
+    enough.then(|| parts.map(|part| (part.squares / part.redundancy).sqrt()))
+}
+
+/// Errors of the boxes of an object, in pixels: by side, then by frame.
+#[derive(Default)]
+struct Rows {
+    errors: [Vec<Option<f64>>; 4],
+    first: usize,
+}
+
+impl Rows {
+    fn add(&mut self, frame: usize, state: &FactorState, leverage: &[f64], observed: Option<&[bool]>) {
+        if self.errors.iter().all(Vec::is_empty) {
+            self.first = frame;
+        }
+        let Some(place) = frame.checked_sub(self.first) else { return };
+        for (side, errors) in self.errors.iter_mut().enumerate() {
+            let seen = observed.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
+            let redundancy = 1.0 - leverage.get(side).copied().unwrap_or(1.0);
+            if let (true, Some(residual)) = (seen && redundancy > LEAST_REDUNDANCY, state.residual.get(side))
+            {
+                errors.resize(place, None);
+                errors.push(Some(residual / redundancy.sqrt()));
+            }
+        }
+    }
+}
+
+/// The group of an object's boxes.
+fn group(object: &MappedObject, by: BoxGroups) -> String {
+    match by {
+        BoxGroups::All | BoxGroups::Given => "all".to_owned(),
+        BoxGroups::Class => {
+            object.class.as_ref().map_or_else(|| "unknown".to_owned(), |class| class.name.clone())
+        }
+        BoxGroups::Object => object.key.to_string(),
+    }
+}
+
+fn groups(
+    mapping: &Mapping,
+    mut boxes: IndexMap<Key, Rows>,
+    settings: &VarianceSettings,
+) -> IndexMap<String, BoxComponent> {
+    if settings.boxes == BoxGroups::Given {
+        return IndexMap::new();
+    }
+    let mut series: IndexMap<String, Vec<Vec<Option<f64>>>> = IndexMap::new();
+    let mut all = vec![];
+    for object in mapping.mapped() {
+        let Some(rows) = boxes.swap_remove(&object.key) else { continue };
+        all.extend(rows.errors.iter().cloned());
+        series.entry(group(object, settings.boxes)).or_default().extend(rows.errors);
+    }
+    let rows = |series: &[Vec<Option<f64>>]| series.iter().flatten().flatten().count();
+    let component = |own: &[Vec<Option<f64>>]| {
+        // too few to tell: as all are
+        box_component(if rows(own) < LEAST_ROWS { &all } else { own }, settings)
+    };
+    series.iter().filter_map(|(name, own)| Some((name.clone(), component(own)?))).collect()
+}
+
+fn box_component(series: &[Vec<Option<f64>>], settings: &VarianceSettings) -> Option<BoxComponent> {
+    let mut sizes: Vec<f64> = series.iter().flatten().flatten().map(|error| error.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    // robust: half of the boxes may be wrong
+    let sigma_px = sizes.get(sizes.len() / 2)? / MEDIAN;
+    if !(sigma_px.is_finite() && sigma_px > 0.0) {
+        return None;
+    }
+    let correlation_time = if settings.correlation {
+        // gross errors are detections of something else, and not what lasts
+        let within = |error: &Option<f64>| error.filter(|error| error.abs() < 3.0 * sigma_px);
+        let within: Vec<Vec<_>> = series.iter().map(|errors| errors.iter().map(within).collect()).collect();
+        autocorrelation_time(&within)
+    } else {
+        1.0
+    };
+    Some(BoxComponent { sigma_px, correlation_time, effective_px: sigma_px * correlation_time.sqrt() })
+}

@@ -1,0 +1,43 @@
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[variance_components]`: the noise of odometry and boxes, estimated from the data. What `[odometry]` and
+/// `[detections]` say of noise is where it begins.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct VarianceSettings {
+    /// Most estimates of the noise, each followed by a solve. An odometry that is better than boxes can tell by far takes
+    /// many small steps to get there.
+    pub rounds: usize,
+    /// The last round is the one after which no standard deviation changes by more than this share.
+    pub tolerance: f64,
+    /// Which boxes have a noise in common.
+    pub boxes: BoxGroups,
+    /// Whether errors of consecutive boxes of an object are taken for correlated, as they are: a detector errs the same
+    /// way in image after image, and no ellipsoid has the outline of a chair. τ such boxes say as much as one alone,
+    /// τ their integrated autocorrelation time, so their standard deviation is √τ times as large.
+    pub correlation: bool,
+    /// Whether the noise of odometry is estimated; it stays as it is given, otherwise.
+    pub odometry: bool,
+}
+
+impl Default for VarianceSettings {
+    fn default() -> Self {
+        Self { rounds: 30, tolerance: 0.02, boxes: BoxGroups::All, correlation: true, odometry: true }
+    }
+}
+
+/// Which boxes have a noise in common.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BoxGroups {
+    /// All.
+    #[default]
+    All,
+    /// Those of objects of one class.
+    Class,
+    /// Those of one object.
+    Object,
+    /// None: the noise of boxes stays as it is given.
+    Given,
+}

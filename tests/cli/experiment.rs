@@ -1,0 +1,116 @@
+use crate::{Ran, folder, manifactor, path, root, run};
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+const BASE: &str = r#"
+semantics = "table_one"
+source = { type = "simulated", scene = { objects = 4 }, trajectory = { frames = 25 } }
+[[variants]]
+name = "Q"
+set = { semantics = [] }
+[[variants]]
+name = "Q+O"
+"#;
+
+/// Twelve trials, of which the four without room for their objects fail.
+const SWEEP: &str = r#"
+title = "small sweep"
+base = "base.toml"
+[[axes]]
+columns = { area = "source.scene.area" }
+rows = [[2.4, 1.6], [2.0, 2.0], [0.1, 0.1]]
+[[axes]]
+columns = { seed = "source.seed" }
+rows = [1, 2]
+[summary]
+baseline = { variant = "Q" }
+metrics = ["position", "shape"]
+resamples = 200
+"#;
+
+fn tables(out: &str) -> Vec<Vec<u8>> {
+    let files = ["trials.csv", "trials.parquet", "summary.csv", "summary.md", "summary.json"];
+    files.map(|file| std::fs::read(Path::new(out).join(file)).unwrap()).into()
+}
+
+fn sweep(folder: &tempfile::TempDir, out: &str, threads: usize) -> Ran {
+    manifactor(&format!("experiment {} --out {out} --threads {threads}", path(folder, "sweep.toml")))
+}
+
+fn lines(path: &str) -> usize {
+    std::fs::read_to_string(path).map_or(0, |text| text.lines().count())
+}
+
+#[test]
+fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
+    let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
+    let (whole, killed) = (path(&folder, "whole"), path(&folder, "killed"));
+    let ran = sweep(&folder, &whole, 2).ended(0);
+    assert!(ran.stdout.contains("less the baseline") && ran.stdout.contains("position"), "{}", ran.stdout);
+
+    let log = format!("{killed}/trials.jsonl");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
+        .current_dir(root())
+        .args(["experiment", &path(&folder, "sweep.toml"), "--out", &killed, "--threads", "1"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let clock = Instant::now();
+    while lines(&log) < 3 && clock.elapsed() < Duration::from_secs(120) {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let done = lines(&log);
+    assert!(done >= 3);
+    // the line that a kill would have torn
+    let mut file = std::fs::OpenOptions::new().append(true).open(&log).unwrap();
+    file.write_all(b"{\"labels\":[\"[2.0, 2.0]\",\"2\"").unwrap();
+    drop(file);
+
+    let ran = sweep(&folder, &killed, 1).ended(0);
+    assert!(
+        ran.stderr.contains(&format!("{done} of 12 trials done, {done} of them before")),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(lines(&log), 12);
+    assert!(tables(&killed) == tables(&whole));
+    // a third time there is nothing to do
+    let ran = sweep(&folder, &killed, 2).ended(0);
+    assert!(ran.stderr.contains("12 of 12 trials done, 12 of them before"), "{}", ran.stderr);
+    assert_eq!(lines(&log), 12);
+}
+
+#[test]
+fn a_failed_trial_is_a_row_with_its_reason() {
+    let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
+    let out = path(&folder, "out");
+    sweep(&folder, &out, 2).ended(0);
+    let table = std::fs::read_to_string(format!("{out}/trials.csv")).unwrap();
+    let rows: Vec<&str> = table.lines().collect();
+    assert_eq!(rows.len(), 13);
+    assert!(rows[0].starts_with("area,seed,variant,status,reason,ate_se3"), "{}", rows[0]);
+    let failed: Vec<_> = rows.iter().filter(|row| row.contains(",failed,")).collect();
+    assert_eq!(failed.len(), 4);
+    assert!(failed.iter().all(|row| row.contains("there is no room for object")), "{failed:?}");
+    let summary = std::fs::read_to_string(format!("{out}/summary.md")).unwrap();
+    assert!(summary.contains("| Q+O | 6 | 2 |"), "{summary}");
+}
+
+#[test]
+fn mistakes_of_an_experiment_are_told_at_their_line() {
+    let wrong = SWEEP.replace("variant = \"Q\"", "variant = \"R\"").replace("source.seed", "source.sed");
+    let folder = folder(&[("base.toml", BASE), ("sweep.toml", &wrong)]);
+    let config = path(&folder, "sweep.toml");
+    let ran = run(["experiment", &config], &[]).ended(2);
+    ran.complains("unknown variant `R`");
+    let fixed = wrong.replace("variant = \"R\"", "variant = \"Q\"");
+    std::fs::write(&config, fixed).unwrap();
+    run(["experiment", &config], &[]).ended(2).complains("unknown field `sed`");
+    std::fs::write(&config, SWEEP.replace("base.toml", "bass.toml")).unwrap();
+    run(["experiment", &config], &[]).ended(2).complains("bass.toml");
+}
