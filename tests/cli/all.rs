@@ -9,6 +9,7 @@ mod interrupt;
 mod mistakes;
 mod names;
 mod new;
+mod reports;
 mod run;
 mod schema;
 mod solve;

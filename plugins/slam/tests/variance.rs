@@ -1,0 +1,48 @@
+//! Variance components on data whose noise is known.
+#![allow(missing_docs, clippy::unwrap_used)]
+use manifactor_config::{Document, Format};
+use manifactor_slam::run::Run;
+use manifactor_slam::run_document::RunDocument;
+use manifactor_slam::variance::Components;
+use manifactor_solve::Silent;
+
+/// The noise that is found in a simulated recording, where the search begins at `sigma` and `sigma_px`.
+fn found(odometry: f64, sigma: f64, sigma_px: f64) -> Components {
+    let text = format!(
+        "
+        source = {{ type = 'simulated', seed = 3, scene = {{ objects = 8, classes = ['sports ball'] }},
+                   trajectory = {{ frames = 60 }},
+                   odometry = {{ translation = {odometry}, rotation = {odometry} }} }}
+        odometry = {{ noise = {{ sigma = {sigma} }} }}
+        detections = {{ noise = {{ sigma = {sigma_px} }} }}
+        objects = {{ refinements = 1 }}
+        variance_components = {{ correlation = false }}"
+    );
+    let document = Document::parse("run.toml", text, Format::Toml).unwrap();
+    let run = RunDocument::read(&document).unwrap();
+    let (estimate, report) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+    assert_eq!(report.variance_components, estimate.components);
+    estimate.components.last().unwrap().clone()
+}
+
+#[test]
+fn the_noise_of_the_simulation_is_found_wherever_the_search_begins() {
+    let components = [found(0.1, 0.001, 20.0), found(0.1, 0.05, 1.0)];
+    for found in &components {
+        // balls are ellipsoids: the detector's 2 px are all there is
+        let sigma_px = found.boxes["all"].sigma_px;
+        assert!((sigma_px - 2.0).abs() < 0.3, "{sigma_px}");
+        // 10 % of 5 degrees, by axis
+        let expected = 0.1 * (300f64 / 59.0).to_radians() / 3f64.sqrt();
+        let [turn, _] = found.odometry.unwrap();
+        assert!((turn / expected).ln().abs() < 0.35, "{turn}, not {expected}");
+    }
+    let [a, b] = components.map(|found| found.odometry.unwrap());
+    assert!((a[0] / b[0]).ln().abs() < 0.1 && (a[1] / b[1]).ln().abs() < 0.1, "{a:?} {b:?}");
+}
+
+#[test]
+fn a_worse_odometry_is_found_to_be_worse() {
+    let [good, bad] = [0.02, 0.1].map(|share| found(share, 0.01, 5.0).odometry.unwrap());
+    assert!(bad[0] > 2.0 * good[0] && bad[1] > 2.0 * good[1], "{good:?} {bad:?}");
+}
