@@ -9,17 +9,17 @@ pub enum LawError {
     #[error("the factor {factor} does not take these variables: {point}")]
     WrongVariables {
         /// The factor.
-        factor: String,
+        factor: Box<str>,
         /// The variables.
-        point: String,
+        point: Box<str>,
     },
     /// A point where the factor says it is not defined; nothing was checked.
     #[error("the factor {factor} is not defined at {point}")]
     NotDefined {
         /// The factor.
-        factor: String,
+        factor: Box<str>,
         /// The variables.
-        point: String,
+        point: Box<str>,
     },
     /// Two residuals that should be equal.
     #[error("{law}: row {row} is {found} and should be {expected}\n  factor {factor}\n  at {point}")]
@@ -33,9 +33,9 @@ pub enum LawError {
         /// What it should be.
         expected: f64,
         /// The factor.
-        factor: String,
+        factor: Box<str>,
         /// The variables.
-        point: String,
+        point: Box<str>,
     },
     /// Two Jacobians that should be equal.
     #[error(
@@ -58,9 +58,9 @@ pub enum LawError {
         /// What it should be.
         expected: f64,
         /// The factor.
-        factor: String,
+        factor: Box<str>,
         /// The variables.
-        point: String,
+        point: Box<str>,
     },
     /// A residual that is not a number, or infinite, where the factor says that it is defined.
     #[error(
@@ -73,9 +73,9 @@ pub enum LawError {
         /// What it is.
         found: f64,
         /// The factor.
-        factor: String,
+        factor: Box<str>,
         /// The variables.
-        point: String,
+        point: Box<str>,
     },
     /// A manifold's law.
     #[error("{law}: off by {error:e}\n  x = {x}\n  y = {y}\n  delta = {delta:?}")]
@@ -109,12 +109,12 @@ pub(crate) fn json_of(variable: &dyn Variable) -> String {
 }
 
 /// Variables, as a document writes them.
-pub(crate) fn json_of_all(variables: &[&dyn Variable]) -> String {
+pub(crate) fn json_of_all(variables: &[&dyn Variable]) -> Box<str> {
     let all: Vec<String> = variables.iter().map(|v| json_of(*v)).collect();
-    format!("[{}]", all.join(", "))
+    format!("[{}]", all.join(", ")).into()
 }
 
 /// A factor, as a document writes it.
-pub(crate) fn json_of_factor(factor: &dyn Factor) -> String {
-    serde_json::to_string(factor).unwrap_or_else(|error| format!("{factor:?} ({error})"))
+pub(crate) fn json_of_factor(factor: &dyn Factor) -> Box<str> {
+    serde_json::to_string(factor).unwrap_or_else(|error| format!("{factor:?} ({error})")).into()
 }

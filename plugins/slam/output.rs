@@ -93,11 +93,11 @@ pub fn write_variant(
     let folder = variant_folder(&run.output, &variant.name);
     let file = |name: &str| folder.join(name);
     write_document(&file("config.toml"), resolved(run, variant))?;
-    write_whole(&file("trajectory.txt"), &tum::format(&estimate.trajectory()))?;
+    write_whole(&file("trajectory.txt"), tum::format(&estimate.trajectory()))?;
     write_document(&file("objects.json"), to_json(&report.objects))?;
     let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);
     write_document(&file("graph.json"), graph)?;
-    write_whole(&file("iterations.csv"), &iterations(&estimate.solution.outcome.history))?;
+    write_whole(&file("iterations.csv"), iterations(&estimate.solution.outcome.history))?;
     write_document(&file("metrics.json"), to_json(report))?;
     if variant.settings.report.covariances {
         let marginals = estimate.solution.marginals(&estimate.mapping.graph, &[])?;

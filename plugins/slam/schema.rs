@@ -1,6 +1,7 @@
 //! JSON Schema of a run, for editors to complete and check by.
 use crate::class::Aliases;
 use crate::settings::{CutSides, EvaluationSettings, ReportSettings};
+use crate::variance::VarianceSettings;
 use manifactor_config::Definitions;
 use manifactor_graph::Noise;
 use manifactor_quadric::BoxModel;
@@ -85,6 +86,7 @@ fn settings(definitions: &mut Definitions) -> Value {
             "anyOf": [{ "type": "string" }, { "type": "array", "items": rule }],
         },
         "aliases": definitions.of::<Aliases>(),
+        "variance_components": definitions.of::<VarianceSettings>(),
         "solver": definitions.kind("solver"),
         "evaluation": definitions.of::<EvaluationSettings>(),
         "report": definitions.of::<ReportSettings>(),
@@ -92,8 +94,9 @@ fn settings(definitions: &mut Definitions) -> Value {
 }
 
 fn object(properties: Value, required: &[&str], description: &str) -> Value {
-    json!({
-        "type": "object", "description": description, "properties": properties, "required": required,
-        "additionalProperties": false,
-    })
+    let mut object = json!({
+        "type": "object", "description": description, "required": required, "additionalProperties": false,
+    });
+    object["properties"] = properties;
+    object
 }

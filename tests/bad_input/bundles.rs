@@ -6,7 +6,7 @@ const POINTS: &str = "0 0 -3\n1 0 -4\n0 1 -5\n1 1 -4\n";
 fn bundle(from: &str, to: &str) -> String {
     let mut all = String::from("2 4 8\n");
     for point in 0..4 {
-        all += &format!("0 {point} {}.5 1.5\n1 {point} {}.25 0.5\n", point, point);
+        all += &format!("0 {point} {point}.5 1.5\n1 {point} {point}.25 0.5\n");
     }
     let cameras = "0 0 0 0 0 0 100 0 0\n0 0 0 -1 0 0 100 0 0\n";
     let all = all + cameras + POINTS;

@@ -48,7 +48,7 @@ impl Solve {
         let mut input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
-            output::note(&note);
+            output::note(note);
         }
         let mut watch = Watch::new(self.verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import statistics
 import subprocess
 import time
@@ -64,7 +65,7 @@ def watched(command, core, patience, log):
                 break
             peak = max(peak, peak_kib(process.pid))
             if time.perf_counter() - began > patience:
-                process.kill()
+                os.kill(process.pid, signal.SIGKILL)  # process.kill would wait for it, and take its status
             time.sleep(0.002)
     process.returncode = os.waitstatus_to_exitcode(status)
     waited = time.perf_counter() - began - usage.ru_utime - usage.ru_stime
