@@ -47,8 +47,8 @@ pub(crate) fn markdown() -> String {
     }
     let mut noise = Definitions::new();
     let schema = noise.of::<Noise>();
-    let docs = schema.get("description").and_then(Value::as_str).unwrap_or_default();
-    out += &format!("\n## Noise\n{docs}\n{}", table(&fields(&schema)));
+    let docs = schema.get("description").and_then(Value::as_str).unwrap_or_default().to_owned();
+    out += &format!("\n## Noise\n{docs}\n{}", table(&fields(&noise.document(schema))));
     for of_kind in catalogue::all().chunk_by(|a, b| a.kind == b.kind) {
         // not the kind alone, which a type of another kind may have for its name
         out += &format!("\n## Every {}\n", of_kind.first().map_or("", |e| e.kind));
