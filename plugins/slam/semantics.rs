@@ -147,11 +147,16 @@ pub fn table_one() -> Result<Vec<Rule>, manifactor_config::Diagnostics> {
     read::shipped_rules("table_one", TABLE_ONE)
 }
 
-/// Classes that a rule names and the data do not have.
+/// Classes that a rule names and the data do not have, each once.
 pub fn unmatched<'a>(rule: &'a Rule, seen: &[String], aliases: &Aliases) -> Vec<&'a str> {
     let near = rule.conditions.near.iter().flat_map(|near| &near.classes);
-    let classes = rule.classes.iter().chain(near).map(String::as_str);
-    classes.filter(|name| *name != ANY && !seen.contains(&aliases.canonical(name))).collect()
+    let mut missing: Vec<&str> = vec![];
+    for name in rule.classes.iter().chain(near).map(String::as_str) {
+        if name != ANY && !seen.contains(&aliases.canonical(name)) && !missing.contains(&name) {
+            missing.push(name);
+        }
+    }
+    missing
 }
 
 /// One `[[semantics]]`, over the document's own variables.
