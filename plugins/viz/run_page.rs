@@ -5,7 +5,9 @@ use crate::picture::Picture;
 use crate::{Scene, View, frames_seen, image, plot};
 use indexmap::IndexMap;
 use manifactor_formats::tum::StampedPose;
+use manifactor_graph::Key;
 use manifactor_slam::estimate::Estimate;
+use manifactor_slam::mapping::MappedObject;
 use manifactor_slam::metrics::{Alignment, align, associate};
 use manifactor_slam::report::{ObjectReport, RunReport, VariantReport};
 use manifactor_slam::settings::{EvaluationSettings, Settings};
@@ -153,14 +155,25 @@ fn object_row(report: &ObjectReport) -> Vec<String> {
     vec![
         object.key.to_string(),
         object.class.as_ref().map_or("-".into(), |class| class.name.clone()),
-        object.class.as_ref().map_or("-".into(), |class| format!("{:.2}", class.share)),
+        object.class.as_ref().map_or("-".into(), |class| format!("{:.2}", class.score)),
         object.detections.to_string(),
         object.boxes.to_string(),
-        object.semantic_factors.join(", "),
+        applied(object),
         report.estimate.as_ref().map_or(String::new(), axes),
         report.error.as_ref().map_or(String::new(), |error| format!("{:.4}", error.position)),
         report.rejected_because.clone().unwrap_or_default(),
     ]
+}
+
+/// Each semantic factor with its reason, then what might have been one, and why it is none.
+fn applied(object: &MappedObject) -> String {
+    let own = |key: &&Key| **key != object.key;
+    let applied = object.semantic_factors.iter().map(|a| {
+        let others: Vec<_> = a.keys.iter().filter(own).map(|key| format!(" with {key}")).collect();
+        format!("{}{}: {}", a.factor, others.concat(), a.because)
+    });
+    let left_out = object.left_out.iter().map(|l| format!("not {}: {}", l.factor, l.because));
+    applied.chain(left_out).collect::<Vec<_>>().join("; ")
 }
 
 /// Whitened residuals by type of factor.
