@@ -113,9 +113,9 @@ fn what_is_near_is_the_second_object_and_each_pair_is_connected_once() {
     let objects = [object(1, "book", 0.8, 0.0), object(2, "book", 0.8, 0.5), object(3, "book", 0.8, 2.0)];
     let found = judged(rule, &objects);
     assert_eq!(keys(&found[0]), [["q1", "q2"]]);
-    assert_eq!(found[0].applied[0].because, "book, 0.30 m from q2 (book)");
+    assert_eq!(found[0].applied[0].because, "book, 0.31 m from q2 (book)");
     assert_eq!(found[1].left_out[0].because, "the rule connects it with q1 already");
-    assert_eq!(found[2].left_out[0].because, "no book within 0.5 m: the nearest is q2, 1.29 m away");
+    assert_eq!(found[2].left_out[0].because, "no book within 0.5 m: the nearest is q2, 1.30 m away");
 }
 
 #[test]
