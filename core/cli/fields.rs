@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn fields_of_items_are_told_and_those_of_registered_types_are_elsewhere() {
-        let schema = json!({ "properties": { "rules": { "anyOf": [{ "type": "string" }, { "type": "array", "items": {
+        let schema = json!({ "properties": { "rules": { "anyOf": [{ "type": "string" }, { "type": "array", "items": { "type": "object",
             "properties": { "factor": { "$ref": "#/$defs/factor" }, "noise": { "title": "Noise", "properties": {} } }
         } }] } } });
         let found = fields(&schema);

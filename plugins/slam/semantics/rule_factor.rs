@@ -193,7 +193,7 @@ fn fill(given: &mut Value, written: &Value, up: &Value) -> bool {
         }
         (Value::Array(given), Value::Array(written)) => {
             let within = given.iter_mut().zip(written).map(|(g, w)| fill(g, w, up));
-            within.fold(false, |any, filled| any || filled)
+            within.filter(|filled| *filled).count() > 0
         }
         _ => false,
     }
