@@ -1,5 +1,6 @@
 //! Numbers that are checked when they are read.
 use schemars::JsonSchema;
+use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// A finite number above zero.
@@ -36,6 +37,31 @@ impl Positive {
 /// Where the number is zero, negative or not finite.
 pub fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Positive::deserialize(from).map(Positive::get)
+}
+
+/// The same for a number that is 1 or more.
+///
+/// # Errors
+/// Where it is less than 1, or not finite.
+pub fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let x = f64::deserialize(from)?;
+    if x >= 1.0 && x.is_finite() {
+        Ok(x)
+    } else {
+        Err(D::Error::custom(format!("expected a finite number, 1 or more, got {x}")))
+    }
+}
+
+/// The same for a least and a most, neither of them negative.
+///
+/// # Errors
+/// Where the first is above the second, below zero, or one of them is not a number.
+pub fn least_and_most<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 2], D::Error> {
+    let [least, most] = <[f64; 2]>::deserialize(from)?;
+    if 0.0 <= least && least <= most {
+        return Ok([least, most]);
+    }
+    Err(D::Error::custom(format!("expected two numbers, 0 ≤ least ≤ most, got [{least}, {most}]")))
 }
 
 impl TryFrom<f64> for Positive {

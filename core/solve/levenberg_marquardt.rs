@@ -7,7 +7,7 @@ use crate::outcome::Outcome;
 use crate::problem::Problem;
 use crate::system::{dot, norm};
 use crate::termination::{Stall, Termination, Tolerance};
-use manifactor_graph::checked::{Positive, positive};
+use manifactor_graph::checked::{Positive, least_and_most, one_or_more, positive};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -37,10 +37,11 @@ pub struct LevenbergMarquardt {
     #[schemars(with = "Positive")]
     pub max_lambda: f64,
     /// Largest factor by which one good step lowers the damping.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(with = "Positive")]
+    #[serde(deserialize_with = "one_or_more")]
+    #[schemars(extend("minimum" = 1))]
     pub decrease: f64,
     /// Least and largest entry of the diagonal that is used for damping.
+    #[serde(deserialize_with = "least_and_most")]
     pub diagonal: [f64; 2],
     /// When to stop.
     pub stop: Stopping,
@@ -105,7 +106,7 @@ impl LevenbergMarquardt {
             loop {
                 session.problem.diagonal(&mut added);
                 let [least, most] = self.diagonal;
-                added.iter_mut().for_each(|d| *d = *lambda * d.clamp(least, most));
+                added.iter_mut().for_each(|d| *d = *lambda * d.max(least).min(most));
                 let factorized = session.problem.factorize(Some(&added));
                 if factorized.is_ok() {
                     session.problem.newton_step(&mut delta);
@@ -116,7 +117,7 @@ impl LevenbergMarquardt {
                     let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
                     session.record(&step, accepted);
                     if let (true, Tried::Lower { gain }) = (accepted, &tried) {
-                        let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(1.0 / self.decrease, 1.0);
+                        let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / self.decrease).min(1.0);
                         (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
                         match session.take(&step) {
                             // a step that damping has made small says nothing of the cost around

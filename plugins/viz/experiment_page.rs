@@ -27,7 +27,7 @@ pub fn experiment_page(
     let done = experiment.trials.len() - summary.open;
     page.paragraph(&format!("{done} of {} trials. {}", experiment.trials.len(), version()));
     page.heading("Summary");
-    page.table(&summary_header(summary), &summary_rows(summary));
+    page.table(&summary.header(), &summary.rows().collect::<Vec<_>>());
     page.paragraph(
         "Means over trials; in brackets the difference from the baseline over pairs of trials, with the bootstrap's 95 % \
          interval, as a share of the baseline's mean.",
@@ -53,23 +53,6 @@ pub fn experiment_page(
 
 fn short(x: f64) -> String {
     if x.fract() == 0.0 && x.abs() < 1e9 { x.to_string() } else { format!("{x:.5}") }
-}
-
-fn summary_header(summary: &Summary) -> Vec<String> {
-    let counts = ["trials", "failed", "not converged"].map(str::to_owned);
-    summary.columns.iter().cloned().chain(counts).chain(summary.metrics.clone()).collect()
-}
-
-fn summary_rows(summary: &Summary) -> Vec<Vec<String>> {
-    let row = |group: &manifactor_slam::experiment::Group| {
-        let metric = |metric: &String| {
-            let mean = group.means.get(metric).map_or("-".to_owned(), |mean| format!("{:.5}", mean.mean));
-            group.comparisons.get(metric).map_or(mean.clone(), |c| format!("{mean} ({c})"))
-        };
-        let counts = [group.trials, group.failed, group.not_converged].map(|n| n.to_string());
-        group.labels.iter().cloned().chain(counts).chain(summary.metrics.iter().map(metric)).collect()
-    };
-    summary.groups.iter().map(row).collect()
 }
 
 /// Values of a metric, group by group of the summary.

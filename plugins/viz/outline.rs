@@ -1,6 +1,6 @@
 //! Outlines of ellipsoids, seen from far away.
 use crate::view::Plane;
-use nalgebra::{Matrix2x3, Matrix3, Point2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Vector3};
 
 /// An ellipsoid: what objects are drawn as.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,28 +17,30 @@ const CORNERS: usize = 64;
 impl Shape {
     /// The closed outline, its first point repeated at the end. None, where there is nothing finite to draw.
     pub(crate) fn outline(&self, plane: &Plane) -> Option<Vec<Point2<f64>>> {
-        let mut outline = ellipse(plane, &self.centroid, &self.axes);
-        outline.extend(outline.first().copied());
-        outline.iter().all(|p| p.iter().all(|x| x.is_finite())).then_some(outline)
+        shadow(plane, &self.centroid, &self.axes)
     }
 }
 
-/// The shadow of an ellipsoid: with a_k the projected semi-axes and S = Σ a_k a_kᵀ, the points
-/// c + L (cos φ, sin φ) with L Lᵀ = S.
-fn ellipse(plane: &Plane, centroid: &Vector3<f64>, axes: &Matrix3<f64>) -> Vec<Point2<f64>> {
+/// The shadow of an ellipsoid: the ellipse of Σ = Σ a_k a_kᵀ, a_k the projected semi-axes.
+fn shadow(plane: &Plane, centroid: &Vector3<f64>, axes: &Matrix3<f64>) -> Option<Vec<Point2<f64>>> {
     let projected = axes.column_iter().map(|a| plane.project(&a.into_owned()).coords);
     let projected = Matrix2x3::from_columns(&projected.collect::<Vec<_>>());
-    let s = projected * projected.transpose();
+    ellipse(&plane.project(centroid), &(projected * projected.transpose()))
+}
+
+/// The closed polygon of an ellipse: centre + L (cos φ, sin φ) with L Lᵀ = Σ, its first point repeated at the end. None,
+/// where there is nothing finite to draw.
+pub(crate) fn ellipse(centre: &Point2<f64>, shape: &Matrix2<f64>) -> Option<Vec<Point2<f64>>> {
     // Cholesky by hand: it has to take flat ones too
-    let a = s.m11.sqrt();
-    let b = if a > 0.0 { s.m21 / a } else { 0.0 };
-    let c = (s.m22 - b * b).max(0.0).sqrt();
-    let center = plane.project(centroid);
+    let a = shape.m11.sqrt();
+    let b = if a > 0.0 { shape.m21 / a } else { 0.0 };
+    let c = (shape.m22 - b * b).max(0.0).sqrt();
     let point = |k: usize| {
-        let (sin, cos) = (std::f64::consts::TAU * k as f64 / CORNERS as f64).sin_cos();
-        Point2::new(center.x + a * cos, center.y + b * cos + c * sin)
+        let (sin, cos) = (std::f64::consts::TAU * (k % CORNERS) as f64 / CORNERS as f64).sin_cos();
+        Point2::new(centre.x + a * cos, centre.y + b * cos + c * sin)
     };
-    (0..CORNERS).map(point).collect()
+    let is_finite = |p: &Point2<f64>| p.iter().all(|x| x.is_finite());
+    (0..=CORNERS).map(point).map(|p| is_finite(&p).then_some(p)).collect()
 }
 
 #[cfg(test)]

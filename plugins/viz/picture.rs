@@ -1,9 +1,12 @@
 //! A picture, before it is a file.
 use kuva::backend::raster::RasterBackend;
 use kuva::backend::svg::SvgBackend;
+use kuva::plot::legend::{LegendEntry, LegendShape};
+use kuva::plot::{LinePlot, LineStyle};
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
 use kuva::render::render::{Scene, render_multiple};
+use nalgebra::Point2;
 
 /// A drawing, as SVG or PNG.
 pub struct Picture {
@@ -48,6 +51,23 @@ impl Picture {
 /// Letters and digits as they are, all else a low line.
 fn file_name(name: &str) -> String {
     name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect()
+}
+
+/// Dashes of what is true or measured; what is estimated is solid.
+pub(crate) const DASHES: &str = "5 3";
+/// The colour of what has no class.
+pub(crate) const INK: &str = "#222222";
+
+/// A line through points.
+pub(crate) fn line(points: &[Point2<f64>], color: &str, width: f64, dashes: Option<&str>) -> Plot {
+    let style = dashes.map_or(LineStyle::Solid, |d| LineStyle::Custom(d.into()));
+    let data = points.iter().map(|p| (p.x, p.y));
+    LinePlot::new().with_data(data).with_color(color).with_stroke_width(width).with_line_style(style).into()
+}
+
+/// What a line or a patch stands for.
+pub(crate) fn entry(label: &str, color: &str, shape: LegendShape, dashes: Option<&str>) -> LegendEntry {
+    LegendEntry { label: plain(label), color: color.into(), shape, dasharray: dashes.map(Into::into) }
 }
 
 /// A dollar sign would begin a formula.

@@ -1,11 +1,10 @@
 //! The picture itself.
 use crate::color::classes;
 use crate::outline::Shape;
-use crate::picture::{Picture, plain};
+use crate::picture::{DASHES, INK, Picture, entry, line, plain};
 use crate::scene::{Scene, TrackKind};
 use crate::view::{Plane, View};
 use kuva::plot::legend::{LegendEntry, LegendShape};
-use kuva::plot::{LinePlot, LineStyle};
 use kuva::render::annotations::TextAnnotation;
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
@@ -17,8 +16,6 @@ const WIDTH: f64 = 900.0;
 const HEIGHT: f64 = 800.0;
 /// What axes, legend and title take, in pixels: about that much.
 const MARGINS: (f64, f64) = (190.0, 110.0);
-const TRUTH: &str = "#222222";
-const DASHES: &str = "5 3";
 
 /// A class, and the outline of an object of it.
 type Outline<'a> = (&'a str, Vec<Point2<f64>>);
@@ -48,8 +45,7 @@ pub fn plot(scene: &Scene, view: View) -> Picture {
     }
 
     let classes = classes(scene.objects.iter().map(|o| o.class.as_str()));
-    let color =
-        |class: &str| classes.iter().find(|(name, _)| *name == class).map_or(TRUTH, |(_, color)| color);
+    let color = |class: &str| classes.iter().find(|(name, _)| *name == class).map_or(INK, |(_, color)| color);
     let outlines = |of: fn(&crate::Object) -> &Option<Shape>| -> Vec<Outline<'_>> {
         let outline = |o| of(o).as_ref().and_then(|shape: &Shape| shape.outline(&plane));
         scene.objects.iter().filter_map(|o| Some((o.class.as_str(), outline(o)?))).collect()
@@ -69,10 +65,10 @@ pub fn plot(scene: &Scene, view: View) -> Picture {
 
     let mut kinds = Vec::new();
     if !truths.is_empty() {
-        kinds.push(entry("true", TRUTH, LegendShape::Line, Some(DASHES)));
+        kinds.push(entry("true", INK, LegendShape::Line, Some(DASHES)));
     }
     if !estimates.is_empty() {
-        kinds.push(entry("estimated", TRUTH, LegendShape::Line, None));
+        kinds.push(entry("estimated", INK, LegendShape::Line, None));
     }
     kinds.extend(classes.iter().map(|(name, color)| entry(name, color, LegendShape::Rect, None)));
     let entries = tracks.len() + kinds.len();
@@ -128,20 +124,10 @@ fn layout(
 
 fn style(kind: TrackKind) -> (&'static str, f64, Option<&'static str>) {
     match kind {
-        TrackKind::Truth => (TRUTH, 1.4, Some(DASHES)),
+        TrackKind::Truth => (INK, 1.4, Some(DASHES)),
         TrackKind::Odometry => ("#ee7733", 1.2, None),
         TrackKind::Estimate => ("#0077bb", 1.6, None),
     }
-}
-
-fn line(points: &[Point2<f64>], color: &str, width: f64, dashes: Option<&str>) -> Plot {
-    let style = dashes.map_or(LineStyle::Solid, |d| LineStyle::Custom(d.into()));
-    let data = points.iter().map(|p| (p.x, p.y));
-    LinePlot::new().with_data(data).with_color(color).with_stroke_width(width).with_line_style(style).into()
-}
-
-fn entry(label: &str, color: &str, shape: LegendShape, dashes: Option<&str>) -> LegendEntry {
-    LegendEntry { label: plain(label), color: color.into(), shape, dasharray: dashes.map(Into::into) }
 }
 
 /// The part of the plane that is shown.

@@ -179,6 +179,9 @@ fn graphs_that_cannot_be_solved() {
         ),
         solver("no iterations", "{ type = \"gauss_newton\", stop = { max_iterations = 0 } }"),
         solver("negative damping", "{ type = \"levenberg_marquardt\", initial_lambda = -1.0 }"),
+        solver("damping that does not fall", "{ type = \"levenberg_marquardt\", decrease = 0.5 }"),
+        solver("diagonal upside down", "{ type = \"levenberg_marquardt\", diagonal = [2.0, 1.0] }"),
+        solver("diagonal not a number", "{ type = \"levenberg_marquardt\", diagonal = [nan, 1.0] }"),
         solver("damping not a number", "{ type = \"levenberg_marquardt\", initial_lambda = nan }"),
         solver(
             "ordering of what is not there",
