@@ -4,7 +4,8 @@ use crate::commands::{
 };
 use crate::failure::Failure;
 use crate::status::Status;
-use clap::{Parser, Subcommand};
+use crate::watch;
+use clap::{ArgAction, Parser, Subcommand};
 use manifactor::graph::catalogue::{all, check_names};
 
 /// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
@@ -19,6 +20,9 @@ pub struct Cli {
     /// Threads to compute with; all processors by default. Results are the same for any number.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Say more on stderr: each step (-v), then all that is read, compiled and written (-vv).
+    #[arg(long, short, global = true, action = ArgAction::Count)]
+    verbose: u8,
 }
 
 #[derive(Debug, Subcommand)]
@@ -43,15 +47,16 @@ impl Cli {
     /// # Errors
     /// Whatever keeps the command from doing it.
     pub fn run(&self) -> Result<Status, Failure> {
+        watch::log(self.verbose);
         if let Some(threads) = self.threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
             pool.build_global().map_err(Failure::input)?;
         }
         check_names(&all()).map_err(Failure::input)?;
         match &self.command {
-            Command::Run(command) => command.run(),
+            Command::Run(command) => command.run(self.verbose),
             Command::Experiment(command) => command.run(),
-            Command::Solve(command) => command.run(),
+            Command::Solve(command) => command.run(self.verbose),
             Command::Check(command) => command.run(),
             Command::CheckFactor(command) => command.run(),
             Command::List(command) => command.run(),

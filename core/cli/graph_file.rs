@@ -5,6 +5,7 @@ use crate::text::{count, list};
 use clap::{Args, ValueEnum};
 use manifactor::config::{Document, Errors, Format, read_graph_section, write_graph};
 use manifactor::formats::pose_graph::{self, Options, Repair, Report};
+use manifactor::formats::whole::{can_write, write_whole};
 use manifactor::formats::{FormatError, bal, g2o};
 use manifactor::graph::{Graph, Key, Values};
 use manifactor::solve::{Optimizer, Start};
@@ -98,8 +99,7 @@ type Noted = (Graph, Values, Vec<String>);
 
 /// `.bal`; or a text that begins like one, as such files are often called `.txt`.
 fn is_bal(path: &Path) -> bool {
-    let named = |extension| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    named("bal") || (named("txt") && std::fs::read_to_string(path).is_ok_and(|text| bal::begins(&text)))
+    is_named(path, "bal") || (is_named(path, "txt") && std::fs::read_to_string(path).is_ok_and(|text| bal::begins(&text)))
 }
 
 fn keys(keys: &[Key]) -> String {
@@ -156,25 +156,40 @@ fn notes(report: &Report) -> Vec<String> {
     notes
 }
 
+/// Whether a graph can be written here: asked before it is solved.
+pub(crate) fn check_place(path: &Path) -> Result<(), Failure> {
+    if Format::of_path(path).is_none() && !is_named(path, "g2o") && !is_named(path, "bal") {
+        return Err(no_format(path));
+    }
+    can_write(path).map_err(Failure::at(path))
+}
+
+fn is_named(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
+fn no_format(path: &Path) -> Failure {
+    Failure::with_help(
+        format!("{}: the extension names no format that graphs are written in", path.display()),
+        "use .toml, .json, .yaml, .g2o or .bal",
+    )
+}
+
 /// Writes a graph with these values; returns what the format has no word for.
 pub(crate) fn write(path: &Path, graph: &Graph, values: &Values) -> Result<Vec<String>, Failure> {
-    let named = |extension| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
     match Format::of_path(path) {
         Some(format) => {
             let text = write_graph(graph, values, format).map_err(Failure::input)?;
-            std::fs::write(path, text).map_err(Failure::at(path))?;
+            write_whole(path, text.as_bytes()).map_err(Failure::at(path))?;
             Ok(Vec::new())
         }
-        None if named("g2o") => {
+        None if is_named(path, "g2o") => {
             Ok(omitted(&g2o::write(path, graph, values).map_err(|e: FormatError| Failure::from(e))?))
         }
-        None if named("bal") => {
+        None if is_named(path, "bal") => {
             Ok(omitted_from_bal(&bal::write(path, graph, values).map_err(Failure::from)?))
         }
-        None => Err(Failure::with_help(
-            format!("{}: the extension names no format that graphs are written in", path.display()),
-            "use .toml, .json, .yaml, .g2o or .bal",
-        )),
+        None => Err(no_format(path)),
     }
 }
 

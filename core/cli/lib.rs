@@ -41,6 +41,7 @@ use std::process::ExitCode;
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     match cli.run() {
+        Ok(_) if output::is_lost() => Failure::files(),
         Ok(status) => status.into(),
         Err(failure) => {
             failure.show(cli.json());

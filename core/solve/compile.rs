@@ -116,6 +116,15 @@ pub(crate) fn compile(
     let factor_types = graph.factors().iter().map(|f| (f.factor.typetag_name(), observed_rows(f))).collect();
     let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };
     let trial = columns.clone();
+    let (factors, entries) = (graph.factors().len(), layout.row_idx.len());
+    tracing::debug!(
+        variables = variables.len(),
+        factors,
+        unknowns,
+        entries,
+        seconds = times.compile,
+        "compiled"
+    );
     Ok(Problem {
         variables,
         factor_variables,

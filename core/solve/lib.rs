@@ -71,7 +71,11 @@ pub fn solve(
     optimizer: &dyn Optimizer,
     observer: &mut dyn Observer,
 ) -> Result<Solution, CompileError> {
-    optimizer.solve_graph(graph, values, observer)
+    let solution = optimizer.solve_graph(graph, values, observer)?;
+    let Outcome { termination, iterations, initial_cost, final_cost, times, .. } = &solution.outcome;
+    let (solver, seconds) = (optimizer.typetag_name(), times.total);
+    tracing::info!(solver, iterations, initial_cost, final_cost, seconds, "{termination}");
+    Ok(solution)
 }
 
 impl Solution {

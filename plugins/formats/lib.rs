@@ -14,5 +14,6 @@ pub mod table;
 pub mod timestamps;
 mod toro;
 pub mod tum;
+pub mod whole;
 
 pub use error::{FormatError, Malformed, Mistake, Problem};

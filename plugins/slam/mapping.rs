@@ -100,6 +100,8 @@ impl Mapping {
             mapping.objects.push(object);
         }
         mapping.warn(settings);
+        let (poses, objects, factors) = (poses.len(), mapping.mapped().count(), mapping.graph.factors().len());
+        tracing::info!(poses, objects, factors, "mapped");
         Ok(mapping)
     }
 
@@ -137,7 +139,10 @@ impl Mapping {
         let key = object_key(measured.id);
         let (start, rejected) = match rejection::start(measured, poses, sequence, &settings.objects) {
             Ok(start) => (Some(start), None),
-            Err(rejection) => (None, Some(rejection)),
+            Err(rejection) => {
+                tracing::info!(object = %measured.id, "not mapped: {rejection}");
+                (None, Some(rejection))
+            }
         };
         let mut semantic_factors = vec![];
         if let Some(start) = start {

@@ -9,6 +9,7 @@
 //! ```
 //! The class `"*"` stands for all. `semantics = "table_one"` stands for the rules of the paper's Table I.
 use crate::class::Aliases;
+use crate::settings::check_rows;
 use manifactor_config::Section;
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Direction, FactorEntry, Key, Noise};
@@ -88,6 +89,9 @@ fn read_rule(mut section: Section<'_>) -> Option<Rule> {
     let classes = section.required::<Vec<String>>("classes");
     let factor = section.take_required("factor").and_then(|node| RuleFactor::read(node, section.errors()));
     let noise = section.or_default::<Noise>("noise");
+    if let Some(rows) = factor.as_ref().and_then(RuleFactor::rows) {
+        check_rows(&section, Some(&noise), rows);
+    }
     let loss = section.optional_registered::<dyn Loss>("loss").map(Arc::from);
     section.finish();
     Some(Rule { classes: classes?, factor: factor?, noise, loss, shipped: false })

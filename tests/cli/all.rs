@@ -1,16 +1,20 @@
 //! The command line, end to end: the binary, its files and its exit codes.
 #![allow(missing_docs, clippy::unwrap_used)]
 mod check_factor;
+mod disk;
 mod documents;
 mod evaluate;
 mod experiment;
 mod graph;
 mod interrupt;
+mod killed;
+mod log;
 mod mistakes;
 mod names;
 mod new;
 mod reports;
 mod run;
+mod repeated;
 mod schema;
 mod solve;
 

@@ -30,7 +30,7 @@ metrics = ["position", "shape"]
 resamples = 200
 "#;
 
-fn tables(out: &str) -> Vec<Vec<u8>> {
+pub(crate) fn tables(out: &str) -> Vec<Vec<u8>> {
     let files = ["trials.csv", "trials.parquet", "summary.csv", "summary.md", "summary.json"];
     files.map(|file| std::fs::read(Path::new(out).join(file)).unwrap()).into()
 }

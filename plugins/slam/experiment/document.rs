@@ -1,7 +1,7 @@
 //! The document that describes an experiment.
 use super::axis::{Axis, Choice};
 use super::{SummarySettings, Trial};
-use crate::run_document::{Declared, common};
+use crate::run_document::{Declared, common, folder};
 use crate::settings::Settings;
 use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Node, Problem, Section, merge};
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ impl Experiment {
             let summary = section.or_default::<SummarySettings>("summary");
             section.finish();
             let base = base?;
-            let folder = Path::new(base.source().name()).parent().unwrap_or(Path::new("")).to_owned();
+            let folder = folder(&base, &errors);
             let variants = Declared::all(&base, &errors);
             let has_variants = |axis: &Axis| axis.columns.iter().any(|column| column == VARIANT);
             if !variants.is_empty() && !axes.iter().any(has_variants) {

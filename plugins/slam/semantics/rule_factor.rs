@@ -19,6 +19,9 @@ pub struct RuleFactor {
     /// Whether it has a field `up` that the config leaves open.
     #[serde(skip)]
     wants_up: bool,
+    /// Of its residual, where they are known by its type.
+    #[serde(skip)]
+    rows: Option<usize>,
 }
 
 /// Why a rule's factor could not be made.
@@ -62,7 +65,10 @@ impl RuleFactor {
             _ => String::new(),
         };
         let factor = node.read_registered::<dyn Factor>(errors)?;
-        let variables = factor.erased().signature().variables;
+        let (variables, rows) = {
+            let signature = factor.erased().signature();
+            (signature.variables, signature.rows)
+        };
         if variables != [TypeId::of::<DualQuadric>()] {
             let names: Vec<_> = variables.iter().map(|id| manifold_name(*id)).collect();
             let message = format!("`{name}` connects {}", names.join(" and "));
@@ -75,12 +81,17 @@ impl RuleFactor {
         // a factor that uses up writes the one that it has
         let written = serde_json::to_value(&factor).ok()?;
         let has_up = written.get(UP).is_some();
-        Some(Self { name, wants_up: has_up && !fields.contains_key(UP), fields })
+        Some(Self { name, wants_up: has_up && !fields.contains_key(UP), rows, fields })
     }
 
     /// Its type.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Rows of its residual, where they are known.
+    pub fn rows(&self) -> Option<usize> {
+        self.rows
     }
 
     /// Whether it waits for gravity.
