@@ -7,6 +7,7 @@ use crate::status::Status;
 use crate::watch;
 use clap::{ArgAction, Parser, Subcommand};
 use manifactor::graph::catalogue::{all, check_names};
+use manifactor::solve::memory_limit;
 
 /// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 ///
@@ -52,6 +53,7 @@ impl Cli {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
             pool.build_global().map_err(Failure::input)?;
         }
+        check_limit()?;
         check_names(&all()).map_err(Failure::input)?;
         match &self.command {
             Command::Run(command) => command.run(self.verbose),
@@ -84,6 +86,20 @@ impl Cli {
             Command::New(_) | Command::Simulate(_) => false,
             Command::Schema(_) => true,
         }
+    }
+}
+
+/// Refuses to begin where not even the program itself is sure to have room.
+fn check_limit() -> Result<(), Failure> {
+    const MIB: u64 = 1 << 20;
+    /// For code, stacks and the buffers of two threads.
+    const LEAST: u64 = 256 * MIB;
+    match memory_limit() {
+        Some(limit) if limit < LEAST => Err(Failure::with_help(
+            format!("the limit of memory is {} MiB, and the program alone takes {}", limit / MIB, LEAST / MIB),
+            "allow more (ulimit -v)",
+        )),
+        _ => Ok(()),
     }
 }
 

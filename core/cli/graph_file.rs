@@ -8,7 +8,7 @@ use manifactor::formats::pose_graph::{self, Options, Repair, Report};
 use manifactor::formats::whole::{can_write, write_whole};
 use manifactor::formats::{FormatError, bal, g2o};
 use manifactor::graph::{Graph, Key, Values};
-use manifactor::solve::{Optimizer, Start};
+use manifactor::solve::{Optimizer, Start, available_memory, memory_limit};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -46,6 +46,7 @@ pub(crate) struct GraphFile {
 impl Reading {
     /// Reads a graph, and the solver and start that file and command line ask for.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
+        check_memory(path)?;
         if Format::of_path(path).is_some() { literal(path, solver) } else { self.plain(path, solver) }
     }
 
@@ -154,6 +155,29 @@ fn notes(report: &Report) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// Refuses a file that is too large to be read, before it is.
+fn check_memory(path: &Path) -> Result<(), Failure> {
+    /// Bytes of a graph for each byte of its text: at least.
+    const GROWTH: u64 = 8;
+    // what cannot be read is told by who reads it
+    let needed = std::fs::metadata(path).map_or(0, |file| file.len()).saturating_mul(GROWTH);
+    // what is read in no time is not worth asking the system
+    const SMALL: u64 = 64 << 20;
+    if needed < SMALL && memory_limit().is_none() {
+        return Ok(());
+    }
+    let available = available_memory();
+    if needed <= available {
+        return Ok(());
+    }
+    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+    let (needed, available) = (gib(needed), gib(available));
+    Err(Failure::with_help(
+        format!("{}: no memory for it: a graph of this size takes at least {needed:.2} GiB, and there are {available:.2}", path.display()),
+        "allow more (ulimit -v), or solve it in parts",
+    ))
 }
 
 /// Whether a graph can be written here: asked before it is solved.

@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+#[allow(clippy::indexing_slicing, reason = "by places that it has made itself")]
 pub(crate) mod anchor;
 mod build;
 mod information;

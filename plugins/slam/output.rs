@@ -5,7 +5,7 @@
 //! `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all.
 use crate::estimate::Estimate;
 use crate::report::{RunReport, VariantReport};
-use crate::run_document::{RunDocument, Variant, slug};
+use crate::run_document::{RunDocument, Variant, absolute, slug};
 use manifactor_config::{Format, WriteError, to_json, to_toml, write_graph};
 use manifactor_formats::table::TableError;
 use manifactor_formats::tum;
@@ -130,8 +130,7 @@ fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> 
         name: &'a str,
     }
     let output = variant_folder(&run.output, &variant.name);
-    // where nobody knows the current folder, the path is as good as it gets
-    let folder = std::env::current_dir().map_or_else(|_| run.folder.clone(), |at| at.join(&run.folder).components().collect());
+    let folder = absolute(&run.folder);
     let variants = [Named { name: &variant.name }];
     let title = &run.title;
     to_toml(&Resolved { title, output: &output, folder: &folder, settings: &variant.settings, variants })

@@ -124,6 +124,11 @@ pub(crate) fn folder(document: &Document, errors: &Errors) -> PathBuf {
     named.map_or_else(|| beside.to_owned(), |named| beside.join(named))
 }
 
+/// The same folder, wherever a program is run; as it stands, where nobody knows the current one.
+pub(crate) fn absolute(folder: &Path) -> PathBuf {
+    std::env::current_dir().map_or_else(|_| folder.to_owned(), |at| at.join(folder).components().collect())
+}
+
 /// The document without what is no setting.
 pub(crate) fn common(root: &Node) -> Node {
     let mut base = root.clone();

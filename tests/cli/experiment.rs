@@ -86,6 +86,19 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
 }
 
 #[test]
+fn a_sweep_is_repeated_from_its_folder_alone() {
+    let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
+    let (first, again) = (path(&folder, "first"), path(&folder, "again"));
+    let set = "--set set.source.scene.objects=2 --set summary.resamples=100";
+    manifactor(&format!("experiment {} --out {first} {set}", path(&folder, "sweep.toml"))).ended(0);
+    std::fs::remove_file(folder.path().join("base.toml")).unwrap();
+    manifactor(&format!("experiment {first}/repeat/experiment.toml --out {again}")).ended(0);
+    assert!(tables(&first) == tables(&again));
+    let text = |out: &str| std::fs::read_to_string(format!("{out}/repeat/experiment.toml")).unwrap();
+    assert_eq!(text(&first), text(&again));
+}
+
+#[test]
 fn a_failed_trial_is_a_row_with_its_reason() {
     let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
     let out = path(&folder, "out");
