@@ -80,7 +80,11 @@ fn steps_take_no_more_than_the_first() {
     let outcome = &solution.outcome;
     assert!(outcome.final_cost < 0.5 * outcome.initial_cost, "{outcome:?}");
     let (first, last) = (steps[0], steps[steps.len() - 1]);
-    eprintln!("{} poses, {} steps: {first} bytes at the first, {last} at the last", values.len(), steps.len());
+    eprintln!(
+        "{} poses, {} steps: {first} bytes at the first, {last} at the last",
+        values.len(),
+        steps.len()
+    );
     assert!(steps.len() >= 3 && last - first < 10_000, "{steps:?}");
     drop(solution);
     let left = held(&region) - before;

@@ -96,7 +96,11 @@ fn check_limit() -> Result<(), Failure> {
     const LEAST: u64 = 256 * MIB;
     match memory_limit() {
         Some(limit) if limit < LEAST => Err(Failure::with_help(
-            format!("the limit of memory is {} MiB, and the program alone takes {}", limit / MIB, LEAST / MIB),
+            format!(
+                "the limit of memory is {} MiB, and the program alone takes {}",
+                limit / MIB,
+                LEAST / MIB
+            ),
             "allow more (ulimit -v)",
         )),
         _ => Ok(()),

@@ -100,7 +100,8 @@ type Noted = (Graph, Values, Vec<String>);
 
 /// `.bal`; or a text that begins like one, as such files are often called `.txt`.
 fn is_bal(path: &Path) -> bool {
-    is_named(path, "bal") || (is_named(path, "txt") && std::fs::read_to_string(path).is_ok_and(|text| bal::begins(&text)))
+    is_named(path, "bal")
+        || (is_named(path, "txt") && std::fs::read_to_string(path).is_ok_and(|text| bal::begins(&text)))
 }
 
 fn keys(keys: &[Key]) -> String {
@@ -175,7 +176,10 @@ fn check_memory(path: &Path) -> Result<(), Failure> {
     let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
     let (needed, available) = (gib(needed), gib(available));
     Err(Failure::with_help(
-        format!("{}: no memory for it: a graph of this size takes at least {needed:.2} GiB, and there are {available:.2}", path.display()),
+        format!(
+            "{}: no memory for it: a graph of this size takes at least {needed:.2} GiB, and there are {available:.2}",
+            path.display()
+        ),
         "allow more (ulimit -v), or solve it in parts",
     ))
 }

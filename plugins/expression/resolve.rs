@@ -53,7 +53,8 @@ impl Library {
         for (i, (found, span)) in arguments.iter().enumerate() {
             let taken: Vec<_> = left.iter().copied().filter(|f| argument(f, i) == Some(*found)).collect();
             if taken.is_empty() {
-                let mut expected: Vec<&str> = left.iter().filter_map(|f| Some(argument(f, i)?.name)).collect();
+                let mut expected: Vec<&str> =
+                    left.iter().filter_map(|f| Some(argument(f, i)?.name)).collect();
                 expected.dedup();
                 let message =
                     format!("`{name}` takes {} here, found {}", one_of(&expected), with_article(found.name));

@@ -100,7 +100,8 @@ impl Mapping {
             mapping.objects.push(object);
         }
         mapping.warn(settings);
-        let (poses, objects, factors) = (poses.len(), mapping.mapped().count(), mapping.graph.factors().len());
+        let (poses, objects, factors) =
+            (poses.len(), mapping.mapped().count(), mapping.graph.factors().len());
         tracing::info!(poses, objects, factors, "mapped");
         Ok(mapping)
     }

@@ -161,7 +161,10 @@ fn loss(section: &mut Section<'_>) -> Option<Arc<dyn Loss>> {
 
 impl OdometrySettings {
     fn take(parent: &mut Section<'_>) -> Option<Self> {
-        number::table(parent, "odometry", |section| Self { noise: noise(section, 0.01, POSE_ROWS), loss: loss(section) })
+        number::table(parent, "odometry", |section| Self {
+            noise: noise(section, 0.01, POSE_ROWS),
+            loss: loss(section),
+        })
     }
 }
 

@@ -12,9 +12,9 @@ mod log;
 mod mistakes;
 mod names;
 mod new;
+mod repeated;
 mod reports;
 mod run;
-mod repeated;
 mod schema;
 mod solve;
 

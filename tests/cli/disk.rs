@@ -151,7 +151,8 @@ fn a_folder_for_reading_only_is_told_before_the_solve() {
 #[test]
 fn a_place_under_a_file_is_told_before_the_solve() {
     let folder = folder(&[("run.toml", RUN), ("file", "")]);
-    let ran = after("true", &format!("run {} --out {}/out -vv", path(&folder, "run.toml"), path(&folder, "file")));
+    let ran =
+        after("true", &format!("run {} --out {}/out -vv", path(&folder, "run.toml"), path(&folder, "file")));
     refused(&ran, &["Not a directory"]);
     assert!(!String::from_utf8_lossy(&ran.stderr).contains("compiled"));
 }

@@ -90,7 +90,8 @@ fn a_signal_at_any_time_leaves_a_folder_that_says_it_is_partial() {
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
         let ended = child.wait_with_output().unwrap();
         assert_eq!(ended.status.code(), Some(130), "{}", String::from_utf8_lossy(&ended.stderr));
-        let report: Value = serde_json::from_slice(&std::fs::read(format!("{out}/report.json")).unwrap()).unwrap();
+        let report: Value =
+            serde_json::from_slice(&std::fs::read(format!("{out}/report.json")).unwrap()).unwrap();
         assert_eq!(report["complete"], false);
         assert_eq!(report["variants"].as_array().unwrap().len(), 1);
         assert_eq!(report["variants"][0]["solve"]["termination"]["status"], "interrupted");

@@ -76,7 +76,8 @@ fn sweeps_that_are_killed_at_any_moment_end_with_the_same_tables() {
         manifactor(&format!("experiment {config} --out {out} --threads 2")).ended(0);
         assert!(tables(&out) == expected, "after {sweeps} sweeps");
         let unfinished = std::fs::read_dir(Path::new(&out)).unwrap();
-        let unfinished = unfinished.filter(|f| f.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
+        let unfinished =
+            unfinished.filter(|f| f.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
         assert_eq!(unfinished.count(), 0, "half-written files are left");
         sweeps += 1;
     }

@@ -18,7 +18,10 @@ fn a_log_is_there_for_those_who_ask() {
     }
     // results are the same, and on standard output alone
     let quiet = manifactor(&format!("solve {graph}")).ended(0).stdout;
-    assert_eq!(manifactor(&format!("-vv solve {graph}")).ended(0).stdout.lines().next(), quiet.lines().next());
+    assert_eq!(
+        manifactor(&format!("-vv solve {graph}")).ended(0).stdout.lines().next(),
+        quiet.lines().next()
+    );
 }
 
 #[test]

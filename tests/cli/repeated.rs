@@ -69,7 +69,8 @@ fn forget_times(json: &mut Value) {
 fn same(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>, places: [&str; 2]) {
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
     for (name, text) in a {
-        let [text, other] = [(text, places[0]), (&b[name], places[1])].map(|(t, place)| t.replace(place, "OUT"));
+        let [text, other] =
+            [(text, places[0]), (&b[name], places[1])].map(|(t, place)| t.replace(place, "OUT"));
         let line = text.lines().zip(other.lines()).find(|(a, b)| a != b);
         assert!(text == other, "{name} differs: {line:?}");
     }
@@ -80,10 +81,7 @@ fn a_run_leaves_the_same_bytes_on_any_number_of_threads() {
     let folder = folder(&[("run.toml", RUN), ("rules.toml", RULES)]);
     let out = [1, 2, 4].map(|threads| {
         let out = path(&folder, &format!("on{threads}"));
-        let ran = manifactor(&format!(
-            "run {} --out {out} --threads {threads}",
-            path(&folder, "run.toml")
-        ));
+        let ran = manifactor(&format!("run {} --out {out} --threads {threads}", path(&folder, "run.toml")));
         assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
         out
     });

@@ -101,7 +101,9 @@ pub fn run(data: &[u8]) {
         (simulation.trajectory.frames, simulation.scene.objects) = (6, 2);
         Arc::new(simulation.simulate().unwrap_or_else(|e| panic!("{e}")))
     });
-    let Ok(document) = Document::parse("run.toml", String::from_utf8_lossy(data), Format::Toml) else { return };
+    let Ok(document) = Document::parse("run.toml", String::from_utf8_lossy(data), Format::Toml) else {
+        return;
+    };
     let Ok(run) = RunDocument::read(&document) else { return };
     for variant in run.variants.into_iter().take(2) {
         let mut settings = variant.settings;
@@ -109,7 +111,9 @@ pub fn run(data: &[u8]) {
         if let Some(variance) = &mut settings.variance_components {
             variance.rounds = variance.rounds.min(2);
         }
-        let Ok((found, report)) = estimate("fuzzed", SEQUENCE.clone(), &settings, &mut third()) else { continue };
+        let Ok((found, report)) = estimate("fuzzed", SEQUENCE.clone(), &settings, &mut third()) else {
+            continue;
+        };
         for (key, value) in found.solution.values.iter() {
             assert!(value.erased().is_finite(), "{key} is not finite: {:?}", report.solve.termination);
         }
