@@ -1,10 +1,11 @@
 //! The fields of a registered type, out of its JSON Schema.
+use manifactor::graph::catalogue;
 use serde_json::Value;
 
 /// A field, in words.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Field {
-    /// Its name; `stop.step` within another.
+    /// Its name; `stop.step` within another, `variables[].key` within the items of a list.
     pub name: String,
     pub kind: String,
     pub default: Option<String>,
@@ -32,14 +33,40 @@ fn collect(root: &Value, schema: &Value, prefix: &str, out: &mut Vec<Field>) {
         let docs = property.get("description").or_else(|| target.get("description"));
         let docs = docs.and_then(Value::as_str).unwrap_or_default();
         let docs = docs.split("\n\n").next().unwrap_or_default().replace('\n', " ");
-        let nested = target.get("properties").is_some() && prefix.matches('.').count() < 3;
+        let within = within(root, property).filter(|_| prefix.matches('.').count() < 3);
+        let nested = within.is_some();
         let default = property.get("default").filter(|_| !nested).map(value);
         let kind = kind(root, property);
         out.push(Field { name: path.clone(), kind, default, required: required(name), docs });
-        if nested {
-            collect(root, target, &format!("{path}."), out);
+        if let Some((table, item)) = within {
+            collect(root, table, &format!("{path}{item}."), out);
         }
     }
+}
+
+/// The table that a field is, or a list of, with what its fields' names have before them. What is described elsewhere has
+/// none: registered types, and noise.
+fn within<'a>(root: &'a Value, schema: &'a Value) -> Option<(&'a Value, &'static str)> {
+    if registered(schema).is_some() {
+        return None;
+    }
+    let schema = resolve(root, schema);
+    if schema.get("properties").is_some() {
+        return (!is_noise(schema)).then_some((schema, ""));
+    }
+    let alternatives = schema.get("anyOf").and_then(Value::as_array).into_iter().flatten();
+    let mut lists = std::iter::once(schema).chain(alternatives).filter_map(|list| list.get("items"));
+    lists.find_map(|items| Some((within(root, items)?.0, "[]")))
+}
+
+/// The kind of registered types that a schema refers to.
+fn registered(schema: &Value) -> Option<&'static str> {
+    let name = schema.get("$ref")?.as_str()?.strip_prefix("#/$defs/")?;
+    catalogue::all().iter().map(|entry| entry.kind).find(|kind| *kind == name)
+}
+
+fn is_noise(schema: &Value) -> bool {
+    schema.get("title").is_some_and(|title| title == "Noise")
 }
 
 /// A default as people write it: `1e15`, not a one and fifteen zeros.
@@ -58,7 +85,13 @@ fn resolve<'a>(root: &'a Value, schema: &'a Value) -> &'a Value {
 
 /// The type in words.
 fn kind(root: &Value, schema: &Value) -> String {
+    if let Some(kind) = registered(schema) {
+        return kind.to_owned();
+    }
     let schema = resolve(root, schema);
+    if is_noise(schema) {
+        return "noise".into();
+    }
     let list = |key| schema.get(key).and_then(Value::as_array);
     if let Some(values) = list("enum") {
         return values.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ");
@@ -119,5 +152,18 @@ mod tests {
         );
         assert_eq!(found[1].default.as_deref(), Some("0.1"));
         assert_eq!(found[0].docs, "When to stop.");
+    }
+
+    #[test]
+    fn fields_of_items_are_told_and_those_of_registered_types_are_elsewhere() {
+        let schema = json!({ "properties": { "rules": { "anyOf": [{ "type": "string" }, { "type": "array", "items": { "type": "object",
+            "properties": { "factor": { "$ref": "#/$defs/factor" }, "noise": { "title": "Noise", "properties": {} } }
+        } }] } } });
+        let found = fields(&schema);
+        let short: Vec<_> = found.iter().map(|f| (f.name.as_str(), f.kind.as_str())).collect();
+        assert_eq!(
+            short,
+            [("rules", "text or list of table"), ("rules[].factor", "factor"), ("rules[].noise", "noise")]
+        );
     }
 }

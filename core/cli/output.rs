@@ -1,7 +1,11 @@
-//! Standard output: results only; everything else goes to stderr.
+//! Standard output: results only; everything else goes to stderr. And pictures, which go to files.
+use crate::failure::Failure;
 use crate::text;
+use manifactor::slam::output::write_whole;
+use manifactor::viz::Picture;
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether results were lost on their way out.
@@ -35,4 +39,13 @@ pub(crate) fn json(value: &impl Serialize) {
         Ok(text) => print(&(text + "\n")),
         Err(error) => eprintln!("cannot write JSON: {error}"),
     }
+}
+
+/// Writes pictures into a folder, each as SVG and as PNG.
+pub(crate) fn pictures(folder: &Path, pictures: &[Picture]) -> Result<(), Failure> {
+    for picture in pictures {
+        write_whole(&folder.join(format!("{}.svg", picture.name)), picture.svg())?;
+        write_whole(&folder.join(format!("{}.png", picture.name)), picture.png().map_err(Failure::input)?)?;
+    }
+    Ok(())
 }

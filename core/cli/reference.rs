@@ -1,35 +1,78 @@
 //! The config reference: every document and every name that is linked, as Markdown.
+//!
+//! It begins with what there is, name by name, so that a reader finds the way from a document to a type and back.
 use crate::fields::{Field, fields};
 use manifactor::config::{Definitions, graph_root};
+use manifactor::graph::Noise;
 use manifactor::graph::catalogue::{self, Entry};
 use manifactor::graph::invariance::invariances_of;
-use manifactor::slam::schema::run_root;
+use manifactor::slam::schema::{experiment_root, rules_root, run_root};
 use serde_json::Value;
+use std::collections::HashMap;
 
 const HEAD: &str = "# Config reference
 Written by `manifactor list --markdown`; a test fails where it is not what is linked. `manifactor explain NAME` prints one of
 these entries, `manifactor schema` the JSON Schema of all of it.
 
-For completion and checks in an editor: `manifactor schema > manifactor.schema.json`, and as first line of a document
-`#:schema ./manifactor.schema.json` (taplo, and VS Code with Even Better TOML).
+For completion and checks in an editor, write the schema of a kind of document to a file, `manifactor schema run > run.schema.json`
+(or `graph`, `experiment`, `rules`; without a name, of all of them), and tell the editor of it:
+- TOML, by taplo or VS Code with Even Better TOML: `#:schema ./run.schema.json` as first line of the document;
+- YAML, by the language server of Red Hat: `# yaml-language-server: $schema=./run.schema.json` as first line;
+- JSON, by VS Code: an entry under `json.schemas` in its settings.
+
+`a.b` is the field `b` of the table `a`, `a[].b` that of each table in the list `a`.
 ";
+
+/// A kind of document, and the root of its schema.
+type Root = fn(&mut Definitions) -> Value;
 
 /// The whole page.
 pub(crate) fn markdown() -> String {
-    let mut out = HEAD.to_owned();
-    for (title, root) in
-        [("A literal graph", graph_root as fn(&mut Definitions) -> Value), ("A run", run_root)]
-    {
+    let roots: [(&str, Root); 4] = [
+        ("A literal graph", graph_root),
+        ("A run", run_root),
+        ("A file of semantic rules", rules_root),
+        ("An experiment", experiment_root),
+    ];
+    let mut out = HEAD.to_owned() + "\n## Contents\n";
+    for (title, _) in roots {
+        out += &format!("- [{title}](#{})\n", title.to_lowercase().replace(' ', "-"));
+    }
+    out += &format!("- [Noise](#noise)\n{}", contents());
+    for (title, root) in roots {
         let mut definitions = Definitions::new();
         let root = root(&mut definitions);
         out += &format!("\n## {title}\n");
         out += &table(&fields(&definitions.document(root)));
     }
+    let mut noise = Definitions::new();
+    let schema = noise.of::<Noise>();
+    let docs = schema.get("description").and_then(Value::as_str).unwrap_or_default().to_owned();
+    out += &format!("\n## Noise\n{docs}\n{}", table(&fields(&noise.document(schema))));
     for of_kind in catalogue::all().chunk_by(|a, b| a.kind == b.kind) {
-        out += &format!("\n## {}\n", of_kind.first().map_or("", |e| e.kind));
+        // not the kind alone, which a type of another kind may have for its name
+        out += &format!("\n## Every {}\n", of_kind.first().map_or("", |e| e.kind));
         for entry in of_kind {
             out += &format!("\n### `{}`\n{}\n", entry.name, section(entry));
         }
+    }
+    out
+}
+
+/// Each name with a link to where it is described. Names that several kinds have are numbered as they come, as in the anchors
+/// of GitHub and of mdBook.
+fn contents() -> String {
+    let mut met: HashMap<&str, usize> = HashMap::new();
+    let mut link = |name: &'static str| {
+        let before = *met.entry(name).and_modify(|n| *n += 1).or_insert(0);
+        if before == 0 { format!("[`{name}`](#{name})") } else { format!("[`{name}`](#{name}-{before})") }
+    };
+    let mut out = String::new();
+    for of_kind in catalogue::all().chunk_by(|a, b| a.kind == b.kind) {
+        let kind = of_kind.first().map_or("", |e| e.kind);
+        let heading = linked(kind);
+        let links: Vec<_> = of_kind.iter().map(|entry| link(entry.name)).collect();
+        out += &format!("- {heading}: {}\n", links.join(", "));
     }
     out
 }
@@ -70,8 +113,18 @@ fn table(fields: &[Field]) -> String {
             (None, true) => "required".into(),
             (None, false) => String::new(),
         };
-        format!("| `{}` | {} | {default} | {} |\n", field.name, cell(&field.kind), cell(&field.docs))
+        let kind = linked(&cell(&field.kind));
+        format!("| `{}` | {kind} | {default} | {} |\n", field.name, cell(&field.docs))
     };
     let rows: String = fields.iter().map(row).collect();
     format!("\n| field | type | default | what it is |\n| --- | --- | --- | --- |\n{rows}")
+}
+
+/// A kind of registered types, or noise, as a link to its section.
+fn linked(kind: &str) -> String {
+    match kind == "noise" || catalogue::all().iter().any(|entry| entry.kind == kind) {
+        true if kind == "noise" => "[noise](#noise)".into(),
+        true => format!("[{kind}](#every-{kind})"),
+        false => kind.to_owned(),
+    }
 }

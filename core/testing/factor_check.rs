@@ -117,7 +117,7 @@ impl FactorCheck {
     }
 
     fn gather(&self, subject: &Subject, drawn: &Drawn, examined: Examined, gathered: &mut Gathered) {
-        gathered.entry(subject, examined.worst);
+        gathered.entry(subject, examined.worst, drawn);
         let smooth = examined.kinks.is_empty() && !drawn.singular;
         for kink in &examined.kinks {
             gathered.kink(subject, kink, drawn);

@@ -23,6 +23,20 @@ pub struct FusedClass {
     pub score: f64,
     /// Its part of all scores, from 0 to 1.
     pub share: f64,
+    /// What else it may be: the other classes by their part of all scores, the largest first.
+    #[serde(skip_serializing_if = "IndexMap::is_empty")]
+    pub others: IndexMap<String, f64>,
+}
+
+/// Classes with a smaller part of all scores are not worth a word.
+const LEAST_SHARE: f64 = 0.01;
+
+impl FusedClass {
+    /// All classes that it may be, with their parts of all scores.
+    pub fn shares(&self) -> impl Iterator<Item = (&str, f64)> {
+        let others = self.others.iter().map(|(name, share)| (name.as_str(), *share));
+        std::iter::once((self.name.as_str(), self.share)).chain(others)
+    }
 }
 
 impl Fusion {
@@ -38,10 +52,15 @@ impl Fusion {
     pub fn best(&self) -> Option<FusedClass> {
         let best = self.sums.iter().reduce(|best, next| if next.1 > best.1 { next } else { best });
         let total: f64 = self.sums.values().sum();
-        best.map(|(name, sum)| FusedClass {
-            name: name.clone(),
-            score: sum / self.detections.max(1) as f64,
-            share: if total > 0.0 { sum / total } else { 0.0 },
+        let share = |sum: f64| if total > 0.0 { sum / total } else { 0.0 };
+        best.map(|(name, sum)| {
+            let others =
+                self.sums.iter().filter(|(other, sum)| *other != name && share(**sum) >= LEAST_SHARE);
+            let mut others: IndexMap<_, _> =
+                others.map(|(other, sum)| (other.clone(), share(*sum))).collect();
+            others.sort_by(|_, a, _, b| b.total_cmp(a));
+            let score = sum / self.detections.max(1) as f64;
+            FusedClass { name: name.clone(), score, share: share(*sum), others }
         })
     }
 }
@@ -65,6 +84,7 @@ mod tests {
         assert_eq!(class.name, "bottle");
         assert!((class.score - 0.3).abs() < 1e-15);
         assert!((class.share - 0.9 / 1.6).abs() < 1e-15);
+        assert!((class.others["cup"] - 0.7 / 1.6).abs() < 1e-15 && class.others.len() == 1);
     }
 
     #[test]

@@ -2,16 +2,16 @@
 //!
 //! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
 //! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
-//! its class says of it.
+//! semantic rules say of it; last, variables and factors of the document's own.
 use crate::fusion::FusedClass;
 use crate::gravity::{GravityError, MapFrame};
 use crate::measurements::{Measured, Measurements, View};
-use crate::semantics::{RuleError, unmatched};
+use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, unmatched};
 use crate::sequence::{ObjectId, Sequence};
 use crate::settings::{DetectionSettings, Settings};
 use manifactor_geometry::{Between, Prior, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_quadric::BoundingBoxFactor;
+use manifactor_quadric::{BoundingBoxFactor, DualQuadric};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -54,8 +54,11 @@ pub struct MappedObject {
     /// Why it is not mapped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<Rejection>,
-    /// Factors that its class brought it.
-    pub semantic_factors: Vec<String>,
+    /// Factors that semantic rules brought it, and why.
+    pub semantic_factors: Vec<Applied>,
+    /// Rules that are for its class and were not applied, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
 }
 
 /// Why a sequence could not be mapped.
@@ -95,10 +98,17 @@ impl Mapping {
         let (objects, warnings) = (vec![], vec![]);
         let mut mapping = Self { graph, values, frame, objects, measurements, warnings };
         let poses = mapping.add_poses(sequence, settings)?;
-        for measured in mapping.measurements.objects.clone() {
-            let object = mapping.add_object(&measured, &poses, sequence, settings)?;
+        let all = mapping.measurements.objects.clone();
+        let start = |measured: &Measured| rejection::start(measured, &poses, sequence, &settings.objects);
+        let starts: Vec<_> = all.iter().map(start).collect();
+        let mapped = all.iter().zip(&starts).filter_map(|(object, start)| candidate(object, start));
+        let up = mapping.frame.up;
+        let mut judge = Judge::new(&settings.semantics, &settings.aliases, up, mapped.collect());
+        for (measured, start) in all.iter().zip(starts) {
+            let object = mapping.add_object(measured, start, &mut judge, sequence, settings)?;
             mapping.objects.push(object);
         }
+        settings.own.add_to(&mut mapping.graph, &mut mapping.values);
         mapping.warn(settings);
         let (poses, objects, factors) =
             (poses.len(), mapping.mapped().count(), mapping.graph.factors().len());
@@ -133,30 +143,24 @@ impl Mapping {
     fn add_object(
         &mut self,
         measured: &Measured,
-        poses: &[Se3],
+        start: Result<DualQuadric, Rejection>,
+        judge: &mut Judge<'_>,
         sequence: &Sequence,
         settings: &Settings,
     ) -> Result<MappedObject, MappingError> {
         let key = object_key(measured.id);
-        let (start, rejected) = match rejection::start(measured, poses, sequence, &settings.objects) {
-            Ok(start) => (Some(start), None),
-            Err(rejection) => {
-                tracing::info!(object = %measured.id, "not mapped: {rejection}");
-                (None, Some(rejection))
-            }
-        };
-        let mut semantic_factors = vec![];
-        if let Some(start) = start {
+        if let Err(rejection) = &start {
+            tracing::info!(object = %measured.id, "not mapped: {rejection}");
+        }
+        let (mut semantic_factors, mut left_out) = (vec![], vec![]);
+        if let Some(candidate) = candidate(measured, &start) {
             let boxes = measured.views.iter();
             let boxes = boxes.map(|view| box_entry(view, key.clone(), sequence, &settings.detections));
-            let mut entries: Vec<FactorEntry> = boxes.collect();
-            let class = measured.class.as_ref().map(|class| class.name.as_str()).unwrap_or_default();
-            for rule in settings.semantics.iter().filter(|rule| rule.applies(class, &settings.aliases)) {
-                entries.push(rule.entry(key.clone(), self.frame.up)?);
-                semantic_factors.push(rule.factor.name().to_owned());
-            }
-            self.values.insert(key.clone(), start);
-            self.graph.factors_mut().extend(entries);
+            self.graph.factors_mut().extend(boxes);
+            let verdict = judge.judge(&candidate)?;
+            self.graph.factors_mut().extend(verdict.entries);
+            self.values.insert(key.clone(), candidate.start);
+            (semantic_factors, left_out) = (verdict.applied, verdict.left_out);
         }
         Ok(MappedObject {
             id: measured.id,
@@ -164,8 +168,9 @@ impl Mapping {
             class: measured.class.clone(),
             detections: measured.detections,
             boxes: measured.views.len(),
-            rejected,
+            rejected: start.err(),
             semantic_factors,
+            left_out,
         })
     }
 
@@ -184,6 +189,12 @@ impl Mapping {
             self.warnings.push(Warning::NoObjects { detected: self.objects.len() });
         }
     }
+}
+
+/// A measured object as rules look at it; `None`, where it is not mapped.
+fn candidate(measured: &Measured, start: &Result<DualQuadric, Rejection>) -> Option<Candidate> {
+    let start = *start.as_ref().ok()?;
+    Some(Candidate { key: object_key(measured.id), class: measured.class.clone(), start })
 }
 
 fn box_entry(view: &View, object: Key, sequence: &Sequence, settings: &DetectionSettings) -> FactorEntry {

@@ -5,6 +5,7 @@
 //! stays in the valley where it begins, and one object on an edge stops all others, since each step that crosses the
 //! edge raises the cost. One object alone is nine numbers: all its valleys can be tried.
 use crate::mapping::Mapping;
+use indexmap::IndexMap;
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::{Direction, FactorEntry, Graph, Key, Values};
 use manifactor_quadric::{DualQuadric, SHORTEST};
@@ -26,22 +27,16 @@ impl<'a> Refiner<'a> {
     /// Sorts the factors of a map by object.
     pub fn new(mapping: &'a Mapping) -> Self {
         let mapped = mapping.mapped().map(|object| (object.key.clone(), vec![]));
-        let mut objects: Vec<(Key, Vec<&FactorEntry>)> = mapped.collect();
-        let mut current = 0;
-        // a map has the factors of one object together
+        let mut objects: IndexMap<Key, Vec<&FactorEntry>> = mapped.collect();
         for entry in mapping.graph.factors() {
-            let of = |(key, _): &(Key, Vec<_>)| entry.keys.contains(key);
-            if !objects.get(current).is_some_and(of) {
-                match objects.iter().position(of) {
-                    Some(place) => current = place,
-                    None => continue,
+            // one between two objects is a factor of both
+            for key in &entry.keys {
+                if let Some(entries) = objects.get_mut(key) {
+                    entries.push(entry);
                 }
             }
-            if let Some((_, entries)) = objects.get_mut(current) {
-                entries.push(entry);
-            }
         }
-        Self { objects, upright: upright(mapping.frame.up) }
+        Self { objects: objects.into_iter().collect(), upright: upright(mapping.frame.up) }
     }
 
     /// Puts each object where it costs the least, as far as any of the starts leads there.

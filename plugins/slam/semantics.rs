@@ -1,4 +1,4 @@
-//! Which classes of objects get which factors.
+//! Which objects get which factors.
 //!
 //! ```toml
 //! [[semantics]]
@@ -6,19 +6,36 @@
 //! factor = { type = "vertical_orientation" }
 //! noise = { sigma = 0.1 }
 //! loss = { type = "cauchy", scale = 1.0 }
+//!
+//! [[semantics]]                       # by score, by size, and by what is near: the second object of the factor
+//! classes = ["keyboard"]
+//! min_score = 0.5
+//! max_size_m = 0.6
+//! near = { classes = ["tv monitor"], within_m = 0.5 }
+//! factor = { type = "beside" }
+//! noise = { sigma = 0.05 }
 //! ```
-//! The class `"*"` stands for all. `semantics = "table_one"` stands for the rules of the paper's Table I.
+//! The class `"*"` stands for all. `semantics = "table_one"` stands for the rules of the paper's Table I. All rules that are
+//! for an object apply to it.
 use crate::class::Aliases;
-use crate::settings::check_rows;
-use manifactor_config::Section;
+use crate::fusion::FusedClass;
+use manifactor_config::{Errors, Place, Problem, Section};
+use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Loss;
-use manifactor_graph::{Direction, FactorEntry, Key, Noise};
+use manifactor_graph::{Direction, Factor, FactorEntry, Key, Noise, Values};
+use manifactor_semantic::{Component, MaxMixture};
 use serde::Serialize;
 use std::sync::Arc;
 
+mod apply;
+mod condition;
 mod read;
 mod rule_factor;
+#[cfg(test)]
+mod tests;
 
+pub use apply::{Applied, Candidate, Judge, LeftOut, Verdict};
+pub use condition::{Conditions, Near};
 pub(crate) use read::read_semantics;
 pub use rule_factor::{RuleError, RuleFactor};
 
@@ -27,13 +44,27 @@ pub const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 
 /// Stands for all classes.
 const ANY: &str = "*";
+/// A class with a smaller share of an object's scores is no alternative.
+const LEAST_SHARE: f64 = 0.05;
+/// In a mixture, that nothing holds is as likely as a residual of so many σ.
+const DOUBT: f64 = 3.0;
 
 /// Objects of these classes get this factor.
 #[derive(Debug, Clone, Serialize)]
 pub struct Rule {
     /// Names of classes, as any detector spells them; `*` for all.
     pub classes: Vec<String>,
-    /// A factor of one object.
+    /// What else has to hold.
+    #[serde(flatten)]
+    pub conditions: Conditions,
+    /// Whether the factor holds only as likely as the object is of these classes; and then for objects that might be of
+    /// them, too.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub mixture: bool,
+    /// Variables of the document that the factor connects besides objects.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub with: Vec<Key>,
+    /// A factor of one object, or of several that are near each other.
     pub factor: RuleFactor,
     /// Its noise.
     #[serde(skip_serializing_if = "Noise::is_default")]
@@ -46,19 +77,57 @@ pub struct Rule {
     pub shipped: bool,
 }
 
+/// Whether a list of classes has this one, named as [`Aliases::canonical`] does.
+fn names(classes: &[String], class: &str, aliases: &Aliases) -> bool {
+    classes.iter().any(|name| name == ANY || aliases.canonical(name) == class)
+}
+
 impl Rule {
     /// Whether objects of a class, named as [`Aliases::canonical`] does, get this factor.
     pub fn applies(&self, class: &str, aliases: &Aliases) -> bool {
-        self.classes.iter().any(|name| name == ANY || aliases.canonical(name) == class)
+        names(&self.classes, class, aliases)
     }
 
-    /// The factor for an object; `up` fills the field of that name where the rule leaves it open.
+    /// How likely the factor holds for an object of that class: 1, or in a mixture the share of its scores that these
+    /// classes have. `None`, where the rule is not for it.
+    fn share(&self, class: Option<&FusedClass>, aliases: &Aliases) -> Option<f64> {
+        let best = class.map_or("", |class| class.name.as_str());
+        if !self.mixture || class.is_none() {
+            return self.applies(best, aliases).then_some(1.0);
+        }
+        let shares = class.into_iter().flat_map(FusedClass::shares);
+        let share: f64 = shares.filter(|(name, _)| self.applies(name, aliases)).map(|(_, share)| share).sum();
+        (share >= LEAST_SHARE).then_some(share.min(1.0))
+    }
+
+    fn class_in_words(&self, object: &Candidate, share: f64) -> String {
+        match object.class_name() {
+            name if self.mixture => format!("{:.0} % of its scores, most for {name}", 100.0 * share),
+            "" => "any class".into(),
+            name => name.to_owned(),
+        }
+    }
+
+    /// The factor between these variables; `up` fills the fields of that name that the rule leaves open. In a mixture, it
+    /// is the one or nothing, by `share`: w = p for the factor, (1 - p) exp(-3²/2) for nothing.
     ///
     /// # Errors
     /// Where the factor needs to know up, and nobody does.
-    pub fn entry(&self, key: Key, up: Option<Direction>) -> Result<FactorEntry, RuleError> {
-        let factor = Arc::from(self.factor.instantiate(up)?);
-        Ok(FactorEntry { keys: vec![key], factor, noise: self.noise.clone(), loss: self.loss.clone() })
+    pub fn entry(&self, keys: Vec<Key>, up: Option<Direction>, share: f64) -> Result<FactorEntry, RuleError> {
+        let factor: Arc<dyn Factor> = Arc::from(self.factor.instantiate(up)?);
+        let (noise, loss) = (self.noise.clone(), self.loss.clone());
+        let nothing = (1.0 - share) * (-0.5 * DOUBT * DOUBT).exp();
+        match (Positive::new(share), Positive::new(nothing)) {
+            (Ok(weight), Ok(nothing)) if self.mixture => {
+                let holds = Component { weight, factor: Some(factor), noise };
+                let nothing = Component { weight: nothing, factor: None, noise: Noise::default() };
+                let mixture = MaxMixture::new(vec![holds, nothing]);
+                let name = || self.factor.name().to_owned();
+                let mixture = mixture.map_err(|source| RuleError::Mixture { factor: name(), source })?;
+                Ok(FactorEntry { keys, factor: Arc::new(mixture), noise: Noise::default(), loss })
+            }
+            _ => Ok(FactorEntry { keys, factor, noise, loss }),
+        }
     }
 }
 
@@ -78,68 +147,49 @@ pub fn table_one() -> Result<Vec<Rule>, manifactor_config::Diagnostics> {
     read::shipped_rules("table_one", TABLE_ONE)
 }
 
-/// Classes that a rule names and the data do not have.
+/// Classes that a rule names and the data do not have, each once.
 pub fn unmatched<'a>(rule: &'a Rule, seen: &[String], aliases: &Aliases) -> Vec<&'a str> {
-    let classes = rule.classes.iter().map(String::as_str);
-    classes.filter(|name| *name != ANY && !seen.contains(&aliases.canonical(name))).collect()
+    let near = rule.conditions.near.iter().flat_map(|near| &near.classes);
+    let mut missing: Vec<&str> = vec![];
+    for name in rule.classes.iter().chain(near).map(String::as_str) {
+        if name != ANY && !seen.contains(&aliases.canonical(name)) && !missing.contains(&name) {
+            missing.push(name);
+        }
+    }
+    missing
 }
 
-/// One `[[semantics]]`.
-fn read_rule(mut section: Section<'_>) -> Option<Rule> {
+/// One `[[semantics]]`, over the document's own variables.
+fn read_rule(mut section: Section<'_>, own: &Values) -> Option<Rule> {
+    let errors = section.errors();
     let classes = section.required::<Vec<String>>("classes");
-    let factor = section.take_required("factor").and_then(|node| RuleFactor::read(node, section.errors()));
+    let conditions = Conditions::take(&mut section);
+    let mixture = section.or_default("mixture");
+    let with: Vec<(Place, Key)> = section
+        .nodes("with")
+        .into_iter()
+        .filter_map(|node| Some((node.place.clone(), Key::from(node.read::<String>(errors)?))))
+        .collect();
+    let factor = section.take_required("factor").and_then(|node| RuleFactor::read(node, errors));
     let noise = section.or_default::<Noise>("noise");
-    if let Some(rows) = factor.as_ref().and_then(RuleFactor::rows) {
-        check_rows(&section, Some(&noise), rows);
-    }
     let loss = section.optional_registered::<dyn Loss>("loss").map(Arc::from);
+    let (place, of_noise) = (section.place_of("factor"), section.place_of("noise"));
     section.finish();
-    Some(Rule { classes: classes?, factor: factor?, noise, loss, shipped: false })
+    let factor = factor?;
+    factor.check(&with, &place, own, errors)?;
+    check_noise(&factor, &noise, of_noise, errors);
+    if factor.partners() > 0 && conditions.near.is_none() {
+        let message = format!("`{}` connects objects, and the rule does not say which", factor.name());
+        let help = "say where the other one is: near = { classes = [\"tv monitor\"], within_m = 0.5 }";
+        errors.report(place, Problem::with_help(message, help));
+        return None;
+    }
+    let with = with.into_iter().map(|(_, key)| key).collect();
+    Some(Rule { classes: classes?, conditions, mixture, with, factor, noise, loss, shipped: false })
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn orientation(class: &str) -> Vec<String> {
-        let aliases = Aliases::default();
-        let class = aliases.canonical(class);
-        let rules = table_one().unwrap();
-        rules.iter().filter(|r| r.applies(&class, &aliases)).map(|r| r.factor.name().to_owned()).collect()
-    }
-
-    #[test]
-    fn table_one_has_the_classes_of_the_paper() {
-        let rules = table_one().unwrap();
-        assert_eq!(rules.iter().map(|r| r.classes.len()).collect::<Vec<_>>(), [12, 9]);
-        assert_eq!(orientation("tvmonitor"), ["horizontal_orientation"]);
-        assert_eq!(orientation("pottedplant"), ["vertical_orientation"]);
-        assert_eq!(orientation("sports ball"), [""; 0]);
-    }
-
-    #[test]
-    fn a_star_is_for_all() {
-        let rule = Rule { classes: vec!["*".into()], ..table_one().unwrap().swap_remove(0) };
-        assert!(rule.applies("sports ball", &Aliases::default()) && rule.applies("", &Aliases::default()));
-        assert_eq!(unmatched(&rule, &[], &Aliases::default()), [""; 0]);
-    }
-
-    #[test]
-    fn classes_that_match_nothing_are_told() {
-        let rules = table_one().unwrap();
-        let seen = vec!["cup".to_owned(), "potted plant".to_owned()];
-        let missing = unmatched(&rules[1], &seen, &Aliases::default());
-        assert_eq!(missing.len(), 7);
-        assert!(!missing.contains(&"cup"));
-    }
-
-    #[test]
-    fn the_factor_gets_up_from_gravity() {
-        let up = Direction::new([0.0, -2.0, 0.0].into()).unwrap();
-        let rules = table_one().unwrap();
-        let entry = rules[1].entry("q1".into(), Some(up)).unwrap();
-        let text = serde_json::to_string(&entry.factor).unwrap();
-        assert_eq!(text, r#"{"type":"vertical_orientation","up":[0.0,-1.0,0.0]}"#);
-        assert!(matches!(rules[1].entry("q1".into(), None), Err(RuleError::NoUp { .. })));
+fn check_noise(factor: &RuleFactor, noise: &Noise, place: Place, errors: &Errors) {
+    if let Some(Err(error)) = factor.rows.map(|rows| noise.whitener(rows)) {
+        errors.report(place, Problem::invalid(error.to_string()));
     }
 }

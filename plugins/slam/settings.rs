@@ -17,11 +17,14 @@ mod detections;
 mod evaluation;
 mod number;
 mod objects;
+mod own;
 mod report;
 
 pub use detections::{CutSides, DetectionSettings};
 pub use evaluation::EvaluationSettings;
+pub(crate) use number::share;
 pub use objects::ObjectSettings;
+pub use own::OwnGraph;
 pub use report::ReportSettings;
 
 /// Everything that is to be known to make an estimate.
@@ -39,8 +42,11 @@ pub struct Settings {
     pub objects: ObjectSettings,
     /// Which way is up.
     pub gravity: Arc<dyn Gravity>,
-    /// Which classes get which factors.
+    /// Which objects get which factors.
     pub semantics: Vec<Rule>,
+    /// Variables and factors of the document's own.
+    #[serde(flatten)]
+    pub own: OwnGraph,
     /// Names of classes that mean the same, besides the usual ones.
     #[serde(skip_serializing_if = "no_aliases")]
     pub aliases: Aliases,
@@ -108,7 +114,8 @@ impl Settings {
         let detections = DetectionSettings::take(section);
         let objects = ObjectSettings::take(section);
         let gravity = section.optional_registered::<dyn Gravity>("gravity");
-        let semantics = read_semantics(section, folder);
+        let own = OwnGraph::take(section);
+        let semantics = read_semantics(section, folder, &own.values);
         let aliases = section.or_default("aliases");
         let variance_components = section.optional("variance_components");
         let solver = section.optional_registered::<dyn Optimizer>("solver");
@@ -122,6 +129,7 @@ impl Settings {
             objects: objects?,
             gravity: gravity.map_or_else(|| Arc::new(FromSource {}) as Arc<dyn Gravity>, Arc::from),
             semantics,
+            own,
             aliases,
             variance_components,
             solver: solver.map_or_else(default_solver, Arc::from),

@@ -7,7 +7,7 @@ use crate::source::{Folders, Source, SourceError};
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::Camera;
-use rand::{RngExt, SeedableRng};
+use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ pub use trajectory::TrajectorySettings;
 /// Objects are solids with flat faces (cuboids, round bodies, folded sheets) that rest on a plane; their
 /// boxes come from their projected corners, clipped by the image, so that an ellipsoid is a model of them
 /// and not the truth. Odometry has 5 % noise of translation and 15 % of rotation, boxes have 2 px.
-/// `seed` is that of the noise; scene and trajectory have theirs.
+/// `seed` is that of the noise; scene and trajectory have theirs, and with another of them the noise is another too.
 ///
 /// ```toml
 /// source = { type = "simulated", seed = 1, scene = { seed = 3, objects = 15, tilted = 0.1 }, trajectory = { frames = 200 } }
@@ -107,8 +107,11 @@ impl Simulated {
         let objects = self.scene.objects(&mut Pcg64::seed_from_u64(self.scene.seed))?;
         let mut path = Pcg64::seed_from_u64(self.trajectory.seed);
         let poses = self.trajectory.poses(self.scene.height, &mut path);
+        // trials of other scenes or trajectories have noise of their own, whatever the seed: they are independent
+        let seeds = [self.seed, self.scene.seed, self.trajectory.seed];
+        let mixed = seeds.iter().fold(0, |mixed, seed| Pcg64::seed_from_u64(mixed ^ seed).next_u64());
         // a stream for each, so that more of one does not change the other
-        let mut noise = Pcg64::seed_from_u64(self.seed);
+        let mut noise = Pcg64::seed_from_u64(mixed);
         let (mut motion, mut detector) = (Pcg64::from_rng(&mut noise), Pcg64::from_rng(&mut noise));
 
         let time = |i: usize| i as f64 * self.trajectory.interval;
@@ -237,6 +240,28 @@ mod tests {
         let again = Simulated::default().simulate().unwrap();
         assert_ne!(other.frames, again.frames);
         assert_eq!(other.ground_truth.unwrap().objects, again.ground_truth.unwrap().objects);
+    }
+
+    #[test]
+    fn the_noise_of_another_trajectory_is_another() {
+        let turns = |seed| {
+            let mut settings = Simulated::default();
+            settings.trajectory.seed = seed;
+            let sequence = settings.simulate().unwrap();
+            let truth = sequence.ground_truth.unwrap().trajectory;
+            let error = |i: usize| {
+                let [a, b] = [i, i + 1].map(|i| &sequence.frames[i].world_from_camera);
+                let [c, d] = [i, i + 1].map(|i| &truth[i].pose);
+                c.between(d).between(&a.between(b)).rotation.log() / c.between(d).rotation.log().norm()
+            };
+            (0..100).map(error).collect::<Vec<_>>()
+        };
+        let (a, b) = (turns(1), turns(2));
+        let dot = |x: &[nalgebra::Vector3<f64>], y: &[nalgebra::Vector3<f64>]| {
+            x.iter().zip(y).map(|(x, y)| x.dot(y)).sum::<f64>()
+        };
+        let correlation = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
+        assert!(correlation.abs() < 0.3, "{correlation}");
     }
 
     #[test]

@@ -1,4 +1,5 @@
 //! Charts of numbers: curves, and how values are distributed.
+use crate::picture::{Picture, plain};
 use kuva::plot::{BoxPlot, LinePlot};
 use kuva::render::layout::Layout;
 use kuva::render::plots::Plot;
@@ -36,9 +37,9 @@ const COLORS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#444444", "#b8a900"];
 
 impl Chart {
-    /// As SVG. Points that are not finite, or not above zero on an axis of powers, are left out; a chart without any
-    /// point is `None`.
-    pub fn svg(&self) -> Option<String> {
+    /// The picture, by the name of its file. Points that are not finite, or not above zero on an axis of powers, are left
+    /// out; a chart without any point is `None`.
+    pub fn picture(&self, name: &str) -> Option<Picture> {
         let shown = |p: &&(f64, f64)| p.0.is_finite() && p.1.is_finite() && !(self.log_x && p.0 <= 0.0);
         let curves = self.curves.iter().zip(COLORS.iter().cycle()).filter_map(|((name, points), color)| {
             let points: Vec<(f64, f64)> = points.iter().filter(shown).copied().collect();
@@ -51,14 +52,14 @@ impl Chart {
         }
         let layout = layout(&plots, &self.title, &self.y).with_x_label(plain(&self.x));
         let layout = if self.log_x { layout.with_log_x() } else { layout };
-        Some(kuva::render_to_svg(plots, layout))
+        Some(Picture::new(name, plots, layout))
     }
 }
 
 impl Distribution {
-    /// As SVG: a box from quartile to quartile with the median in it, for each group. Values that are not finite are
-    /// left out; `None` where nothing is left.
-    pub fn svg(&self) -> Option<String> {
+    /// The picture, by the name of its file: a box from quartile to quartile with the median in it, for each group.
+    /// Values that are not finite are left out; `None` where nothing is left.
+    pub fn picture(&self, name: &str) -> Option<Picture> {
         let mut plot = BoxPlot::new().with_color(COLORS[0]);
         let mut any = false;
         for (name, values) in &self.groups {
@@ -72,7 +73,7 @@ impl Distribution {
         any.then(|| {
             let layout = layout(&plots, &self.title, &self.y);
             let layout = if self.groups.len() > 5 { layout.with_x_tick_rotate(-30.0) } else { layout };
-            kuva::render_to_svg(plots, layout)
+            Picture::new(name, plots, layout)
         })
     }
 }
@@ -84,11 +85,6 @@ fn layout(plots: &[Plot], title: &str, y: &str) -> Layout {
         .with_title(plain(title))
         .with_title_size(15)
         .with_y_label(plain(y))
-}
-
-/// A dollar sign would begin a formula.
-pub(crate) fn plain(label: &str) -> String {
-    label.replace('$', "\\$")
 }
 
 #[cfg(test)]
@@ -105,19 +101,20 @@ mod tests {
             log_x: true,
             curves: vec![("fr1/desk & more".into(), curve), ("nothing".into(), vec![(f64::NAN, 1.0)])],
         };
-        let svg = chart.svg().unwrap();
+        let svg = chart.picture("ate").unwrap().svg();
         for text in ["ATE over σ", "ATE (m)", "fr1/desk &amp; more"] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(!svg.contains("NaN") && !svg.contains("nothing"));
-        assert_eq!(Chart::default().svg(), None);
+        assert!(Chart::default().picture("none").is_none());
     }
 
     #[test]
     fn each_group_has_its_box() {
         let groups = vec![("Q".into(), vec![0.1, 0.2, 0.4]), ("Q+O".into(), vec![0.1, f64::INFINITY])];
-        let svg = Distribution { title: "shape".into(), y: "shape".into(), groups }.svg().unwrap();
+        let shape = Distribution { title: "shape".into(), y: "shape".into(), groups };
+        let svg = shape.picture("shape").unwrap().svg();
         assert!(svg.contains(">Q<") && svg.contains(">Q+O<") && !svg.contains("inf"));
-        assert_eq!(Distribution::default().svg(), None);
+        assert!(Distribution::default().picture("none").is_none());
     }
 }

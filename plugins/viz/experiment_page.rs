@@ -1,12 +1,28 @@
 //! The page of an experiment: means, comparisons, distributions, curves, and every trial.
 use crate::chart::{Chart, Distribution};
 use crate::page::Page;
+use crate::picture::Picture;
 use crate::run_page::version;
 use manifactor_formats::table::{Column, Table};
 use manifactor_slam::experiment::{Experiment, Summary};
 
+/// The pictures of an experiment, one a metric: a curve over the column that the summary names, or distributions.
+pub fn experiment_pictures(experiment: &Experiment, summary: &Summary, trials: &Table) -> Vec<Picture> {
+    let picture = |metric: &String| match &experiment.summary.curve {
+        Some(x) => curve(summary, x, metric).picture(&format!("{metric}_over_{x}")),
+        None => distribution(summary, trials, metric).picture(metric),
+    };
+    summary.metrics.iter().filter_map(picture).collect()
+}
+
 /// The page of an experiment. `trials` is the table of trials, `config` what was read.
-pub fn experiment_page(experiment: &Experiment, summary: &Summary, trials: &Table, config: &str) -> String {
+pub fn experiment_page(
+    experiment: &Experiment,
+    summary: &Summary,
+    trials: &Table,
+    pictures: &[Picture],
+    config: &str,
+) -> String {
     let mut page = Page::new(&experiment.title);
     let done = experiment.trials.len() - summary.open;
     page.paragraph(&format!("{done} of {} trials. {}", experiment.trials.len(), version()));
@@ -16,17 +32,11 @@ pub fn experiment_page(experiment: &Experiment, summary: &Summary, trials: &Tabl
         "Means over trials; in brackets the difference from the baseline over pairs of trials, with the bootstrap's 95 % \
          interval, as a share of the baseline's mean.",
     );
-    if let Some(x) = &experiment.summary.curve {
-        page.heading(&format!("Over {x}"));
-        for metric in &summary.metrics {
-            curve(summary, x, metric).svg().iter().for_each(|svg| _ = page.picture(svg));
-        }
-    } else {
-        page.heading("Distributions");
-        for metric in &summary.metrics {
-            distribution(summary, trials, metric).svg().iter().for_each(|svg| _ = page.picture(svg));
-        }
-    }
+    match &experiment.summary.curve {
+        Some(x) => page.heading(&format!("Over {x}")),
+        None => page.heading("Distributions"),
+    };
+    pictures.iter().for_each(|picture| _ = page.picture(picture));
     page.heading("Trials");
     let header: Vec<String> = trials.columns.iter().map(|(name, _)| name.clone()).collect();
     let rows = trials.rows().unwrap_or_default();

@@ -1,4 +1,5 @@
 //! A page of HTML with everything in it: it opens without a network, and fetches nothing.
+use crate::picture::Picture;
 use std::fmt::Write as _;
 
 /// A page that grows from top to bottom.
@@ -65,8 +66,12 @@ impl Page {
         self.push(&(html + "</tbody></table></div>"))
     }
 
-    /// A picture, as SVG.
-    pub fn picture(&mut self, svg: &str) -> &mut Self {
+    /// A picture.
+    pub fn picture(&mut self, picture: &Picture) -> &mut Self {
+        self.svg(&picture.svg())
+    }
+
+    fn svg(&mut self, svg: &str) -> &mut Self {
         // a prolog belongs to files, and not into a page
         let start = svg.find("<svg").unwrap_or(0);
         self.push(&format!("<div class=\"wide\">{}</div>", svg.get(start..).unwrap_or_default()))
@@ -115,7 +120,7 @@ mod tests {
     fn what_is_written_is_shown_and_not_obeyed() {
         let mut page = Page::new("a < b");
         page.heading("<script>").table(&["x & y".into()], &[vec!["0.125".into(), "cup".into()]]);
-        page.picture("<?xml version=\"1.0\"?><svg></svg>").folded("config", "a = \"<b>\"");
+        page.svg("<?xml version=\"1.0\"?><svg></svg>").folded("config", "a = \"<b>\"");
         let html = page.html();
         assert!(html.contains("<title>a &lt; b</title>") && !html.contains("<script>"));
         assert!(html.contains("<td class=\"n\">0.125</td><td>cup</td>") && html.contains("x &amp; y"));

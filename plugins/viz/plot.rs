@@ -1,6 +1,7 @@
 //! The picture itself.
 use crate::color::classes;
 use crate::outline::Shape;
+use crate::picture::{Picture, plain};
 use crate::scene::{Scene, TrackKind};
 use crate::view::{Plane, View};
 use kuva::plot::legend::{LegendEntry, LegendShape};
@@ -22,12 +23,12 @@ const DASHES: &str = "5 3";
 /// A class, and the outline of an object of it.
 type Outline<'a> = (&'a str, Vec<Point2<f64>>);
 
-/// Draws a scene as SVG, in metres, both axes to the same scale.
+/// Draws a scene, in metres, both axes to the same scale.
 ///
 /// What is true is dashed, what is estimated solid; objects have the colour of their class. The picture shows all
 /// trajectories and true objects whole; an estimate far away from them is left outside, and the title says how many
 /// are. Coordinates that are not finite are left out.
-pub fn plot(scene: &Scene, view: View) -> String {
+pub fn plot(scene: &Scene, view: View) -> Picture {
     let plane = view.plane(&scene.up);
     let mut frame = Frame::default();
     let mut plots: Vec<Plot> = Vec::new();
@@ -46,7 +47,7 @@ pub fn plot(scene: &Scene, view: View) -> String {
         tracks.push(entry(&track.name, color, LegendShape::Line, dashes));
     }
 
-    let classes = classes(scene);
+    let classes = classes(scene.objects.iter().map(|o| o.class.as_str()));
     let color =
         |class: &str| classes.iter().find(|(name, _)| *name == class).map_or(TRUTH, |(_, color)| color);
     let outlines = |of: fn(&crate::Object) -> &Option<Shape>| -> Vec<Outline<'_>> {
@@ -84,10 +85,14 @@ pub fn plot(scene: &Scene, view: View) -> String {
     let above = 0.008 * frame.size();
     // seen from the side, what stands on one table stands on one line
     for (class, top) in labels.into_iter().filter(|_| view == View::Top) {
-        let label = TextAnnotation::new(text(class), top.x, top.y + above);
+        let label = TextAnnotation::new(plain(class), top.x, top.y + above);
         layout = layout.with_annotation(label.with_font_size(10).with_color(color(class)));
     }
-    kuva::render_to_svg(plots, layout)
+    let name = match view {
+        View::Top => "map_top",
+        View::Side => "map_side",
+    };
+    Picture::new(name, plots, layout)
 }
 
 fn layout(
@@ -103,8 +108,8 @@ fn layout(
     let height = MARGINS.1 + (WIDTH - MARGINS.0) * (high.y - low.y) / (high.x - low.x);
     let height = height.clamp(100.0 + 20.0 * entries as f64, HEIGHT.max(120.0 + 20.0 * entries as f64));
     let title = match outside {
-        0 => text(&scene.title),
-        n => format!("{} ({n} of {} objects outside the picture)", text(&scene.title), scene.objects.len()),
+        0 => plain(&scene.title),
+        n => format!("{} ({n} of {} objects outside the picture)", plain(&scene.title), scene.objects.len()),
     };
     let [x, y] = plane.labels;
     Layout::auto_from_plots(plots)
@@ -136,12 +141,7 @@ fn line(points: &[Point2<f64>], color: &str, width: f64, dashes: Option<&str>) -
 }
 
 fn entry(label: &str, color: &str, shape: LegendShape, dashes: Option<&str>) -> LegendEntry {
-    LegendEntry { label: text(label), color: color.into(), shape, dasharray: dashes.map(Into::into) }
-}
-
-/// A dollar sign would begin a formula.
-fn text(label: &str) -> String {
-    label.replace('$', "\\$")
+    LegendEntry { label: plain(label), color: color.into(), shape, dasharray: dashes.map(Into::into) }
 }
 
 /// The part of the plane that is shown.

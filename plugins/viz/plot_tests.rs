@@ -43,7 +43,7 @@ fn desk() -> Scene {
 #[test]
 fn every_class_and_trajectory_is_in_the_legend() {
     for view in [View::Top, View::Side] {
-        let svg = plot(&desk(), view);
+        let svg = plot(&desk(), view).svg();
         assert!(svg.starts_with("<svg") || svg.starts_with("<?xml"), "{}", &svg[..40]);
         for text in ["true", "odometry", "estimated", "cup", "keyboard", "bottle", "tv &amp; book", "(m)"] {
             assert!(svg.contains(text), "{text} is missing");
@@ -58,7 +58,7 @@ fn every_class_and_trajectory_is_in_the_legend() {
 fn an_estimate_far_away_does_not_shrink_the_rest() {
     let mut scene = desk();
     scene.objects[0].estimate = Some(ellipsoid([1e5, 0.0, 0.0], [1.0, 1.0, 1.0], 0.0));
-    let svg = plot(&scene, View::Top);
+    let svg = plot(&scene, View::Top).svg();
     assert!(svg.contains("1 of 4 objects outside the picture"));
     // the ticks are those of a frame of three metres
     assert!(svg.contains(">0.5<") && !svg.contains(">100000<"));
@@ -69,7 +69,7 @@ fn what_is_not_finite_is_left_out() {
     let mut scene = desk();
     scene.tracks[2].positions[3] = Vector3::new(f64::NAN, 0.0, f64::INFINITY);
     scene.objects[1].estimate = Some(ellipsoid([f64::NAN; 3], [1.0; 3], 0.0));
-    assert!(!plot(&scene, View::Top).contains("NaN"));
+    assert!(!plot(&scene, View::Top).svg().contains("NaN"));
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn an_empty_scene_is_an_empty_picture() {
         vec![],
         vec![Track { kind: TrackKind::Truth, name: "one".into(), positions: vec![Vector3::zeros()] }],
     ] {
-        let svg = plot(&Scene { tracks, ..Scene::default() }, View::Top);
+        let svg = plot(&Scene { tracks, ..Scene::default() }, View::Top).svg();
         assert!(svg.contains("</svg>"));
     }
 }

@@ -1,18 +1,34 @@
 //! The page of a run: what came in, what came out, and what was done with each object.
 use crate::chart::{Chart, Distribution};
 use crate::page::Page;
-use crate::{Scene, View, plot};
+use crate::picture::Picture;
+use crate::{Scene, View, frames_seen, image, plot};
 use indexmap::IndexMap;
 use manifactor_formats::tum::StampedPose;
+use manifactor_graph::Key;
 use manifactor_slam::estimate::Estimate;
+use manifactor_slam::mapping::MappedObject;
 use manifactor_slam::metrics::{Alignment, align, associate};
 use manifactor_slam::report::{ObjectReport, RunReport, VariantReport};
-use manifactor_slam::settings::EvaluationSettings;
+use manifactor_slam::settings::{EvaluationSettings, Settings};
 
 /// The page of a run, made variant by variant.
 #[derive(Debug, Clone)]
 pub struct RunPage {
     variants: Page,
+}
+
+/// All pictures of an estimate: the map from above and from the side, errors over time, residuals, and some images.
+pub fn run_pictures(title: &str, estimate: &Estimate, settings: &Settings) -> Vec<Picture> {
+    let evaluation = &settings.evaluation;
+    let scene = Scene::of_estimate(title, estimate, evaluation.max_time_difference);
+    let mut pictures = vec![plot(&scene, View::Top), plot(&scene, View::Side)];
+    pictures.extend(error_over_time(estimate, evaluation).picture("error_over_time"));
+    pictures.extend(residuals(estimate).picture("residuals"));
+    pictures.extend(
+        frames_seen(estimate, settings.report.images).into_iter().map(|frame| image(estimate, frame)),
+    );
+    pictures
 }
 
 impl Default for RunPage {
@@ -22,21 +38,18 @@ impl Default for RunPage {
 }
 
 impl RunPage {
-    /// Adds a variant: pictures, residuals, objects, and the config that makes it again.
+    /// Adds a variant: its [pictures](run_pictures), residuals, objects, and the config that makes it again.
     pub fn variant(
         &mut self,
         estimate: &Estimate,
         report: &VariantReport,
-        evaluation: &EvaluationSettings,
+        pictures: &[Picture],
         config: &str,
     ) -> &mut Self {
         let page = &mut self.variants;
         page.heading(&report.name);
         page.warnings(&report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
-        let scene = Scene::of_estimate(report.name.clone(), estimate, evaluation.max_time_difference);
-        page.picture(&plot(&scene, View::Top)).picture(&plot(&scene, View::Side));
-        let charts = [error_over_time(estimate, evaluation).svg(), residuals(estimate).svg()];
-        charts.iter().flatten().for_each(|svg| _ = page.picture(svg));
+        pictures.iter().for_each(|picture| _ = page.picture(picture));
         page.paragraph("Residuals at the estimate, in standard deviations of their noise, row by row.");
         page.table(&words(RESIDUALS), &residual_rows(estimate));
         if let Some(noise) = report.variance_components.last() {
@@ -142,14 +155,25 @@ fn object_row(report: &ObjectReport) -> Vec<String> {
     vec![
         object.key.to_string(),
         object.class.as_ref().map_or("-".into(), |class| class.name.clone()),
-        object.class.as_ref().map_or("-".into(), |class| format!("{:.2}", class.share)),
+        object.class.as_ref().map_or("-".into(), |class| format!("{:.2}", class.score)),
         object.detections.to_string(),
         object.boxes.to_string(),
-        object.semantic_factors.join(", "),
+        applied(object),
         report.estimate.as_ref().map_or(String::new(), axes),
         report.error.as_ref().map_or(String::new(), |error| format!("{:.4}", error.position)),
         report.rejected_because.clone().unwrap_or_default(),
     ]
+}
+
+/// Each semantic factor with its reason, then what might have been one, and why it is none.
+fn applied(object: &MappedObject) -> String {
+    let own = |key: &&Key| **key != object.key;
+    let applied = object.semantic_factors.iter().map(|a| {
+        let others: Vec<_> = a.keys.iter().filter(own).map(|key| format!(" with {key}")).collect();
+        format!("{}{}: {}", a.factor, others.concat(), a.because)
+    });
+    let left_out = object.left_out.iter().map(|l| format!("not {}: {}", l.factor, l.because));
+    applied.chain(left_out).collect::<Vec<_>>().join("; ")
 }
 
 /// Whitened residuals by type of factor.

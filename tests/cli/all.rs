@@ -1,5 +1,6 @@
 //! The command line, end to end: the binary, its files and its exit codes.
 #![allow(missing_docs, clippy::unwrap_used)]
+mod book;
 mod check_factor;
 mod disk;
 mod documents;

@@ -31,7 +31,7 @@ fn a_new_plugin_compiles_and_passes_outside_of_the_workspace() {
     let text =
         String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{text}");
-    assert!(text.contains("2 passed") && text.contains("1 passed"), "{text}");
+    assert!(text.matches("2 passed").count() == 2, "{text}");
 }
 
 #[test]

@@ -54,10 +54,14 @@ fn the_report_of_a_run_needs_no_network() {
     ] {
         assert!(html.contains(text), "{text}");
     }
-    // two maps, errors and residuals, for each of two variants
-    assert_eq!(html.matches("<svg").count(), 8);
+    // two maps, errors, residuals and four images, for each of two variants
+    assert_eq!(html.matches("<svg").count(), 16);
     if let Some(dom) = rendered(&page) {
-        assert!(dom.contains("simulated desk") && dom.matches("<svg").count() == 8);
+        assert!(dom.contains("simulated desk") && dom.matches("<svg").count() == 16);
+    }
+    for picture in ["map_top", "map_side", "error_over_time", "residuals", "image_000000"] {
+        let png = std::fs::read(Path::new(&out).join(format!("quadricslam/{picture}.png"))).unwrap();
+        assert_eq!(png.get(1..4), Some(&b"PNG"[..]), "{picture}");
     }
 }
 

@@ -79,3 +79,54 @@ fn a_simulated_sequence_is_written_as_files() {
         manifactor(&format!("evaluate {out}/groundtruth.txt {out}/odometry.txt --json")).ended(0).json();
     assert_eq!(json["pairs"], 40);
 }
+
+#[test]
+fn what_rules_applied_to_which_object_and_why_is_told() {
+    let folder = folder(&[]);
+    let out = path(&folder, "rules");
+    let small = "--set source.trajectory.frames=60";
+    let ran = manifactor(&format!("run examples/04_rules/desk.toml --out {out} {small}"));
+    assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
+    let read = |file: &str| std::fs::read_to_string(format!("{out}/with-rules/{file}")).unwrap();
+    let objects: Value = serde_json::from_str(&read("objects.json")).unwrap();
+    let of = |field: &str| -> Vec<Value> {
+        let lists = objects.as_array().unwrap().iter().filter_map(|object| object[field].as_array());
+        lists.flatten().cloned().collect()
+    };
+    let (applied, left_out) = (of("semantic_factors"), of("left_out"));
+    let because = |all: &[Value], factor: &str, text: &str| {
+        let mut of_factor = all.iter().filter(|a| a["factor"] == factor);
+        assert!(
+            of_factor.any(|a| a["because"].as_str().unwrap().contains(text)),
+            "{factor}: {text}: {all:?}"
+        );
+    };
+    because(&applied, "supporting_plane", "");
+    because(&applied, "vertical_orientation_smooth", "% of its scores, most for");
+    because(&applied, "upright", "(at least 0.5), 0.");
+    because(&applied, "parallel", " m from q");
+    because(&left_out, "parallel", "the rule connects it with q");
+    let plane = applied.iter().find(|a| a["factor"] == "supporting_plane").unwrap();
+    assert_eq!((plane["rule"].as_u64(), &plane["keys"][1]), (Some(1), &Value::from("table")));
+    // the plane is a variable of the graph, and the config that is written has it again
+    assert!(read("graph.json").contains(r#""key":"table""#));
+    let config = format!("{out}/with-rules/config.toml");
+    manifactor(&format!("check {config}")).ended(0);
+    let again = manifactor(&format!("run {config} --json --out {}", path(&folder, "again"))).json();
+    let first: Value = serde_json::from_str(&read("metrics.json")).unwrap();
+    assert_eq!(again["variants"][0]["solve"]["final_cost"], first["solve"]["final_cost"]);
+    let page = std::fs::read_to_string(format!("{out}/report.html")).unwrap();
+    assert!(page.contains("supporting_plane with table: ") && page.contains("not parallel: "));
+}
+
+#[test]
+fn a_variable_of_a_run_is_no_pose_and_no_object() {
+    let run = |key: &str| {
+        let variable =
+            format!("variables=[{{ key = \"{key}\", value = {{ type = \"point1\", position = [0.5] }} }}]");
+        crate::run(["check", "examples/desk/desk.toml", "--set", &variable], &[])
+    };
+    run("table").ended(0);
+    run("quarter").ended(0);
+    run("q1").ended(2).complains("`q1` is the key of a pose or an object");
+}

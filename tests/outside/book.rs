@@ -1,6 +1,7 @@
 //! The blocks of TOML in the book, as a reader would paste them.
 use manifactor::config::{Document, Format, Node, Value};
 use manifactor::graph::catalogue::{self, Entry};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -90,5 +91,62 @@ fn the_summary_has_every_page_and_no_other() {
     }
     for link in summary.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
         assert!(docs.join(link).is_file(), "SUMMARY.md leads to {link}, which is not there");
+    }
+}
+
+/// The anchors of a page's headings, as mdBook and GitHub make them.
+fn anchors(page: &str) -> Vec<String> {
+    let mut met: HashMap<String, usize> = HashMap::new();
+    let anchor = |heading: &str| {
+        let text = heading.trim_start_matches('#').trim().to_lowercase().replace(' ', "-");
+        let name: String = text.chars().filter(|c| c.is_alphanumeric() || "_-".contains(*c)).collect();
+        let before = *met.entry(name.clone()).and_modify(|n| *n += 1).or_insert(0);
+        if before == 0 { name } else { format!("{name}-{before}") }
+    };
+    page.lines().filter(|line| line.starts_with('#')).map(anchor).collect()
+}
+
+#[test]
+fn every_link_within_the_book_leads_somewhere() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let (mut found, mut count) = (vec![], 0);
+    pages(&docs, &mut found);
+    for page in &found {
+        let text = std::fs::read_to_string(page).unwrap();
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            if link.starts_with("http") || link.contains(' ') {
+                continue;
+            }
+            let (file, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target = if file.is_empty() { page.clone() } else { page.parent().unwrap().join(file) };
+            let place = format!("{}: {link}", page.display());
+            let target = target.canonicalize().unwrap_or_else(|_| panic!("{place} leads nowhere"));
+            assert!(target.starts_with(docs.canonicalize().unwrap()), "{place} leads out of the book");
+            let known = || anchors(&std::fs::read_to_string(&target).unwrap());
+            assert!(anchor.is_empty() || known().iter().any(|a| a == anchor), "{place} has no such heading");
+            count += 1;
+        }
+    }
+    assert!(count > 100, "{count} links");
+}
+
+/// The peers' factors in the book, by the interpreter that `python3` is; said aloud, where it lacks a peer.
+#[test]
+fn blocks_of_python_run_where_their_packages_are() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/coming-from.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let blocks: Vec<&str> = page.split("```python\n").skip(1).filter_map(|b| b.split("```").next()).collect();
+    assert_eq!(blocks.len(), 2);
+    for block in blocks {
+        let Ok(output) = std::process::Command::new("python3").args(["-c", block]).output() else {
+            eprintln!("skipped: there is no python3");
+            return;
+        };
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        if let Some(missing) = said.lines().find(|line| line.starts_with("ModuleNotFoundError")) {
+            eprintln!("skipped: {missing}");
+            continue;
+        }
+        assert!(output.status.success(), "{block}\n{said}");
     }
 }

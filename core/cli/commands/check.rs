@@ -32,7 +32,8 @@ impl Check {
         let path = &self.run.config;
         let found = if Format::of_path(path).is_some() {
             let document = Document::open(path)?;
-            let is_graph = matches!(&document.root().value, Value::Table(t) if t.contains_key("variables"));
+            // a run may have variables of its own
+            let is_graph = matches!(&document.root().value, Value::Table(t) if t.contains_key("variables") && !t.contains_key("source"));
             if is_graph { self.graph()? } else { self.document(document)? }
         } else {
             self.graph()?

@@ -15,7 +15,8 @@ use std::path::PathBuf;
 ///
 /// At random points: around the example in its docs or the values of a graph, wherever its manifolds' strategies draw, at
 /// their singular points and near them. Where a law is broken, the worst entry is shown with its variable and direction,
-/// at the simplest point that was found, as a graph that `--config` takes. Exit code 1 where a law is broken.
+/// at the simplest point that was found, as a graph that `--config` takes; `--json` has the points of the worst entry and of
+/// the kinks of a sound factor, too. Exit code 1 where a law is broken.
 #[derive(Debug, Args)]
 pub(crate) struct CheckFactor {
     /// The factor, one of `manifactor list factors`; all factors of the graph, if not given.

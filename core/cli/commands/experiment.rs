@@ -9,7 +9,7 @@ use manifactor::config::Document;
 use manifactor::slam::experiment::{self, Experiment as Sweep, Journal, Progress, Summary};
 use manifactor::slam::output::write_whole;
 use manifactor::slam::source::Folders;
-use manifactor::viz::experiment_page;
+use manifactor::viz::{experiment_page, experiment_pictures};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -62,7 +62,9 @@ impl Experiment {
         drop(bar);
         let summary = experiment::write(&sweep, &journal)?;
         let trials = experiment::trials_table(&sweep, &journal);
-        let page = experiment_page(&sweep, &summary, &trials, document.source().text());
+        let pictures = experiment_pictures(&sweep, &summary, &trials);
+        output::pictures(&sweep.output, &pictures)?;
+        let page = experiment_page(&sweep, &summary, &trials, &pictures, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);
         Ok(if complete { Status::Done } else { Status::Interrupted })

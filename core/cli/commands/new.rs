@@ -17,7 +17,7 @@ enum What {
     Plugin(Plugin),
 }
 
-/// A crate with one factor, its tests, an example graph, a binary that knows the factor, and a README.
+/// A crate with one factor, its tests, an example graph and run, a binary that knows the factor, and a README.
 #[derive(Debug, Args)]
 struct Plugin {
     /// Its name, in snake case or with hyphens: of the folder, of the crate and of its factor.
@@ -27,14 +27,16 @@ struct Plugin {
     manifactor: Option<PathBuf>,
 }
 
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 9] = [
+    (".gitignore", include_str!("../plugin_template/gitignore.in")),
     ("Cargo.toml", include_str!("../plugin_template/Cargo.toml.in")),
     ("README.md", include_str!("../plugin_template/README.md.in")),
     ("graph.toml", include_str!("../plugin_template/graph.toml.in")),
     ("src/lib.rs", include_str!("../plugin_template/lib.rs.in")),
     ("src/main.rs", include_str!("../plugin_template/main.rs.in")),
     ("src/{name}.rs", include_str!("../plugin_template/factor.rs.in")),
-    ("tests/graph.rs", include_str!("../plugin_template/graph_test.rs.in")),
+    ("run.toml", include_str!("../plugin_template/run.toml.in")),
+    ("tests/examples.rs", include_str!("../plugin_template/examples_test.rs.in")),
 ];
 
 impl New {

@@ -8,14 +8,14 @@ use clap::Args;
 use manifactor::slam::output::{check_folder, variant_folder, write_report, write_variant, write_whole};
 use manifactor::slam::run::Run as Running;
 use manifactor::solve::All;
-use manifactor::viz::{RunPage, Scene, View, plot};
+use manifactor::viz::{RunPage, run_pictures};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 /// Build, solve, evaluate and write what a document describes.
 ///
 /// Each variant of the run gets a folder with its settings, trajectory, objects, graph, iterations, metrics and
-/// pictures (map_top.svg, map_side.svg); report.html shows all of it, and needs no network.
+/// pictures, as SVG and PNG (the map from above and from the side, errors over time, residuals, images); report.html shows all of it, and needs no network.
 #[derive(Debug, Args)]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -47,11 +47,10 @@ impl Run {
             status = status.and(Status::from(&report.solve.termination));
             let folder = write_variant(&document, variant, &estimate, &report)?;
             let title = format!("{}: {}", document.title, variant.name);
-            let scene = Scene::of_estimate(title, &estimate, variant.settings.evaluation.max_time_difference);
-            write_whole(&folder.join("map_top.svg"), plot(&scene, View::Top))?;
-            write_whole(&folder.join("map_side.svg"), plot(&scene, View::Side))?;
+            let pictures = run_pictures(&title, &estimate, &variant.settings);
+            output::pictures(&folder, &pictures)?;
             let config = std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?;
-            page.variant(&estimate, &report, &variant.settings.evaluation, &config);
+            page.variant(&estimate, &report, &pictures, &config);
             if interrupt.0.load(Ordering::Relaxed) {
                 status = Status::Interrupted;
                 break;

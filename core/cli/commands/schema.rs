@@ -4,8 +4,8 @@ use crate::output;
 use crate::status::Status;
 use clap::{Args, ValueEnum};
 use manifactor::config::{Definitions, graph_root};
-use manifactor::slam::schema::run_root;
-use serde_json::json;
+use manifactor::slam::schema::{experiment_root, rules_root, run_root};
+use serde_json::{Value, json};
 
 /// Print the JSON Schema of a document, for editors to complete and check by.
 #[derive(Debug, Args)]
@@ -17,12 +17,16 @@ pub(crate) struct Schema {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Document {
-    /// Either of them.
+    /// Any of them.
     Any,
     /// A literal graph: what `solve` takes.
     Graph,
     /// A run: what `run` takes.
     Run,
+    /// A run over a grid of settings: what `experiment` takes.
+    Experiment,
+    /// A file of semantic rules, which runs name.
+    Rules,
 }
 
 impl Schema {
@@ -31,9 +35,12 @@ impl Schema {
         let root = match self.document {
             Document::Graph => graph_root(&mut definitions),
             Document::Run => run_root(&mut definitions),
+            Document::Experiment => experiment_root(&mut definitions),
+            Document::Rules => rules_root(&mut definitions),
             Document::Any => {
-                let either = [graph_root(&mut definitions), run_root(&mut definitions)];
-                json!({ "title": "A document of Manifactor", "anyOf": either })
+                let roots = [graph_root, run_root, experiment_root, rules_root];
+                let any = roots.map(|root: fn(&mut Definitions) -> Value| root(&mut definitions));
+                json!({ "title": "A document of Manifactor", "anyOf": any })
             }
         };
         output::json(&definitions.document(root));

@@ -53,6 +53,8 @@ pub struct NamedEntry {
     pub numeric: f64,
     /// How far they are apart, relative to the largest entry of the block, or to 1.
     pub error: f64,
+    /// The point, as a literal graph that reproduces it.
+    pub at: Value,
 }
 
 /// Directions that are free, alone or in so many combinations.
@@ -139,11 +141,12 @@ impl Gathered {
     }
 
     /// Keeps an entry, if it is the worst so far.
-    pub(super) fn entry(&mut self, subject: &Subject, entry: Option<Entry>) {
+    pub(super) fn entry(&mut self, subject: &Subject, entry: Option<Entry>, drawn: &Drawn) {
         let Some(Entry { variable, column, row, found, expected, error }) = entry else { return };
         if self.worst.as_ref().is_none_or(|worst| error > worst.error) {
             let direction = subject.direction(variable, column);
-            self.worst = Some(NamedEntry { direction, row, automatic: found, numeric: expected, error });
+            let at = subject.graph(&drawn.variables);
+            self.worst = Some(NamedEntry { direction, row, automatic: found, numeric: expected, error, at });
         }
     }
 
@@ -225,16 +228,26 @@ impl Display for FactorReport {
             f,
             "{name}: defined at {defined} of {drawn} points, {singular} of them singular or nearly so (seed {seed})"
         )?;
-        if let Some(NamedEntry { direction, row, automatic, numeric, error }) = &self.worst {
-            writeln!(
-                f,
-                "Jacobian: right; the worst entry, row {row} by {direction}, is {automatic} against {numeric} ({error:.0e})"
-            )?;
+        match &self.worst {
+            Some(NamedEntry { direction, row, automatic, numeric, error, .. }) if *error > 0.0 => {
+                let (found, expected) = (digits(*automatic), digits(*numeric));
+                writeln!(
+                    f,
+                    "Jacobian: right; the worst entry, row {row} by {direction}, is {found} against {expected} ({error:.0e})"
+                )?;
+            }
+            Some(_) => writeln!(f, "Jacobian: right; no entry differs")?,
+            None => {}
         }
         let free: usize = self.free.iter().map(|f| f.count).sum();
         match self.rank {
             0 => writeln!(f, "Free: not known, as every point was singular or at a kink")?,
-            _ => writeln!(f, "Free: {free} of {} directions{}", self.directions, list(&self.free))?,
+            _ => writeln!(
+                f,
+                "Free: {free} of {} directions{}",
+                self.directions,
+                list(&self.free, self.directions)
+            )?,
         }
         for Unchanged { motion, points } in &self.unchanged {
             writeln!(f, "Unchanged by {motion}: at {}", points_in_words(*points))?;
@@ -255,13 +268,22 @@ fn points_in_words(n: usize) -> String {
     format!("{n} point{}", if n == 1 { "" } else { "s" })
 }
 
-/// `: q0.x, q0.y, 2 combinations of q0.rx, q0.ry, q0.rz`.
-fn list(free: &[FreeDirections]) -> String {
+/// Twelve digits: enough to see by how much two numbers differ that agree to 1e-9.
+fn digits(x: f64) -> String {
+    let rounded: f64 = format!("{x:.11e}").parse().unwrap_or(x);
+    rounded.to_string()
+}
+
+/// `: q0.x, q0.y, 2 combinations of (q0.rx, q0.ry, q0.rz)`.
+fn list(free: &[FreeDirections], directions: usize) -> String {
     let part = |f: &FreeDirections| match f.count == f.among.len() {
         true => f.among.join(", "),
         false => {
             let noun = if f.count == 1 { "combination" } else { "combinations" };
-            format!("{} {noun} of ({})", f.count, f.among.join(", "))
+            match f.among.len() == directions {
+                true => format!("{} {noun} of all", f.count),
+                false => format!("{} {noun} of ({})", f.count, f.among.join(", ")),
+            }
         }
     };
     let parts: Vec<_> = free.iter().map(part).collect();

@@ -90,15 +90,18 @@ impl Summary {
 type Bound = (&'static str, fn(&Interval) -> f64);
 const BOUNDS: [Bound; 3] = [("mean", |i| i.mean), ("low", |i| i.low), ("high", |i| i.high)];
 
-/// `-1.4 % [-1.9, -0.8]`: as shares of the baseline.
+/// `-1.4 % [-1.9, -0.8]`: as shares of the baseline. A single pair has no interval.
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Interval { mean, low, high } = self.difference;
         let percent = 100.0 / self.baseline.abs();
-        if percent.is_finite() {
-            write!(f, "{:+.1} % [{:+.1}, {:+.1}]", mean * percent, low * percent, high * percent)
-        } else {
-            write!(f, "{mean:+.4} [{low:+.4}, {high:+.4}]")
+        match (percent.is_finite(), self.pairs > 1) {
+            (true, true) => {
+                write!(f, "{:+.1} % [{:+.1}, {:+.1}]", mean * percent, low * percent, high * percent)
+            }
+            (true, false) => write!(f, "{:+.1} %", mean * percent),
+            (false, true) => write!(f, "{mean:+.4} [{low:+.4}, {high:+.4}]"),
+            (false, false) => write!(f, "{mean:+.4}"),
         }
     }
 }

@@ -1,7 +1,8 @@
-use manifactor_config::{Errors, Node, Problem, Value as NodeValue};
+use manifactor_config::{Errors, Node, Place, Problem, Value as NodeValue};
 use manifactor_graph::catalogue::{Kind, ParseError, find, manifold_name};
-use manifactor_graph::{Direction, Factor};
+use manifactor_graph::{Direction, Factor, Key, Values};
 use manifactor_quadric::DualQuadric;
+use manifactor_semantic::MixtureError;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::any::TypeId;
@@ -9,19 +10,22 @@ use std::any::TypeId;
 /// The field that gravity fills.
 const UP: &str = "up";
 
-/// A factor of one object, whose `up` is open until gravity is known.
+/// A factor of an object, and perhaps of others, whose `up` is open until gravity is known.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RuleFactor {
     #[serde(rename = "type")]
     name: String,
     #[serde(flatten)]
     fields: Map<String, Value>,
-    /// Whether it has a field `up` that the config leaves open.
+    /// The factor as it writes itself, with the fields that the config leaves open.
     #[serde(skip)]
-    wants_up: bool,
-    /// Of its residual, where they are known by its type.
+    written: Value,
+    /// The types of its variables.
     #[serde(skip)]
-    rows: Option<usize>,
+    variables: Vec<TypeId>,
+    /// Rows of its residual, where that is known.
+    #[serde(skip)]
+    pub(super) rows: Option<usize>,
 }
 
 /// Why a rule's factor could not be made.
@@ -51,6 +55,14 @@ pub enum RuleError {
         /// What is wrong with its fields.
         source: ParseError,
     },
+    /// It cannot be one of two possibilities.
+    #[error("the semantic factor `{factor}` as a mixture: {source}")]
+    Mixture {
+        /// The factor's type.
+        factor: String,
+        /// Why.
+        source: MixtureError,
+    },
 }
 
 impl RuleFactor {
@@ -65,23 +77,20 @@ impl RuleFactor {
             _ => String::new(),
         };
         let factor = node.read_registered::<dyn Factor>(errors)?;
-        let (variables, rows) = {
-            let signature = factor.erased().signature();
-            (signature.variables, signature.rows)
-        };
-        if variables != [TypeId::of::<DualQuadric>()] {
+        let signature = factor.erased().signature();
+        let variables = signature.variables;
+        if signature.many || !variables.contains(&TypeId::of::<DualQuadric>()) {
             let names: Vec<_> = variables.iter().map(|id| manifold_name(*id)).collect();
             let message = format!("`{name}` connects {}", names.join(" and "));
-            let help = "a semantic rule adds a factor of one dual_quadric, such as `vertical_orientation`";
+            let help = "a semantic rule adds a factor of one dual_quadric, such as `vertical_orientation`, or of several, such \
+                        as `beside`";
             errors.report(place, Problem::with_help(message, help));
             return None;
         }
         let Ok(Value::Object(mut fields)) = json else { return None };
         fields.shift_remove("type");
-        // a factor that uses up writes the one that it has
         let written = serde_json::to_value(&factor).ok()?;
-        let has_up = written.get(UP).is_some();
-        Some(Self { name, wants_up: has_up && !fields.contains_key(UP), rows, fields })
+        Some(Self { name, fields, written, variables, rows: signature.rows })
     }
 
     /// Its type.
@@ -89,14 +98,67 @@ impl RuleFactor {
         &self.name
     }
 
-    /// Rows of its residual, where they are known.
-    pub fn rows(&self) -> Option<usize> {
-        self.rows
-    }
-
     /// Whether it waits for gravity.
     pub fn wants_up(&self) -> bool {
-        self.wants_up
+        let mut fields = Value::Object(self.fields.clone());
+        fill(&mut fields, &self.written, &Value::Null)
+    }
+
+    /// How many objects it connects the object with.
+    pub fn partners(&self) -> usize {
+        self.variables.iter().filter(|id| **id == TypeId::of::<DualQuadric>()).count().saturating_sub(1)
+    }
+
+    /// Its keys: the object and its partners in the places of objects, `with` in those of other variables.
+    pub(super) fn keys(&self, object: &Key, partners: &[Key], with: &[Key]) -> Vec<Key> {
+        let mut objects = std::iter::once(object).chain(partners);
+        let mut others = with.iter();
+        let key = |id: &TypeId| {
+            if *id == TypeId::of::<DualQuadric>() { objects.next() } else { others.next() }.cloned()
+        };
+        self.variables.iter().filter_map(key).collect()
+    }
+
+    /// Checks that `with` names a variable for each place that is not an object's.
+    pub(super) fn check(
+        &self,
+        with: &[(Place, Key)],
+        place: &Place,
+        own: &Values,
+        errors: &Errors,
+    ) -> Option<()> {
+        let wanted: Vec<_> = self.variables.iter().filter(|id| **id != TypeId::of::<DualQuadric>()).collect();
+        if wanted.len() != with.len() {
+            let types: Vec<_> = wanted.iter().map(|id| format!("a `{}`", manifold_name(**id))).collect();
+            let types = if types.is_empty() { "nothing".into() } else { types.join(" and ") };
+            let message =
+                format!("besides objects `{}` connects {types}, found {} in `with`", self.name, with.len());
+            let help =
+                "declare such variables as `[[variables]]` and name them in their order: with = [\"table\"]";
+            errors.report(place.clone(), Problem::with_help(message, help));
+            return None;
+        }
+        for ((place, key), id) in with.iter().zip(wanted) {
+            let expected = manifold_name(*id);
+            match own.variable(key.as_str()) {
+                Some(found) if found.typetag_name() == expected => {}
+                Some(found) => {
+                    let (name, found) = (&self.name, found.typetag_name());
+                    let message = format!(
+                        "`{name}` takes a variable of type `{expected}` here, `{key}` is of type `{found}`"
+                    );
+                    errors.report(place.clone(), Problem::invalid(message));
+                    return None;
+                }
+                None => {
+                    let known = own.iter().map(|(key, _)| key.to_string()).collect();
+                    let (what, name) = ("variable".to_owned(), key.to_string());
+                    errors.report(place.clone(), Problem::UnknownName { what, name, known });
+                    return None;
+                }
+            }
+        }
+        Some(())
     }
 
     /// The factor itself.
@@ -105,14 +167,34 @@ impl RuleFactor {
     /// Where it needs to know up, and nobody does.
     pub fn instantiate(&self, up: Option<Direction>) -> Result<Box<dyn Factor>, RuleError> {
         let factor = || self.name.clone();
-        let mut fields = self.fields.clone();
-        if self.wants_up {
-            let up = up.ok_or_else(|| RuleError::NoUp { factor: factor() })?;
-            fields.insert(UP.to_owned(), json!([up.x, up.y, up.z]));
+        let mut fields = Value::Object(self.fields.clone());
+        let known = up.map_or(Value::Null, |up| json!([up.x, up.y, up.z]));
+        if fill(&mut fields, &self.written, &known) && up.is_none() {
+            return Err(RuleError::NoUp { factor: factor() });
         }
         let entry = find(<dyn Factor as Kind>::NAME, &self.name);
         let entry = entry.ok_or_else(|| RuleError::NotRegistered { factor: factor() })?;
-        let parsed = entry.parse::<dyn Factor>(Value::Object(fields));
+        let parsed = entry.parse::<dyn Factor>(fields);
         parsed.map_err(|source| RuleError::Fields { factor: factor(), source })
+    }
+}
+
+/// Puts `up` into each factor that has a field of that name, and leaves it open: this one, or one within it, as in a
+/// mixture. A factor that uses up writes the one that it has. Whether there was such a field.
+fn fill(given: &mut Value, written: &Value, up: &Value) -> bool {
+    match (given, written) {
+        (Value::Object(given), Value::Object(written)) => {
+            let open = written.contains_key("type") && written.contains_key(UP) && !given.contains_key(UP);
+            if open {
+                given.insert(UP.to_owned(), up.clone());
+            }
+            let within = written.iter().filter_map(|(name, w)| Some(fill(given.get_mut(name)?, w, up)));
+            within.fold(open, |any, filled| any || filled)
+        }
+        (Value::Array(given), Value::Array(written)) => {
+            let within = given.iter_mut().zip(written).map(|(g, w)| fill(g, w, up));
+            within.filter(|filled| *filled).count() > 0
+        }
+        _ => false,
     }
 }

@@ -2,9 +2,17 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[report]`: what is written besides the usual.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReportSettings {
     /// `covariances.json`: the marginal covariance of each pose and each object, in its tangent space.
     pub covariances: bool,
+    /// How many images are drawn with their boxes, measured and estimated; spread over all frames where objects are seen.
+    pub images: usize,
+}
+
+impl Default for ReportSettings {
+    fn default() -> Self {
+        Self { covariances: false, images: 4 }
+    }
 }

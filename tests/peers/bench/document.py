@@ -6,7 +6,7 @@ INTRODUCTION = """# Benchmarks
 <!-- written by `tests/peers/run --write`; change that, not this -->
 Ours and its peers on the same files, from the same start, by the same stopping rule (a step that changes the cost by less
 than {relative_cost:g} of it, {max_iterations} iterations at most), on the same core. `tests/peers/run` repeats it;
-[its README](../tests/peers/README.md) says what each adapter does.
+`tests/peers/README.md` says what each adapter does.
 
 Costs are ½ Σ rᵀΩr with the full logarithm, recomputed by one referee from the estimates that each method wrote; ✗ marks
 those that are not within 1e-4 of the best known. Times run from loaded data to the final estimate, everything symbolic

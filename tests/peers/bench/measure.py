@@ -12,8 +12,6 @@ from pathlib import Path
 
 # for what counts cores by other means than the affinity
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1"}
-# bytes, as much as most methods take
-TOUCHED = 192 << 20
 
 
 @dataclass(frozen=True)
@@ -105,17 +103,10 @@ def last_words(log):
     return next((line for line in reversed(lines) if line and not line.startswith("note:")), "nothing said")
 
 
-def touch_memory():
-    """Has the machine find pages first. A virtual machine gives back what lies idle, after a long run of another method
-    most of all, and who comes next would pay some 10 ms for each 10 MiB, and not for its own work."""
-    return len(b"\1" * TOUCHED)
-
-
 def run_once(method, problem_input, folder, stop, core, patience):
     """One run; its report with peak memory, or a text that says how it failed."""
     output, log = folder / f"estimate{problem_input.suffix}", folder / "report.json"
     output.unlink(missing_ok=True)
-    touch_memory()
     code, peak, waited = watched(method.command(problem_input, output, stop), core, patience, log)
     told = report(log)
     if told is None:

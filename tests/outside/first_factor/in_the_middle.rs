@@ -1,0 +1,39 @@
+use manifactor::prelude::*;
+use manifactor::quadric::DualQuadric;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// An object is in the middle of its shelf: r = c · along - middle, in metres.
+///
+/// c is its centroid. Moving across `along`, turning and growing leave it unchanged. Smooth and defined everywhere.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["q0"]
+/// factor = { type = "in_the_middle", along = [1.0, 0.0, 0.0], middle = 0.4 }
+/// noise  = { sigma = 0.1 }
+/// ```
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InTheMiddle {
+    /// Along the shelf, of any length but zero.
+    pub along: Direction,
+    /// The middle of the shelf, in metres along it.
+    pub middle: f64,
+}
+
+impl Residual for InTheMiddle {
+    type Variables = (DualQuadric,);
+    type Dim = U1;
+
+    fn residual<T: Scalar>(&self, (quadric,): Lifted<Self::Variables, T>) -> Vector1<T> {
+        let along: Vector3<T> = self.along.lift();
+        Vector1::new(quadric.centroid().dot(&along) - self.middle)
+    }
+}
+register_factor!("in_the_middle", InTheMiddle);
+
+#[cfg(test)]
+mod tests {
+    manifactor::testing::factor_laws! { in_the_middle }
+}
