@@ -4,8 +4,10 @@ use crate::commands::{
 };
 use crate::failure::Failure;
 use crate::status::Status;
-use clap::{Parser, Subcommand};
+use crate::watch;
+use clap::{ArgAction, Parser, Subcommand};
 use manifactor::graph::catalogue::{all, check_names};
+use manifactor::solve::memory_limit;
 
 /// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 ///
@@ -19,6 +21,9 @@ pub struct Cli {
     /// Threads to compute with; all processors by default. Results are the same for any number.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Say more on stderr: each step (-v), then all that is read, compiled and written (-vv).
+    #[arg(long, short, global = true, action = ArgAction::Count)]
+    verbose: u8,
 }
 
 #[derive(Debug, Subcommand)]
@@ -43,15 +48,17 @@ impl Cli {
     /// # Errors
     /// Whatever keeps the command from doing it.
     pub fn run(&self) -> Result<Status, Failure> {
+        watch::log(self.verbose);
         if let Some(threads) = self.threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
             pool.build_global().map_err(Failure::input)?;
         }
+        check_limit()?;
         check_names(&all()).map_err(Failure::input)?;
         match &self.command {
-            Command::Run(command) => command.run(),
+            Command::Run(command) => command.run(self.verbose),
             Command::Experiment(command) => command.run(),
-            Command::Solve(command) => command.run(),
+            Command::Solve(command) => command.run(self.verbose),
             Command::Check(command) => command.run(),
             Command::CheckFactor(command) => command.run(),
             Command::List(command) => command.run(),
@@ -79,6 +86,24 @@ impl Cli {
             Command::New(_) | Command::Simulate(_) => false,
             Command::Schema(_) => true,
         }
+    }
+}
+
+/// Refuses to begin where not even the program itself is sure to have room.
+fn check_limit() -> Result<(), Failure> {
+    const MIB: u64 = 1 << 20;
+    /// For code, stacks and the buffers of two threads.
+    const LEAST: u64 = 256 * MIB;
+    match memory_limit() {
+        Some(limit) if limit < LEAST => Err(Failure::with_help(
+            format!(
+                "the limit of memory is {} MiB, and the program alone takes {}",
+                limit / MIB,
+                LEAST / MIB
+            ),
+            "allow more (ulimit -v)",
+        )),
+        _ => Ok(()),
     }
 }
 

@@ -52,11 +52,16 @@ impl Failure {
         move |source| Self::File { path: path.to_owned(), source }
     }
 
+    /// That of files that could not be written or read: 3.
+    pub(crate) fn files() -> ExitCode {
+        ExitCode::from(3)
+    }
+
     /// 2 for bad input, 3 for files.
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Documents(_) | Self::Input { .. } => ExitCode::from(2),
-            Self::File { .. } => ExitCode::from(3),
+            Self::File { .. } => Self::files(),
         }
     }
 

@@ -5,9 +5,10 @@ use crate::text::{count, list};
 use clap::{Args, ValueEnum};
 use manifactor::config::{Document, Errors, Format, read_graph_section, write_graph};
 use manifactor::formats::pose_graph::{self, Options, Repair, Report};
+use manifactor::formats::whole::{can_write, write_whole};
 use manifactor::formats::{FormatError, bal, g2o};
 use manifactor::graph::{Graph, Key, Values};
-use manifactor::solve::{Optimizer, Start};
+use manifactor::solve::{Optimizer, Start, available_memory, memory_limit};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -45,6 +46,7 @@ pub(crate) struct GraphFile {
 impl Reading {
     /// Reads a graph, and the solver and start that file and command line ask for.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
+        check_memory(path)?;
         if Format::of_path(path).is_some() { literal(path, solver) } else { self.plain(path, solver) }
     }
 
@@ -98,8 +100,8 @@ type Noted = (Graph, Values, Vec<String>);
 
 /// `.bal`; or a text that begins like one, as such files are often called `.txt`.
 fn is_bal(path: &Path) -> bool {
-    let named = |extension| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
-    named("bal") || (named("txt") && std::fs::read_to_string(path).is_ok_and(|text| bal::begins(&text)))
+    is_named(path, "bal")
+        || (is_named(path, "txt") && std::fs::read_to_string(path).is_ok_and(|text| bal::begins(&text)))
 }
 
 fn keys(keys: &[Key]) -> String {
@@ -156,25 +158,66 @@ fn notes(report: &Report) -> Vec<String> {
     notes
 }
 
+/// Refuses a file that is too large to be read, before it is.
+fn check_memory(path: &Path) -> Result<(), Failure> {
+    /// Bytes of a graph for each byte of its text: at least.
+    const GROWTH: u64 = 8;
+    // what cannot be read is told by who reads it
+    let needed = std::fs::metadata(path).map_or(0, |file| file.len()).saturating_mul(GROWTH);
+    // what is read in no time is not worth asking the system
+    const SMALL: u64 = 64 << 20;
+    if needed < SMALL && memory_limit().is_none() {
+        return Ok(());
+    }
+    let available = available_memory();
+    if needed <= available {
+        return Ok(());
+    }
+    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+    let (needed, available) = (gib(needed), gib(available));
+    Err(Failure::with_help(
+        format!(
+            "{}: no memory for it: a graph of this size takes at least {needed:.2} GiB, and there are {available:.2}",
+            path.display()
+        ),
+        "allow more (ulimit -v), or solve it in parts",
+    ))
+}
+
+/// Whether a graph can be written here: asked before it is solved.
+pub(crate) fn check_place(path: &Path) -> Result<(), Failure> {
+    if Format::of_path(path).is_none() && !is_named(path, "g2o") && !is_named(path, "bal") {
+        return Err(no_format(path));
+    }
+    can_write(path).map_err(Failure::at(path))
+}
+
+fn is_named(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}
+
+fn no_format(path: &Path) -> Failure {
+    Failure::with_help(
+        format!("{}: the extension names no format that graphs are written in", path.display()),
+        "use .toml, .json, .yaml, .g2o or .bal",
+    )
+}
+
 /// Writes a graph with these values; returns what the format has no word for.
 pub(crate) fn write(path: &Path, graph: &Graph, values: &Values) -> Result<Vec<String>, Failure> {
-    let named = |extension| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension));
     match Format::of_path(path) {
         Some(format) => {
             let text = write_graph(graph, values, format).map_err(Failure::input)?;
-            std::fs::write(path, text).map_err(Failure::at(path))?;
+            write_whole(path, text.as_bytes()).map_err(Failure::at(path))?;
             Ok(Vec::new())
         }
-        None if named("g2o") => {
+        None if is_named(path, "g2o") => {
             Ok(omitted(&g2o::write(path, graph, values).map_err(|e: FormatError| Failure::from(e))?))
         }
-        None if named("bal") => {
+        None if is_named(path, "bal") => {
             Ok(omitted_from_bal(&bal::write(path, graph, values).map_err(Failure::from)?))
         }
-        None => Err(Failure::with_help(
-            format!("{}: the extension names no format that graphs are written in", path.display()),
-            "use .toml, .json, .yaml, .g2o or .bal",
-        )),
+        None => Err(no_format(path)),
     }
 }
 

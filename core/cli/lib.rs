@@ -10,12 +10,16 @@
 //! ```
 //!
 //! Exit codes are those of [`Status`] and [`Failure`]: 0 done, 1 no convergence, 2 bad input, 3 files, 130 interrupted.
+// strangers' input comes in here: no place of it is taken for granted
+#![warn(clippy::indexing_slicing)]
 mod arguments;
 mod choice;
+#[allow(clippy::indexing_slicing, reason = "its own names and objects")]
 mod commands;
 mod failure;
 mod fields;
 mod graph_file;
+#[allow(clippy::indexing_slicing, reason = "rows that it has made")]
 mod inspection;
 mod interrupt;
 mod output;
@@ -24,6 +28,7 @@ mod report;
 mod run_file;
 mod solver;
 mod status;
+#[allow(clippy::indexing_slicing, reason = "cells that it has made")]
 mod summary_table;
 mod table;
 mod text;
@@ -41,6 +46,7 @@ use std::process::ExitCode;
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     match cli.run() {
+        Ok(_) if output::is_lost() => Failure::files(),
         Ok(status) => status.into(),
         Err(failure) => {
             failure.show(cli.json());

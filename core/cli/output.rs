@@ -6,6 +6,15 @@ use manifactor::viz::Picture;
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether results were lost on their way out.
+static LOST: AtomicBool = AtomicBool::new(false);
+
+/// Whether standard output could not take all that was printed.
+pub(crate) fn is_lost() -> bool {
+    LOST.load(Ordering::Relaxed)
+}
 
 /// Prints text. A reader that has heard enough, such as `head`, is no error.
 pub(crate) fn print(text: &str) {
@@ -14,6 +23,7 @@ pub(crate) fn print(text: &str) {
     if let Err(error) = written
         && error.kind() != ErrorKind::BrokenPipe
     {
+        LOST.store(true, Ordering::Relaxed);
         eprintln!("cannot write to standard output: {error}");
     }
 }

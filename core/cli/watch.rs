@@ -1,10 +1,12 @@
-//! Watching a solve on a terminal: a progress bar, or a line for each step.
+//! Watching a program at work, on stderr: a progress bar, a line for each step, or the log of all parts.
 use crate::text::seconds;
 use indicatif::{ProgressBar, ProgressStyle};
 use manifactor::solve::{IterationRecord, Observer};
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::time::Duration;
+use tracing::Level;
+use tracing_subscriber::fmt::time::uptime;
 
 /// What `-v` and a terminal ask for. All of it goes to stderr.
 pub(crate) enum Watch {
@@ -17,13 +19,12 @@ pub(crate) enum Watch {
 }
 
 impl Watch {
-    /// Lines with `-v`; else a bar, where stderr is a terminal.
-    pub(crate) fn new(verbose: bool, title: &str) -> Self {
-        if verbose {
-            return Self::Lines { begun: false };
-        }
-        if !std::io::stderr().is_terminal() {
-            return Self::Nothing;
+    /// Lines with `-v`, the log's own with more; else a bar, where stderr is a terminal.
+    pub(crate) fn new(verbose: u8, title: &str) -> Self {
+        match verbose {
+            0 if std::io::stderr().is_terminal() => {}
+            1 => return Self::Lines { begun: false },
+            _ => return Self::Nothing,
         }
         let bar = ProgressBar::new_spinner().with_prefix(title.to_owned());
         // the template is a literal: without it the default style is as good
@@ -33,6 +34,20 @@ impl Watch {
         bar.enable_steady_tick(Duration::from_millis(100));
         Self::Bar(bar)
     }
+}
+
+/// Shows what all parts log: nothing but warnings, without `-v`; what was done with one; how, with two.
+pub(crate) fn log(verbose: u8) {
+    let level = match verbose {
+        0 => Level::WARN,
+        1 => Level::INFO,
+        2 => Level::DEBUG,
+        _ => Level::TRACE,
+    };
+    let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+    let log = tracing_subscriber::fmt().with_max_level(level).with_ansi(colours).with_timer(uptime());
+    // a program that brings a log of its own keeps it
+    let _ = log.with_writer(std::io::stderr).try_init();
 }
 
 impl Observer for Watch {

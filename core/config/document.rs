@@ -32,6 +32,7 @@ impl Document {
         let file = std::fs::File::open(path).map_err(unreadable)?;
         // one byte more than allowed, so that too long a file is told from the longest one
         file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        tracing::debug!(file = name, bytes = bytes.len(), "read");
         let text = String::from_utf8(bytes).map_err(|error| {
             let at = error.utf8_error().valid_up_to();
             let text = error.as_bytes().get(..at).map(String::from_utf8_lossy).unwrap_or_default();

@@ -4,6 +4,8 @@
 //! table of it field by field, serde types and registered trait objects alike, and collects in [`Errors`] everything
 //! that is wrong; [`Diagnostics`] is that list, each entry with its place and what to do about it.
 //! [`read_graph`] and [`write_graph`] are the two ways of a literal graph, [`graph_schema`] describes it to editors.
+// strangers' input comes in here: no place of it is taken for granted
+#![warn(clippy::indexing_slicing)]
 mod diagnostic;
 mod document;
 mod format;

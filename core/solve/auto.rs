@@ -85,6 +85,7 @@ impl Optimizer for Auto {
         (watch.until, outcome.times.other) = (0, outcome.times.other + looking);
         outcome.times.total += looking;
         for point in points {
+            tracing::debug!(cost = point.cost, inactive = point.inactive, "another start");
             problem.set_values(&point.values);
             let next = match point.refused {
                 true => self.damped(REFUSED).solve(&mut problem, &mut watch),

@@ -1,5 +1,6 @@
 //! From the dynamic view of a graph to the columnar one.
 use crate::layout::Layout;
+use crate::linear::memory;
 use crate::linear_solver::LinearSolver;
 use crate::linear_system::{self, Blocks};
 use crate::outcome::Times;
@@ -32,6 +33,16 @@ pub enum CompileError {
         /// How many there are.
         factors: usize,
     },
+    /// The graph does not fit into memory.
+    #[error("no memory for a graph of {factors} factors: it takes at least {:.2} GiB, and there are {:.2}", gib(*.needed), gib(*.available))]
+    TooLarge {
+        /// How many it has.
+        factors: usize,
+        /// Bytes that it takes once it is compiled, without a factorization.
+        needed: u64,
+        /// Bytes that there are.
+        available: u64,
+    },
     /// The linear system does not fit into memory.
     #[error("no memory for a linear system of {unknowns} unknowns{}", shortage(*.needed, *.available))]
     OutOfMemory {
@@ -44,8 +55,11 @@ pub enum CompileError {
     },
 }
 
+fn gib(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 30)
+}
+
 fn shortage(needed: Option<u64>, available: u64) -> String {
-    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
     needed.map_or(String::new(), |needed| {
         let (needed, available) = (gib(needed), gib(available));
         format!(
@@ -70,6 +84,7 @@ pub(crate) fn compile(
     linear: &LinearSolver,
 ) -> Result<Problem, CompileError> {
     let clock = Instant::now();
+    check_memory(graph, values)?;
     let resolved = graph.resolve(values).map_err(CompileError::Graph)?;
     let (mut variables, columns) = columns(graph, values);
 
@@ -116,6 +131,15 @@ pub(crate) fn compile(
     let factor_types = graph.factors().iter().map(|f| (f.factor.typetag_name(), observed_rows(f))).collect();
     let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };
     let trial = columns.clone();
+    let (factors, entries) = (graph.factors().len(), layout.row_idx.len());
+    tracing::debug!(
+        variables = variables.len(),
+        factors,
+        unknowns,
+        entries,
+        seconds = times.compile,
+        "compiled"
+    );
     Ok(Problem {
         variables,
         factor_variables,
@@ -135,6 +159,23 @@ pub(crate) fn compile(
         forward: vec![],
         times,
     })
+}
+
+/// Refuses a graph for which there is no memory, before any of it is taken.
+fn check_memory(graph: &Graph, values: &Values) -> Result<(), CompileError> {
+    // fewer are had without asking, which takes longer than they do
+    const FEW: usize = 100_000;
+    let factors = graph.factors().len();
+    if factors < FEW && memory::memory_limit().is_none() {
+        return Ok(());
+    }
+    let (needed, available) = (memory::of_graph(graph, values), memory::available_memory());
+    // what a few variables take is always there
+    const LITTLE: u64 = 1 << 20;
+    match needed > available.max(LITTLE) {
+        true => Err(CompileError::TooLarge { factors, needed, available }),
+        false => Ok(()),
+    }
 }
 
 fn observed_rows(entry: &FactorEntry) -> usize {

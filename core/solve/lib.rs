@@ -36,6 +36,7 @@ pub use dogleg::Dogleg;
 pub use gauss_newton::GaussNewton;
 pub use gnc::{BadParameter, Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor};
 pub use levenberg_marquardt::LevenbergMarquardt;
+pub use linear::memory::{available_memory, memory_limit};
 pub use linear_solver::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
 pub use observer::{All, Interrupt, Observer, Silent};
 pub use optimizer::{Optimizer, Stopping};
@@ -71,7 +72,11 @@ pub fn solve(
     optimizer: &dyn Optimizer,
     observer: &mut dyn Observer,
 ) -> Result<Solution, CompileError> {
-    optimizer.solve_graph(graph, values, observer)
+    let solution = optimizer.solve_graph(graph, values, observer)?;
+    let Outcome { termination, iterations, initial_cost, final_cost, times, .. } = &solution.outcome;
+    let (solver, seconds) = (optimizer.typetag_name(), times.total);
+    tracing::info!(solver, iterations, initial_cost, final_cost, seconds, "{termination}");
+    Ok(solution)
 }
 
 impl Solution {

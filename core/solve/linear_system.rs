@@ -106,10 +106,11 @@ pub(crate) fn method(
 /// Bytes for a factor. Small ones are had without asking the system, which takes longer than they do.
 fn available(linear: &LinearSolver, needed: u64) -> u64 {
     const SMALL: u64 = 256 << 20;
+    const LITTLE: u64 = 1 << 20;
     match linear.memory_gib {
         Some(gib) => (gib * f64::from(1 << 30)) as u64,
-        None if needed <= SMALL => SMALL,
-        None => memory::available(),
+        None if needed <= SMALL => SMALL.min(memory::below_limit()).max(LITTLE),
+        None => memory::available_memory(),
     }
 }
 

@@ -226,6 +226,8 @@ impl<'a> Session<'a> {
             inactive: self.at.inactive,
             seconds: self.clock.elapsed().as_secs_f64(),
         };
+        let IterationRecord { iteration, cost, trial_cost, gradient, step, control, .. } = record;
+        tracing::debug!(iteration, cost, trial_cost, gradient, step, control, accepted, "step");
         self.interrupted |= self.observer.iteration(&record).is_break();
         self.history.push(record);
     }

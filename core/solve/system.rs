@@ -59,7 +59,7 @@ impl Problem {
             return Some(run(self));
         }
         let structure = self.layout.structure(false);
-        if structure.bytes() > memory::available() {
+        if structure.bytes() > memory::available_memory() {
             return None;
         }
         let direct = Method::Cholesky(Cholesky::new(structure)?);

@@ -51,9 +51,10 @@ impl Library {
         // the first argument that none of them takes there, the others before it being as they are
         let mut left = of_arity.clone();
         for (i, (found, span)) in arguments.iter().enumerate() {
-            let taken: Vec<_> = left.iter().copied().filter(|f| f.arguments[i].1 == *found).collect();
+            let taken: Vec<_> = left.iter().copied().filter(|f| argument(f, i) == Some(*found)).collect();
             if taken.is_empty() {
-                let mut expected: Vec<&str> = left.iter().map(|f| f.arguments[i].1.name).collect();
+                let mut expected: Vec<&str> =
+                    left.iter().filter_map(|f| Some(argument(f, i)?.name)).collect();
                 expected.dedup();
                 let message =
                     format!("`{name}` takes {} here, found {}", one_of(&expected), with_article(found.name));
@@ -114,6 +115,11 @@ impl Library {
 /// Whether it is a function rather than an operator.
 pub(crate) fn is_word(name: &str) -> bool {
     name.starts_with(char::is_alphabetic)
+}
+
+/// The type of an argument by place, where there is one.
+fn argument(function: &Function, place: usize) -> Option<Shape> {
+    function.arguments.get(place).map(|(_, shape)| *shape)
 }
 
 fn no_operator(name: &str, whole: Range<usize>, arguments: Arguments<'_>) -> Mistake {

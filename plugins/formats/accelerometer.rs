@@ -21,9 +21,17 @@ pub struct Acceleration {
 /// All malformed lines; time that runs back.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<Acceleration>, FormatError> {
     let path = path.as_ref();
-    let (text, mut problems) = (read_text(path)?, Problems::of(path));
+    parse(&read_text(path)?, path)
+}
+
+/// As [`read`], of a text; `path` is what errors name.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Acceleration>, FormatError> {
+    let mut problems = Problems::of(path.as_ref());
     let mut readings: Vec<Acceleration> = vec![];
-    for (line, text) in lines(&text) {
+    for (line, text) in lines(text) {
         let previous = readings.last().map_or(f64::NEG_INFINITY, |r| r.timestamp);
         let reading = Fields::of(text, "timestamp ax ay az").and_then(|mut fields| {
             let found = fields.number()?;

@@ -105,7 +105,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle,
     // without the right number of numbers, none is known to be a focal length
     let known = if problems.is_empty() { cameras } else { 0 };
     for (i, camera) in numbers.chunks_exact(CAMERA).take(known).enumerate() {
-        let found = camera[FOCAL_LENGTH];
+        let found = camera.get(FOCAL_LENGTH).copied().unwrap_or_default();
         if found <= 0.0 {
             let what = format!("camera {i}: expected a focal length above zero, got {found}");
             problems.push(0, Mistake::Row(what));
@@ -139,6 +139,7 @@ fn observation(text: &str, Counts([cameras, points, _]): &Counts) -> Result<Obse
     Ok((camera, point, Coordinates::new(Vector2::from(f.numbers::<2>()?))?))
 }
 
+#[allow(clippy::indexing_slicing, reason = "`observation` has checked the numbers")]
 fn build(seen: &[Observation], (cameras, points): (&[f64], &[f64]), anchor: bool) -> Bundle {
     let mut bundle = Bundle::default();
     let camera_keys: Vec<Key> = (0..cameras.len() / CAMERA).map(|i| Key::indexed("c", i)).collect();

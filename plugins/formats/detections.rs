@@ -5,6 +5,7 @@
 //! box is associated with no object), `class_id`, and `scores`, all classes with a score as
 //! `cup:0.7;bowl:0.2`.
 use crate::error::{FormatError, Mistake, Problems, io_error, read_text};
+use crate::whole::write_whole;
 use csv::{ReaderBuilder, StringRecord, Trim, Writer};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -161,11 +162,12 @@ fn reason(e: &csv::Error, header: &StringRecord) -> String {
 pub fn write(path: impl AsRef<Path>, detections: &[Detection]) -> Result<(), FormatError> {
     let path = path.as_ref();
     let other = |e: csv::Error| FormatError::Io { path: path.to_owned(), source: e.into() };
-    let mut writer = Writer::from_path(path).map_err(other)?;
+    let mut writer = Writer::from_writer(vec![]);
     for detection in detections {
         writer.serialize(detection).map_err(other)?;
     }
-    writer.flush().map_err(io_error(path))
+    let bytes = writer.into_inner().map_err(|e| io_error(path)(e.into_error()))?;
+    write_whole(path, &bytes).map_err(io_error(path))
 }
 
 #[cfg(test)]

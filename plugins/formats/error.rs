@@ -1,4 +1,5 @@
 //! What can be wrong with a file, and where.
+use crate::whole::write_whole;
 use manifactor_geometry::{NoCoordinates, NotARotation};
 use manifactor_graph::ValueError;
 use manifactor_graph::noise::NoiseError;
@@ -214,6 +215,7 @@ pub(crate) fn io_error(path: &Path) -> impl FnOnce(io::Error) -> FormatError + '
 
 pub(crate) fn read_text(path: &Path) -> Result<String, FormatError> {
     let bytes = std::fs::read(path).map_err(io_error(path))?;
+    tracing::debug!(file = %path.display(), bytes = bytes.len(), "read");
     String::from_utf8(bytes).map_err(|e| {
         let good = e.as_bytes().iter().take(e.utf8_error().valid_up_to());
         let mut problems = Problems::of(path);
@@ -224,5 +226,5 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FormatError> {
 }
 
 pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), FormatError> {
-    std::fs::write(path, text).map_err(io_error(path))
+    write_whole(path, text.as_bytes()).map_err(io_error(path))
 }

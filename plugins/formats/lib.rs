@@ -3,6 +3,8 @@
 //! All readers keep one bargain: nothing in a file is passed over in silence. A malformed line is an
 //! error with file and line; all of a file's errors come at once; what is left out on purpose is
 //! counted in a report. Blank lines, `#` comments, repeated spaces and CRLF are fine everywhere.
+// strangers' input comes in here: no place of it is taken for granted
+#![warn(clippy::indexing_slicing)]
 pub mod accelerometer;
 pub mod bal;
 pub mod detections;
@@ -14,5 +16,6 @@ pub mod table;
 pub mod timestamps;
 mod toro;
 pub mod tum;
+pub mod whole;
 
 pub use error::{FormatError, Malformed, Mistake, Problem};

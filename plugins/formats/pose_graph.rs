@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+#[allow(clippy::indexing_slicing, reason = "by places that it has made itself")]
 pub(crate) mod anchor;
 mod build;
 mod information;
@@ -135,5 +136,8 @@ pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<Po
     problems.finish()?;
     let mut built = built.unwrap_or_default();
     built.report.unknown = unknown;
+    let Report { vertices, edges, filled, rejected, clamped, .. } = &built.report;
+    let (filled, rejected, clamped) = (filled.len(), rejected.len(), clamped.len());
+    tracing::info!(vertices, edges, filled, rejected, clamped, "pose graph");
     Ok(built)
 }

@@ -19,9 +19,17 @@ pub struct StampedFile {
 /// All malformed lines; time that does not increase.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<StampedFile>, FormatError> {
     let path = path.as_ref();
-    let (text, mut problems) = (read_text(path)?, Problems::of(path));
+    parse(&read_text(path)?, path)
+}
+
+/// As [`read`], of a text; `path` is what errors name.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<StampedFile>, FormatError> {
+    let mut problems = Problems::of(path.as_ref());
     let mut list: Vec<StampedFile> = vec![];
-    for (line, text) in lines(&text) {
+    for (line, text) in lines(text) {
         let previous = list.last().map(|f| f.timestamp);
         let file = Fields::of(text, "timestamp filename").and_then(|mut fields| {
             let timestamp = fields.number()?;

@@ -37,7 +37,7 @@ mod table;
 mod trial;
 
 pub use bootstrap::{Interval, bootstrap};
-pub use document::Experiment;
+pub use document::{Documents, Experiment};
 pub use journal::{Journal, JournalError};
 pub use measures::measures;
 pub use output::write;

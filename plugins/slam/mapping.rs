@@ -110,6 +110,9 @@ impl Mapping {
         }
         settings.own.add_to(&mut mapping.graph, &mut mapping.values);
         mapping.warn(settings);
+        let (poses, objects, factors) =
+            (poses.len(), mapping.mapped().count(), mapping.graph.factors().len());
+        tracing::info!(poses, objects, factors, "mapped");
         Ok(mapping)
     }
 
@@ -146,6 +149,9 @@ impl Mapping {
         settings: &Settings,
     ) -> Result<MappedObject, MappingError> {
         let key = object_key(measured.id);
+        if let Err(rejection) = &start {
+            tracing::info!(object = %measured.id, "not mapped: {rejection}");
+        }
         let (mut semantic_factors, mut left_out) = (vec![], vec![]);
         if let Some(candidate) = candidate(measured, &start) {
             let boxes = measured.views.iter();

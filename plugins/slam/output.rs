@@ -5,10 +5,11 @@
 //! `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all.
 use crate::estimate::Estimate;
 use crate::report::{RunReport, VariantReport};
-use crate::run_document::{RunDocument, Variant, slug};
+use crate::run_document::{RunDocument, Variant, absolute, slug};
 use manifactor_config::{Format, WriteError, to_json, to_toml, write_graph};
 use manifactor_formats::table::TableError;
 use manifactor_formats::tum;
+use manifactor_formats::whole;
 use manifactor_solve::{CovarianceError, IterationRecord};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -53,7 +54,15 @@ pub fn variant_folder(output: &Path, variant: &str) -> PathBuf {
     output.join(slug(variant))
 }
 
-/// Writes a file whole or not at all: under another name first, then renamed.
+/// Whether results can be written into a folder, there or not yet: asked before they are computed.
+///
+/// # Errors
+/// Where they cannot.
+pub fn check_folder(folder: &Path) -> Result<(), OutputError> {
+    whole::can_write_into(folder).map_err(|source| OutputError::Io { path: folder.to_owned(), source })
+}
+
+/// Writes a file whole or not at all, and the folders that it lies in, where they are not there.
 ///
 /// # Errors
 /// Where the folder or the file cannot be written.
@@ -62,14 +71,7 @@ pub fn write_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputE
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(fail)?;
     }
-    let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-    let unfinished = path.with_file_name(format!(".{name}.{}", std::process::id()));
-    let written = std::fs::write(&unfinished, content).and_then(|()| std::fs::rename(&unfinished, path));
-    written.map_err(|source| {
-        // nothing better can be done about a leftover than about the failure itself
-        let _ = std::fs::remove_file(&unfinished);
-        fail(source)
-    })
+    whole::write_whole(path, content.as_ref()).map_err(fail)
 }
 
 /// Writes the report of a run.
@@ -116,15 +118,22 @@ pub(crate) fn write_document(path: &Path, text: Result<String, WriteError>) -> R
 fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> {
     #[derive(Serialize)]
     struct Resolved<'a> {
-        title: String,
+        title: &'a str,
         output: &'a Path,
+        folder: &'a Path,
         #[serde(flatten)]
         settings: &'a crate::settings::Settings,
+        variants: [Named<'a>; 1],
     }
-    let title = format!("{}: {}", run.title, variant.name);
+    #[derive(Serialize)]
+    struct Named<'a> {
+        name: &'a str,
+    }
     let output = variant_folder(&run.output, &variant.name);
-    let text = to_toml(&Resolved { title, output: &output, settings: &variant.settings })?;
-    Ok(format!("# Files are named from {}\n{text}", run.folder.display()))
+    let folder = absolute(&run.folder);
+    let variants = [Named { name: &variant.name }];
+    let title = &run.title;
+    to_toml(&Resolved { title, output: &output, folder: &folder, settings: &variant.settings, variants })
 }
 
 fn iterations(history: &[IterationRecord]) -> String {

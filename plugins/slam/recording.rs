@@ -3,6 +3,7 @@ use crate::sequence::{Sequence, TrueObject};
 use manifactor_formats::FormatError;
 use manifactor_formats::detections::{self, Detection};
 use manifactor_formats::tum::{self, StampedPose};
+use manifactor_formats::whole::write_whole;
 use serde_json::json;
 use std::path::Path;
 
@@ -26,7 +27,7 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
         tum::write(folder.join("groundtruth.txt"), &truth.trajectory)?;
         let objects: Vec<_> = truth.objects.iter().map(document).collect();
         let path = folder.join("objects.json");
-        std::fs::write(&path, format!("{:#}\n", json!(objects))).map_err(io(&path))?;
+        write_whole(&path, format!("{:#}\n", json!(objects)).as_bytes()).map_err(io(&path))?;
     }
     Ok(())
 }

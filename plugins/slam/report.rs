@@ -20,8 +20,12 @@ pub use trajectory::{TrajectoryError, TrajectoryReport};
 /// A run, variant by variant.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunReport {
+    /// Of the program that made it.
+    pub version: &'static str,
     /// What the run is called.
     pub title: String,
+    /// Whether all variants were run, each to its end; not, where somebody interrupted it.
+    pub complete: bool,
     /// In the order of the document.
     pub variants: Vec<VariantReport>,
     /// All of it, from reading to the last metric.
@@ -33,6 +37,8 @@ pub struct RunReport {
 pub struct VariantReport {
     /// Its name.
     pub name: String,
+    /// Of its [settings](Settings::fingerprint), which `config.toml` has, and of the program's version.
+    pub fingerprint: String,
     /// How much there is of what.
     pub counts: Counts,
     /// Up in the map's frame, where it is known.
@@ -138,6 +144,7 @@ impl VariantReport {
         let landmarks = LandmarkReport::new(&before, &after);
         Self {
             name: name.to_owned(),
+            fingerprint: settings.fingerprint(),
             counts: Counts::of(estimate),
             up: mapping.frame.up,
             variance_components: estimate.components.clone(),

@@ -6,7 +6,7 @@ use crate::run_document::{RunDocument, Variant};
 use crate::sequence::Sequence;
 use crate::settings::Settings;
 use crate::source::{Folders, SourceError};
-use manifactor_solve::Observer;
+use manifactor_solve::{Observer, Termination};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -98,8 +98,12 @@ impl<'a> Run<'a> {
 
     /// The report over all variants that were run.
     pub fn finish(self) -> RunReport {
+        let ended = |report: &VariantReport| report.solve.termination != Termination::Interrupted;
+        let complete = self.reports.len() == self.document.variants.len() && self.reports.iter().all(ended);
         RunReport {
+            version: env!("CARGO_PKG_VERSION"),
             title: self.document.title.clone(),
+            complete,
             variants: self.reports,
             seconds: self.began.elapsed().as_secs_f64(),
         }

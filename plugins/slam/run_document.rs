@@ -51,24 +51,24 @@ pub struct Variant {
 const ONLY: &str = "estimate";
 
 impl RunDocument {
-    /// Reads a run. Files are found from the folder of the document.
+    /// Reads a run. Files are found from the folder of the document, or from the one that it names as `folder`.
     ///
     /// # Errors
     /// Everything that is wrong with it, in all variants, each at its place.
     pub fn read(document: &Document) -> Result<Self, Diagnostics> {
         let name = Path::new(document.source().name());
-        let folder = name.parent().unwrap_or(Path::new("")).to_owned();
         let stem = name.file_stem().map_or_else(|| "run".into(), |s| s.to_string_lossy().into_owned());
         let errors = Errors::new();
         let run = document.section(&errors).and_then(|mut section| {
             let title = section.or_default::<Option<String>>("title").unwrap_or_else(|| stem.clone());
             let output = section.optional("output").unwrap_or_else(|| Path::new("out").join(&stem));
+            let folder = folder(document, &errors);
             let declared = Declared::all(document, &errors);
             let base = common(document.root());
             let variants = read_variants(declared, &base, &folder, &errors);
             // what the settings have read, in each variant, is not unknown here
             section.ignore_rest();
-            Some(Self { title, output, variants: variants?, folder: folder.clone() })
+            Some(Self { title, output, variants: variants?, folder })
         });
         errors.finish(run)
     }
@@ -113,11 +113,27 @@ fn twice(declared: &[Declared], errors: &Errors) {
     }
 }
 
+/// The folder from which a run's files are named: what it says, from where it lies.
+pub(crate) fn folder(document: &Document, errors: &Errors) -> PathBuf {
+    let beside = Path::new(document.source().name()).parent().unwrap_or(Path::new(""));
+    let named = document.section(errors).and_then(|mut section| {
+        let named = section.optional::<PathBuf>("folder");
+        section.ignore_rest();
+        named
+    });
+    named.map_or_else(|| beside.to_owned(), |named| beside.join(named))
+}
+
+/// The same folder, wherever a program is run; as it stands, where nobody knows the current one.
+pub(crate) fn absolute(folder: &Path) -> PathBuf {
+    std::env::current_dir().map_or_else(|_| folder.to_owned(), |at| at.join(folder).components().collect())
+}
+
 /// The document without what is no setting.
 pub(crate) fn common(root: &Node) -> Node {
     let mut base = root.clone();
     if let Value::Table(table) = &mut base.value {
-        for field in ["title", "output", "variants"] {
+        for field in ["title", "output", "folder", "variants"] {
             table.shift_remove(field);
         }
     }

@@ -17,6 +17,7 @@ pub fn run_root(definitions: &mut Definitions) -> Value {
     let own = json!({
         "title": text("What it is called in reports."),
         "output": text("Where its results go; out/ and the document's name, where nothing is said."),
+        "folder": text("From which its files are named; its own, where nothing is said."),
         "variants": {
             "type": "array",
             "description": "Ways to do the run, to compare.",

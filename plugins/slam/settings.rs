@@ -4,11 +4,12 @@ use crate::gravity::{FromSource, Gravity};
 use crate::semantics::{Rule, read_semantics};
 use crate::source::Source;
 use crate::variance::VarianceSettings;
-use manifactor_config::{Diagnostics, Errors, Node, Section};
+use manifactor_config::{Diagnostics, Errors, Node, Problem, Section};
 use manifactor_graph::Noise;
 use manifactor_graph::loss::Loss;
 use manifactor_solve::{LevenbergMarquardt, Optimizer};
 use serde::Serialize;
+use std::hash::Hasher;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -96,6 +97,15 @@ impl Settings {
         errors.finish(settings)
     }
 
+    /// Tells these settings from others, and this program's version from others; the same on all machines.
+    pub fn fingerprint(&self) -> String {
+        let mut hash = fnv::FnvHasher::default();
+        // what cannot be written has the version alone
+        hash.write(serde_json::to_string(self).unwrap_or_default().as_bytes());
+        hash.write(env!("CARGO_PKG_VERSION").as_bytes());
+        format!("{:016x}", hash.finish())
+    }
+
     /// Takes all settings out of a document.
     pub(crate) fn take(section: &mut Section<'_>, folder: &Path) -> Option<Self> {
         let source = section.registered::<dyn Source>("source");
@@ -136,11 +146,22 @@ fn default_solver() -> Arc<dyn Optimizer> {
 }
 
 /// The noise of a section, or one of σ in every row.
-fn noise(section: &mut Section<'_>, sigma: f64) -> Noise {
+fn noise(section: &mut Section<'_>, sigma: f64, rows: usize) -> Noise {
     let given = section.optional::<Noise>("noise");
+    check_rows(section, given.as_ref(), rows);
     // a literal that is positive
     given.unwrap_or_else(|| Noise::sigma(sigma).unwrap_or_default())
 }
+
+/// Reports a section's noise that does not fit a residual of so many rows: once, and not for each factor that gets it.
+pub(crate) fn check_rows(section: &Section<'_>, noise: Option<&Noise>, rows: usize) {
+    if let Some(Err(error)) = noise.map(|noise| noise.whitener(rows)) {
+        section.report("noise", Problem::invalid(error.to_string()));
+    }
+}
+
+/// Rows of a pose's residual: rotation, translation.
+const POSE_ROWS: usize = 6;
 
 fn loss(section: &mut Section<'_>) -> Option<Arc<dyn Loss>> {
     section.optional_registered::<dyn Loss>("loss").map(Arc::from)
@@ -148,12 +169,15 @@ fn loss(section: &mut Section<'_>) -> Option<Arc<dyn Loss>> {
 
 impl OdometrySettings {
     fn take(parent: &mut Section<'_>) -> Option<Self> {
-        number::table(parent, "odometry", |section| Self { noise: noise(section, 0.01), loss: loss(section) })
+        number::table(parent, "odometry", |section| Self {
+            noise: noise(section, 0.01, POSE_ROWS),
+            loss: loss(section),
+        })
     }
 }
 
 impl PriorSettings {
     fn take(parent: &mut Section<'_>) -> Option<Self> {
-        number::table(parent, "prior", |section| Self { noise: noise(section, 0.001) })
+        number::table(parent, "prior", |section| Self { noise: noise(section, 0.001, POSE_ROWS) })
     }
 }

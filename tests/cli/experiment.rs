@@ -30,7 +30,7 @@ metrics = ["position", "shape"]
 resamples = 200
 "#;
 
-fn tables(out: &str) -> Vec<Vec<u8>> {
+pub(crate) fn tables(out: &str) -> Vec<Vec<u8>> {
     let files = ["trials.csv", "trials.parquet", "summary.csv", "summary.md", "summary.json"];
     files.map(|file| std::fs::read(Path::new(out).join(file)).unwrap()).into()
 }
@@ -83,6 +83,19 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
     let ran = sweep(&folder, &killed, 2).ended(0);
     assert!(ran.stderr.contains("12 of 12 trials done, 12 of them before"), "{}", ran.stderr);
     assert_eq!(lines(&log), 12);
+}
+
+#[test]
+fn a_sweep_is_repeated_from_its_folder_alone() {
+    let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
+    let (first, again) = (path(&folder, "first"), path(&folder, "again"));
+    let set = "--set set.source.scene.objects=2 --set summary.resamples=100";
+    manifactor(&format!("experiment {} --out {first} {set}", path(&folder, "sweep.toml"))).ended(0);
+    std::fs::remove_file(folder.path().join("base.toml")).unwrap();
+    manifactor(&format!("experiment {first}/repeat/experiment.toml --out {again}")).ended(0);
+    assert!(tables(&first) == tables(&again));
+    let text = |out: &str| std::fs::read_to_string(format!("{out}/repeat/experiment.toml")).unwrap();
+    assert_eq!(text(&first), text(&again));
 }
 
 #[test]

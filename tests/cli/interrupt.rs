@@ -1,5 +1,6 @@
 //! Ctrl-C and SIGTERM, while a solve is under way.
 use crate::{folder, path};
+use serde_json::Value;
 use std::fmt::Write as _;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -58,5 +59,44 @@ fn a_signal_ends_a_solve_with_the_best_values_written() {
             .unwrap()
             .filter(|f| f.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
         assert_eq!(left.count(), 0, "a half-written file is left");
+    }
+}
+
+/// A run of two variants that takes many seconds.
+const LONG: &str = r#"
+semantics = "table_one"
+source = { type = "simulated", scene = { objects = 30 }, trajectory = { frames = 900 } }
+objects = { refinements = 1 }
+solver = { type = "levenberg_marquardt", stop = { max_iterations = 10000, relative_cost = 0.0, gradient = 0.0, step = 0.0 } }
+[[variants]]
+name = "first"
+[[variants]]
+name = "second"
+"#;
+
+#[test]
+#[cfg(unix)]
+fn a_signal_at_any_time_leaves_a_folder_that_says_it_is_partial() {
+    let folder = folder(&[("run.toml", LONG)]);
+    for (signal, milliseconds) in [("-TERM", 150), ("-INT", 700), ("-INT", 1700)] {
+        let out = path(&folder, &format!("out{milliseconds}"));
+        let child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
+            .args(["run", &path(&folder, "run.toml"), "--out", &out])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(milliseconds));
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(130), "{}", String::from_utf8_lossy(&ended.stderr));
+        let report: Value =
+            serde_json::from_slice(&std::fs::read(format!("{out}/report.json")).unwrap()).unwrap();
+        assert_eq!(report["complete"], false);
+        assert_eq!(report["variants"].as_array().unwrap().len(), 1);
+        assert_eq!(report["variants"][0]["solve"]["termination"]["status"], "interrupted");
+        let files = std::fs::read_dir(format!("{out}/first")).unwrap();
+        let names: Vec<_> = files.map(|f| f.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        assert!(names.len() == 8 && names.iter().all(|name| !name.starts_with('.')), "{names:?}");
     }
 }

@@ -1,16 +1,21 @@
 //! What strangers' bytes go through: nothing here may panic, hang, or leave a value that is not finite.
-use manifactor::config::{Document, Format, read_graph, write_graph};
+use manifactor::config::{Document, Errors, Format, read_graph, read_graph_section, to_json, write_graph};
 use manifactor::formats::pose_graph::{self, Options, Repair};
-use manifactor::formats::{bal, detections, tum};
+use manifactor::formats::{accelerometer, bal, detections, timestamps, tum};
 use manifactor::prelude::*;
+use manifactor::slam::run::estimate;
 use manifactor::slam::run_document::RunDocument;
-use manifactor::solve::Auto;
+use manifactor::slam::sequence::Sequence;
+use manifactor::slam::simulator::Simulated;
+use manifactor::solve::{Auto, IterationRecord};
+use std::ops::ControlFlow;
+use std::sync::{Arc, LazyLock};
 
 /// A target by name.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub const TARGETS: [Target; 8] = [
+pub const TARGETS: [Target; 9] = [
     ("pose_graph", pose_graph),
     ("bundle", bundle),
     ("trajectory", trajectory),
@@ -19,6 +24,7 @@ pub const TARGETS: [Target; 8] = [
     ("json", json),
     ("yaml", yaml),
     ("expression", expression),
+    ("run", run),
 ];
 
 /// Graphs of more are read, but not solved: fuzzers are there for many small inputs.
@@ -30,7 +36,7 @@ pub fn pose_graph(data: &[u8]) {
     for repair in [Repair::Error, Repair::Reject, Repair::Clamp] {
         let options = Options { repair, ..Options::default() };
         if let Ok(read) = pose_graph::parse(&text, "graph.g2o", &options) {
-            three_steps(&read.graph, &read.values);
+            three_steps(&read.graph, &read.values, &Auto::default());
         }
     }
 }
@@ -38,12 +44,14 @@ pub fn pose_graph(data: &[u8]) {
 /// Bundle adjustments in BAL's form.
 pub fn bundle(data: &[u8]) {
     if let Ok(read) = bal::parse(&String::from_utf8_lossy(data), "scene.bal", true) {
-        three_steps(&read.graph, &read.values);
+        three_steps(&read.graph, &read.values, &Auto::default());
     }
 }
 
-/// TUM's trajectories: what is read is read back from what is written.
+/// TUM's trajectories, and lists of times and accelerations: what is read is read back from what is written.
 pub fn trajectory(data: &[u8]) {
+    let text = String::from_utf8_lossy(data);
+    let _ = (accelerometer::parse(&text, "accelerometer.txt"), timestamps::parse(&text, "rgb.txt"));
     if let Ok(read) = tum::parse(&String::from_utf8_lossy(data), "poses.txt") {
         let again = tum::parse(&tum::format(&read.poses), "poses.txt").unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(again.poses.len(), read.poses.len());
@@ -86,25 +94,74 @@ pub fn expression(data: &[u8]) {
     document(graph.as_bytes(), Format::Json);
 }
 
-/// As a graph, and as a run.
+/// Runs, of a small simulation in place of their own source: from the document to the report.
+pub fn run(data: &[u8]) {
+    static SEQUENCE: LazyLock<Arc<Sequence>> = LazyLock::new(|| {
+        let mut simulation = Simulated::default();
+        (simulation.trajectory.frames, simulation.scene.objects) = (6, 2);
+        Arc::new(simulation.simulate().unwrap_or_else(|e| panic!("{e}")))
+    });
+    let Ok(document) = Document::parse("run.toml", String::from_utf8_lossy(data), Format::Toml) else {
+        return;
+    };
+    let Ok(run) = RunDocument::read(&document) else { return };
+    for variant in run.variants.into_iter().take(2) {
+        let mut settings = variant.settings;
+        settings.objects.refinements = settings.objects.refinements.min(1);
+        if let Some(variance) = &mut settings.variance_components {
+            variance.rounds = variance.rounds.min(2);
+        }
+        let Ok((found, report)) = estimate("fuzzed", SEQUENCE.clone(), &settings, &mut third()) else {
+            continue;
+        };
+        for (key, value) in found.solution.values.iter() {
+            assert!(value.erased().is_finite(), "{key} is not finite: {:?}", report.solve.termination);
+        }
+        let _ = to_json(&report);
+    }
+}
+
+/// As a graph, with the solver and the start that it may name, and as a run.
 fn document(data: &[u8], format: Format) {
     let Ok(document) = Document::parse("document", String::from_utf8_lossy(data), format) else { return };
     // nothing is loaded: sources may be as large as they like
     let _ = RunDocument::read(&document);
-    let Ok((graph, values)) = read_graph(&document) else { return };
+    let errors = Errors::new();
+    let read = document.section(&errors).map(|mut section| {
+        let (graph, values) = read_graph_section(&mut section);
+        let optimizer = section.optional_registered::<dyn Optimizer>("solver");
+        let start = section.optional_registered::<dyn Start>("start");
+        section.finish();
+        (graph, values, optimizer, start)
+    });
+    let Ok((graph, values, optimizer, start)) = errors.finish(read) else { return };
     let written = write_graph(&graph, &values, format).unwrap_or_else(|e| panic!("{e}"));
     let again = Document::parse("written", written, format).and_then(|document| read_graph(&document));
-    let (graph, values) = again.unwrap_or_else(|e| panic!("{e}"));
-    three_steps(&graph, &values);
+    let (graph, mut values) = again.unwrap_or_else(|e| panic!("{e}"));
+    if values.len() > SOLVED {
+        return;
+    }
+    if let Some(Ok(begin)) = start.map(|start| start.start(&graph, &values)) {
+        values = begin;
+    }
+    three_steps(&graph, &values, &*optimizer.unwrap_or_else(|| Box::new(Auto::default())));
 }
 
-/// A few steps of the default solver, where graph and values fit each other.
-fn three_steps(graph: &Graph, values: &Values) {
+/// Ends a solve at its third step.
+fn third() -> impl Observer {
+    let mut steps = 0;
+    move |_: &IterationRecord| {
+        steps += 1;
+        if steps < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    }
+}
+
+/// A few steps, where graph and values fit each other.
+fn three_steps(graph: &Graph, values: &Values, solver: &dyn Optimizer) {
     if values.len() > SOLVED || graph.factors().len() > SOLVED {
         return;
     }
-    let solver = Auto { stop: Stopping { max_iterations: 3, ..Stopping::default() }, ..Auto::default() };
-    let Ok(solution) = solve(graph, values, &solver, &mut Silent) else { return };
+    let Ok(solution) = solve(graph, values, solver, &mut third()) else { return };
     for (key, value) in solution.values.iter() {
         assert!(value.erased().is_finite(), "{key} is not finite: {:?}", solution.outcome.termination);
     }

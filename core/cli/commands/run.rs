@@ -5,7 +5,7 @@ use crate::status::Status;
 use crate::watch::Watch;
 use crate::{interrupt, output, table};
 use clap::Args;
-use manifactor::slam::output::{variant_folder, write_report, write_variant, write_whole};
+use manifactor::slam::output::{check_folder, variant_folder, write_report, write_variant, write_whole};
 use manifactor::slam::run::Run as Running;
 use manifactor::solve::All;
 use manifactor::viz::{RunPage, run_pictures};
@@ -26,25 +26,21 @@ pub(crate) struct Run {
     /// Print JSON: the report that is also written.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Show each step of each solve.
-    #[arg(long, short)]
-    verbose: bool,
 }
 
 impl Run {
-    pub(crate) fn run(&self) -> Result<Status, Failure> {
+    pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         let mut document = self.run.open()?;
         if let Some(out) = &self.out {
             document.output.clone_from(out);
         }
+        check_folder(&document.output)?;
         let mut interrupt = interrupt::on_ctrl_c();
         let (mut status, mut page) = (Status::Done, RunPage::default());
         let mut run = Running::new(&document, self.run.data());
         for variant in &document.variants {
-            if self.verbose {
-                eprintln!("{}", variant.name);
-            }
-            let mut watch = Watch::new(self.verbose, &variant.name);
+            tracing::info!("variant {}", variant.name);
+            let mut watch = Watch::new(verbose, &variant.name);
             let mut observer = All(vec![&mut watch, &mut interrupt]);
             let (estimate, report) = run.variant(variant, &mut observer)?;
             drop(watch);

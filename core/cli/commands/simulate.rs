@@ -6,6 +6,7 @@ use crate::status::Status;
 use crate::text::count;
 use clap::Args;
 use manifactor::config::{Diagnostic, Problem, Source};
+use manifactor::slam::output::check_folder;
 use manifactor::slam::recording;
 use manifactor::slam::run::Run as Running;
 use std::path::PathBuf;
@@ -30,6 +31,7 @@ impl Simulate {
             let problem = Problem::invalid("there is no variant to simulate");
             return Err(Failure::Documents(Diagnostic::new(source.place(0..0), problem).into()));
         };
+        check_folder(&self.out)?;
         let sequence = Running::new(&document, self.run.data()).sequence(variant)?;
         recording::write(&sequence, &self.out)?;
         let objects = sequence.ground_truth.as_ref().map_or(0, |truth| truth.objects.len());

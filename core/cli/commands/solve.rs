@@ -38,19 +38,19 @@ pub(crate) struct Solve {
     /// Print JSON: costs, iterations, termination, seconds by stage; with -v a record for each step.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Show each step.
-    #[arg(long, short)]
-    verbose: bool,
 }
 
 impl Solve {
-    pub(crate) fn run(&self) -> Result<Status, Failure> {
+    pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
+        if let Some(path) = &self.out {
+            graph_file::check_place(path)?;
+        }
         let mut input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
             output::note(note);
         }
-        let mut watch = Watch::new(self.verbose, "solving");
+        let mut watch = Watch::new(verbose, "solving");
         let mut interrupt = interrupt::on_ctrl_c();
         let mut observer = All(vec![&mut watch, &mut interrupt]);
         let clock = Instant::now();
@@ -78,6 +78,9 @@ impl Solve {
             if let Some(marginals) = marginals {
                 json["covariances"] = json!(marginals);
             }
+            if verbose > 0 {
+                json["history"] = json!(solution.outcome.history);
+            }
             if let Some(certificate) = certificate {
                 json["certificate"] = json!(certificate);
             }
@@ -95,7 +98,7 @@ impl Solve {
 
     fn as_json(&self, input: &GraphFile, solution: &Solution, start: f64) -> Value {
         let outcome = &solution.outcome;
-        let mut json = json!({
+        json!({
             "graph": self.graph,
             "variables": input.values.len(),
             "factors": outcome.factors,
@@ -109,10 +112,6 @@ impl Solve {
             "rejected": outcome.rejected,
             "seconds": outcome.times,
             "notes": input.notes,
-        });
-        if self.verbose {
-            json["history"] = json!(outcome.history);
-        }
-        json
+        })
     }
 }

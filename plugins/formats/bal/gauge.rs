@@ -26,8 +26,8 @@ pub(super) fn hold(graph: &mut Graph, values: &Values) -> Vec<Key> {
         let Some((_, key, camera)) = farthest.filter(|(.., camera)| away(camera).norm() > 0.0) else {
             continue;
         };
-        let axis = ["x", "y", "z"][away(camera).iamax()];
-        graph.fix_directions(*key, &[axis]);
+        let axis = ["x", "y", "z"].into_iter().nth(away(camera).iamax());
+        graph.fix_directions(*key, axis.as_slice());
         held.push((*key).clone());
     }
     held

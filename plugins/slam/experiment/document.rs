@@ -1,7 +1,7 @@
 //! The document that describes an experiment.
 use super::axis::{Axis, Choice};
 use super::{SummarySettings, Trial};
-use crate::run_document::{Declared, common};
+use crate::run_document::{Declared, absolute, common, folder};
 use crate::settings::Settings;
 use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Node, Problem, Section, merge};
 use std::path::{Path, PathBuf};
@@ -21,6 +21,17 @@ pub struct Experiment {
     pub summary: SummarySettings,
     /// The folder from which the base's files are named.
     pub folder: PathBuf,
+    /// The experiment and its base as they were read, whatever was set from outside; they are written beside the results.
+    pub documents: Documents,
+}
+
+/// What repeats an experiment.
+#[derive(Debug, Clone, Default)]
+pub struct Documents {
+    /// Its own document, which names `base.toml`.
+    pub experiment: serde_json::Value,
+    /// The run.
+    pub base: serde_json::Value,
 }
 
 /// What the column of the base's variants is called.
@@ -47,7 +58,7 @@ impl Experiment {
             let summary = section.or_default::<SummarySettings>("summary");
             section.finish();
             let base = base?;
-            let folder = Path::new(base.source().name()).parent().unwrap_or(Path::new("")).to_owned();
+            let folder = folder(&base, &errors);
             let variants = Declared::all(&base, &errors);
             let has_variants = |axis: &Axis| axis.columns.iter().any(|column| column == VARIANT);
             if !variants.is_empty() && !axes.iter().any(has_variants) {
@@ -63,9 +74,33 @@ impl Experiment {
                 merge(&mut node, set);
             }
             let trials = if errors.is_empty() { trials(&node, &axes, &folder, &errors)? } else { vec![] };
-            Some(Self { title, output, columns, trials, summary, folder })
+            let documents = Documents::new((&title, document), &base, &folder, &errors)?;
+            Some(Self { title, output, columns, trials, summary, folder, documents })
         });
         errors.finish(read)
+    }
+}
+
+impl Documents {
+    fn new(
+        (title, experiment): (&str, &Document),
+        base: &Document,
+        folder: &Path,
+        errors: &Errors,
+    ) -> Option<Self> {
+        let json = |document: &Document| match document.root().to_json() {
+            Ok(serde_json::Value::Object(fields)) => Some(fields),
+            Ok(_) => None,
+            Err(diagnostics) => {
+                diagnostics.into_iter().for_each(|diagnostic| errors.push(diagnostic));
+                None
+            }
+        };
+        let (mut experiment, mut base) = (json(experiment)?, json(base)?);
+        experiment.insert("title".to_owned(), title.into());
+        experiment.insert("base".to_owned(), "base.toml".into());
+        base.insert("folder".to_owned(), absolute(folder).display().to_string().into());
+        Some(Self { experiment: experiment.into(), base: base.into() })
     }
 }
 

@@ -4,6 +4,7 @@
 //! Of several lines for one trial the last counts, as a trial that failed may be run again, and lines of trials that the experiment does not have any more are
 //! passed over, so that a changed experiment runs what is new and keeps what is not.
 use super::{Record, Trial};
+use manifactor_formats::whole::remove_unfinished;
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
@@ -64,6 +65,9 @@ impl Journal {
             Err(TryLockError::WouldBlock) => return Err(JournalError::InUse { path: path.to_owned() }),
             // a file system without locks is no reason not to run
             Err(TryLockError::Error(_)) | Ok(()) => {}
+        }
+        if let Some(folder) = path.parent() {
+            remove_unfinished(folder);
         }
         let mut bytes = vec![];
         file.read_to_end(&mut bytes).map_err(io)?;

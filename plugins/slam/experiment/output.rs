@@ -1,7 +1,8 @@
 //! The files that an experiment leaves.
+use super::document::Documents;
 use super::{Comparison, Experiment, Interval, Journal, Summary, times_table, trials_table};
 use crate::output::{OutputError, write_document, write_whole};
-use manifactor_config::to_json;
+use manifactor_config::{to_json, to_toml};
 use manifactor_formats::table::{Column, Table, TableError, to_parquet};
 use std::fmt;
 
@@ -15,6 +16,10 @@ pub fn write(experiment: &Experiment, journal: &Journal) -> Result<Summary, Outp
         let content = content.map_err(|source| OutputError::Table { path: file(name), source })?;
         write_whole(&file(name), content)
     };
+    let Documents { experiment: own, base } = &experiment.documents;
+    // in a folder of their own: beside the results there may be others of these names
+    write_document(&file("repeat/experiment.toml"), to_toml(own))?;
+    write_document(&file("repeat/base.toml"), to_toml(base))?;
     let csv = |table: &Table| table.to_csv().map(String::into_bytes);
     let trials = trials_table(experiment, journal);
     write("trials.csv", csv(&trials))?;

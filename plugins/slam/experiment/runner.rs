@@ -50,6 +50,8 @@ pub fn run(
         drop(send);
         // once the receiver is gone, workers end after the trial that they are at
         for record in receive {
+            let (trial, status) = (record.labels.join(", "), record.outcome.status());
+            tracing::info!(trial, status, seconds = record.seconds, "trial");
             journal.append(record)?;
             done += 1;
             progress(Progress { done, kept, trials });

@@ -6,7 +6,6 @@ use crate::source::Folders;
 use indexmap::IndexMap;
 use manifactor_solve::{Observer, Termination};
 use serde::{Deserialize, Serialize};
-use std::hash::Hasher;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -51,13 +50,9 @@ pub struct Record {
 }
 
 impl Trial {
-    /// Tells these settings from others, and this program's version from others; the same on all machines.
+    /// That of its [settings](Settings::fingerprint).
     pub fn fingerprint(&self) -> String {
-        let mut hash = fnv::FnvHasher::default();
-        // what cannot be written is told from other trials by its labels alone
-        hash.write(serde_json::to_string(&self.settings).unwrap_or_default().as_bytes());
-        hash.write(env!("CARGO_PKG_VERSION").as_bytes());
-        format!("{:016x}", hash.finish())
+        self.settings.fingerprint()
     }
 
     /// Runs it; `None` where the observer stopped it. Whatever goes wrong is an outcome.

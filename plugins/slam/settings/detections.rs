@@ -50,6 +50,9 @@ impl CutSides {
     }
 }
 
+/// Rows of a box's residual.
+const SIDES: usize = 4;
+
 impl DetectionSettings {
     /// The noise of a box with these of its sides inside of the image.
     pub fn noise_of(&self, inside: [bool; 4]) -> Noise {
@@ -61,7 +64,7 @@ impl DetectionSettings {
 
     pub(super) fn take(parent: &mut Section<'_>) -> Option<Self> {
         table(parent, "detections", |section| Self {
-            noise: noise(section, 20.0),
+            noise: noise(section, 20.0, SIDES),
             loss: loss(section),
             model: section.or_default("model"),
             cut_sides: section.or_default("cut_sides"),
