@@ -1,5 +1,5 @@
 //! What every registered type has to have, checked by walking the catalogue.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 use manifactor::config::{Document, Format, Node, Value};
 use manifactor::graph::catalogue::{Entry, Kind, all, entries};
 use manifactor::graph::loss::Loss;

@@ -69,6 +69,8 @@ const GAIN: f64 = 1e-4;
 const NEGLIGIBLE: f64 = 1e-3;
 /// Damping above which a small step is no sign of a minimum, as a share of the diagonal.
 const TRUSTED: f64 = 1.0;
+/// Damping up to which one small step is sign enough; above, it takes two.
+const LIGHT: f64 = 1e-2;
 
 #[typetag::serde(name = "levenberg_marquardt")]
 impl Optimizer for LevenbergMarquardt {
@@ -96,7 +98,7 @@ register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
 
 impl LevenbergMarquardt {
     fn iterate(&self, session: &mut Session<'_>, lambda: &mut f64) -> Termination {
-        let mut rise = 2.0;
+        let (mut rise, mut small_before) = (2.0, false);
         let (mut delta, mut added) = (vec![], vec![]);
         'linearized: loop {
             if let Some(termination) = session.finished() {
@@ -119,14 +121,16 @@ impl LevenbergMarquardt {
                     if let (true, Tried::Lower { gain }) = (accepted, &tried) {
                         let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / self.decrease).min(1.0);
                         (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
-                        match session.take(&step) {
-                            // a step that damping has made small says nothing of the cost around
-                            Some(Termination::Converged { .. }) if step.control > TRUSTED => {
-                                continue 'linearized;
+                        let ended = session.take(&step);
+                        // a step that damping has made small says little of the cost around
+                        let small = ended.is_some() && step.control <= TRUSTED;
+                        match ended {
+                            Some(termination) if small && (small_before || step.control <= LIGHT) => {
+                                return termination;
                             }
-                            Some(termination) => return termination,
-                            None => continue 'linearized,
+                            _ => small_before = small,
                         }
+                        continue 'linearized;
                     }
                     if !matches!(tried, Tried::Undefined) && step.control <= TRUSTED && session.settled(&step)
                     {

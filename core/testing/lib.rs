@@ -10,7 +10,9 @@
 //! factor_laws! { rests_on }
 //! jacobian_laws! { agrees_with_differences: (any_factor(), any_se3(), any_se3()) }
 //! ```
+#[allow(clippy::panic, reason = "laws are assertions: a test fails by them")]
 pub mod catalogue;
+#[allow(clippy::panic, reason = "laws are assertions: a test fails by them")]
 mod check;
 mod differences;
 mod error;

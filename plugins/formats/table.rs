@@ -110,7 +110,9 @@ mod tests {
         let text = sample().to_csv().unwrap();
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows: Vec<(String, Option<f64>)> = reader.deserialize().map(Result::unwrap).collect();
-        let Column::Number(numbers) = &sample().columns[1].1 else { unreachable!() };
+        let Column::Number(numbers) = &sample().columns[1].1 else {
+            panic!("the second column is of numbers")
+        };
         assert_eq!(rows.iter().map(|row| row.1).collect::<Vec<_>>(), *numbers);
         assert_eq!(rows[2].0, "with \"quotes\"");
     }

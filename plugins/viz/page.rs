@@ -1,5 +1,5 @@
 //! A page of HTML with everything in it: it opens without a network, and fetches nothing.
-use crate::picture::Picture;
+use crate::picture::{Picture, numbered};
 use std::fmt::Write as _;
 
 /// A page that grows from top to bottom.
@@ -68,7 +68,7 @@ impl Page {
 
     /// A picture.
     pub fn picture(&mut self, picture: &Picture) -> &mut Self {
-        self.svg(&picture.svg())
+        self.svg(&picture.part())
     }
 
     fn svg(&mut self, svg: &str) -> &mut Self {
@@ -94,8 +94,7 @@ impl Page {
 
     /// The page.
     pub fn html(&self) -> String {
-        let Self { title, body } = self;
-        let title = escape(title);
+        let (title, body) = (escape(&self.title), numbered(&self.body));
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
              <style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"

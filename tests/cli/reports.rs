@@ -76,8 +76,12 @@ fn the_report_of_an_experiment_needs_no_network() {
     let folder = folder(&[("base.toml", base), ("sweep.toml", sweep)]);
     let out = path(&folder, "out");
     manifactor(&format!("experiment {} --out {out}", path(&folder, "sweep.toml"))).ended(0);
-    let html = std::fs::read_to_string(Path::new(&out).join("report.html")).unwrap();
+    let page = Path::new(&out).join("report.html");
+    let html = std::fs::read_to_string(&page).unwrap();
     assert_self_contained(&html);
+    if let Some(dom) = rendered(&page) {
+        assert_eq!(dom.matches("<svg").count(), html.matches("<svg").count());
+    }
     for text in ["noise of boxes", "position over sigma_px", "2 of 2 trials", "base.toml"] {
         assert!(html.contains(text), "{text}");
     }

@@ -151,9 +151,10 @@ impl<'a> Builder<'a> {
         let position = Point3::new(sensor.act(&position));
         let r = sensor.rotation.matrix();
         let turned = |m: &DMatrix<f64>| {
-            let m = r * m * r.transpose();
+            let mut m = r * m * r.transpose();
             // symmetric up to rounding only
-            DMatrix::from_fn(3, 3, |i, k| if i <= k { m[(i, k)] } else { m[(k, i)] })
+            m.fill_lower_triangle_with_upper_triangle();
+            DMatrix::from_column_slice(3, 3, m.as_slice())
         };
         let information = edge.information.as_ref().map(turned);
         Ok((Measurement::Point3 { position, sensor: None }, information))

@@ -102,16 +102,10 @@ pub(crate) type Parse = fn(&str) -> Result<Record, Mistake>;
 
 /// The symmetric matrix of `n` rows whose upper triangle is given by rows.
 pub(crate) fn upper_triangle(n: usize, numbers: &[f64]) -> DMatrix<f64> {
-    let mut numbers = numbers.iter();
-    let mut m = DMatrix::zeros(n, n);
-    for r in 0..n {
-        for c in r..n {
-            let x = *numbers.next().unwrap_or(&0.0);
-            m[(r, c)] = x;
-            m[(c, r)] = x;
-        }
-    }
-    m
+    DMatrix::from_fn(n, n, |r, c| {
+        let (r, c) = (r.min(c), r.max(c));
+        numbers.get(r * (2 * n - r - 1) / 2 + c).copied().unwrap_or_default()
+    })
 }
 
 /// Exchanges translation first and rotation first in a 6 × 6 matrix; its own inverse.
