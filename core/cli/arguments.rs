@@ -7,7 +7,7 @@ use crate::status::Status;
 use crate::watch;
 use clap::{ArgAction, Parser, Subcommand};
 use manifactor::graph::catalogue::{all, check_names};
-use manifactor::solve::memory_limit;
+use manifactor::solve::{Bytes, memory_limit};
 
 /// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 ///
@@ -91,16 +91,11 @@ impl Cli {
 
 /// Refuses to begin where not even the program itself is sure to have room.
 fn check_limit() -> Result<(), Failure> {
-    const MIB: u64 = 1 << 20;
     /// For code, stacks and the buffers of two threads.
-    const LEAST: u64 = 256 * MIB;
+    const LEAST: u64 = 256 << 20;
     match memory_limit() {
         Some(limit) if limit < LEAST => Err(Failure::with_help(
-            format!(
-                "the limit of memory is {} MiB, and the program alone takes {}",
-                limit / MIB,
-                LEAST / MIB
-            ),
+            format!("the limit of memory is {}, and the program alone takes {}", Bytes(limit), Bytes(LEAST)),
             "allow more (ulimit -v)",
         )),
         _ => Ok(()),

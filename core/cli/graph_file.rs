@@ -8,7 +8,7 @@ use manifactor::formats::pose_graph::{self, Options, Repair, Report};
 use manifactor::formats::whole::{can_write, write_whole};
 use manifactor::formats::{FormatError, bal, g2o};
 use manifactor::graph::{Graph, Key, Values};
-use manifactor::solve::{Optimizer, Start, available_memory, memory_limit};
+use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -173,14 +173,13 @@ fn check_memory(path: &Path) -> Result<(), Failure> {
     if needed <= available {
         return Ok(());
     }
-    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
-    let (needed, available) = (gib(needed), gib(available));
+    let (needed, available) = (Bytes(needed), Bytes(available));
     Err(Failure::with_help(
         format!(
-            "{}: no memory for it: a graph of this size takes at least {needed:.2} GiB, and there are {available:.2}",
+            "{}: no memory for it: a graph of this size takes at least {needed}, and there are {available}",
             path.display()
         ),
-        "allow more (ulimit -v), or solve it in parts",
+        "allow more (ulimit -v), take fewer threads, or solve it in parts",
     ))
 }
 

@@ -1,6 +1,6 @@
 //! From the dynamic view of a graph to the columnar one.
 use crate::layout::Layout;
-use crate::linear::memory;
+use crate::linear::memory::{self, Bytes};
 use crate::linear_solver::LinearSolver;
 use crate::linear_system::{self, Blocks};
 use crate::outcome::Times;
@@ -34,7 +34,7 @@ pub enum CompileError {
         factors: usize,
     },
     /// The graph does not fit into memory.
-    #[error("no memory for a graph of {factors} factors: it takes at least {:.2} GiB, and there are {:.2}", gib(*.needed), gib(*.available))]
+    #[error("no memory for a graph of {factors} factors: it takes at least {}, and there are {}; allow more, or take fewer threads", Bytes(*.needed), Bytes(*.available))]
     TooLarge {
         /// How many it has.
         factors: usize,
@@ -55,15 +55,11 @@ pub enum CompileError {
     },
 }
 
-fn gib(bytes: u64) -> f64 {
-    bytes as f64 / f64::from(1 << 30)
-}
-
 fn shortage(needed: Option<u64>, available: u64) -> String {
     needed.map_or(String::new(), |needed| {
-        let (needed, available) = (gib(needed), gib(available));
+        let (needed, available) = (Bytes(needed), Bytes(available));
         format!(
-            ": its factor takes {needed:.2} GiB, and there are {available:.2}; \
+            ": its factor takes {needed}, and there are {available}; \
              take another ordering, or linear = {{ method = \"conjugate_gradients\" }}, or allow more by memory_gib"
         )
     })
@@ -170,9 +166,7 @@ fn check_memory(graph: &Graph, values: &Values) -> Result<(), CompileError> {
         return Ok(());
     }
     let (needed, available) = (memory::of_graph(graph, values), memory::available_memory());
-    // what a few variables take is always there
-    const LITTLE: u64 = 1 << 20;
-    match needed > available.max(LITTLE) {
+    match needed > available {
         true => Err(CompileError::TooLarge { factors, needed, available }),
         false => Ok(()),
     }

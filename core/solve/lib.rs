@@ -36,7 +36,7 @@ pub use dogleg::Dogleg;
 pub use gauss_newton::GaussNewton;
 pub use gnc::{BadParameter, Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor};
 pub use levenberg_marquardt::LevenbergMarquardt;
-pub use linear::memory::{available_memory, memory_limit};
+pub use linear::memory::{Bytes, available_memory, memory_limit};
 pub use linear_solver::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
 pub use observer::{All, Interrupt, Observer, Silent};
 pub use optimizer::{Optimizer, Stopping};

@@ -1,5 +1,18 @@
 //! How much memory there is, and how much a graph takes.
 use manifactor_graph::{Graph, Values};
+use std::fmt;
+use std::sync::OnceLock;
+
+/// A number of bytes, as people say it: `12.0 MiB`, `1.50 GiB`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bytes(pub u64);
+
+impl fmt::Display for Bytes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mib = self.0 as f64 / f64::from(1 << 20);
+        if mib < 1024.0 { write!(f, "{mib:.1} MiB") } else { write!(f, "{:.2} GiB", mib / 1024.0) }
+    }
+}
 
 /// Bytes that this process can still have: what the system has left, or the limit that it was given.
 pub fn available_memory() -> u64 {
@@ -22,14 +35,20 @@ pub fn memory_limit() -> Option<u64> {
     None
 }
 
-/// Bytes that a limit leaves; all that there are, where there is none.
+/// Bytes that a limit leaves; all that there are, where there is none. Rather too few than too many: an allocator that
+/// finds nothing ends the program.
 pub(crate) fn below_limit() -> u64 {
-    // a limit is on addresses: stacks and code count, and the buffers that a dense product takes on each thread
-    const STACKS_AND_CODE: u64 = 96 << 20;
-    const BUFFERS: u64 = 64 << 20;
+    // a limit is on addresses: those of code and of the main thread count, and for each of the others what its allocator
+    // sets aside, and the buffer of a large product
+    const PROGRAM: u64 = 288 << 20;
+    const THREAD: u64 = 128 << 20;
+    // for what has no large products
+    const LEAST: u64 = 4 << 20;
     let Some(limit) = memory_limit() else { return u64::MAX };
-    let reserved = STACKS_AND_CODE + BUFFERS * rayon::current_num_threads() as u64;
-    limit.saturating_sub(reserved + resident())
+    // what earlier solves have given back is resident still, and to be had again: so it is asked once
+    static BEFORE: OnceLock<u64> = OnceLock::new();
+    let taken = PROGRAM + THREAD * rayon::current_num_threads() as u64 + BEFORE.get_or_init(resident);
+    limit.saturating_sub(taken).max(LEAST)
 }
 
 /// Bytes in use. What an allocator has reserved beyond that is still to be had.
