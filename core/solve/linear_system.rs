@@ -92,7 +92,7 @@ pub(crate) fn method(
     };
     let structure = layout.structure(dense);
     let needed = structure.bytes();
-    let available = available(linear, needed, layout.row_idx.len() as u64);
+    let available = available(linear, needed, layout.row_idx.len());
     if needed > available && linear.method == chosen::Method::Auto {
         return iterative(linear, blocks, layout);
     }
@@ -104,15 +104,12 @@ pub(crate) fn method(
 }
 
 /// Bytes for a factor. Small ones are had without asking the system, which takes longer than they do.
-fn available(linear: &LinearSolver, needed: u64, entries: u64) -> u64 {
+fn available(linear: &LinearSolver, needed: u64, entries: usize) -> u64 {
     const SMALL: u64 = 256 << 20;
-    // graph, values, batches and fronts take up to twelve times what H does
-    const BESIDE: u64 = 12 * 16;
-    let limit = memory::below_limit().saturating_sub(BESIDE * entries);
     match linear.memory_gib {
         Some(gib) => (gib * f64::from(1 << 30)) as u64,
-        None if needed <= SMALL => SMALL.min(limit),
-        None => memory::available_memory().min(limit),
+        None if needed <= SMALL => SMALL.min(memory::beside(entries)),
+        None => memory::available_memory().min(memory::beside(entries)),
     }
 }
 

@@ -51,6 +51,13 @@ pub(crate) fn below_limit() -> u64 {
     limit.saturating_sub(taken).max(LEAST)
 }
 
+/// Bytes that a limit leaves for a factor beside a compiled graph whose H has so many entries.
+pub(crate) fn beside(entries: usize) -> u64 {
+    // graph, values, batches and fronts take up to eighteen times what H does
+    const BESIDE: u64 = 18 * 16;
+    below_limit().saturating_sub(BESIDE * entries as u64)
+}
+
 /// Bytes in use. What an allocator has reserved beyond that is still to be had.
 fn resident() -> u64 {
     const PAGE: u64 = 4096;
