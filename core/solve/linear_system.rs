@@ -109,7 +109,7 @@ fn available(linear: &LinearSolver, needed: u64, entries: usize) -> u64 {
     match linear.memory_gib {
         Some(gib) => (gib * f64::from(1 << 30)) as u64,
         None if needed <= SMALL => SMALL.min(memory::beside(entries)),
-        None => memory::available_memory().min(memory::beside(entries)),
+        None => memory::for_factor(entries),
     }
 }
 

@@ -59,7 +59,7 @@ impl Problem {
             return Some(run(self));
         }
         let structure = self.layout.structure(false);
-        if structure.bytes() > memory::available_memory().min(memory::beside(self.layout.row_idx.len())) {
+        if structure.bytes() > memory::for_factor(self.layout.row_idx.len()) {
             return None;
         }
         let direct = Method::Cholesky(Cholesky::new(structure)?);

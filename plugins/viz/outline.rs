@@ -15,17 +15,13 @@ pub struct Shape {
 const CORNERS: usize = 64;
 
 impl Shape {
-    /// The closed outline, its first point repeated at the end. None, where there is nothing finite to draw.
+    /// The closed outline of its shadow, the ellipse of Σ a_k a_kᵀ, a_k the projected semi-axes. None, where there is
+    /// nothing finite to draw.
     pub(crate) fn outline(&self, plane: &Plane) -> Option<Vec<Point2<f64>>> {
-        shadow(plane, &self.centroid, &self.axes)
+        let projected = self.axes.column_iter().map(|a| plane.project(&a.into_owned()).coords);
+        let projected = Matrix2x3::from_columns(&projected.collect::<Vec<_>>());
+        ellipse(&plane.project(&self.centroid), &(projected * projected.transpose()))
     }
-}
-
-/// The shadow of an ellipsoid: the ellipse of Σ = Σ a_k a_kᵀ, a_k the projected semi-axes.
-fn shadow(plane: &Plane, centroid: &Vector3<f64>, axes: &Matrix3<f64>) -> Option<Vec<Point2<f64>>> {
-    let projected = axes.column_iter().map(|a| plane.project(&a.into_owned()).coords);
-    let projected = Matrix2x3::from_columns(&projected.collect::<Vec<_>>());
-    ellipse(&plane.project(centroid), &(projected * projected.transpose()))
 }
 
 /// The closed polygon of an ellipse: centre + L (cos φ, sin φ) with L Lᵀ = Σ, its first point repeated at the end. None,

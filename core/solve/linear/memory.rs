@@ -58,6 +58,11 @@ pub(crate) fn beside(entries: usize) -> u64 {
     below_limit().saturating_sub(BESIDE * entries as u64)
 }
 
+/// Bytes that there are for a factor beside such a graph.
+pub(crate) fn for_factor(entries: usize) -> u64 {
+    available_memory().min(beside(entries))
+}
+
 /// Bytes in use. What an allocator has reserved beyond that is still to be had.
 fn resident() -> u64 {
     const PAGE: u64 = 4096;
