@@ -49,21 +49,27 @@ impl<G: LieGroup> Residual for Between<G> {
         // Log(Z⁻¹ (A Exp δ)⁻¹ B) = Log(Z⁻¹ A⁻¹B · Exp(-Ad((A⁻¹B)⁻¹) δ))
         jacobians.1 = G::inverse_right_jacobian(&r);
         if free[0] {
-            jacobians.0 = minus_product::<G::Dim>(&jacobians.1, &G::adjoint_of_inverse(&b_in_a));
+            jacobians.0 = minus_product::<G>(&jacobians.1, &G::adjoint_of_inverse(&b_in_a));
         }
         r
     }
 }
 
-/// -A B, without what nalgebra would ask of a generic dimension.
+/// -A B of two Jacobians of a group, without what nalgebra would ask of a generic dimension.
 #[inline(always)]
-fn minus_product<D: Dimension>(a: &Matrix<D, D>, b: &Matrix<D, D>) -> Matrix<D, D> {
-    let mut product = <Matrix<D, D> as Block>::zeros();
+fn minus_product<G: LieGroup>(
+    a: &Matrix<G::Dim, G::Dim>,
+    b: &Matrix<G::Dim, G::Dim>,
+) -> Matrix<G::Dim, G::Dim> {
+    let n = <G::Dim as Dimension>::N;
+    let mut product = <Matrix<G::Dim, G::Dim> as Block>::zeros();
     let (a, b, to) = (a.as_slice(), b.as_slice(), product.as_mut_slice());
-    for c in 0..D::N {
-        for k in 0..D::N {
-            for r in 0..D::N {
-                to[r + c * D::N] -= a[r + k * D::N] * b[k + c * D::N];
+    // the first row that is not zero in a column
+    let first = |column: usize| if column < G::LEADING { 0 } else { G::LEADING };
+    for c in 0..n {
+        for k in first(c)..n {
+            for r in first(k)..n {
+                to[r + c * n] -= a[r + k * n] * b[k + c * n];
             }
         }
     }

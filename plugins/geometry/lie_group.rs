@@ -7,6 +7,9 @@ pub trait LieGroup: Manifold {
     const NAME: &'static str;
     /// A point, as TOML writes it inside of a factor; for the catalogue.
     const EXAMPLE: &'static str;
+    /// The first so many rows of its Jacobians depend on as many directions only, as rotations do not on translations: the
+    /// block beside is zero. None, where nothing is known.
+    const LEADING: usize = 0;
 
     /// The element that changes nothing.
     fn identity() -> Self;

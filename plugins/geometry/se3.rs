@@ -172,6 +172,7 @@ register_manifold!("se3", Se3);
 impl LieGroup for Se3 {
     const NAME: &'static str = "se3";
     const EXAMPLE: &'static str = "{ translation = [1.0, 0.0, 0.5], rotation = [0.0, 0.0, 0.6, 0.8] }";
+    const LEADING: usize = 3;
     fn identity() -> Se3 {
         Se3::identity()
     }
