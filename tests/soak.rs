@@ -60,11 +60,11 @@ fn square(side: usize) -> (Graph, Values) {
 #[test]
 fn memory_is_flat() {
     small_solves_leave_nothing();
-    steps_take_no_more_than_the_first();
+    steps_take_no_more_than_the_second();
 }
 
 /// `MANIFACTOR_SOAK=320` makes it 102,400 poses.
-fn steps_take_no_more_than_the_first() {
+fn steps_take_no_more_than_the_second() {
     let side = std::env::var("MANIFACTOR_SOAK").map_or(40, |side| side.parse().unwrap());
     let region = Region::new(ALLOCATOR);
     let (graph, values) = square(side);
@@ -81,13 +81,14 @@ fn steps_take_no_more_than_the_first() {
         steps
     };
     let steps = solve_it();
-    let (first, last) = (steps[0], steps[steps.len() - 1]);
+    // threads get their room once the first pass is known to be long
+    let (second, last) = (steps[1], steps[steps.len() - 1]);
     eprintln!(
-        "{} poses, {} steps: {first} bytes at the first, {last} at the last",
+        "{} poses, {} steps: {second} bytes at the second, {last} at the last",
         values.len(),
         steps.len()
     );
-    assert!(steps.len() >= 3 && last - first < 10_000, "{steps:?}");
+    assert!(steps.len() >= 3 && last - second < 10_000, "{steps:?}");
     // what large products keep for each thread is there by now
     let before = held(&region);
     solve_it();

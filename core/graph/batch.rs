@@ -1,18 +1,17 @@
-//! Factors of one concrete type, side by side: the loop that runs.
+//! Factors of one concrete type, side by side.
+mod pass;
+
 use crate::column::{Columns, FIXED};
-use crate::dimension::{Block, Dimension, Matrix};
+use crate::dimension::Block;
 use crate::kernel::Kernel;
 use crate::loss::{Loss, LossColumn};
 use crate::noise::{Whitener, Whiteners};
-use crate::normal_equations::{NormalEquations, Places, Slot};
-use nalgebra::U1;
+use crate::normal_equations::{NormalEquations, Slot};
+use pass::{CHUNK, COST, Work};
+use pulp::Arch;
 use rayon::prelude::*;
 use std::any::Any;
-
-/// Factors in a chunk: one virtual call of a loss, and one task of a thread, serves this many.
-const CHUNK: usize = 16;
-/// Batches smaller than this are not worth a thread.
-const PARALLEL: usize = 8 * CHUNK;
+use std::time::Instant;
 
 /// A factor on its way into a batch.
 pub struct Member<'a> {
@@ -92,6 +91,8 @@ pub struct FactorRows<'a> {
 pub trait Batch: Send + Sync {
     /// Whether a factor of the same type belongs here, by its noise and loss.
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool;
+    /// Makes room for so many factors, with so many variables in all.
+    fn reserve(&mut self, factors: usize, variables: usize);
     /// Adds a factor of this batch's type; others are left out.
     fn push(&mut self, member: &Member<'_>);
     /// Decides which factors are active, and adds their parts of H and g.
@@ -126,28 +127,12 @@ pub(crate) struct BatchOf<F: Kernel> {
     /// What each factor's cost is multiplied by; empty, where nobody weighs them.
     weights: Vec<f64>,
     active: Vec<bool>,
-    /// One for each chunk, for threads; empty until they are used.
-    work: Vec<Work<F>>,
-}
-
-/// Room for one chunk.
-#[derive(Clone)]
-struct Work<F: Kernel> {
-    r: [Matrix<F::Dim, U1>; CHUNK],
-    j: [F::Blocks; CHUNK],
-    w: [f64; CHUNK],
-    evaluation: Evaluation,
-}
-
-impl<F: Kernel> Work<F> {
-    fn new() -> Self {
-        Self {
-            r: [Block::zeros(); CHUNK],
-            j: std::array::from_fn(|_| F::blocks()),
-            w: [0.0; CHUNK],
-            evaluation: Evaluation::default(),
-        }
-    }
+    /// One for each chunk of a window, and of the next, for threads; empty until they are used.
+    work: [Vec<Work<F>>; 2],
+    /// Seconds that the last linearization by one thread took.
+    alone: f64,
+    /// What registers there are: loops over entries of blocks are compiled for each width.
+    arch: Arch,
 }
 
 impl<F: Kernel> BatchOf<F> {
@@ -167,7 +152,9 @@ impl<F: Kernel> BatchOf<F> {
             losses: loss.map(|l| l.erased().column()),
             weights: vec![],
             active: vec![],
-            work: vec![],
+            work: [vec![], vec![]],
+            alone: 0.0,
+            arch: Arch::new(),
         }
     }
 
@@ -176,151 +163,27 @@ impl<F: Kernel> BatchOf<F> {
         let first = if i == 0 { 0 } else { ends[i - 1] as usize };
         first..ends[i] as usize
     }
-
-    /// Whitened residuals, Jacobians and robust weights of the chunk that begins at `first`.
-    #[inline(always)]
-    fn evaluate(&self, columns: F::Columns<'_>, first: usize, active: &mut [bool], work: &mut Work<F>) {
-        let mut inactive = 0;
-        for (k, active) in active.iter_mut().enumerate() {
-            let i = first + k;
-            let range = Self::range(&self.ends, i);
-            let x = self.factors[i].load(columns, &self.index[range.clone()]);
-            *active = self.factors[i].is_defined(x.clone());
-            if !*active {
-                inactive += 1;
-                work.w[k] = 0.0;
-                continue;
-            }
-            let j = &mut work.j[k];
-            let value = self.factors[i].linearize(x, &self.free[range.clone()], j);
-            let r = work.r[k].as_mut_slice();
-            r.copy_from_slice(value.as_ref());
-            self.whiteners.whiten(i, r);
-            work.w[k] = r.iter().map(|x| x * x).sum();
-            let held = if self.held.is_empty() { &[][..] } else { &self.held[range] };
-            F::each(j, |a, block| {
-                self.whiteners.whiten(i, block);
-                if let Some(held) = held.get(a) {
-                    hold::<F::Dim>(*held, block);
-                }
-            });
-        }
-        let cost = self.weigh(first, &mut work.w[..active.len()], active);
-        let not_finite = if cost.is_finite() { None } else { self.find_not_finite(first, active, work) };
-        work.evaluation = Evaluation { cost, inactive, left: 0, not_finite };
-    }
-
-    fn find_not_finite(&self, first: usize, active: &[bool], work: &Work<F>) -> Option<usize> {
-        let bad = |k: &usize| active[*k] && work.r[*k].as_slice().iter().any(|x| !x.is_finite());
-        let k = (0..active.len()).find(bad).unwrap_or(0);
-        Some(self.entries[first + k] as usize)
-    }
-
-    /// Squared norms into weights, and ½ Σ ρ: one virtual call. Inactive factors have norm 0.
-    #[inline(always)]
-    fn weigh(&self, first: usize, squared: &mut [f64], active: &[bool]) -> f64 {
-        let cost = match self.weights.get(first..first + squared.len()) {
-            None => self.robust(first, squared),
-            Some(weights) => self.reweigh(first, squared, weights),
-        };
-        for (w, active) in squared.iter_mut().zip(active) {
-            if !active {
-                *w = 0.0;
-            }
-        }
-        cost
-    }
-
-    /// Squared norms into the loss's weights, and ½ Σ ρ.
-    #[inline(always)]
-    fn robust(&self, first: usize, squared: &mut [f64]) -> f64 {
-        match &self.losses {
-            Some(losses) => losses.weigh(first, squared),
-            None => squared.iter_mut().map(|s| 0.5 * std::mem::replace(s, 1.0)).sum(),
-        }
-    }
-
-    /// As `robust`, each factor `weights` times. A loss sums up what it is shown: show it one at a time.
-    fn reweigh(&self, first: usize, squared: &mut [f64], weights: &[f64]) -> f64 {
-        let one = |(k, (s, weight)): (usize, (&mut f64, &f64))| {
-            let cost = self.robust(first + k, std::slice::from_mut(s));
-            *s *= weight;
-            // a factor that does not count may be as far off as it likes
-            if *weight == 0.0 { 0.0 } else { weight * cost }
-        };
-        squared.iter_mut().zip(weights).enumerate().map(one).sum()
-    }
-
-    /// ‖whitened residual‖²; `None` where the factor is not defined.
-    #[inline(always)]
-    fn squared(&self, columns: F::Columns<'_>, i: usize) -> Option<f64> {
-        let x = self.factors[i].load(columns, &self.index[Self::range(&self.ends, i)]);
-        if !self.factors[i].is_defined(x.clone()) {
-            return None;
-        }
-        let value = self.factors[i].value(&x);
-        let mut r = <Matrix<F::Dim, U1> as Block>::zeros();
-        let r = r.as_mut_slice();
-        r.copy_from_slice(value.as_ref());
-        self.whiteners.whiten(i, r);
-        Some(r.iter().map(|x| x * x).sum())
-    }
-
-    #[inline(always)]
-    fn scatter(&self, first: usize, active: &[bool], work: &Work<F>, to: &mut NormalEquations<'_>) {
-        for (k, _) in active.iter().enumerate().filter(|(_, active)| **active) {
-            let i = first + k;
-            let places = Places {
-                starts: &self.starts[Self::range(&self.ends, i)],
-                slots: &self.slots[Self::range(&self.slot_ends, i)],
-            };
-            F::scatter(&work.j[k], work.r[k].as_slice(), work.w[k], places, to);
-        }
-    }
-
-    #[inline(always)]
-    fn chunk_cost(&self, columns: F::Columns<'_>, first: usize) -> Evaluation {
-        let len = CHUNK.min(self.factors.len() - first);
-        let active = &self.active[first..first + len];
-        let mut out = Evaluation::default();
-        let mut squared = [0.0; CHUNK];
-        for k in 0..len {
-            let i = first + k;
-            if !active[k] {
-                out.inactive += 1;
-                continue;
-            }
-            let Some(s) = self.squared(columns, i) else {
-                out.left += 1;
-                continue;
-            };
-            squared[k] = s;
-            if !squared[k].is_finite() && out.not_finite.is_none() {
-                out.not_finite = Some(self.entries[i] as usize);
-            }
-        }
-        out.cost = self.weigh(first, &mut squared[..len], active);
-        out
-    }
-
-    fn in_parallel(&self) -> bool {
-        self.factors.len() >= PARALLEL && rayon::current_num_threads() > 1
-    }
-}
-
-/// Zeroes the columns of directions that are held.
-fn hold<R: Dimension>(held: u32, block: &mut [f64]) {
-    for (c, column) in block.chunks_exact_mut(R::N).enumerate() {
-        if held >> c & 1 == 1 {
-            column.fill(0.0);
-        }
-    }
 }
 
 impl<F: Kernel> Batch for BatchOf<F> {
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool {
         self.whiteners.fits(noise)
             && self.losses.as_ref().map(|l| l.loss_type()) == loss.map(|l| l.erased().as_any().type_id())
+    }
+
+    fn reserve(&mut self, factors: usize, variables: usize) {
+        self.factors.reserve_exact(factors);
+        self.entries.reserve_exact(factors);
+        self.ends.reserve_exact(factors);
+        self.index.reserve_exact(variables);
+        self.starts.reserve_exact(variables);
+        self.free.reserve_exact(variables);
+        self.slot_ends.reserve_exact(factors);
+        // as many as there are, where all have as many variables
+        let each = variables / factors.max(1);
+        self.slots.reserve_exact(factors * each * (each + 1) / 2);
+        self.whiteners.reserve(factors);
+        self.active.reserve_exact(factors);
     }
 
     fn push(&mut self, member: &Member<'_>) {
@@ -349,29 +212,18 @@ impl<F: Kernel> Batch for BatchOf<F> {
     fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation {
         let columns = F::columns(columns);
         let mut active = std::mem::take(&mut self.active);
-        let mut total = Evaluation::default();
-        if self.in_parallel() {
-            // evaluated by threads, scattered by one in order: the same sums as without threads
+        let total = if self.in_parallel(1.0) {
             let mut work = std::mem::take(&mut self.work);
-            work.resize_with(active.len().div_ceil(CHUNK), Work::new);
-            work.par_iter_mut().zip(active.par_chunks_mut(CHUNK)).enumerate().for_each(
-                |(n, (work, active))| {
-                    self.evaluate(columns, n * CHUNK, active, work);
-                },
-            );
-            for (n, (work, active)) in work.iter().zip(active.chunks(CHUNK)).enumerate() {
-                total = total.and(work.evaluation);
-                self.scatter(n * CHUNK, active, work, to);
-            }
+            // into the pool once, and not for each window
+            let total = rayon::scope(|_| self.linearize_together(columns, &mut active, &mut work, to));
             self.work = work;
+            total
         } else {
-            let mut work = Work::new();
-            for (n, active) in active.chunks_mut(CHUNK).enumerate() {
-                self.evaluate(columns, n * CHUNK, active, &mut work);
-                total = total.and(work.evaluation);
-                self.scatter(n * CHUNK, active, &work, to);
-            }
-        }
+            let clock = Instant::now();
+            let total = self.linearize_alone(columns, &mut active, to);
+            self.alone = clock.elapsed().as_secs_f64();
+            total
+        };
         self.active = active;
         total
     }
@@ -379,7 +231,7 @@ impl<F: Kernel> Batch for BatchOf<F> {
     fn cost(&self, columns: &Columns) -> Evaluation {
         let columns = F::columns(columns);
         let chunks = self.factors.len().div_ceil(CHUNK);
-        if self.in_parallel() {
+        if self.in_parallel(COST) {
             let costs: Vec<_> =
                 (0..chunks).into_par_iter().map(|n| self.chunk_cost(columns, n * CHUNK)).collect();
             costs.into_iter().fold(Evaluation::default(), Evaluation::and)

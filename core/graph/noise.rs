@@ -3,7 +3,7 @@
 //! A closed set: every Gaussian noise is one of four forms of a square-root information W, with
 //! whitened residual W r and Ω = WᵀW. Rows that are not observed have a zero row and column in W.
 use crate::dimension::{Block, Dimension, Matrix, Vector};
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::{Cholesky, DMatrix, U1};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -423,6 +423,14 @@ impl<D: Dimension> Whiteners<D> {
                 | (Self::Full(_), Whitener::Full(_))
         )
     }
+    pub(crate) fn reserve(&mut self, factors: usize) {
+        match self {
+            Self::Unit => {}
+            Self::Isotropic(all) => all.reserve_exact(factors),
+            Self::Diagonal(all) => all.reserve_exact(factors),
+            Self::Full(all) => all.reserve_exact(factors),
+        }
+    }
     pub(crate) fn push(&mut self, one: &Whitener) {
         match (self, one) {
             (Self::Isotropic(all), Whitener::Isotropic(w)) => all.push(*w),
@@ -452,15 +460,19 @@ impl<D: Dimension> Whiteners<D> {
             Self::Full(w) => {
                 let w = w[i].as_slice();
                 for column in x.chunks_exact_mut(D::N) {
-                    for r in 0..D::N {
-                        // upper triangular: row r needs entries r.. only, so the order is safe
-                        let mut sum = 0.0;
-                        for k in r..D::N {
-                            let w = w[r + k * D::N];
-                            sum += if w == 0.0 { 0.0 } else { w * column[k] };
+                    // whole columns of W, though half of them is zero: entries side by side go through one register
+                    let mut sum = <Matrix<D, U1> as Block>::zeros();
+                    let sum = sum.as_mut_slice();
+                    for (k, x) in column.iter().enumerate() {
+                        let w = &w[k * D::N..(k + 1) * D::N];
+                        // a row that is not observed has a column of zeros, and may hold anything
+                        if w[k] != 0.0 {
+                            for r in 0..D::N {
+                                sum[r] += w[r] * x;
+                            }
                         }
-                        column[r] = sum;
                     }
+                    column.copy_from_slice(sum);
                 }
             }
         }

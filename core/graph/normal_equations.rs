@@ -41,6 +41,14 @@ pub struct Places<'a> {
     pub slots: &'a [Slot],
 }
 
+/// h ← h + s for a few entries, by twos: masked stores, which a plain loop would be compiled to, are slow.
+#[inline(always)]
+fn add_short(h: &mut [f64], s: &[f64]) {
+    let ((h, last), (s, of_last)) = (h.as_chunks_mut::<2>(), s.as_chunks::<2>());
+    h.iter_mut().zip(s).for_each(|(h, s)| (0..2).for_each(|i| h[i] += s[i]));
+    last.iter_mut().zip(of_last).for_each(|(h, s)| *h += s);
+}
+
 impl NormalEquations<'_> {
     /// g ← g + w Jₐᵀr.
     #[inline(always)]
@@ -129,9 +137,10 @@ impl NormalEquations<'_> {
                     sum[r] += at[r + k * A::N] * b;
                 }
             }
-            let first = if lower { c } else { 0 };
-            for (h, s) in self.h[to + first..to + A::N].iter_mut().zip(&sum[first..]) {
-                *h += s;
+            let column = &mut self.h[to..to + A::N];
+            match lower {
+                true => add_short(&mut column[c..], &sum[c..]),
+                false => column.iter_mut().zip(&*sum).for_each(|(h, s)| *h += s),
             }
             to += slot.stride as usize - c;
         }

@@ -95,7 +95,8 @@ pub(crate) fn compile(
     free.iter().enumerate().for_each(|(b, v)| block[*v] = Some(b));
     let dims: Vec<usize> = free.iter().map(|v| variables[*v].tangent.len()).collect();
     let unknowns = dims.iter().sum();
-    let mut pairs = vec![];
+    let count = |factor: &Resolved| factor.variables.len() * factor.variables.len().saturating_sub(1) / 2;
+    let mut pairs = Vec::with_capacity(resolved.iter().map(count).sum());
     let mut blocks: Vec<u32> = vec![];
     for factor in &resolved {
         blocks.clear();
@@ -217,19 +218,30 @@ fn batches(
 ) -> Vec<Box<dyn Batch>> {
     let mut batches: Vec<Box<dyn Batch>> = vec![];
     let mut of_type: HashMap<TypeId, Vec<usize>> = HashMap::new();
-    let (mut index, mut starts, mut held, mut slots) = (vec![], vec![], vec![], vec![]);
-    for (entry, (factor, Resolved { variables: ids, whitener })) in
-        graph.factors().iter().zip(resolved).enumerate()
-    {
-        let erased = factor.factor.erased();
-        let loss = factor.loss.as_deref();
+    // by factor its batch, and by batch the numbers of factors and of their variables: room is made once
+    let mut batch_of = Vec::with_capacity(resolved.len());
+    let mut sizes: Vec<(usize, usize)> = vec![];
+    for (factor, Resolved { variables, whitener }) in graph.factors().iter().zip(resolved) {
+        let (erased, loss) = (factor.factor.erased(), factor.loss.as_deref());
         let candidates = of_type.entry(erased.type_id()).or_default();
         let found = candidates.iter().copied().find(|b| batches[*b].fits(whitener, loss));
         let batch = found.unwrap_or_else(|| {
             batches.push(erased.new_batch(whitener, loss));
             candidates.push(batches.len() - 1);
+            sizes.push((0, 0));
             batches.len() - 1
         });
+        sizes[batch].0 += 1;
+        sizes[batch].1 += variables.len();
+        batch_of.push(batch);
+    }
+    for (batch, (factors, variables)) in batches.iter_mut().zip(sizes) {
+        batch.reserve(factors, variables);
+    }
+    let (mut index, mut starts, mut held, mut slots) = (vec![], vec![], vec![], vec![]);
+    for (entry, (factor, Resolved { variables: ids, whitener })) in
+        graph.factors().iter().zip(resolved).enumerate()
+    {
         index.clear();
         starts.clear();
         held.clear();
@@ -243,15 +255,15 @@ fn batches(
                 slots.push(both.and_then(|(a, b)| layout.slot(a, b)).unwrap_or_default());
             }
         }
-        batches[batch].push(&Member {
+        batches[batch_of[entry]].push(&Member {
             entry,
-            factor: erased.as_any(),
+            factor: factor.factor.erased().as_any(),
             index: &index,
             starts: &starts,
             held: &held,
             slots: &slots,
             whitener,
-            loss,
+            loss: factor.loss.as_deref(),
         });
     }
     batches

@@ -25,7 +25,7 @@ fn no_number_of_threads_changes_a_bit() {
         Box::new(Auto::default()),
         Box::new(Gnc::default()),
     ];
-    for (graph, values) in [scene::sphere(20, 25), scene::desk(60, 12)] {
+    for (graph, values) in [scene::sphere(24, 30), scene::desk(60, 12)] {
         assert!(graph.factors().len() > 600, "enough to be shared among threads");
         for solver in &solvers {
             let one = everything(&graph, &values, &**solver, 1);
