@@ -49,9 +49,11 @@ impl Cli {
     /// Whatever keeps the command from doing it.
     pub fn run(&self) -> Result<Status, Failure> {
         watch::log(self.verbose);
-        if let Some(threads) = self.threads {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-            pool.build_global().map_err(Failure::input)?;
+        // this thread is one of them: what it has in its caches stays there
+        let pool = rayon::ThreadPoolBuilder::new().use_current_thread();
+        let pool = pool.num_threads(self.threads.map_or(0, Into::into)).build_global();
+        if self.threads.is_some() {
+            pool.map_err(Failure::input)?;
         }
         check_limit()?;
         check_names(&all()).map_err(Failure::input)?;

@@ -13,7 +13,7 @@ pub(crate) struct Layout {
     /// Place of block i in the elimination order.
     pub rank: Vec<u32>,
     pub col_ptr: Vec<usize>,
-    pub row_idx: Vec<usize>,
+    pub row_idx: Vec<u32>,
     /// By block column in elimination order: blocks at and below the diagonal, by rank.
     block_ptr: Vec<usize>,
     block_rows: Vec<u32>,
@@ -47,15 +47,25 @@ impl Layout {
     fn fill(&mut self, lower: Elimination) {
         let first = |rank: usize| self.first[rank] as usize;
         self.col_ptr.push(0);
-        let mut rows: Vec<usize> = vec![];
+        let column_rows = |column: usize| &lower.rows[lower.ptr[column]..lower.ptr[column + 1]];
+        let width = |block: usize| first(block + 1) - first(block);
+        let entries = |column: usize| {
+            let height: usize = column_rows(column).iter().map(|row| width(*row as usize)).sum();
+            let width = width(column);
+            height * width - width * width.saturating_sub(1) / 2
+        };
+        self.row_idx.reserve_exact((0..lower.ptr.len() - 1).map(entries).sum());
+        self.block_at.reserve_exact(lower.rows.len());
+        self.col_ptr.reserve_exact(self.first[self.first.len() - 1] as usize);
+        let mut rows: Vec<u32> = vec![];
         for column in 0..lower.ptr.len() - 1 {
             rows.clear();
             let at = self.row_idx.len();
-            for &row in &lower.rows[lower.ptr[column]..lower.ptr[column + 1]] {
+            for &row in column_rows(column) {
                 self.block_at.push(at + rows.len());
-                rows.extend(first(row as usize)..first(row as usize + 1));
+                rows.extend(self.first[row as usize]..self.first[row as usize + 1]);
             }
-            for c in 0..first(column + 1) - first(column) {
+            for c in 0..width(column) {
                 self.row_idx.extend_from_slice(&rows[c..]);
                 self.col_ptr.push(self.row_idx.len());
             }
@@ -96,8 +106,8 @@ impl Layout {
             // in a lower triangle the diagonal comes first in its column
             let mut sum = values[0] * x[c];
             for (r, h) in rows[1..].iter().zip(&values[1..]) {
-                sum += h * x[*r];
-                y[*r] += h * x[c];
+                sum += h * x[*r as usize];
+                y[*r as usize] += h * x[c];
             }
             y[c] += sum;
         }
@@ -148,7 +158,7 @@ mod tests {
                         let at = slot.at + c * slot.stride as usize - c * c.saturating_sub(1) / 2 + r;
                         let scalar = layout.start[column] as usize + c;
                         prop_assert!((layout.col_ptr[scalar]..layout.col_ptr[scalar + 1]).contains(&at));
-                        prop_assert_eq!(layout.row_idx[at], layout.start[row] as usize + r);
+                        prop_assert_eq!(layout.row_idx[at] as usize, layout.start[row] as usize + r);
                     }
                 }
             }

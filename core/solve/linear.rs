@@ -5,6 +5,7 @@ mod dense;
 pub(crate) mod elimination;
 mod inverse;
 mod kernel;
+mod large;
 pub(crate) mod memory;
 pub(crate) mod ordering;
 mod qr;

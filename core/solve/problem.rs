@@ -131,7 +131,7 @@ impl Problem {
 
     /// The lower triangle of H = JᵀJ as compressed columns, in the order of elimination, and g = Jᵀr;
     /// as of the last linearization.
-    pub fn normal_equations(&self) -> (&[usize], &[usize], &[f64], &[f64]) {
+    pub fn normal_equations(&self) -> (&[usize], &[u32], &[f64], &[f64]) {
         (&self.layout.col_ptr, &self.layout.row_idx, &self.h, &self.g)
     }
 

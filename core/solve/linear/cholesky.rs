@@ -1,7 +1,7 @@
 //! Supernodal sparse Cholesky: structure once, numbers many times, in memory that is reused.
 use super::structure::{Node, Structure};
 use super::subtrees::subtrees;
-use super::{NotPositiveDefinite, kernel};
+use super::{NotPositiveDefinite, kernel, large};
 use faer::dyn_stack::MemBuffer;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -64,17 +64,40 @@ impl Cholesky {
         added: Option<&[f64]>,
         x: &mut [f64],
     ) -> Result<(), NotPositiveDefinite> {
+        if rayon::current_num_threads() == 1 || self.structure.flops < WORTH_THREADS {
+            return self.in_turn(h, added, x);
+        }
+        // into the pool once, and not for each front
+        rayon::scope(|_| self.together(h, added, x))
+    }
+
+    fn in_turn(
+        &mut self,
+        h: &[f64],
+        added: Option<&[f64]>,
+        x: &mut [f64],
+    ) -> Result<(), NotPositiveDefinite> {
+        let of = Matrix { structure: &self.structure, h, added };
+        let nodes = 0..self.structure.nodes.len();
+        let (panels, right) = ((&mut self.values[..], 0), Some((x, &mut self.below[..])));
+        self.arch.dispatch(Factorize { of, nodes, panels, workspace: &mut self.whole, parts: &[], right })
+    }
+
+    /// Subtrees at the same time, then what is above them; large fronts are shared in either.
+    fn together(
+        &mut self,
+        h: &[f64],
+        added: Option<&[f64]>,
+        x: &mut [f64],
+    ) -> Result<(), NotPositiveDefinite> {
+        if self.parts.is_none() {
+            self.parts = Some(Part::all(&self.structure).ok_or(NotPositiveDefinite)?);
+        }
+        let Some(parts) = self.parts.as_mut().filter(|parts| !parts.is_empty()) else {
+            return self.in_turn(h, added, x);
+        };
         let of = Matrix { structure: &self.structure, h, added };
         let all = 0..self.structure.nodes.len();
-        if rayon::current_num_threads() == 1 || self.structure.flops < WORTH_THREADS {
-            let (panels, right) = ((&mut self.values[..], 0), Some((x, &mut self.below[..])));
-            let task = Factorize { of, nodes: all, panels, workspace: &mut self.whole, parts: &[], right };
-            return self.arch.dispatch(task);
-        }
-        let parts = match &mut self.parts {
-            Some(parts) => parts,
-            none => none.insert(Part::all(&self.structure).ok_or(NotPositiveDefinite)?),
-        };
         let mut rest = (&mut self.values[..], 0);
         let mut tasks = Vec::with_capacity(parts.len());
         for part in &mut *parts {
@@ -148,7 +171,7 @@ impl Workspace {
             updates: [zeros(size(0))?, zeros(size(1))?],
             base,
             open: Vec::with_capacity(nodes.len()),
-            memory: kernel::scratch(widest),
+            memory: large::scratch(widest),
         })
     }
 }
@@ -157,7 +180,7 @@ impl Part {
     fn all(structure: &Structure) -> Option<Vec<Self>> {
         let part =
             |nodes: Range<usize>| Some(Self { workspace: Workspace::new(structure, nodes.clone())?, nodes });
-        subtrees(structure).into_iter().map(part).collect()
+        subtrees(structure, rayon::current_num_threads()).into_iter().map(part).collect()
     }
 
     /// The update of its root.
@@ -352,26 +375,37 @@ mod tests {
         (dims, (0..points).flat_map(seen).collect())
     }
 
+    /// Two groups of blocks, all coupled, that overlap: large fronts, one with an update.
+    fn cliques() -> (Vec<usize>, Vec<(u32, u32)>) {
+        let clique = |from: u32, to: u32| (from..to).flat_map(move |a| (from..a).map(move |b| (a, b)));
+        (vec![6; 120], clique(0, 80).chain(clique(40, 120)).collect())
+    }
+
     /// Factor and solution of a system, by so many threads.
     fn solved((dims, pairs): (Vec<usize>, Vec<(u32, u32)>), threads: usize) -> (Vec<f64>, Vec<f64>) {
         let layout = Layout::new(&dims, pairs, &Order::Best).unwrap();
         let mut h: Vec<f64> = (0..layout.row_idx.len()).map(|i| (i as f64 * 0.7).sin()).collect();
         layout.diagonal().iter().for_each(|at| h[*at] += 2000.0);
+        let h = h;
         let mut cholesky = Cholesky::new(layout.structure(false)).unwrap();
         assert!(cholesky.structure.flops > WORTH_THREADS, "{}", cholesky.structure.flops);
-        let mut x: Vec<f64> = (0..layout.dim()).map(|i| (i as f64).cos()).collect();
+        let right: Vec<f64> = (0..layout.dim()).map(|i| (i as f64).cos()).collect();
+        let mut x = right.clone();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             cholesky.factorize(&h, None, &mut x).unwrap();
             cholesky.solve_upper(&mut x);
         });
+        let mut product = vec![0.0; x.len()];
+        layout.multiply_add(&h, &x, &mut product);
+        assert!(product.iter().zip(&right).all(|(a, b)| (a - b).abs() < 1e-12), "it solves the system");
         (cholesky.values, x)
     }
 
     #[test]
     fn any_number_of_threads_gives_the_same_bits() {
         let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        for system in [grid(), bundle()] {
+        for system in [grid(), bundle(), cliques()] {
             let alone = solved(system.clone(), 1);
             for threads in [2, 4] {
                 let together = solved(system.clone(), threads);

@@ -106,7 +106,7 @@ mod tests {
         let mut values = vec![0.0; layout.row_idx.len()];
         for c in 0..n {
             for i in layout.col_ptr[c]..layout.col_ptr[c + 1] {
-                let r = layout.row_idx[i];
+                let r = layout.row_idx[i] as usize;
                 values[i] = if r == c { n as f64 } else { random() };
                 (dense[(r, c)], dense[(c, r)]) = (values[i], values[i]);
             }
@@ -134,8 +134,8 @@ mod tests {
             let selected = cholesky.selected_inverse().unwrap();
             for c in 0..layout.dim() {
                 for i in layout.col_ptr[c]..layout.col_ptr[c + 1] {
-                    let entry = selected.get(layout.row_idx[i], c).unwrap();
-                    assert!((entry - inverse[(layout.row_idx[i], c)]).abs() < 1e-12);
+                    let entry = selected.get(layout.row_idx[i] as usize, c).unwrap();
+                    assert!((entry - inverse[(layout.row_idx[i] as usize, c)]).abs() < 1e-12);
                 }
             }
         }

@@ -1,20 +1,18 @@
 //! Dense kernels for fronts: small ones here, where a call costs more than the work; large ones by faer.
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Accum, MatMut, Par};
-use pulp::Simd;
+use super::large;
+use faer::dyn_stack::MemBuffer;
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
 
 /// Columns that are eliminated together, and columns of a product that are summed up in registers.
 const COLUMNS: usize = 4;
 /// From so many multiplications on, a front is large.
 const LARGE: usize = 1 << 24;
-
-/// Room for faer's kernels.
-pub(crate) fn scratch(width: usize) -> MemBuffer {
-    MemBuffer::new(cholesky_in_place_scratch::<f64>(width, Par::Seq, Default::default()))
-}
+/// From so many multiplications on, and so many for each of its entries, threads share an update. Where there are fewer,
+/// it takes longer to bring the entries together again. Tests are to see it in small problems too.
+const SHARED: (usize, usize) = if cfg!(debug_assertions) { (1 << 14, 4) } else { (1 << 21, 48) };
+/// Columns of an update that a thread takes at a time.
+const SHARE: usize = 8 * COLUMNS;
 
 /// Factorizes the first `width` columns of a front: L into `panel`, and what they subtract from the others, −L₂₁L₂₁ᵀ,
 /// into the lower triangle of `update`, or onto what is there already where it is not to `REPLACE` it. Both column-major; above their diagonals, they hold garbage afterwards.
@@ -31,7 +29,7 @@ pub(crate) fn eliminate<S: Simd, const REPLACE: bool>(
 ) -> Result<(), usize> {
     let height = panel.len() / width;
     if height * height * width >= LARGE {
-        return eliminate_large::<REPLACE>(panel, update, width, memory);
+        return large::eliminate::<REPLACE>(panel, update, width, memory);
     }
     for first in (0..width).step_by(COLUMNS) {
         let n = COLUMNS.min(width - first);
@@ -42,20 +40,38 @@ pub(crate) fn eliminate<S: Simd, const REPLACE: bool>(
         factorize_columns(&mut rest[..n * height], height, first).map_err(|c| first + c)?;
     }
     let below = height - width;
-    for column in (0..below).step_by(COLUMNS) {
-        let n = COLUMNS.min(below - column);
-        let from = width + column;
-        product::<S, REPLACE>(
-            simd,
-            panel,
-            height,
-            (from, from),
-            &mut update[column * (below + 1)..],
-            below,
-            n,
-        );
+    let is_shared = below * below * width >= SHARED.0 && width >= SHARED.1;
+    if !is_shared || rayon::current_num_threads() == 1 {
+        Update::<REPLACE> { panel, width, first: 0, columns: update }.with_simd(simd);
+    } else {
+        update.par_chunks_mut(SHARE * below).enumerate().for_each(|(i, columns)| {
+            simd.vectorize(Update::<REPLACE> { panel, width, first: i * SHARE, columns });
+        });
     }
     Ok(())
+}
+
+/// Some columns of an update, from the `first` on. Each entry is a sum of its own: the same whoever has its column.
+struct Update<'a, const REPLACE: bool> {
+    panel: &'a [f64],
+    width: usize,
+    first: usize,
+    columns: &'a mut [f64],
+}
+
+impl<const REPLACE: bool> WithSimd for Update<'_, REPLACE> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let height = self.panel.len() / self.width;
+        let below = height - self.width;
+        for (i, columns) in self.columns.chunks_mut(COLUMNS * below.max(1)).enumerate() {
+            let at = self.first + i * COLUMNS;
+            let (rows, n) = ((self.width + at, self.width + at), columns.len() / below);
+            product::<S, REPLACE>(simd, self.panel, height, rows, &mut columns[at..], below, n);
+        }
+    }
 }
 
 /// Adds the columns of a child's update that are columns of its parent's panel: row i of the child's is row
@@ -216,42 +232,6 @@ fn tail<S: Simd, const REPLACE: bool, const C: usize>(
         let before = if REPLACE { simd.splat_f64s(0.0) } else { simd.partial_load_f64s(to) };
         simd.partial_store_f64s(to, simd.sub_f64s(before, sum[c]));
     }
-}
-
-fn eliminate_large<const REPLACE: bool>(
-    panel: &mut [f64],
-    update: &mut [f64],
-    width: usize,
-    memory: &mut MemBuffer,
-) -> Result<(), usize> {
-    let height = panel.len() / width;
-    let below = height - width;
-    let panel = MatMut::from_column_major_slice_mut(panel, height, width);
-    let (mut top, mut bottom) = panel.split_at_row_mut(width);
-    cholesky_in_place(
-        top.as_mut(),
-        LltRegularization::default(),
-        Par::Seq,
-        MemStack::new(memory),
-        Default::default(),
-    )
-    .map_err(|faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index }| index)?;
-    if below == 0 {
-        return Ok(());
-    }
-    solve_lower_triangular_in_place(top.as_ref(), bottom.as_mut().transpose_mut(), Par::Seq);
-    matmul(
-        MatMut::from_column_major_slice_mut(update, below, below),
-        BlockStructure::TriangularLower,
-        if REPLACE { Accum::Replace } else { Accum::Add },
-        bottom.as_ref(),
-        BlockStructure::Rectangular,
-        bottom.as_ref().transpose(),
-        BlockStructure::Rectangular,
-        -1.0,
-        Par::Seq,
-    );
-    Ok(())
 }
 
 /// x ← L⁻¹ x for the panel's columns, and what it takes from the rows below, into `below`.

@@ -70,7 +70,7 @@ impl Structure {
         blocks: Pattern<'_>,
         start: &[u32],
         col_ptr: &[usize],
-        row_idx: &[usize],
+        row_idx: &[u32],
         dense: bool,
     ) -> Self {
         let groups = if dense { whole(start) } else { merge(groups(blocks, start)) };
@@ -91,6 +91,8 @@ impl Structure {
         let mut block_rows: Vec<u32> = vec![];
         // block rows of the nodes that have no parent yet
         let mut open: Vec<(u32, Range<usize>)> = vec![];
+        self.rows.reserve_exact(groups.iter().map(|group| group.below).sum());
+        self.nodes.reserve_exact(groups.len());
         for (g, group) in groups.iter().enumerate() {
             let begin = block_rows.len();
             let mut add = |row: u32, rows: &mut Vec<u32>| {
@@ -161,7 +163,7 @@ impl Structure {
     }
 
     /// Where rows are in their parent's front, entries of the matrix in panels, and updates on their stacks.
-    fn place(&mut self, col_ptr: &[usize], row_idx: &[usize]) {
+    fn place(&mut self, col_ptr: &[usize], row_idx: &[u32]) {
         self.places = vec![0; self.rows.len()];
         self.scatter = vec![0; row_idx.len()];
         let mut place = vec![0_u32; col_ptr.len() - 1];
@@ -179,7 +181,7 @@ impl Structure {
             }
             for c in 0..node.width {
                 for i in col_ptr[node.first + c]..col_ptr[node.first + c + 1] {
-                    self.scatter[i] = (c * node.height()) as u32 + place[row_idx[i]];
+                    self.scatter[i] = (c * node.height()) as u32 + place[row_idx[i] as usize];
                 }
             }
             let level = node.level as usize % 2;

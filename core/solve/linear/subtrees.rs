@@ -7,8 +7,14 @@ const LARGEST: f64 = 1.0 / 12.0;
 /// Smallest share that is worth a task.
 const SMALLEST: f64 = 1.0 / 400.0;
 
-/// Disjoint ranges of nodes, each a whole subtree, whose root is its last; the others are above them, or small.
-pub(crate) fn subtrees(structure: &Structure) -> Vec<Range<usize>> {
+/// Smallest share of all work that has to be saved by it, as threads have to meet.
+const SAVED: f64 = 0.05;
+/// Work that a value costs which a subtree hands on: it has left the caches when its parent takes it.
+const HANDED_ON: f64 = 20.0;
+
+/// Disjoint ranges of nodes, each a whole subtree, whose root is its last; the others are above them, or small. None,
+/// where so many threads would save next to nothing.
+pub(crate) fn subtrees(structure: &Structure, threads: usize) -> Vec<Range<usize>> {
     let n = structure.nodes.len();
     let (mut work, mut begin, mut parent) = (vec![0.0; n], vec![0; n], vec![None; n]);
     let mut open: Vec<usize> = vec![];
@@ -25,13 +31,20 @@ pub(crate) fn subtrees(structure: &Structure) -> Vec<Range<usize>> {
     let total: f64 = open.iter().map(|root| work[*root]).sum();
     let mut is_above = vec![false; n];
     let mut found = vec![];
+    let (mut shared, mut largest, mut handed_on) = (0.0, 0.0_f64, 0.0);
     for i in (0..n).rev() {
         let is_free = parent[i].is_none_or(|p: usize| is_above[p]);
         if is_free && work[i] > LARGEST * total {
             is_above[i] = true;
         } else if is_free && work[i] > SMALLEST * total {
             found.push(begin[i]..i + 1);
+            (shared, largest) = (shared + work[i], largest.max(work[i]));
+            handed_on += (structure.nodes[i].below as f64).powi(2);
         }
+    }
+    let saved = shared - largest.max(shared / threads as f64) - HANDED_ON * handed_on;
+    if saved < SAVED * total {
+        return vec![];
     }
     found.reverse();
     found
