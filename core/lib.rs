@@ -50,7 +50,7 @@ pub use manifactor_graph::{
     register_quantity,
 };
 
-/// For traits that [`register!`] enters: `use manifactor::typetag;`, then `#[typetag::serde(name = "…")]` on the `impl`.
+/// For traits that [`register!`] enters: `use manifactor::typetag;`, then `#[typetag::serialize(name = "…")]` on the `impl`.
 pub use manifactor_graph::__private::typetag;
 
 /// The names that most programs and most plugins need.

@@ -1,5 +1,4 @@
 //! Formulas beside the built-in factors that say the same, and in the examples.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 use manifactor::config::{Document, Format, graph_schema, read_graph, to_toml, write_graph};
 use manifactor::geometry::{Point1, Se3};
 use manifactor::prelude::*;

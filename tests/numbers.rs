@@ -1,5 +1,4 @@
 //! Scales, offsets and weights at the ends of what a robot meets: a solve gives the scaled answer, or says why not.
-#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor::geometry::{Between, Prior, Se2, Se3};
 use manifactor::prelude::*;
 use manifactor::solve::Auto;

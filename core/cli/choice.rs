@@ -1,16 +1,19 @@
 //! A registered type that the document names, or the command line does.
 use manifactor::config::{Field, Node, Section, Source, Table, Value};
-use manifactor::graph::catalogue::Kind;
+use serde::de::DeserializeOwned;
 
 /// Takes `field` out of a document's table: what `argument` names, such as `--solver`, with the document's
 /// settings; else what the document names; else `default`.
-pub(crate) fn choose<K: Kind + ?Sized>(
+pub(crate) fn choose<K: ?Sized>(
     section: &mut Section<'_>,
     field: &str,
     (argument, name): (&str, Option<&str>),
     default: &str,
     document: &Source,
-) -> Option<Box<K>> {
+) -> Option<Box<K>>
+where
+    Box<K>: DeserializeOwned,
+{
     let chosen = |node| named(argument, name.unwrap_or(default), node, document);
     let node = match section.take(field) {
         Some(node) if name.is_none() && has_type(&node) => node,
@@ -20,7 +23,7 @@ pub(crate) fn choose<K: Kind + ?Sized>(
             chosen(Node::new(nothing.place(0..0), Value::Table(Table::new())))
         }
     };
-    node.read_registered(section.errors())
+    node.read(section.errors())
 }
 
 fn has_type(node: &Node) -> bool {

@@ -1,12 +1,12 @@
 //! A document that was read from a file or a text.
-use crate::diagnostic::{Diagnostic, Diagnostics, Errors};
 use crate::format::{Format, MAX_BYTES};
-use crate::merge::merge;
-use crate::node::Node;
 use crate::overrides::apply;
-use crate::problem::Problem;
-use crate::section::Section;
-use crate::source::Source;
+use manifactor_tree::Node;
+use manifactor_tree::Problem;
+use manifactor_tree::Section;
+use manifactor_tree::Source;
+use manifactor_tree::merge;
+use manifactor_tree::{Diagnostic, Diagnostics, Errors};
 use std::io::Read;
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 //! The formats that a document may have, told by the file's extension.
-use crate::diagnostic::{Diagnostic, Diagnostics};
-use crate::node::{MAX_DEPTH, Node};
-use crate::problem::Problem;
-use crate::source::{Place, Source};
 use crate::{json, toml, yaml};
+use manifactor_tree::Problem;
+use manifactor_tree::{Diagnostic, Diagnostics};
+use manifactor_tree::{MAX_DEPTH, Node};
+use manifactor_tree::{Place, Source};
 use std::fmt;
 use std::path::Path;
 

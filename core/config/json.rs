@@ -1,13 +1,13 @@
 //! Strict JSON as a tree with places.
-use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::format::too_deep;
-use crate::node::{Field, MAX_DEPTH, Node, Table, Value};
-use crate::problem::Problem;
-use crate::source::{Place, Source};
 use indexmap::map::Entry;
 use jsonc_parser::ast::{Object, Value as Ast};
 use jsonc_parser::common::{Range, Ranged};
 use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
+use manifactor_tree::Problem;
+use manifactor_tree::{Diagnostic, Diagnostics};
+use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
+use manifactor_tree::{Place, Source};
 
 /// Parses a document.
 pub(crate) fn parse(source: &Source) -> Result<Node, Diagnostics> {

@@ -6,35 +6,22 @@
 //! [`read_graph`] and [`write_graph`] are the two ways of a literal graph, [`graph_schema`] describes it to editors.
 // strangers' input comes in here: no place of it is taken for granted
 #![warn(clippy::indexing_slicing)]
-mod diagnostic;
 mod document;
 mod format;
 mod graph_document;
 mod json;
-mod merge;
-mod message;
-mod node;
 mod overrides;
-mod parse;
-mod problem;
-mod registered;
 mod schema;
-mod section;
-mod source;
-mod suggest;
 mod toml;
 mod write;
 mod yaml;
 
-pub use diagnostic::{Diagnostic, Diagnostics, Errors};
 pub use document::Document;
 pub use format::{Format, MAX_BYTES};
 pub use graph_document::{read_graph, read_graph_section, write_graph};
-pub use merge::merge;
-pub use node::{Field, Found, MAX_DEPTH, Node, Table, Value};
-pub use problem::{Problem, quoted_list};
+pub use manifactor_tree::{
+    Diagnostic, Diagnostics, Errors, Field, MAX_DEPTH, Node, Place, Problem, ReadError, Reader, Section,
+    Source, Table, Value, merge, nearest, quoted_list,
+};
 pub use schema::{Definitions, graph_root, graph_schema};
-pub use section::Section;
-pub use source::{Place, Source};
-pub use suggest::nearest;
 pub use write::{WriteError, to_json, to_toml, to_yaml};

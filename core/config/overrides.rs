@@ -1,10 +1,10 @@
 //! Single values set from outside, as `--set solver.max_iterations=50` does.
-use crate::diagnostic::Errors;
 use crate::format::too_deep;
-use crate::node::{Field, MAX_DEPTH, Node, Table, Value};
-use crate::problem::Problem;
-use crate::source::{Place, Source};
 use crate::toml::parse_value;
+use manifactor_tree::Errors;
+use manifactor_tree::Problem;
+use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
+use manifactor_tree::{Place, Source};
 use std::ops::Range;
 
 /// One step into a document.

@@ -1,11 +1,11 @@
 //! TOML as a tree with places. All its syntax errors are reported, not only the first.
-use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::format::too_deep;
-use crate::node::{Field, MAX_DEPTH, Node, Table, Value};
-use crate::problem::Problem;
-use crate::source::{Place, Source};
 use ::toml::Spanned;
 use ::toml::de::{DeInteger, DeTable, DeValue};
+use manifactor_tree::Problem;
+use manifactor_tree::{Diagnostic, Diagnostics};
+use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
+use manifactor_tree::{Place, Source};
 use std::ops::Range;
 
 /// One bracket that is missing makes a dozen errors: no more than these are told.

@@ -2,12 +2,12 @@
 //!
 //! Anchors and aliases are copied, up to a limit. Tags other than those of the core schema, several documents in one
 //! file and keys that are not scalars are refused.
-use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::format::too_deep;
-use crate::node::{Field, MAX_DEPTH, Node, Table, Value};
-use crate::problem::Problem;
-use crate::source::{Place, Source};
 use indexmap::map::Entry;
+use manifactor_tree::Problem;
+use manifactor_tree::{Diagnostic, Diagnostics};
+use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
+use manifactor_tree::{Place, Source};
 use saphyr_parser::{Event, Parser, ScalarStyle, Span, Tag};
 use std::borrow::Cow;
 use std::collections::HashMap;

@@ -1,5 +1,6 @@
 //! Factors of one concrete type, side by side.
 mod pass;
+mod threads;
 
 use crate::column::{Columns, FIXED};
 use crate::dimension::Block;
@@ -9,7 +10,6 @@ use crate::noise::{Whitener, Whiteners};
 use crate::normal_equations::{NormalEquations, Slot};
 use pass::{CHUNK, COST, Work};
 use pulp::Arch;
-use rayon::prelude::*;
 use std::any::Any;
 use std::time::Instant;
 
@@ -214,8 +214,8 @@ impl<F: Kernel> Batch for BatchOf<F> {
         let mut active = std::mem::take(&mut self.active);
         let total = if self.in_parallel(1.0) {
             let mut work = std::mem::take(&mut self.work);
-            // into the pool once, and not for each window
-            let total = rayon::scope(|_| self.linearize_together(columns, &mut active, &mut work, to));
+            let mut total = Evaluation::default();
+            threads::enter(&mut || total = self.linearize_together(columns, &mut active, &mut work, to));
             self.work = work;
             total
         } else {
@@ -232,8 +232,8 @@ impl<F: Kernel> Batch for BatchOf<F> {
         let columns = F::columns(columns);
         let chunks = self.factors.len().div_ceil(CHUNK);
         if self.in_parallel(COST) {
-            let costs: Vec<_> =
-                (0..chunks).into_par_iter().map(|n| self.chunk_cost(columns, n * CHUNK)).collect();
+            let mut costs = vec![Evaluation::default(); chunks];
+            threads::enter(&mut || self.chunk_costs(columns, 0, &mut costs));
             costs.into_iter().fold(Evaluation::default(), Evaluation::and)
         } else {
             (0..chunks)

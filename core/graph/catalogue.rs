@@ -4,18 +4,21 @@
 //! enters an implementation. The catalogue takes a type's summary, explanation and example from its
 //! doc comment, which travels in its JSON Schema: the first paragraph is the summary, the first
 //! `toml` block the example.
+use manifactor_tree::{Node, Problem, ReadError, Reader};
 use schemars::Schema;
 use serde_json::Value;
 use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::sync::OnceLock;
 
-/// A trait object whose implementations are chosen by name.
+/// The field of a document that names a type.
+pub const TAG: &str = "type";
+
+/// A trait object whose implementations are chosen by name. [`kind!`](crate::kind) makes a trait one.
 pub trait Kind: 'static {
     /// What it is called: `factor`, `loss`, `solver`, …
     const NAME: &'static str;
 }
-
-/// Why a registered type could not be read, with the path to the place.
-pub type ParseError = serde_path_to_error::Error<serde_json::Error>;
 
 /// One registered type.
 pub struct Entry {
@@ -32,7 +35,7 @@ pub struct Entry {
     /// What a factor or a manifold has beyond a name.
     pub signature: fn() -> Signature,
     #[doc(hidden)]
-    pub parse: fn(Value) -> Result<Box<dyn Any>, ParseError>,
+    pub read_boxed: fn(Reader<'_>) -> Result<Box<dyn Any>, ReadError>,
 }
 inventory::collect!(Entry);
 
@@ -50,15 +53,15 @@ pub struct Signature {
 }
 
 impl Entry {
-    /// Reads the fields of this type, without the tag, into a trait object of kind `K`.
+    /// Reads the fields of this type into a trait object of kind `K`. The field `type` is passed over.
     ///
     /// # Errors
-    /// Whatever serde finds, with the path to it.
-    pub fn parse<K: Kind + ?Sized>(&self, fields: Value) -> Result<Box<K>, ParseError> {
-        let any = (self.parse)(fields)?;
-        any.downcast::<Box<K>>().map(|b| *b).map_err(|_| {
+    /// Whatever serde finds, at its place.
+    pub fn read<K: Kind + ?Sized>(&self, fields: &Node) -> Result<Box<K>, ReadError> {
+        let any = (self.read_boxed)(Reader::without(fields, TAG)).map_err(|error| error.at(fields))?;
+        any.downcast::<Box<K>>().map(|boxed| *boxed).map_err(|_| {
             let text = format!("`{}` is a {}, not a {}", self.name, self.kind, K::NAME);
-            ParseError::new(Path::empty(), serde::de::Error::custom(text))
+            ReadError::new(fields.place.clone(), Problem::invalid(text))
         })
     }
 
@@ -82,17 +85,6 @@ impl Entry {
         let (_, rest) = docs.split_once("```toml\n")?;
         let (example, _) = rest.split_once("```")?;
         Some(example.trim_end().to_owned())
-    }
-}
-
-use path::Path;
-mod path {
-    /// serde_path_to_error builds no path by hand: track one over nothing.
-    pub(super) struct Path;
-    impl Path {
-        pub(super) fn empty() -> serde_path_to_error::Path {
-            serde_path_to_error::Track::new().path()
-        }
     }
 }
 
@@ -139,9 +131,14 @@ pub fn check_names(sorted: &[&Entry]) -> Result<(), NameTaken> {
     }
 }
 
+pub use crate::registered::read;
+
 /// The entry of this kind and name.
 pub fn find(kind: &str, name: &str) -> Option<&'static Entry> {
-    inventory::iter::<Entry>.into_iter().find(|e| e.kind == kind && e.name == name)
+    static INDEX: OnceLock<HashMap<(&str, &str), &Entry>> = OnceLock::new();
+    // the first of two of one name, as `check_names` tells them
+    let index = INDEX.get_or_init(|| all().into_iter().rev().map(|e| ((e.kind, e.name), e)).collect());
+    index.get(&(kind, name)).copied()
 }
 
 /// The name of a registered manifold; its Rust type's name, where it is not registered.
@@ -151,7 +148,29 @@ pub fn manifold_name(id: TypeId) -> &'static str {
     entry.map_or("an unregistered manifold", |e| e.name)
 }
 
-/// Enters `$type` into the catalogue as a `$kind`, for traits that have `#[typetag::serde]` on the impl.
+/// Makes a trait a [`Kind`](crate::catalogue::Kind) of this name: `kind!(dyn Optimizer, "solver");`. Boxes of it are read
+/// from documents by their `type`; `#[typetag::serialize(tag = "type")]` on the trait writes them.
+#[macro_export]
+macro_rules! kind {
+    ($kind:ty, $name:literal) => {
+        impl $crate::catalogue::Kind for $kind {
+            const NAME: &'static str = $name;
+        }
+        impl<'de> $crate::__private::serde::Deserialize<'de> for ::std::boxed::Box<$kind> {
+            fn deserialize<D>(deserializer: D) -> ::std::result::Result<Self, D::Error>
+            where
+                D: $crate::__private::serde::Deserializer<'de>,
+            {
+                $crate::__private::manifactor_tree::deserialize_with(deserializer, |node| {
+                    let read: Self = $crate::catalogue::read::<$kind>(node)?;
+                    Ok(::std::boxed::Box::new(read))
+                })
+            }
+        }
+    };
+}
+
+/// Enters `$type` into the catalogue as a `$kind`, for traits that have `#[typetag::serialize(name = …)]` on the impl.
 ///
 /// `register!(dyn Optimizer, "gauss_newton", GaussNewton);`
 #[macro_export]
@@ -168,8 +187,8 @@ macro_rules! register {
                 schema: || $crate::__private::schemars::schema_for!($type),
                 type_id: || ::std::any::TypeId::of::<$type>(),
                 signature: || $signature,
-                parse: |fields| {
-                    let x: $type = $crate::__private::serde_path_to_error::deserialize(fields)?;
+                read_boxed: |fields| {
+                    let x: $type = $crate::__private::serde::Deserialize::deserialize(fields)?;
                     let boxed: ::std::boxed::Box<$kind> = ::std::boxed::Box::new(x);
                     Ok(::std::boxed::Box::new(boxed))
                 },
@@ -184,7 +203,7 @@ macro_rules! register_factor {
     ($name:literal, $type:ty) => {
         const _: () = {
             use $crate::__private::typetag;
-            #[typetag::serde(name = $name)]
+            #[typetag::serialize(name = $name)]
             impl $crate::Factor for $type {
                 fn erased(&self) -> &dyn $crate::ErasedResidual {
                     self
@@ -201,7 +220,7 @@ macro_rules! register_manifold {
     ($name:literal, $type:ty) => {
         const _: () = {
             use $crate::__private::typetag;
-            #[typetag::serde(name = $name)]
+            #[typetag::serialize(name = $name)]
             impl $crate::Variable for $type {
                 fn erased(&self) -> &dyn $crate::ErasedManifold {
                     self
@@ -232,7 +251,7 @@ macro_rules! register_loss {
     ($name:literal, $type:ty) => {
         const _: () = {
             use $crate::__private::typetag;
-            #[typetag::serde(name = $name)]
+            #[typetag::serialize(name = $name)]
             impl $crate::loss::Loss for $type {
                 fn erased(&self) -> &dyn $crate::loss::ErasedLoss {
                     self
@@ -256,7 +275,7 @@ mod tests {
             schema: || schemars::schema_for!(f64),
             type_id: || TypeId::of::<f64>(),
             signature: Signature::default,
-            parse: |_| Err(ParseError::new(Path::empty(), serde::de::Error::custom("none"))),
+            read_boxed: |_| Err(serde::de::Error::custom("none")),
         };
         let (a, b, c) = (entry("leans", "one"), entry("rests_on", "one"), entry("rests_on", "other"));
         assert_eq!(check_names(&[&a, &b]), Ok(()));

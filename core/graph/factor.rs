@@ -1,6 +1,6 @@
 //! Factors in a graph: any registered residual, with its keys, noise and loss.
 use crate::batch::{Batch, BatchOf};
-use crate::catalogue::{Kind, Signature};
+use crate::catalogue::Signature;
 use crate::dimension::Dimension;
 use crate::key::Key;
 use crate::loss::Loss;
@@ -20,15 +20,13 @@ use std::sync::Arc;
     label = "not a factor",
     note = "write `register_factor!(\"its_name\", {Self});` below `impl Residual for {Self}`"
 )]
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 pub trait Factor: Debug + Send + Sync {
     /// Everything else.
     fn erased(&self) -> &dyn ErasedResidual;
 }
 
-impl Kind for dyn Factor {
-    const NAME: &'static str = "factor";
-}
+crate::kind!(dyn Factor, "factor");
 
 /// One factor of a graph.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -24,9 +24,9 @@ mod many;
 pub mod noise;
 pub mod normal_equations;
 pub mod quantity;
+mod registered;
 mod residual;
 mod scalar;
-mod text_error;
 mod values;
 mod variable;
 mod variables;
@@ -37,17 +37,17 @@ pub use dynamic::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
 pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices};
 pub use key::Key;
+pub use manifactor_tree::TextError;
 pub use manifold::{Manifold, Tangent};
 pub use many::{List, Many};
 pub use noise::Noise;
 pub use residual::{Jacobians, Lifted, Refs, Residual};
 pub use scalar::{Jet, JetOf, Lift, Scalar};
-pub use text_error::TextError;
 pub use values::{ValueError, Values};
 pub use variable::{AsVariable, ErasedManifold, Variable, as_variable};
 pub use variables::Variables;
 
 #[doc(hidden)]
 pub mod __private {
-    pub use {inventory, schemars, serde_path_to_error, typetag};
+    pub use {inventory, manifactor_tree, schemars, serde, typetag};
 }

@@ -3,7 +3,6 @@
 //! One convention throughout. A factor with whitened residual r costs ½ρ(s), s = ‖r‖², and enters
 //! the normal equations with the weight ρ'(s). Each ρ has ρ(0) = 0 and, but for L1, ρ(s) ≈ s near 0:
 //! a small residual costs what it costs without a loss.
-use crate::catalogue::Kind;
 use crate::column::Plain;
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
@@ -18,15 +17,13 @@ pub trait RobustLoss: Debug + Clone + Send + Sync + 'static {
 }
 
 /// A robust loss, chosen by name.
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 pub trait Loss: Debug + Send + Sync {
     /// Everything else.
     fn erased(&self) -> &dyn ErasedLoss;
 }
 
-impl Kind for dyn Loss {
-    const NAME: &'static str = "loss";
-}
+crate::kind!(dyn Loss, "loss");
 
 /// The object-safe face of [`RobustLoss`], implemented once for all of them.
 pub trait ErasedLoss: Send + Sync {

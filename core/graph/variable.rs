@@ -1,5 +1,4 @@
 //! Values in a graph: points of any registered manifold.
-use crate::catalogue::Kind;
 use crate::column::{Column, Plain};
 use crate::dimension::Dimension;
 use crate::manifold::Manifold;
@@ -12,15 +11,13 @@ use std::fmt::Debug;
     label = "not a type of variables",
     note = "write `register_manifold!(\"its_name\", {Self});` below `impl Manifold for {Self}`, or use a registered one such as `Se3`"
 )]
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 pub trait Variable: Debug + Send + Sync {
     /// Everything else.
     fn erased(&self) -> &dyn ErasedManifold;
 }
 
-impl Kind for dyn Variable {
-    const NAME: &'static str = "variable";
-}
+crate::kind!(dyn Variable, "variable");
 
 /// The way from `dyn Any` back to a registered type of variables. Made by
 /// [`register_manifold!`](crate::register_manifold).

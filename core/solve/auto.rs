@@ -11,6 +11,7 @@ use crate::start::{Given, Start};
 use crate::{Solution, Termination};
 use manifactor_graph::catalogue::{self, Kind};
 use manifactor_graph::{Graph, Values, register};
+use manifactor_tree::Node;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
@@ -48,7 +49,7 @@ const EARLY: usize = 3;
 /// 2F by degrees of freedom: about 1 where the noise is as stated, and the minimum the right one.
 const MISFIT: f64 = 1.5;
 
-#[typetag::serde(name = "auto")]
+#[typetag::serialize(name = "auto")]
 impl Optimizer for Auto {
     fn linear(&self) -> LinearSolver {
         self.linear.clone()
@@ -141,7 +142,7 @@ pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> V
     let others = catalogue::entries(<dyn Start>::NAME).into_iter().filter(|e| e.name != Given::NAME);
     others
         .filter_map(|entry| {
-            let start = entry.parse::<dyn Start>(serde_json::json!({})).ok()?;
+            let start = entry.read::<dyn Start>(&Node::empty_table()).ok()?;
             // one that does not apply has nothing to offer
             let values = start.start(graph, values).ok()?;
             problem.set_values(&values);

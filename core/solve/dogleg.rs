@@ -37,7 +37,7 @@ pub struct Dogleg {
 /// Least share of the predicted decrease that makes a step good enough to take.
 const GAIN: f64 = 1e-4;
 
-#[typetag::serde(name = "dogleg")]
+#[typetag::serialize(name = "dogleg")]
 impl Optimizer for Dogleg {
     fn linear(&self) -> LinearSolver {
         self.linear.clone()

@@ -34,7 +34,7 @@ const RISES: usize = 5;
 /// Halvings of one step.
 const HALVINGS: usize = 30;
 
-#[typetag::serde(name = "gauss_newton")]
+#[typetag::serialize(name = "gauss_newton")]
 impl Optimizer for GaussNewton {
     fn linear(&self) -> LinearSolver {
         self.linear.clone()

@@ -86,7 +86,7 @@ impl Default for Gnc {
     }
 }
 
-#[typetag::serde(name = "gnc")]
+#[typetag::serialize(name = "gnc")]
 impl Optimizer for Gnc {
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         Graduation::new(self, problem, None, observer).run()

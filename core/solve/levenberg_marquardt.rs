@@ -72,7 +72,7 @@ const TRUSTED: f64 = 1.0;
 /// Damping up to which one small step is sign enough; above, it takes two.
 const LIGHT: f64 = 1e-2;
 
-#[typetag::serde(name = "levenberg_marquardt")]
+#[typetag::serialize(name = "levenberg_marquardt")]
 impl Optimizer for LevenbergMarquardt {
     fn linear(&self) -> LinearSolver {
         self.linear.clone()

@@ -7,7 +7,6 @@ use crate::outcome::{IterationRecord, Outcome};
 use crate::problem::Problem;
 use crate::termination::{Stall, Termination, Tolerance, Undetermined};
 use manifactor_graph::batch::Evaluation;
-use manifactor_graph::catalogue::Kind;
 use manifactor_graph::column::Columns;
 use manifactor_graph::{Graph, Values};
 use schemars::JsonSchema;
@@ -16,7 +15,7 @@ use std::fmt::Debug;
 use std::time::Instant;
 
 /// A strategy that lowers the cost of a problem. Chosen by name.
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 pub trait Optimizer: Debug + Send + Sync {
     /// Moves the problem's estimate to a minimum of its cost, or as far as it gets. The estimate is
     /// the best found, however the solve ends.
@@ -43,9 +42,7 @@ pub trait Optimizer: Debug + Send + Sync {
     }
 }
 
-impl Kind for dyn Optimizer {
-    const NAME: &'static str = "solver";
-}
+manifactor_graph::kind!(dyn Optimizer, "solver");
 
 /// When to stop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

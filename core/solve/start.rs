@@ -1,6 +1,5 @@
 //! Where a solve begins: initial values by a strategy that is chosen by name.
 use crate::block_system::BlockSystemError;
-use manifactor_graph::catalogue::Kind;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{Graph, Key, ValueError, Values, register};
 use schemars::JsonSchema;
@@ -8,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
 /// A strategy that finds initial values. Chosen by name.
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 pub trait Start: Debug + Send + Sync {
     /// Values to begin with: `values`, with those replaced and added that the strategy has something to say
     /// of. Held variables keep their values, and the order of the values stays.
@@ -18,9 +17,7 @@ pub trait Start: Debug + Send + Sync {
     fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError>;
 }
 
-impl Kind for dyn Start {
-    const NAME: &'static str = "start";
-}
+manifactor_graph::kind!(dyn Start, "start");
 
 /// Why there are no initial values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -80,7 +77,7 @@ impl Given {
     pub(crate) const NAME: &'static str = "given";
 }
 
-#[typetag::serde(name = "given")]
+#[typetag::serialize(name = "given")]
 impl Start for Given {
     fn start(&self, _: &Graph, values: &Values) -> Result<Values, StartError> {
         Ok(values.clone())

@@ -7,6 +7,7 @@ use crate::factor_check::{FactorCheck, FactorReport, Subject};
 use crate::manifold::manifold_laws;
 use manifactor_graph::catalogue::{self, Entry, Kind};
 use manifactor_graph::{Factor, Variable};
+use manifactor_tree::{Node, Reader};
 use proptest::prelude::RngExt;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use serde_json::Value;
@@ -24,8 +25,8 @@ pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
     require(!entry.summary().is_empty(), "its type has no doc comment")?;
     let schema = (entry.schema)();
     require(schema.as_object().is_some(), "its schema is no object")?;
-    (entry.parse)(example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))?;
-    Ok(())
+    let read = (entry.read_boxed)(Reader::new(&example_fields(entry)?));
+    read.map(drop).map_err(|e| problem(entry, format!("its example: {e}")))
 }
 
 /// The example in the docs of a registered type.
@@ -33,7 +34,7 @@ pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
 /// # Errors
 /// Where there is none, or it cannot be read.
 pub fn example<K: Kind + ?Sized>(entry: &'static Entry) -> Result<Box<K>, LawError> {
-    entry.parse::<K>(example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))
+    entry.read::<K>(&example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))
 }
 
 /// Checks a factor's example, see [`FactorCheck`], at so many points. Returns what was found.
@@ -108,9 +109,10 @@ pub(crate) fn example_point(of: &'static Entry, id: TypeId) -> Result<Box<dyn Va
 }
 
 /// The fields of the example: the table in it whose `type` is the entry's name.
-fn example_fields(entry: &'static Entry) -> Result<Value, LawError> {
+fn example_fields(entry: &'static Entry) -> Result<Node, LawError> {
     let missing = || problem(entry, format!("its example has no table with type = \"{}\"", entry.name));
-    table_of_type(&example_document(entry)?, entry.name).ok_or_else(missing)
+    let table = table_of_type(&example_document(entry)?, entry.name).ok_or_else(missing)?;
+    serde_json::from_value(table).map_err(|e| problem(entry, e.to_string()))
 }
 
 fn example_document(entry: &'static Entry) -> Result<Value, LawError> {

@@ -43,7 +43,7 @@ pub(crate) fn compile(
 
 struct Compiler<'a> {
     scope: &'a Scope,
-    library: Library,
+    library: &'static Library,
     code: Code,
     names: HashMap<&'a str, Value>,
     uses_up: bool,
@@ -76,7 +76,7 @@ impl<'a> Compiler<'a> {
             };
             names.insert(name.as_str(), Value { shape, at, depends });
         }
-        let (library, calls, rows, known) = (Library::new(), vec![], vec![], HashMap::new());
+        let (library, calls, rows, known) = (Library::linked(), vec![], vec![], HashMap::new());
         Self { scope, library, code, names, uses_up: false, calls, rows, known }
     }
 

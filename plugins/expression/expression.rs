@@ -125,7 +125,7 @@ impl Expression {
     }
 }
 
-#[typetag::serde(name = "expression")]
+#[typetag::serialize(name = "expression")]
 impl Factor for Expression {
     fn erased(&self) -> &dyn ErasedResidual {
         &self.program

@@ -4,19 +4,31 @@ use crate::scope::{Named, Scope};
 use manifactor_config::nearest;
 use manifactor_graph::quantity::{Function, Quantity, Shape, functions};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// How many signatures a message lists.
 const LISTED: usize = 6;
 
 /// Every function that is linked.
-pub(crate) struct Library(Vec<&'static Function>);
+pub(crate) struct Library {
+    /// By name.
+    functions: Vec<&'static Function>,
+}
 
 /// A call's arguments: what they are, and where.
 type Arguments<'a> = &'a [(Shape, Range<usize>)];
 
 impl Library {
-    pub(crate) fn new() -> Self {
-        Self(functions())
+    /// Found once for all formulas.
+    pub(crate) fn linked() -> &'static Self {
+        static LINKED: OnceLock<Library> = OnceLock::new();
+        LINKED.get_or_init(|| Self { functions: functions() })
+    }
+
+    fn named(&self, name: &str) -> &[&'static Function] {
+        let first = self.functions.partition_point(|f| f.name < name);
+        let end = self.functions.partition_point(|f| f.name <= name);
+        self.functions.get(first..end).unwrap_or_default()
     }
 
     /// The function of that name that takes these arguments.
@@ -28,7 +40,7 @@ impl Library {
         arguments: Arguments<'_>,
         scope: &Scope,
     ) -> Result<&'static Function, Mistake> {
-        let named: Vec<_> = self.0.iter().copied().filter(|f| f.name == name).collect();
+        let named = self.named(name);
         let fits = |f: &&Function| {
             f.arguments.len() == arguments.len()
                 && f.arguments.iter().zip(arguments).all(|((_, shape), (found, _))| shape == found)
@@ -45,8 +57,8 @@ impl Library {
         let of_arity: Vec<_> =
             named.iter().copied().filter(|f| f.arguments.len() == arguments.len()).collect();
         if of_arity.is_empty() {
-            let message = format!("`{name}` takes {}, found {}", counts(&named), arguments.len());
-            return Err(Mistake::new(whole.clone(), message).help(signatures(&named)));
+            let message = format!("`{name}` takes {}, found {}", counts(named), arguments.len());
+            return Err(Mistake::new(whole.clone(), message).help(signatures(named)));
         }
         // the first argument that none of them takes there, the others before it being as they are
         let mut left = of_arity.clone();
@@ -84,7 +96,7 @@ impl Library {
 
     /// A name that is neither a variable nor a constant.
     pub(crate) fn unknown_name(&self, name: &str, at: Range<usize>, scope: &Scope) -> Mistake {
-        if let Some(function) = self.0.iter().find(|f| f.name == name) {
+        if let Some(function) = self.named(name).first() {
             let arguments: Vec<_> = function.arguments.iter().map(|(name, _)| *name).collect();
             let help = format!("write {name}({})", arguments.join(", "));
             return Mistake::new(at, format!("`{name}` is a function")).help(help);
@@ -99,7 +111,7 @@ impl Library {
     pub(crate) fn takers(&self, shape: Shape) -> String {
         let takes =
             |f: &&&'static Function| is_word(f.name) && f.arguments.first().is_some_and(|(_, s)| *s == shape);
-        let mut names: Vec<&str> = self.0.iter().filter(takes).map(|f| f.name).collect();
+        let mut names: Vec<&str> = self.functions.iter().filter(takes).map(|f| f.name).collect();
         names.dedup();
         match names.is_empty() {
             true => format!("no function takes {}", with_article(shape.name)),
@@ -108,7 +120,7 @@ impl Library {
     }
 
     fn words(&self) -> impl Iterator<Item = &'static str> {
-        self.0.iter().map(|f| f.name).filter(|name| is_word(name))
+        self.functions.iter().map(|f| f.name).filter(|name| is_word(name))
     }
 }
 

@@ -12,7 +12,6 @@ use crate::ellipsoid::Ellipsoid;
 use crate::from_matrix::NotAnEllipsoid;
 use manifactor_geometry::{Camera, Se3};
 use manifactor_graph::Manifold;
-use manifactor_graph::catalogue::Kind;
 use nalgebra::Vector3;
 use std::fmt::Debug;
 
@@ -22,7 +21,7 @@ pub use rays::Rays;
 pub use svd::Svd;
 
 /// A way to a first estimate of an object.
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 pub trait Initialiser: Debug + Send + Sync {
     /// An object that all views show, in the frame of their poses.
     ///
@@ -31,9 +30,7 @@ pub trait Initialiser: Debug + Send + Sync {
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError>;
 }
 
-impl Kind for dyn Initialiser {
-    const NAME: &'static str = "initialiser";
-}
+manifactor_graph::kind!(dyn Initialiser, "initialiser");
 
 /// One box that shows the object, and where it was seen from.
 #[derive(Debug, Clone, Copy, PartialEq)]

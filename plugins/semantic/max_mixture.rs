@@ -128,7 +128,7 @@ impl From<MaxMixture> for Document {
     }
 }
 
-#[typetag::serde(name = "max_mixture")]
+#[typetag::serialize(name = "max_mixture")]
 impl Factor for MaxMixture {
     fn erased(&self) -> &dyn ErasedResidual {
         &self.mixture

@@ -3,7 +3,6 @@
 //! Orientation factors need the world's up, and odometry alone does not know it.
 use crate::sequence::{Frame, Sequence};
 use manifactor_geometry::Se3;
-use manifactor_graph::catalogue::Kind;
 use manifactor_graph::{Direction, NoDirection};
 use std::fmt::Debug;
 
@@ -18,7 +17,7 @@ pub use source::FromSource;
 pub use vector::UpVector;
 
 /// Tells where up is. Chosen by name in a run's `[gravity]`.
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 pub trait Gravity: Debug + Send + Sync {
     /// Up, and the frame of the map.
     ///
@@ -27,9 +26,7 @@ pub trait Gravity: Debug + Send + Sync {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError>;
 }
 
-impl Kind for dyn Gravity {
-    const NAME: &'static str = "gravity";
-}
+manifactor_graph::kind!(dyn Gravity, "gravity");
 
 /// The frame of the map, and up in it.
 #[derive(Debug, Clone, Copy, PartialEq)]

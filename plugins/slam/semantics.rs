@@ -172,7 +172,7 @@ fn read_rule(mut section: Section<'_>, own: &Values) -> Option<Rule> {
         .collect();
     let factor = section.take_required("factor").and_then(|node| RuleFactor::read(node, errors));
     let noise = section.or_default::<Noise>("noise");
-    let loss = section.optional_registered::<dyn Loss>("loss").map(Arc::from);
+    let loss = section.optional::<Box<dyn Loss>>("loss").map(Arc::from);
     let (place, of_noise) = (section.place_of("factor"), section.place_of("noise"));
     section.finish();
     let factor = factor?;

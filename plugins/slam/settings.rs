@@ -108,17 +108,17 @@ impl Settings {
 
     /// Takes all settings out of a document.
     pub(crate) fn take(section: &mut Section<'_>, folder: &Path) -> Option<Self> {
-        let source = section.registered::<dyn Source>("source");
+        let source = section.required::<Box<dyn Source>>("source");
         let odometry = OdometrySettings::take(section);
         let prior = PriorSettings::take(section);
         let detections = DetectionSettings::take(section);
         let objects = ObjectSettings::take(section);
-        let gravity = section.optional_registered::<dyn Gravity>("gravity");
+        let gravity = section.optional::<Box<dyn Gravity>>("gravity");
         let own = OwnGraph::take(section);
         let semantics = read_semantics(section, folder, &own.values);
         let aliases = section.or_default("aliases");
         let variance_components = section.optional("variance_components");
-        let solver = section.optional_registered::<dyn Optimizer>("solver");
+        let solver = section.optional::<Box<dyn Optimizer>>("solver");
         let evaluation = section.or_default("evaluation");
         let report = section.or_default("report");
         Some(Self {
@@ -164,7 +164,7 @@ pub(crate) fn check_rows(section: &Section<'_>, noise: Option<&Noise>, rows: usi
 const POSE_ROWS: usize = 6;
 
 fn loss(section: &mut Section<'_>) -> Option<Arc<dyn Loss>> {
-    section.optional_registered::<dyn Loss>("loss").map(Arc::from)
+    section.optional::<Box<dyn Loss>>("loss").map(Arc::from)
 }
 
 impl OdometrySettings {

@@ -220,7 +220,7 @@ impl Simulated {
     }
 }
 
-#[typetag::serde(name = "simulated")]
+#[typetag::serialize(name = "simulated")]
 impl Source for Simulated {
     fn load(&self, _: &Folders) -> Result<Sequence, SourceError> {
         self.simulate().map_err(|e| SourceError::Simulation(e.to_string()))

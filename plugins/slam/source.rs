@@ -1,7 +1,6 @@
 //! Where sequences come from, chosen by name in a run's `[source]`.
 use crate::sequence::Sequence;
 use manifactor_formats::FormatError;
-use manifactor_graph::catalogue::Kind;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +14,7 @@ pub use recorded::Recorded;
 pub use tum::TumRgbd;
 
 /// A source of a sequence.
-#[typetag::serde(tag = "type")]
+#[typetag::serialize(tag = "type")]
 pub trait Source: Debug + Send + Sync {
     /// Reads or makes the sequence.
     ///
@@ -24,9 +23,7 @@ pub trait Source: Debug + Send + Sync {
     fn load(&self, folders: &Folders) -> Result<Sequence, SourceError>;
 }
 
-impl Kind for dyn Source {
-    const NAME: &'static str = "source";
-}
+manifactor_graph::kind!(dyn Source, "source");
 
 /// Where files are looked for.
 #[derive(Debug, Clone, Default, PartialEq)]

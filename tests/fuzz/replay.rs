@@ -1,7 +1,7 @@
 //! The fuzz targets, on what is kept of their corpora and on quick random changes of it.
 //!
 //! Fuzzers that look for new paths need a nightly compiler: `README.md` says how to run them.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic, unreachable_pub)]
+#![allow(unreachable_pub)]
 mod targets;
 
 use rand::{RngExt, SeedableRng, rngs::StdRng};

@@ -129,8 +129,8 @@ fn document(data: &[u8], format: Format) {
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
         let (graph, values) = read_graph_section(&mut section);
-        let optimizer = section.optional_registered::<dyn Optimizer>("solver");
-        let start = section.optional_registered::<dyn Start>("start");
+        let optimizer = section.optional::<Box<dyn Optimizer>>("solver");
+        let start = section.optional::<Box<dyn Start>>("start");
         section.finish();
         (graph, values, optimizer, start)
     });

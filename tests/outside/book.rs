@@ -1,5 +1,5 @@
 //! The blocks of TOML in the book, as a reader would paste them.
-use manifactor::config::{Document, Format, Node, Value};
+use manifactor::config::{Document, Format, Node, Reader, Value};
 use manifactor::graph::catalogue::{self, Entry};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -35,10 +35,11 @@ fn read_all(node: &Node, place: &str) -> Vec<String> {
         Value::Table(table) => {
             if let Some(Value::String(name)) = table.get("type").map(|field| &field.node.value) {
                 let entries: Vec<&Entry> = catalogue::all().into_iter().filter(|e| e.name == *name).collect();
-                let mut fields = node.to_json().unwrap();
-                fields.as_object_mut().unwrap().shift_remove("type");
                 // a factor and a gravity may have one name
-                let read: Vec<_> = entries.iter().map(|entry| (entry.parse)(fields.clone()).err()).collect();
+                let read: Vec<_> = entries
+                    .iter()
+                    .map(|entry| (entry.read_boxed)(Reader::without(node, "type")).err())
+                    .collect();
                 match read.first() {
                     Some(Some(error)) if read.iter().all(Option::is_some) => {
                         panic!("{place}: {name}: {error}")

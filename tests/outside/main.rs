@@ -20,7 +20,7 @@ fn solve_document(text: &str) -> Solution {
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
         let graph = read_graph_section(&mut section);
-        let solver = section.optional_registered::<dyn Optimizer>("solver");
+        let solver = section.optional::<Box<dyn Optimizer>>("solver");
         section.finish();
         (graph, solver)
     });

@@ -12,7 +12,7 @@ struct Relay {
     first: usize,
 }
 
-#[typetag::serde(name = "test_relay")]
+#[typetag::serialize(name = "test_relay")]
 impl Optimizer for Relay {
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let stop = Stopping { max_iterations: self.first, ..Stopping::default() };

@@ -18,7 +18,7 @@ struct Nothing {
     frames: usize,
 }
 
-#[typetag::serde(name = "test_nothing")]
+#[typetag::serialize(name = "test_nothing")]
 impl Source for Nothing {
     fn load(&self, _folders: &Folders) -> Result<Sequence, SourceError> {
         let frame = |i: usize| Frame { timestamp: i as f64, world_from_camera: Se3::identity() };

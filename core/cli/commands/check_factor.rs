@@ -64,7 +64,7 @@ impl CheckFactor {
         let document = Document::parse("--parameters", text.as_str(), Format::Json)?;
         let errors = Errors::new();
         let root = document.root().clone();
-        let factor = named("factor", name, root, document.source()).read_registered::<dyn Factor>(&errors);
+        let factor = named("factor", name, root, document.source()).read::<Box<dyn Factor>>(&errors);
         let factor = errors.finish(factor)?;
         Subject::around_examples(entry, factor.into()).map_err(Failure::input)
     }

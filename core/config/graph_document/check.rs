@@ -1,10 +1,10 @@
 //! What is wrong between the factors and the variables of a document, at its place.
 use super::read::{FactorPlace, Read};
-use crate::diagnostic::{Diagnostic, Errors};
-use crate::problem::{Problem, quoted_list};
-use crate::source::Place;
-use crate::suggest::nearest;
 use manifactor_graph::{GraphError, Key};
+use manifactor_tree::Place;
+use manifactor_tree::nearest;
+use manifactor_tree::{Diagnostic, Errors};
+use manifactor_tree::{Problem, quoted_list};
 
 /// Up to this many variables are listed for a key that is none of them.
 const LISTED: usize = 12;

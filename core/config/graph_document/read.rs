@@ -1,14 +1,14 @@
 //! A literal graph, read.
 use super::check::check;
-use crate::diagnostic::{Diagnostic, Diagnostics, Errors};
 use crate::document::Document;
-use crate::node::{Node, Value};
-use crate::problem::Problem;
-use crate::section::Section;
-use crate::source::Place;
 use indexmap::IndexMap;
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Values, Variable};
+use manifactor_tree::Place;
+use manifactor_tree::Problem;
+use manifactor_tree::Section;
+use manifactor_tree::{Diagnostic, Diagnostics, Errors};
+use manifactor_tree::{Node, Value};
 use std::sync::Arc;
 
 /// Reads a document that is a graph: every variable and every factor by key.
@@ -87,7 +87,7 @@ impl Read {
         let errors = section.errors();
         let key = section.required::<String>("key").map(Key::from);
         let place = section.place_of("key");
-        let value = section.registered::<dyn Variable>("value");
+        let value = section.required::<Box<dyn Variable>>("value");
         let fixed = section.take("fixed").and_then(|node| fixed(&node, errors));
         section.finish();
         let Some(key) = key else { return };
@@ -113,11 +113,11 @@ impl Read {
         let place = section.place_of("keys");
         let each = keys.and_then(|node| keys_of(node, errors));
         let noise = if section.has("noise") { "noise" } else { "factor" };
-        let factor = section.registered::<dyn Factor>("factor");
+        let factor = section.required::<Box<dyn Factor>>("factor");
         let noise_before = errors.len();
         let noise_value = section.or_default("noise");
         let noise_read = errors.len() == noise_before;
-        let loss = section.optional_registered::<dyn Loss>("loss");
+        let loss = section.optional::<Box<dyn Loss>>("loss");
         let noise = section.place_of(noise);
         section.finish();
         let mut read = false;

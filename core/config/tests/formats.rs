@@ -1,5 +1,4 @@
 //! The same document in three formats, and what is said of those that are none.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "tests")]
 
 use manifactor_config::{Document, Format, MAX_DEPTH, Node, Value};
 

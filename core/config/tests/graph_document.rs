@@ -1,13 +1,10 @@
 //! Literal graphs: what they say, that they round trip, and what is said of wrong ones.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
 
-mod plugin;
-
+use crate::plugin::{Balance, Height, Offset, Plane, Real, Unit};
 use manifactor_config::{Document, Format, read_graph, write_graph};
 use manifactor_graph::loss::{Cauchy, Huber};
 use manifactor_graph::{Fixed, Graph, Noise, Values};
 use nalgebra::DMatrix;
-use plugin::{Balance, Height, Offset, Plane, Real, Unit};
 use proptest::prelude::*;
 
 const GOOD: &str = r#"

@@ -1,5 +1,4 @@
 //! `--set` and variants.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
 
 use manifactor_config::{Document, Errors, Format, to_toml};
 use serde_json::json;

@@ -1,5 +1,4 @@
 //! No text makes the parsers panic, and what is written reads back to the last bit.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
 
 use manifactor_config::{Document, Errors, Format, Node, Value};
 use proptest::prelude::*;

@@ -1,8 +1,6 @@
 //! What is said of documents that are well formed and wrong, in full.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
 
 use manifactor_config::{Document, Errors, Format, Problem, Section};
-use manifactor_graph::catalogue::Kind;
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -10,13 +8,9 @@ use serde::Deserialize;
 trait Shape: Send + Sync {
     fn area(&self) -> f64;
 }
-impl Kind for dyn Shape {
-    const NAME: &'static str = "shape";
-}
+manifactor_graph::kind!(dyn Shape, "shape");
 trait Ink: Send + Sync {}
-impl Kind for dyn Ink {
-    const NAME: &'static str = "ink";
-}
+manifactor_graph::kind!(dyn Ink, "ink");
 
 /// A disc.
 #[derive(Deserialize, JsonSchema)]
@@ -91,7 +85,9 @@ fn said<T>(format: Format, text: &str, with: impl FnOnce(&mut Section<'_>) -> Op
 }
 
 fn shapes(section: &mut Section<'_>) -> Option<f64> {
-    let shapes = section.registered_items::<dyn Shape>("shapes");
+    let errors = section.errors();
+    let shapes: Vec<_> =
+        section.nodes("shapes").into_iter().filter_map(|node| node.read::<Box<dyn Shape>>(errors)).collect();
     Some(shapes.iter().map(|s| s.area()).sum())
 }
 
@@ -195,7 +191,7 @@ fn what_is_misspelled_is_not_missing_as_well() {
 #[test]
 fn parts_may_be_left_out_and_the_rest_read_as_one() {
     let parts = |section: &mut Section<'_>| {
-        let shape = section.optional_registered::<dyn Shape>("shape").map(|s| s.area());
+        let shape = section.optional::<Box<dyn Shape>>("shape").map(|s| s.area());
         let mut sheet = section.optional_section("sheet")?;
         let tags: Vec<String> = sheet.or_default("tags");
         let sheet: Option<Sheet> = sheet.rest();

@@ -1,18 +1,15 @@
 //! The schema of literal graphs.
 #![allow(dead_code, reason = "types that are here for their schemas alone")]
-mod plugin;
 
 use manifactor_config::{Definitions, graph_schema};
-use manifactor_graph::catalogue::{Kind, entries};
+use manifactor_graph::catalogue::entries;
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 trait Shade {}
-impl Kind for dyn Shade {
-    const NAME: &'static str = "shade";
-}
+manifactor_graph::kind!(dyn Shade, "shade");
 
 mod one {
     /// A level.

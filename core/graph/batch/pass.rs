@@ -1,11 +1,11 @@
 //! The passes over a batch: chunk by chunk, by one thread or several, with the same bits.
+use super::threads::join;
 use super::{BatchOf, Evaluation};
 use crate::dimension::{Block, Dimension, Matrix};
 use crate::kernel::Kernel;
 use crate::normal_equations::{NormalEquations, Places};
 use nalgebra::U1;
 use pulp::{Simd, WithSimd};
-use rayon::prelude::*;
 
 /// Factors in a chunk: one virtual call of a loss, and one task of a thread, serves this many.
 pub(super) const CHUNK: usize = 16;
@@ -151,6 +151,39 @@ impl<F: Kernel> BatchOf<F> {
         out
     }
 
+    /// The costs of chunks `first..`, by threads.
+    pub(super) fn chunk_costs(&self, columns: F::Columns<'_>, first: usize, costs: &mut [Evaluation]) {
+        if costs.len() <= 1 {
+            costs.iter_mut().for_each(|cost| *cost = self.chunk_cost(columns, first * CHUNK));
+            return;
+        }
+        let middle = costs.len() / 2;
+        let (left, right) = costs.split_at_mut(middle);
+        join(&mut || self.chunk_costs(columns, first, left), &mut || {
+            self.chunk_costs(columns, first + middle, right);
+        });
+    }
+
+    /// Evaluates the chunks of `active`, the first of which begins at the factor `first`, by threads.
+    fn evaluate_chunks(
+        &self,
+        columns: F::Columns<'_>,
+        first: usize,
+        active: &mut [bool],
+        work: &mut [Work<F>],
+    ) {
+        if active.len() <= CHUNK {
+            self.evaluate(columns, first, active, &mut work[0]);
+            return;
+        }
+        let middle = active.len().div_ceil(CHUNK) / 2;
+        let (active, active_right) = active.split_at_mut(middle * CHUNK);
+        let (work, work_right) = work.split_at_mut(middle);
+        join(&mut || self.evaluate_chunks(columns, first, active, work), &mut || {
+            self.evaluate_chunks(columns, first + middle * CHUNK, active_right, work_right);
+        });
+    }
+
     /// Whether threads are worth it for this share of a linearization's work.
     pub(super) fn in_parallel(&self, share: f64) -> bool {
         share * self.alone > PARALLEL && rayon::current_num_threads() > 1
@@ -181,11 +214,7 @@ impl<F: Kernel> BatchOf<F> {
         to: &mut NormalEquations<'_>,
     ) -> Evaluation {
         let evaluate = |n: usize, active: &mut [bool], work: &mut [Work<F>]| {
-            work.par_iter_mut().zip(active.par_chunks_mut(CHUNK)).enumerate().for_each(
-                |(k, (work, active))| {
-                    self.evaluate(columns, n * WINDOW + k * CHUNK, active, work);
-                },
-            );
+            self.evaluate_chunks(columns, n * WINDOW, active, work);
         };
         let mut add = |mut total: Evaluation, n: usize, active: &[bool], work: &[Work<F>]| {
             for (k, (work, active)) in work.iter().zip(active.chunks(CHUNK)).enumerate() {
@@ -205,16 +234,13 @@ impl<F: Kernel> BatchOf<F> {
             (n, &*active)
         });
         while let Some((n, active)) = evaluated {
-            let next = windows.next();
-            (total, evaluated) = rayon::join(
-                || add(total, n, active, here),
-                || {
-                    next.map(|(n, active)| {
-                        evaluate(n, active, ahead);
-                        (n, &*active)
-                    })
-                },
-            );
+            let mut next = windows.next();
+            join(&mut || total = add(total, n, active, here), &mut || {
+                if let Some((n, active)) = &mut next {
+                    evaluate(*n, active, ahead);
+                }
+            });
+            evaluated = next.map(|(n, active)| (n, &*active));
             std::mem::swap(&mut here, &mut ahead);
         }
         total

@@ -1,10 +1,8 @@
 //! Covariances against the inverse of the dense Hessian.
-#![allow(missing_docs, clippy::unwrap_used)]
-mod toy;
+use crate::toy::*;
 use manifactor_graph::{Graph, Noise, Values};
 use manifactor_solve::{CovarianceError, Problem};
 use nalgebra::DMatrix;
-use toy::*;
 
 /// A chain of points with a measurement of the first, and a loop.
 fn chain(n: usize) -> (Graph, Values) {

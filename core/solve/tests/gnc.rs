@@ -1,9 +1,7 @@
 //! Graduated non-convexity on problems that are simple enough to solve by hand.
-#![allow(missing_docs, clippy::unwrap_used)]
-mod toy;
+use crate::toy::{Apart, At, Plane};
 use manifactor_graph::{Graph, Noise, Values};
 use manifactor_solve::{CompileError, Gnc, Optimizer, Problem, Silent, Solution, solve};
-use toy::{Apart, At, Plane};
 
 fn gnc(settings: &str) -> Box<dyn Optimizer> {
     serde_json::from_str(&format!(r#"{{"type": "gnc" {settings}}}"#)).unwrap()

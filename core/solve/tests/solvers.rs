@@ -1,13 +1,11 @@
 //! Every solver on problems whose answer is known.
-#![allow(missing_docs, clippy::unwrap_used)]
-mod toy;
+use crate::toy::*;
 use manifactor_graph::loss::{Cauchy, GemanMcClure};
 use manifactor_graph::{Graph, Noise, Values};
 use manifactor_solve::{
     Auto, Dogleg, GaussNewton, LevenbergMarquardt, Optimizer, Problem, Silent, Solution, Termination, solve,
 };
 use std::ops::ControlFlow;
-use toy::*;
 
 fn solvers() -> Vec<Box<dyn Optimizer>> {
     vec![

@@ -1,5 +1,4 @@
 //! Formulas obey the laws of all factors, and every function that they can call agrees with its derivative.
-#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_expression::{Constant, Expression};
 use manifactor_geometry::testing::{any_point3, any_se2, any_se3};
 use manifactor_geometry::{Between, Se3};

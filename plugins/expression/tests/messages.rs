@@ -1,5 +1,4 @@
 //! What each mistake says: the texts are reviewed here.
-#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_expression::{Constant, Expression};
 use manifactor_geometry as _;
 use manifactor_quadric as _;

@@ -1,5 +1,4 @@
 //! The default solver on published pose graphs: no tuning, the best known minimum of each.
-#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_formats::pose_graph::{Options, read};
 use manifactor_solve::{Auto, Silent, solve};
 use std::path::PathBuf;

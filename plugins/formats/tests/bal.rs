@@ -1,5 +1,4 @@
 //! Bundle adjustment in BAL files: reading, writing, and solving what was read.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 use manifactor_formats::{FormatError, bal};
 use manifactor_geometry::{BalCamera, Coordinates, Point3, ProjectionBal, Se3, So3};
 use manifactor_graph::loss::Huber;

@@ -1,5 +1,4 @@
 //! What the pose-graph reader makes of good and of bad lines.
-#![allow(clippy::unwrap_used)]
 use manifactor_formats::pose_graph::{Options, PoseGraph, Repair, parse};
 use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3, Tree};
 use manifactor_graph::{Factor, Fixed, Key};

@@ -1,5 +1,4 @@
 //! The published sequences of `MANIFACTOR_DATA/tum`: every file loads whole.
-#![allow(clippy::unwrap_used)]
 use manifactor_formats::{accelerometer, detections, timestamps, tum};
 use std::path::PathBuf;
 

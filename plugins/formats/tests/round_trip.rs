@@ -1,5 +1,4 @@
 //! A graph that is written as g2o file reads back as it was.
-#![allow(clippy::unwrap_used)]
 use manifactor_formats::{g2o, pose_graph};
 use manifactor_geometry::{Between, Landmark, Point2, Point3, Prior, Se2, Se3, So3};
 use manifactor_graph::loss::Huber;

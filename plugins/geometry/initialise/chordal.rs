@@ -38,7 +38,7 @@ pub struct Chordal {}
 
 const NAME: &str = "chordal";
 
-#[typetag::serde(name = "chordal")]
+#[typetag::serialize(name = "chordal")]
 impl Start for Chordal {
     fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError> {
         match relax_all(graph, values) {

@@ -23,7 +23,7 @@ pub struct SpanningTree {
     pub tree: Tree,
 }
 
-#[typetag::serde(name = "spanning_tree")]
+#[typetag::serialize(name = "spanning_tree")]
 impl Start for SpanningTree {
     fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError> {
         let Some(roots) = roots(graph, values) else {

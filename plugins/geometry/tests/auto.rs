@@ -1,5 +1,4 @@
 //! The default solver leaves a minimum that does not fit the noise.
-#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_geometry::{Between, Se2};
 use manifactor_graph::{Graph, Key, Noise, Values};
 use manifactor_solve::{Auto, LevenbergMarquardt, Optimizer, Silent, Termination, solve};

@@ -1,5 +1,4 @@
 //! Every way to solve the linear system of a step leads to the same estimate.
-#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_geometry::{Between, Coordinates, Landmark, Prior, Rn, Se3};
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
 use manifactor_solve::{

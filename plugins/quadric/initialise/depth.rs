@@ -44,7 +44,7 @@ impl Depth {
     }
 }
 
-#[typetag::serde(name = "depth")]
+#[typetag::serialize(name = "depth")]
 impl Initialiser for Depth {
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
         check_views(views, 1)?;

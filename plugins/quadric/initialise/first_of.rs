@@ -24,7 +24,7 @@ fn list(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": "array", "items": { "type": "object", "required": ["type"] }, "minItems": 1 })
 }
 
-#[typetag::serde(name = "first_of")]
+#[typetag::serialize(name = "first_of")]
 impl Initialiser for FirstOf {
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
         let mut errors = vec![];

@@ -30,7 +30,7 @@ impl Default for Rays {
     }
 }
 
-#[typetag::serde(name = "rays")]
+#[typetag::serialize(name = "rays")]
 impl Initialiser for Rays {
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
         check_views(views, self.min_views.max(2))?;

@@ -46,7 +46,7 @@ impl Default for Svd {
     }
 }
 
-#[typetag::serde(name = "svd")]
+#[typetag::serialize(name = "svd")]
 impl Initialiser for Svd {
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
         check_views(views, self.min_views)?;

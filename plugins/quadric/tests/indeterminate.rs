@@ -1,6 +1,5 @@
 //! What nothing constrains is named, with its directions.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
-mod scene;
+use crate::scene::{camera, desk, jitter, looking, sphere};
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric};
@@ -8,7 +7,6 @@ use manifactor_solve::{
     Auto, Dogleg, GaussNewton, LevenbergMarquardt, Optimizer, Silent, Termination, Undetermined, solve,
 };
 use nalgebra::Vector3;
-use scene::{camera, desk, jitter, looking, sphere};
 use std::collections::BTreeSet;
 
 /// What each solver finds open: as its ending, or as a warning where it damps.

@@ -1,6 +1,5 @@
 //! Whole solves give the same bits on one thread, two and four.
-#![allow(missing_docs, clippy::unwrap_used)]
-mod scene;
+use crate::scene;
 use manifactor_graph::{Graph, Values};
 use manifactor_solve::{Auto, Dogleg, GaussNewton, Gnc, LevenbergMarquardt, Optimizer, Silent, solve};
 

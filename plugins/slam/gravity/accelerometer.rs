@@ -50,7 +50,7 @@ impl Default for Accelerometer {
     }
 }
 
-#[typetag::serde(name = "accelerometer")]
+#[typetag::serialize(name = "accelerometer")]
 impl Gravity for Accelerometer {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
         let first = first_frame(sequence)?;

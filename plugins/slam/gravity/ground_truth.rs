@@ -25,7 +25,7 @@ impl Default for GroundTruthPose {
     }
 }
 
-#[typetag::serde(name = "ground_truth")]
+#[typetag::serialize(name = "ground_truth")]
 impl Gravity for GroundTruthPose {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
         let first = first_frame(sequence)?;

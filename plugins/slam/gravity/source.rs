@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct FromSource {}
 
-#[typetag::serde(name = "source")]
+#[typetag::serialize(name = "source")]
 impl Gravity for FromSource {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
         Ok(MapFrame::of_odometry(sequence.up))

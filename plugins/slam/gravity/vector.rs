@@ -19,7 +19,7 @@ pub struct UpVector {
     pub up: Direction,
 }
 
-#[typetag::serde(name = "vector")]
+#[typetag::serialize(name = "vector")]
 impl Gravity for UpVector {
     fn locate(&self, _: &Sequence) -> Result<MapFrame, GravityError> {
         Ok(MapFrame::of_odometry(Some(self.up)))

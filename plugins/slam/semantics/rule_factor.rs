@@ -1,5 +1,5 @@
-use manifactor_config::{Errors, Node, Place, Problem, Value as NodeValue};
-use manifactor_graph::catalogue::{Kind, ParseError, find, manifold_name};
+use manifactor_config::{Errors, Node, Place, Problem, ReadError, Value as NodeValue};
+use manifactor_graph::catalogue::{Kind, find, manifold_name};
 use manifactor_graph::{Direction, Factor, Key, Values};
 use manifactor_quadric::DualQuadric;
 use manifactor_semantic::MixtureError;
@@ -53,7 +53,7 @@ pub enum RuleError {
         /// The factor's type.
         factor: String,
         /// What is wrong with its fields.
-        source: ParseError,
+        source: ReadError,
     },
     /// It cannot be one of two possibilities.
     #[error("the semantic factor `{factor}` as a mixture: {source}")]
@@ -76,7 +76,7 @@ impl RuleFactor {
             },
             _ => String::new(),
         };
-        let factor = node.read_registered::<dyn Factor>(errors)?;
+        let factor = node.read::<Box<dyn Factor>>(errors)?;
         let signature = factor.erased().signature();
         let variables = signature.variables;
         if signature.many || !variables.contains(&TypeId::of::<DualQuadric>()) {
@@ -174,7 +174,8 @@ impl RuleFactor {
         }
         let entry = find(<dyn Factor as Kind>::NAME, &self.name);
         let entry = entry.ok_or_else(|| RuleError::NotRegistered { factor: factor() })?;
-        let parsed = entry.parse::<dyn Factor>(fields);
+        let parsed = serde_json::from_value::<Node>(fields).map_err(serde::de::Error::custom);
+        let parsed = parsed.and_then(|fields: Node| entry.read::<dyn Factor>(&fields));
         parsed.map_err(|source| RuleError::Fields { factor: factor(), source })
     }
 }

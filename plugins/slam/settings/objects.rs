@@ -26,7 +26,7 @@ impl ObjectSettings {
     pub(super) fn take(parent: &mut Section<'_>) -> Option<Self> {
         table(parent, "objects", |section| {
             let min_views = section.optional::<usize>("min_views").unwrap_or(3);
-            let initialiser = section.optional_registered::<dyn Initialiser>("initialiser");
+            let initialiser = section.optional::<Box<dyn Initialiser>>("initialiser");
             Self {
                 min_views,
                 max_box_deviation_px: within(section, "max_box_deviation_px", 50.0, 0.0..=f64::INFINITY),

@@ -49,7 +49,7 @@ fn exact() -> f64 {
     1e-6
 }
 
-#[typetag::serde(name = "recorded")]
+#[typetag::serialize(name = "recorded")]
 impl Source for Recorded {
     fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.folder)?;

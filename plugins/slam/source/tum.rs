@@ -47,7 +47,7 @@ fn exact() -> f64 {
     1e-6
 }
 
-#[typetag::serde(name = "tum")]
+#[typetag::serialize(name = "tum")]
 impl Source for TumRgbd {
     fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.sequence)?;

@@ -1,5 +1,4 @@
 //! The scenes of the simulated experiment, as they were settled before anything was tuned.
-#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_config::Document;
 use manifactor_slam::experiment::{Experiment, Trial};
 use manifactor_slam::sequence::Sequence;

@@ -1,5 +1,4 @@
 //! Variance components on data whose noise is known.
-#![allow(missing_docs, clippy::unwrap_used)]
 use manifactor_config::{Document, Format};
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;

@@ -72,7 +72,7 @@ impl From<Chain> for usize {
     }
 }
 
-#[typetag::serde(name = "chain_of_spots")]
+#[typetag::serialize(name = "chain_of_spots")]
 impl Factor for Chain {
     fn erased(&self) -> &dyn ErasedResidual {
         &self.0

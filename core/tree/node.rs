@@ -1,11 +1,11 @@
 //! A document as a tree in which everything knows its place: one type for all formats.
 use crate::diagnostic::Diagnostic;
-use crate::problem::Problem;
 use crate::source::Place;
+use crate::text_error::TextError;
 use indexmap::IndexMap;
-use manifactor_graph::TextError;
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde::{Serialize, Serializer};
-use serde_path_to_error::{Path, Segment};
+use std::fmt;
 
 /// Tables and arrays may be nested this deep.
 pub const MAX_DEPTH: usize = 64;
@@ -56,6 +56,11 @@ impl Node {
         Node { place, value }
     }
 
+    /// A table of no fields and no place.
+    pub fn empty_table() -> Self {
+        Node::new(Place::nowhere(), Value::Table(Table::new()))
+    }
+
     /// As JSON, in which serde types are read; every number that is not finite is an error.
     pub fn to_json(&self) -> Result<serde_json::Value, Vec<Diagnostic>> {
         let mut errors = Vec::new();
@@ -71,11 +76,7 @@ impl Node {
             Value::Float(value) => match serde_json::Number::from_f64(*value) {
                 Some(number) => number.into(),
                 None => {
-                    let text = match self.place.text() {
-                        "" => value.to_string(),
-                        text => text.to_owned(),
-                    };
-                    errors.push(Diagnostic::new(self.place.clone(), Problem::NotFinite { text }));
+                    errors.push(self.not_finite(*value));
                     serde_json::Value::Null
                 }
             },
@@ -85,27 +86,6 @@ impl Node {
                 table.iter().map(|(key, field)| (key.clone(), field.node.json(errors))).collect()
             }
         }
-    }
-
-    /// The deepest node on a serde path that exists, and the key that it stands under.
-    pub fn find(&self, path: &Path) -> Found<'_> {
-        let mut found = Found { node: self, key: None, complete: true };
-        for segment in path {
-            let next = match (segment, &found.node.value) {
-                (Segment::Map { key } | Segment::Enum { variant: key }, Value::Table(table)) => {
-                    table.get(key).map(|field| (&field.node, Some(&field.key)))
-                }
-                (Segment::Seq { index }, Value::Array(items)) => items.get(*index).map(|item| (item, None)),
-                _ => None,
-            };
-            match (next, segment) {
-                (Some((node, key)), _) => found = Found { node, key, complete: true },
-                // a unit variant is the string itself
-                (None, Segment::Enum { .. }) => {}
-                (None, _) => return Found { complete: false, ..found },
-            }
-        }
-        found
     }
 
     /// The place that an error within one of the texts below this node means; the whole text, where it is written with
@@ -171,15 +151,56 @@ impl Serialize for Node {
     }
 }
 
-/// What [`Node::find`] came to.
-#[derive(Debug, Clone, Copy)]
-pub struct Found<'a> {
-    /// The deepest node that exists.
-    pub node: &'a Node,
-    /// Its key, if it is in a table.
-    pub key: Option<&'a Place>,
-    /// Whether the whole path exists.
-    pub complete: bool,
+/// From any other format, without places.
+impl<'de> Deserialize<'de> for Node {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Anything;
+        impl<'de> Visitor<'de> for Anything {
+            type Value = Value;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a value")
+            }
+            fn visit_unit<E: Error>(self) -> Result<Value, E> {
+                Ok(Value::Null)
+            }
+            fn visit_none<E: Error>(self) -> Result<Value, E> {
+                Ok(Value::Null)
+            }
+            fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
+                deserializer.deserialize_any(self)
+            }
+            fn visit_bool<E: Error>(self, value: bool) -> Result<Value, E> {
+                Ok(Value::Bool(value))
+            }
+            fn visit_i64<E: Error>(self, value: i64) -> Result<Value, E> {
+                Ok(Value::Integer(value))
+            }
+            fn visit_u64<E: Error>(self, value: u64) -> Result<Value, E> {
+                Ok(i64::try_from(value).map_or(Value::Float(value as f64), Value::Integer))
+            }
+            fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
+                Ok(Value::Float(value))
+            }
+            fn visit_str<E: Error>(self, value: &str) -> Result<Value, E> {
+                Ok(Value::String(value.to_owned()))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
+                let mut array = vec![];
+                while let Some(item) = items.next_element()? {
+                    array.push(item);
+                }
+                Ok(Value::Array(array))
+            }
+            fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<Value, A::Error> {
+                let mut table = Table::new();
+                while let Some((name, node)) = fields.next_entry()? {
+                    table.insert(name, Field { key: Place::nowhere(), node });
+                }
+                Ok(Value::Table(table))
+            }
+        }
+        Ok(Node::new(Place::nowhere(), deserializer.deserialize_any(Anything)?))
+    }
 }
 
 /// The start of a text, so that messages stay short.

@@ -20,7 +20,7 @@ fn normal(name: &str) -> String {
 }
 
 /// ``did you mean `a`? known: `a`, `b` ``
-pub(crate) fn advice(name: &str, known: &[String]) -> Option<String> {
+pub fn advice(name: &str, known: &[String]) -> Option<String> {
     let near = nearest(name, known.iter().map(String::as_str));
     let list = list(known);
     match (near, known.is_empty()) {

@@ -81,6 +81,12 @@ pub struct Place {
 }
 
 impl Place {
+    /// For what was not read from a text.
+    pub fn nowhere() -> Self {
+        static NOWHERE: OnceLock<Source> = OnceLock::new();
+        NOWHERE.get_or_init(|| Source::new("document", "")).place(0..0)
+    }
+
     /// The line, from 1.
     pub fn line(&self) -> usize {
         self.source.line_and_column(self.span.start).0

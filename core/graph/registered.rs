@@ -1,69 +1,31 @@
 //! Trait objects that a document chooses by name: `solver = { type = "gauss_newton", max_iterations = 20 }`.
-use crate::diagnostic::Errors;
-use crate::node::{Field, Node, Value};
-use crate::problem::Problem;
-use crate::section::Section;
-use crate::suggest::{advice, nearest};
-use manifactor_graph::catalogue::{Entry, Kind, all, entries, find};
+use crate::catalogue::{Entry, Kind, TAG, all, entries, find};
+use manifactor_tree::{Field, Node, Place, Problem, ReadError, Value, advice, nearest};
 
-/// The field that names the type.
-const TAG: &str = "type";
-
-impl Section<'_> {
-    /// A trait object that has to be there.
-    pub fn registered<K: Kind + ?Sized>(&mut self, field: &str) -> Option<Box<K>> {
-        let node = self.take_required(field)?;
-        node.read_registered(self.errors())
-    }
-
-    /// A trait object that may be left out.
-    pub fn optional_registered<K: Kind + ?Sized>(&mut self, field: &str) -> Option<Box<K>> {
-        let node = self.take(field)?;
-        node.read_registered(self.errors())
-    }
-
-    /// An array of trait objects; empty, if it is not there. Those that are wrong are reported and left out.
-    pub fn registered_items<K: Kind + ?Sized>(&mut self, field: &str) -> Vec<Box<K>> {
-        let errors = self.errors();
-        self.nodes(field).into_iter().filter_map(|node| node.read_registered(errors)).collect()
-    }
+/// Reads a table as the registered type of kind `K` that its `type` names.
+///
+/// # Errors
+/// No `type`, one that is not registered, and whatever is wrong with the fields; each at its place.
+pub fn read<K: Kind + ?Sized>(node: &Node) -> Result<Box<K>, ReadError> {
+    let tag = match &node.value {
+        Value::Table(table) => table.get(TAG),
+        _ => None,
+    };
+    let entry = match tag {
+        Some(Field { node: tag, .. }) => {
+            entry_of(tag, K::NAME).map_err(|problem| (tag.place.clone(), problem))
+        }
+        None => Err(untagged(node, K::NAME)),
+    };
+    entry.map_err(|(place, problem)| ReadError::new(place, problem))?.read(node)
 }
 
-impl Node {
-    /// Reads a table as the registered type of kind `K` that its `type` names.
-    pub fn read_registered<K: Kind + ?Sized>(self, errors: &Errors) -> Option<Box<K>> {
-        let (entry, fields) = self.named(K::NAME, errors)?;
-        fields.read_with(errors, |json| entry.parse::<K>(json))
-    }
-
-    /// The catalogue's entry for a table's `type`, and the table without it.
-    fn named(mut self, kind: &str, errors: &Errors) -> Option<(&'static Entry, Node)> {
-        let entry = match &mut self.value {
-            Value::Table(table) => match table.get(TAG) {
-                Some(Field { node: tag, .. }) => {
-                    let entry = entry_of(tag, kind, errors);
-                    table.shift_remove(TAG);
-                    entry
-                }
-                None => {
-                    untagged(&self, kind, errors);
-                    None
-                }
-            },
-            _ => {
-                untagged(&self, kind, errors);
-                None
-            }
-        };
-        Some((entry?, self))
-    }
-}
-
-fn entry_of(tag: &Node, kind: &str, errors: &Errors) -> Option<&'static Entry> {
+/// The entry that a tag names.
+fn entry_of(tag: &Node, kind: &str) -> Result<&'static Entry, Problem> {
     let a = article(kind);
-    let problem = match &tag.value {
+    Err(match &tag.value {
         Value::String(name) => match find(kind, name) {
-            Some(entry) => return Some(entry),
+            Some(entry) => return Ok(entry),
             None => match all().into_iter().find(|e| e.name == name) {
                 Some(other) => {
                     let (b, other) = (article(other.kind), other.kind);
@@ -74,9 +36,7 @@ fn entry_of(tag: &Node, kind: &str, errors: &Errors) -> Option<&'static Entry> {
             },
         },
         _ => Problem::wrong_type(format!("the name of {a} {kind}"), tag.in_words()),
-    };
-    errors.report(tag.place.clone(), problem);
-    None
+    })
 }
 
 /// A name that nothing has: misspelt, or of a plugin that is not there.
@@ -91,8 +51,8 @@ fn unknown(kind: &str, name: &str) -> Problem {
     Problem::with_help(format!("unknown {kind} `{name}`"), help)
 }
 
-/// Reports what has no `type`.
-fn untagged(node: &Node, kind: &str, errors: &Errors) {
+/// What is wrong where there is no `type`.
+fn untagged(node: &Node, kind: &str) -> (Place, Problem) {
     let a = article(kind);
     let (place, problem) = match &node.value {
         Value::Table(table) => match table.iter().find(|(name, _)| nearest(name, [TAG]).is_some()) {
@@ -117,7 +77,7 @@ fn untagged(node: &Node, kind: &str, errors: &Errors) {
             }
         }
     };
-    errors.report(place.clone(), problem);
+    (place.clone(), problem)
 }
 
 fn known(kind: &str) -> Vec<String> {

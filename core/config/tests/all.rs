@@ -1,0 +1,9 @@
+//! Documents, from text to graphs.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+mod formats;
+mod graph_document;
+mod overrides;
+mod plugin;
+mod properties;
+mod reading;
+mod schema;

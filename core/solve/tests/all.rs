@@ -1,0 +1,6 @@
+//! Solvers on problems whose answer is known.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+mod covariance;
+mod gnc;
+mod solvers;
+mod toy;

@@ -1,0 +1,220 @@
+//! What serde says of a node, as a problem at a place, in words of documents rather than of Rust.
+use crate::node::{Node, Value};
+use crate::problem::Problem;
+use crate::source::Place;
+use crate::text_error::TextError;
+use serde::de::{Error, Expected, Unexpected};
+use std::fmt;
+
+/// Why a type could not be read, and where.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadError(Box<Inner>);
+
+#[derive(Debug, Clone, PartialEq)]
+enum Inner {
+    /// The node is not known yet.
+    Unplaced(What),
+    Placed {
+        place: Place,
+        problem: Problem,
+        unread: bool,
+    },
+}
+
+/// What serde says before it is known of which node.
+#[derive(Debug, Clone, PartialEq)]
+enum What {
+    Type { expected: String, found: String },
+    Length { expected: String, found: usize },
+    Variant { name: String, known: Vec<String> },
+    Field { name: String, known: Vec<String> },
+    Missing { name: String },
+    Text(TextError),
+    Message(String),
+}
+
+impl ReadError {
+    /// A problem at a place.
+    pub fn new(place: Place, problem: Problem) -> Self {
+        Self(Box::new(Inner::Placed { place, problem, unread: false }))
+    }
+
+    /// What is wrong.
+    pub fn problem(&self) -> Problem {
+        match &*self.0 {
+            Inner::Unplaced(what) => what.problem(None),
+            Inner::Placed { problem, .. } => problem.clone(),
+        }
+    }
+
+    /// Where, if that is known.
+    pub fn place(&self) -> Option<&Place> {
+        match &*self.0 {
+            Inner::Unplaced(_) => None,
+            Inner::Placed { place, .. } => Some(place),
+        }
+    }
+
+    /// Whether a field is there that nothing reads: without it, reading may go on.
+    pub(crate) fn is_unread_field(&self) -> bool {
+        matches!(&*self.0, Inner::Placed { unread: true, .. })
+    }
+
+    /// The error of this node, or of a part of it that is known already.
+    #[must_use]
+    pub fn at(self, node: &Node) -> Self {
+        let Inner::Unplaced(what) = &*self.0 else { return self };
+        let unread = matches!(what, What::Field { .. });
+        Self(Box::new(Inner::Placed { place: what.place(node), problem: what.problem(Some(node)), unread }))
+    }
+
+    fn unplaced(what: What) -> Self {
+        Self(Box::new(Inner::Unplaced(what)))
+    }
+}
+
+impl What {
+    fn place(&self, node: &Node) -> Place {
+        let found = match (self, &node.value) {
+            (Self::Field { name, .. } | Self::Variant { name, .. }, Value::Table(table)) => {
+                table.get(name).map(|field| field.key.clone())
+            }
+            // the text may be a value or a name
+            (Self::Text(error), _) => node.place_in_text(error).or_else(|| node.place_of_name(&error.text)),
+            _ => None,
+        };
+        found.unwrap_or_else(|| node.place.clone())
+    }
+
+    fn problem(&self, node: Option<&Node>) -> Problem {
+        let is_table = node.is_some_and(|node| matches!(node.value, Value::Table(_)));
+        match self.clone() {
+            Self::Type { expected, found } => {
+                let found = node.map_or(found, Node::in_words);
+                Problem::WrongType { expected: in_words(&expected), found }
+            }
+            Self::Length { expected, found } => {
+                let found = if found == 1 { "1 element".to_owned() } else { format!("{found} elements") };
+                Problem::WrongType { expected: in_words(&expected), found }
+            }
+            // { sigma = 1 } names its variant as a field
+            Self::Variant { name, known } if is_table => Problem::UnknownField { field: name, known },
+            Self::Variant { name, known } => Problem::UnknownName { what: "value".into(), name, known },
+            Self::Field { name, known } => Problem::UnknownField { field: name, known },
+            Self::Missing { name } => Problem::MissingField { field: name },
+            Self::Text(error) => Problem::Invalid { message: error.message, help: error.help },
+            Self::Message(message) if message.starts_with("data did not match any variant of untagged") => {
+                let found = node.map_or_else(|| "something else".to_owned(), Node::in_words);
+                Problem::invalid(format!("{found} has none of the forms that are possible here"))
+            }
+            Self::Message(message) => Problem::invalid(message),
+        }
+    }
+}
+
+impl Error for ReadError {
+    fn custom<T: fmt::Display>(message: T) -> Self {
+        let message = message.to_string();
+        if let Some(error) = TextError::parse(&message) {
+            return Self::unplaced(What::Text(error));
+        }
+        let line = message.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+        Self::unplaced(What::Message(line.trim().to_owned()))
+    }
+
+    fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        Self::unplaced(What::Type { expected: expected.to_string(), found: found.to_string() })
+    }
+
+    fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        Self::invalid_type(found, expected)
+    }
+
+    fn invalid_length(found: usize, expected: &dyn Expected) -> Self {
+        Self::unplaced(What::Length { expected: expected.to_string(), found })
+    }
+
+    fn unknown_variant(name: &str, known: &'static [&'static str]) -> Self {
+        Self::unplaced(What::Variant { name: name.to_owned(), known: owned(known) })
+    }
+
+    fn unknown_field(name: &str, known: &'static [&'static str]) -> Self {
+        Self::unplaced(What::Field { name: name.to_owned(), known: owned(known) })
+    }
+
+    fn missing_field(name: &'static str) -> Self {
+        Self::unplaced(What::Missing { name: name.to_owned() })
+    }
+}
+
+impl fmt::Display for ReadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let problem = self.problem();
+        write!(f, "{problem}")?;
+        problem.help().map_or(Ok(()), |help| write!(f, " ({help})"))
+    }
+}
+
+impl std::error::Error for ReadError {}
+
+fn owned(names: &[&str]) -> Vec<String> {
+    names.iter().map(|name| (*name).to_owned()).collect()
+}
+
+/// What serde expected, without Rust's types.
+fn in_words(expected: &str) -> String {
+    let words = match expected {
+        "f64" | "f32" => "a number",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "a nonzero u32" | "a nonzero u64" | "a nonzero usize" => "a whole number, 1 or more",
+        "a boolean" => "true or false",
+        "a string" | "a borrowed string" | "path string" => "a text",
+        "a sequence" => "an array",
+        "a map" => "a table",
+        "fewer elements in array" => "fewer elements",
+        _ => "",
+    };
+    match words {
+        "" if expected.starts_with("struct ") => "a table".into(),
+        "" if expected.starts_with("tuple ") || expected.starts_with("a tuple") => match size(expected) {
+            Some(size) => format!("an array of {size}"),
+            None => "an array".into(),
+        },
+        "" if expected.starts_with("an array of length ") => {
+            format!("an array of {}", size(expected).unwrap_or("some size"))
+        }
+        "" if expected.contains(" enum ") || expected.starts_with("enum ") => "a name or a table".into(),
+        "" => expected.to_owned(),
+        words => words.to_owned(),
+    }
+}
+
+/// `3` of `an array of length 3`, `a tuple of size 3`, `tuple struct Box with 3 elements`.
+fn size(expected: &str) -> Option<&str> {
+    expected.split_whitespace().find(|word| word.bytes().all(|b| b.is_ascii_digit()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_and_their_neighbours_are_told() {
+        let problem = ReadError::unknown_field("sigam", &["sigma", "loss"]).problem();
+        assert_eq!(problem.to_string(), "unknown field `sigam`");
+        assert_eq!(problem.help().unwrap(), "did you mean `sigma`? there are `sigma` and `loss`");
+        let problem = ReadError::unknown_field("x", &[]).problem();
+        assert_eq!(problem.help().unwrap(), "there are no fields here");
+    }
+
+    #[test]
+    fn types_are_said_in_words() {
+        let wrong = |expected| ReadError::invalid_type(Unexpected::Map, &expected).problem().to_string();
+        assert_eq!(wrong("f64"), "expected a number, found map");
+        assert_eq!(wrong("a tuple of size 4"), "expected an array of 4, found map");
+        let short = ReadError::invalid_length(2, &"an array of length 3").problem();
+        assert_eq!(short.to_string(), "expected an array of 3, found 2 elements");
+        assert_eq!(ReadError::custom("sigma has to be positive\n\n").to_string(), "sigma has to be positive");
+    }
+}

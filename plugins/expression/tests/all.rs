@@ -1,0 +1,4 @@
+//! Formulas: their laws, and what each mistake says.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+mod laws;
+mod messages;

@@ -1,0 +1,10 @@
+//! Files, read, written and solved.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+mod auto;
+mod bal;
+mod gnc;
+mod pose_graphs;
+mod published_graphs;
+mod published_sequences;
+mod round_trip;
+mod starts;

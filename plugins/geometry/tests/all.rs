@@ -1,0 +1,5 @@
+//! Solvers on poses and points, and the catalogue of the crate.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+mod auto;
+mod catalogue;
+mod linear_solvers;

@@ -1,0 +1,6 @@
+//! Mapping, from sequences to reports.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+mod evo;
+mod simulation;
+mod tum;
+mod variance;
