@@ -7,7 +7,7 @@ use manifactor::quadric::initialise::Initialiser;
 use manifactor::slam::gravity::Gravity;
 use manifactor::slam::source::Source;
 use manifactor::solve::{Optimizer, Start};
-use manifactor_testing::catalogue::{documentation_law, factor_law, manifold_law};
+use manifactor_testing::catalogue::{documentation_law, factor_law, loss_law, manifold_law};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value as Json;
 
@@ -68,6 +68,13 @@ fn every_factor_agrees_with_its_derivatives() {
 fn every_manifold_keeps_the_laws() {
     for entry in entries("variable") {
         manifold_law(entry, 256).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
+    }
+}
+
+#[test]
+fn every_loss_is_tempered_as_the_definition_says() {
+    for entry in entries("loss") {
+        loss_law(entry).unwrap_or_else(|e| panic!("{e}"));
     }
 }
 

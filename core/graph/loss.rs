@@ -3,17 +3,30 @@
 //! One convention throughout. A factor with whitened residual r costs ½ρ(s), s = ‖r‖², and enters
 //! the normal equations with the weight ρ'(s). Each ρ has ρ(0) = 0 and, but for L1, ρ(s) ≈ s near 0:
 //! a small residual costs what it costs without a loss.
+use crate::checked::Positive;
 use crate::column::Plain;
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
+use std::sync::Arc;
 
 mod kernels;
+mod tempered;
 pub use kernels::{Cauchy, Dcs, Fair, GemanMcClure, Huber, L1, L2, Tukey, Welsch};
+pub use tempered::Tempered;
 
 /// The author's trait: ρ and its derivative. Register it with [`register_loss!`](crate::register_loss).
 pub trait RobustLoss: Debug + Clone + Send + Sync + 'static {
     /// (ρ(s), ρ'(s)) at the squared norm `s` of a whitened residual.
     fn rho(&self, s: f64) -> (f64, f64);
+
+    /// ρ(τs)/τ as a loss of the same type: the loss of a residual that was whitened by √τ times its σ, because τ of its
+    /// kind say as much as one alone. A loss with one scale k, in σ's, has it with the scale k/√τ.
+    ///
+    /// The default is `None`: the loss is put into a [`Tempered`], which is as exact and costs one virtual call a factor.
+    fn tempered(&self, tau: Positive) -> Option<Self> {
+        let _ = tau;
+        None
+    }
 }
 
 /// A robust loss, chosen by name.
@@ -33,9 +46,11 @@ pub trait ErasedLoss: Send + Sync {
     fn column(&self) -> Box<dyn LossColumn>;
     /// (ρ(s), ρ'(s)).
     fn rho(&self, s: f64) -> (f64, f64);
+    /// ρ(τs)/τ, see [`RobustLoss::tempered`].
+    fn tempered(&self, tau: Positive) -> Arc<dyn Loss>;
 }
 
-impl<L: RobustLoss> ErasedLoss for L {
+impl<L: RobustLoss + Loss> ErasedLoss for L {
     fn as_any(&self) -> &dyn Any {
         self
     }
@@ -44,6 +59,12 @@ impl<L: RobustLoss> ErasedLoss for L {
     }
     fn rho(&self, s: f64) -> (f64, f64) {
         RobustLoss::rho(self, s)
+    }
+    fn tempered(&self, tau: Positive) -> Arc<dyn Loss> {
+        match RobustLoss::tempered(self, tau) {
+            Some(loss) => Arc::new(loss),
+            None => Arc::new(Tempered { tau, loss: Arc::new(self.clone()) }),
+        }
     }
 }
 

@@ -6,6 +6,8 @@ use crate::error::LawError;
 use crate::factor_check::{FactorCheck, FactorReport, Subject};
 use crate::manifold::manifold_laws;
 use manifactor_graph::catalogue::{self, Entry, Kind};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, Variable};
 use manifactor_tree::{Node, Reader};
 use proptest::prelude::RngExt;
@@ -87,6 +89,47 @@ pub fn manifold_law(entry: &'static Entry, cases: usize) -> Result<(), LawError>
         let (Some(x), Some(y)) = (around(&*origin, &mut rng), around(&*origin, &mut rng)) else { continue };
         let delta: Vec<f64> = (0..x.erased().dim()).map(|_| rng.random_range(-1.0..1.0)).collect();
         manifold_laws(&*x, &*y, &delta)?;
+    }
+    Ok(())
+}
+
+/// Checks a loss's example at many s: that its weight is the derivative of ρ, and that [tempered], once and twice, it is
+/// ρ(τs)/τ for many τ.
+///
+/// # Errors
+/// The law that is broken, or what the catalogue lacks.
+///
+/// [tempered]: manifactor_graph::loss::RobustLoss::tempered
+pub fn loss_law(entry: &'static Entry) -> Result<(), LawError> {
+    let loss = example::<dyn Loss>(entry)?;
+    let rho = |s: f64| loss.erased().rho(s);
+    // between round numbers, where a loss may have its bounds
+    let grid = |exponents: std::ops::Range<i32>| exponents.map(|i| 10f64.powf(0.37 * f64::from(i) + 0.013));
+    let near = |(a, b): (f64, f64), share: f64| (a - b).abs() <= share * (1.0 + b.abs());
+    for s in grid(-40..20) {
+        let h = 1e-5 * s;
+        let (slope, weight) = ((rho(s + h).0 - rho(s - h).0) / (2.0 * h), rho(s).1);
+        if !near((slope, weight), 1e-4) {
+            return Err(problem(
+                entry,
+                format!("at s = {s} its weight is {weight}, and the derivative of ρ {slope}"),
+            ));
+        }
+    }
+    for tau in grid(-10..15).filter_map(|tau| Positive::new(tau).ok()) {
+        let tempered = loss.erased().tempered(tau);
+        let twice = tempered.erased().tempered(tau);
+        for (tempered, tau) in [(tempered, tau.get()), (twice, tau.get().powi(2))] {
+            for s in grid(-40..20) {
+                let (expected, found) = ((rho(tau * s).0 / tau, rho(tau * s).1), tempered.erased().rho(s));
+                if !(near((found.0, expected.0), 1e-11) && near((found.1, expected.1), 1e-11)) {
+                    let text = format!(
+                        "tempered by τ = {tau}, at s = {s}, it is {found:?}, not ρ(τs)/τ and ρ'(τs), {expected:?}"
+                    );
+                    return Err(problem(entry, text));
+                }
+            }
+        }
     }
     Ok(())
 }

@@ -142,7 +142,7 @@ impl Estimate {
         let interrupted = |of: &Self| of.solution.outcome.termination == Termination::Interrupted;
         while !(settled || interrupted(&estimate) || estimate.mapping.mapped().next().is_none()) {
             let found = Components::of(&estimate, variance)?;
-            settled = components.len() + 1 >= variance.rounds
+            settled = components.len() + 1 >= variance.rounds.get()
                 || components.last().is_some_and(|before| found.change(before) < variance.tolerance);
             found.apply(&mut estimate.mapping, variance, settings.detections.loss.as_ref())?;
             components.push(found);

@@ -26,9 +26,11 @@
 //! runs; it is written to a [`Journal`] once it is done, and not run again. The tables are made of the journal.
 mod axis;
 mod bootstrap;
+mod check;
 mod document;
 mod journal;
 mod measures;
+mod names;
 mod output;
 mod runner;
 mod summary;
@@ -39,7 +41,7 @@ mod trial;
 pub use bootstrap::{Interval, bootstrap};
 pub use document::{Documents, Experiment};
 pub use journal::{Journal, JournalError};
-pub use measures::measures;
+pub use measures::{measure_names, measures};
 pub use output::write;
 pub use runner::{Progress, run};
 pub use summary::{Comparison, Group, Summary};

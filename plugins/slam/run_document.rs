@@ -77,7 +77,8 @@ impl RunDocument {
 /// A variant, as it is written.
 pub(crate) struct Declared {
     pub(crate) name: String,
-    place: Place,
+    /// Where the name is.
+    pub(crate) place: Place,
     /// What it puts over the settings that all variants have in common.
     pub(crate) set: Option<Node>,
 }

@@ -36,3 +36,15 @@ fn a_graph_names_it_and_the_outlier_does_not_pull() {
     // two measurements one σ off, and the bound of the third
     assert!((solution.outcome.final_cost - 0.5 * (1.0 + 1.0 + 9.0)).abs() < 1e-9);
 }
+
+/// `Truncated` has no `tempered` of its own.
+#[test]
+fn it_is_tempered_all_the_same() {
+    let loss = Truncated { scale: Positive::new(3.0).unwrap() };
+    let tempered = loss.erased().tempered(Positive::new(4.0).unwrap());
+    assert_eq!(tempered.erased().rho(2.0), (2.0, 1.0));
+    assert_eq!(tempered.erased().rho(3.0), (9.0 / 4.0, 0.0));
+    let written = serde_json::to_string(&tempered).unwrap();
+    let read: Box<dyn Loss> = serde_json::from_str(&written).unwrap();
+    assert_eq!(read.erased().rho(3.0), (9.0 / 4.0, 0.0));
+}

@@ -127,7 +127,8 @@ factor = { type = "offset", measured = [0.5, 1] }
 
 [solver]
 "#;
-    let losses = "`cauchy`, `dcs`, `fair`, `geman_mcclure`, `huber`, `l1`, `l2`, `tukey` and `welsch`";
+    let losses =
+        "`cauchy`, `dcs`, `fair`, `geman_mcclure`, `huber`, `l1`, `l2`, `tempered`, `tukey` and `welsch`";
     let expected = format!(
         "graph:4:18: unknown variable `plan` (did you mean `plane`? there are `plane` and `real`)\n\
          graph:5:1: unknown field `fixd` (did you mean `fixed`? there are `key`, `value` and `fixed`)\n\

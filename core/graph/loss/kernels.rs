@@ -5,9 +5,13 @@ use crate::register_loss;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Declares a loss with one scale: its docs, its default and its ρ.
+/// Declares a loss with one scale: its docs, its default, its ρ, and the scale k of ρ(τs)/τ by (k, τ): k/√τ where k is
+/// in σ's.
 macro_rules! loss {
     ($(#[$doc:meta])* $type:ident, $name:literal, $scale:literal, |$s:ident, $k:ident| $rho:expr) => {
+        loss! { $(#[$doc])* $type, $name, $scale, |$s, $k| $rho, |k, tau| k / tau.sqrt() }
+    };
+    ($(#[$doc:meta])* $type:ident, $name:literal, $scale:literal, |$s:ident, $k:ident| $rho:expr, $tempered:expr) => {
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields, default)]
@@ -35,6 +39,11 @@ macro_rules! loss {
                 let $k = self.scale.get();
                 $rho
             }
+            fn tempered(&self, tau: Positive) -> Option<Self> {
+                let scale: fn(f64, f64) -> f64 = $tempered;
+                // a scale too small for a number is left to the wrapper
+                Self::new(scale(self.scale.get(), tau.get())).ok()
+            }
         }
         register_loss!($name, $type);
     };
@@ -53,28 +62,30 @@ impl RobustLoss for L2 {
     fn rho(&self, s: f64) -> (f64, f64) {
         (s, 1.0)
     }
+    fn tempered(&self, _: Positive) -> Option<Self> {
+        Some(self.clone())
+    }
 }
 register_loss!("l2", L2);
 
-/// The norm instead of its square: ρ = 2√s.
-///
-/// The weight 1/√s has no bound; below √s = 1e-6 the loss goes on as a parabola of the same slope.
-///
-/// ```toml
-/// loss = { type = "l1" }
-/// ```
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct L1 {}
-impl RobustLoss for L1 {
-    #[inline]
-    fn rho(&self, s: f64) -> (f64, f64) {
-        const SMALL: f64 = 1e-6;
+/// Below √s = k times this, [`L1`] is a parabola.
+const SMALL: f64 = 1e-6;
+
+loss! {
+    /// The norm instead of its square: ρ = 2k√s.
+    ///
+    /// The scale is the slope: half the cost of one more σ. The weight k/√s has no bound; below √s = 1e-6 k the loss
+    /// continues as a parabola of the same slope.
+    ///
+    /// ```toml
+    /// loss = { type = "l1" }
+    /// ```
+    L1, "l1", 1.0, |s, k| {
         let r = s.sqrt();
-        if r < SMALL { (s / SMALL, 1.0 / SMALL) } else { (2.0 * r - SMALL, 1.0 / r) }
+        let small = SMALL * k;
+        if r < small { (s / SMALL, 1.0 / SMALL) } else { (k * (2.0 * r - small), k / r) }
     }
 }
-register_loss!("l1", L1);
 
 loss! {
     /// Squares up to the scale k, linear beyond: ρ = s for √s ≤ k, 2k√s - k² beyond.
@@ -166,7 +177,7 @@ loss! {
     Dcs, "dcs", 1.0, |s, k| {
         let z = 2.0 * k / (k + s);
         if s <= k { (s, 1.0) } else { (k * (3.0 - 2.0 * z), z * z) }
-    }
+    }, |k, tau| k / tau
 }
 
 #[cfg(test)]
@@ -178,7 +189,7 @@ mod tests {
     fn all(k: f64) -> Vec<Box<dyn Loss>> {
         vec![
             Box::new(L2 {}),
-            Box::new(L1 {}),
+            Box::new(L1::new(k).unwrap()),
             Box::new(Huber::new(k).unwrap()),
             Box::new(Cauchy::new(k).unwrap()),
             Box::new(Tukey::new(k).unwrap()),

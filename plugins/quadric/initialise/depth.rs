@@ -1,6 +1,7 @@
 //! A box and how far away its middle is: one view is enough.
 use super::{InitialiseError, Initialiser, View, check_views, check_visible, shape};
 use crate::dual_quadric::DualQuadric;
+use manifactor_graph::checked::not_negative;
 use manifactor_graph::register;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -23,6 +24,8 @@ use serde::{Deserialize, Serialize};
 pub struct Depth {
     /// How deep objects are, relative to their width and height: 1 for a ball, 0 where the depth is
     /// that of the centre.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub thickness: f64,
 }
 

@@ -1,6 +1,7 @@
 //! Where lines of sight meet, with a size from the boxes.
 use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
 use crate::dual_quadric::DualQuadric;
+use manifactor_graph::checked::not_negative;
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,8 @@ pub struct Rays {
     /// The least number of views, 2 or more.
     pub min_views: usize,
     /// The least angle between the lines of sight of two views, in degrees.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub min_parallax: f64,
 }
 

@@ -2,6 +2,7 @@
 use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
 use crate::dual_quadric::DualQuadric;
 use crate::from_matrix::OnHyperboloid;
+use manifactor_graph::checked::not_negative;
 use manifactor_graph::register;
 use nalgebra::{DMatrix, Dyn, Matrix4, SVD, Vector3, Vector4};
 use schemars::JsonSchema;
@@ -32,6 +33,8 @@ pub struct Svd {
     /// The least number of views; 3 determine it, if they have all their sides.
     pub min_views: usize,
     /// The least angle between the lines of sight of two views, in degrees.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub min_parallax: f64,
     /// Whether the system is scaled to be well conditioned.
     pub normalised: bool,

@@ -5,9 +5,15 @@ use manifactor_config::{Errors, Field, Node, Place, Problem, Section, Table, Val
 /// Columns of the table that change together, and the ways they do.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
-    pub(super) columns: Vec<String>,
-    pub(super) place: Place,
+    pub(super) columns: Vec<Column>,
     pub(super) options: Vec<Choice>,
+}
+
+/// A column of the table, and where it is named.
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    pub(super) name: String,
+    pub(super) place: Place,
 }
 
 /// One way to set the columns of an axis.
@@ -15,21 +21,22 @@ pub(super) struct Axis {
 pub(super) struct Choice {
     /// As tables show it, by column.
     pub(super) labels: Vec<String>,
-    /// What is put over the base.
-    pub(super) set: Option<Node>,
+    pub(super) place: Place,
+    /// What is put over the base, by column.
+    pub(super) sets: Vec<Node>,
 }
 
 impl Axis {
     /// Reads one of `[[axes]]`; `None` where it is not as it should be, which is reported.
     pub(super) fn read(mut section: Section<'_>) -> Option<Self> {
-        let place = section.place().clone();
         let axis = if section.has("columns") {
-            Self::of_rows(&mut section, place)
+            Self::of_rows(&mut section)
         } else {
             let name = section.required::<String>("name");
             let options: Vec<_> =
                 section.required_items("options").into_iter().filter_map(Declared::read).collect();
-            name.map(|name| Self::of_options(name, options, place))
+            let place = section.place_of("name");
+            name.map(|name| Self::of_options(Column { name, place }, options))
         };
         if axis.as_ref().is_some_and(|axis| axis.options.is_empty()) {
             section.report("options", Problem::invalid("an axis without options leaves nothing to run"));
@@ -39,12 +46,16 @@ impl Axis {
     }
 
     /// One column, each option with a name.
-    pub(super) fn of_options(name: String, options: Vec<Declared>, place: Place) -> Self {
-        let choice = |option: Declared| Choice { labels: vec![option.name], set: option.set };
-        Self { columns: vec![name], place, options: options.into_iter().map(choice).collect() }
+    pub(super) fn of_options(column: Column, options: Vec<Declared>) -> Self {
+        let choice = |Declared { name, place, set }| Choice {
+            labels: vec![name],
+            sets: vec![set.unwrap_or_else(|| Node::new(place.clone(), Value::Table(Table::new())))],
+            place,
+        };
+        Self { columns: vec![column], options: options.into_iter().map(choice).collect() }
     }
 
-    fn of_rows(section: &mut Section<'_>, place: Place) -> Option<Self> {
+    fn of_rows(section: &mut Section<'_>) -> Option<Self> {
         let errors = section.errors();
         let columns = section.take_required("columns")?;
         let Value::Table(columns) = columns.value else {
@@ -52,13 +63,15 @@ impl Axis {
             errors.report(columns.place, problem);
             return None;
         };
-        let (names, keys): (Vec<String>, Vec<Node>) =
-            columns.into_iter().map(|(name, field)| (name, field.node)).unzip();
+        let (columns, keys): (Vec<Column>, Vec<Node>) = columns
+            .into_iter()
+            .map(|(name, Field { key, node })| (Column { name, place: key }, node))
+            .unzip();
         let paths: Vec<Option<String>> = keys.into_iter().map(|key| key.read(errors)).collect();
         let paths: Vec<String> = paths.into_iter().collect::<Option<_>>()?;
         let rows = section.nodes("rows").into_iter().map(|row| choice(row, &paths, errors));
         let options: Vec<Option<Choice>> = rows.collect();
-        Some(Self { columns: names, place, options: options.into_iter().collect::<Option<_>>()? })
+        Some(Self { columns, options: options.into_iter().collect::<Option<_>>()? })
     }
 }
 
@@ -76,11 +89,8 @@ fn choice(row: Node, paths: &[String], errors: &Errors) -> Option<Choice> {
         return None;
     }
     let labels = values.iter().map(label).collect();
-    let mut set = Node::new(place, Value::Table(Table::new()));
-    for (path, value) in paths.iter().zip(values) {
-        manifactor_config::merge(&mut set, nested(path, value));
-    }
-    Some(Choice { labels, set: Some(set) })
+    let sets = paths.iter().zip(values).map(|(path, value)| nested(path, value)).collect();
+    Some(Choice { labels, place, sets })
 }
 
 /// `a.b.c` and a value as tables within tables.

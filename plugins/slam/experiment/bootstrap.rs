@@ -3,21 +3,24 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
-/// A mean, and where it lies with 95 % confidence.
+/// A mean, and where it lies with 95 % confidence: `None`, left out of documents, where there is nothing to draw from,
+/// which is a single cluster or a single sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
     /// Of the sample.
     pub mean: f64,
     /// 2.5 % of the means of samples drawn anew are below.
-    pub low: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub low: Option<f64>,
     /// 2.5 % are above.
-    pub high: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub high: Option<f64>,
 }
 
 impl Interval {
-    /// Whether zero lies outside.
+    /// Whether zero lies outside; not, where there is no interval.
     pub fn excludes_zero(&self) -> bool {
-        self.low > 0.0 || self.high < 0.0
+        self.low.is_some_and(|low| low > 0.0) || self.high.is_some_and(|high| high < 0.0)
     }
 }
 
@@ -33,12 +36,15 @@ pub fn bootstrap(clusters: &[Vec<f64>], resamples: usize, seed: u64) -> Option<I
     if sums.is_empty() {
         return None;
     }
+    if sums.len() < 2 || resamples < 2 {
+        return Some(Interval { mean, low: None, high: None });
+    }
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut drawn =
         || mean_of((0..sums.len()).fold((0.0, 0), |a, _| add(a, &sums[rng.random_range(0..sums.len())])));
-    let mut means: Vec<f64> = (0..resamples.max(1)).map(|_| drawn()).collect();
+    let mut means: Vec<f64> = (0..resamples).map(|_| drawn()).collect();
     means.sort_by(f64::total_cmp);
-    let quantile = |q: f64| means[((means.len() - 1) as f64 * q).round() as usize];
+    let quantile = |q: f64| means.get(((means.len() - 1) as f64 * q).round() as usize).copied();
     Some(Interval { mean, low: quantile(0.025), high: quantile(0.975) })
 }
 
@@ -56,8 +62,9 @@ mod tests {
         let interval = bootstrap(&alone((1..=400).map(f64::from)), 4000, 1).unwrap();
         let expected = 1.96 * 400.0 / 12f64.sqrt() / 20.0;
         assert_eq!(interval.mean, 200.5);
-        assert!((interval.high - 200.5 - expected).abs() < 0.1 * expected, "{interval:?}");
-        assert!((200.5 - interval.low - expected).abs() < 0.1 * expected, "{interval:?}");
+        let (low, high) = (interval.low.unwrap(), interval.high.unwrap());
+        assert!((high - 200.5 - expected).abs() < 0.1 * expected, "{interval:?}");
+        assert!((200.5 - low - expected).abs() < 0.1 * expected, "{interval:?}");
     }
 
     #[test]
@@ -76,9 +83,14 @@ mod tests {
     }
 
     #[test]
-    fn one_value_has_no_spread() {
-        let interval = bootstrap(&alone([2.0]), 100, 1).unwrap();
-        assert_eq!((interval.low, interval.high), (2.0, 2.0));
-        assert!(interval.excludes_zero());
+    fn one_value_or_one_cluster_or_one_sample_has_no_interval() {
+        for (clusters, resamples) in
+            [(alone([2.0]), 100), (vec![vec![1.0, 3.0]], 100), (alone([1.0, 3.0]), 1)]
+        {
+            let interval = bootstrap(&clusters, resamples, 1).unwrap();
+            assert_eq!(interval, Interval { mean: 2.0, low: None, high: None });
+            assert!(!interval.excludes_zero());
+            assert_eq!(serde_json::to_string(&interval).unwrap(), r#"{"mean":2.0}"#);
+        }
     }
 }

@@ -1,9 +1,10 @@
 //! The document that describes an experiment.
-use super::axis::{Axis, Choice};
-use super::{SummarySettings, Trial};
+use super::axis::{Axis, Choice, Column};
+use super::names::Names;
+use super::{SummarySettings, Trial, check};
 use crate::run_document::{Declared, absolute, common, folder};
 use crate::settings::Settings;
-use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Node, Problem, Section, merge};
+use manifactor_config::{Diagnostics, Document, Errors, Node, Problem, Section, merge};
 use std::path::{Path, PathBuf};
 
 /// An experiment: all its trials, in the order of the table.
@@ -54,26 +55,28 @@ impl Experiment {
             let base = open_base(&mut section, path.parent().unwrap_or(Path::new("")));
             let set = section.take("set");
             let mut axes: Vec<Axis> = section.items("axes").into_iter().filter_map(Axis::read).collect();
-            let summary_place = section.place_of("summary");
-            let summary = section.or_default::<SummarySettings>("summary");
+            let (place, written) = (section.place_of("summary"), section.take("summary"));
+            let summary =
+                written.clone().and_then(|node| node.read::<SummarySettings>(&errors)).unwrap_or_default();
             section.finish();
             let base = base?;
             let folder = folder(&base, &errors);
             let variants = Declared::all(&base, &errors);
-            let has_variants = |axis: &Axis| axis.columns.iter().any(|column| column == VARIANT);
+            let has_variants = |axis: &Axis| axis.columns.iter().any(|column| column.name == VARIANT);
             if !variants.is_empty() && !axes.iter().any(has_variants) {
                 let place = base.source().place(0..0);
-                axes.push(Axis::of_options(VARIANT.to_owned(), variants, place));
+                axes.push(Axis::of_options(Column { name: VARIANT.to_owned(), place }, variants));
             }
-            let columns = columns(&axes, &errors);
-            for problem in problems(&summary, &columns, &axes) {
-                errors.report(summary_place.clone(), problem);
-            }
+            check::axes(&axes, &errors);
+            let names = Names { settings: &summary, written: written.as_ref(), place, errors: &errors };
+            names.check(&axes);
             let mut node = common(base.root());
             if let Some(set) = set {
                 merge(&mut node, set);
             }
             let trials = if errors.is_empty() { trials(&node, &axes, &folder, &errors)? } else { vec![] };
+            names.check_alignments(&trials);
+            let columns = axes.into_iter().flat_map(|axis| axis.columns).map(|column| column.name).collect();
             let documents = Documents::new((&title, document), &base, &folder, &errors)?;
             Some(Self { title, output, columns, trials, summary, folder, documents })
         });
@@ -116,46 +119,6 @@ fn open_base(section: &mut Section<'_>, folder: &Path) -> Option<Document> {
     }
 }
 
-fn columns(axes: &[Axis], errors: &Errors) -> Vec<String> {
-    let mut columns: Vec<String> = vec![];
-    for axis in axes {
-        for column in &axis.columns {
-            if columns.contains(column) {
-                let what = format!("there are two columns `{column}`: name one of them otherwise");
-                errors.push(Diagnostic::new(axis.place.clone(), Problem::invalid(what)));
-            }
-            columns.push(column.clone());
-        }
-    }
-    columns
-}
-
-/// What the summary names and is not there.
-fn problems(summary: &SummarySettings, columns: &[String], axes: &[Axis]) -> Vec<Problem> {
-    let named =
-        summary.by.iter().chain(&summary.clusters).chain(&summary.curve).chain(summary.baseline.keys());
-    let unknown = |what: &str, name: &str, known: &[String]| {
-        let (what, name, known) = (what.to_owned(), name.to_owned(), known.to_vec());
-        Problem::UnknownName { what, name, known }
-    };
-    let mut problems: Vec<Problem> =
-        named.filter(|name| !columns.contains(name)).map(|name| unknown("column", name, columns)).collect();
-    if let Some((column, value)) = summary.compared() {
-        let options = axes.iter().filter_map(|axis| {
-            let place = axis.columns.iter().position(|c| c == column)?;
-            Some(axis.options.iter().filter_map(move |option| option.labels.get(place).cloned()))
-        });
-        let known: Vec<String> = options.flatten().collect();
-        if !known.is_empty() && !known.iter().any(|label| label == value) {
-            problems.push(unknown(column, value, &known));
-        }
-    }
-    if summary.baseline.len() > 1 {
-        problems.push(Problem::invalid("`baseline` is one column and one of its values"));
-    }
-    problems
-}
-
 /// All combinations, the last axis changing fastest.
 fn trials(base: &Node, axes: &[Axis], folder: &Path, errors: &Errors) -> Option<Vec<Trial>> {
     let count = axes.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.options.len()));
@@ -193,7 +156,7 @@ fn trial<'a>(
     let (mut node, mut labels) = (base.clone(), vec![]);
     for choice in choices {
         labels.extend(choice.labels.iter().cloned());
-        if let Some(set) = &choice.set {
+        for set in &choice.sets {
             merge(&mut node, set.clone());
         }
     }

@@ -1,10 +1,54 @@
 //! What a trial is measured by.
 use crate::class::Aliases;
 use crate::estimate::Estimate;
-use crate::report::{TrajectoryError, VariantReport, alignment_name};
+use crate::metrics::Alignment;
+use crate::report::{TrajectoryReport, VariantReport, alignment_name};
 use crate::semantics::{Rule, table_one};
 use indexmap::IndexMap;
+use manifactor_config::quoted_list;
 use manifactor_quadric::DualQuadric;
+
+/// What is measured under each alignment: `ate` is `ate_se3`, `ate_sim3`, ….
+const BY_ALIGNMENT: [(&str, fn(&TrajectoryReport) -> Option<f64>); 7] = [
+    ("ate", |t| Some(t.estimate.ate.rmse)),
+    ("odometry_ate", |t| Some(t.odometry.ate.rmse)),
+    ("gain", |t| Some(1.0 - t.estimate.ate.rmse / t.odometry.ate.rmse)),
+    ("rpe_translation", |t| Some(t.estimate.rpe.as_ref()?.translation.rmse)),
+    ("rpe_rotation", |t| Some(t.estimate.rpe.as_ref()?.rotation.rmse)),
+    ("odometry_rpe_translation", |t| Some(t.odometry.rpe.as_ref()?.translation.rmse)),
+    ("odometry_rpe_rotation", |t| Some(t.odometry.rpe.as_ref()?.rotation.rmse)),
+];
+
+/// What is measured once.
+const ONCE: [(&str, fn(&Estimate, &VariantReport) -> Option<f64>); 24] = [
+    ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
+    ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
+    ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),
+    ("quality", |_, r| Some(r.landmarks?.estimate.mean.quality)),
+    ("initial_position", |_, r| Some(r.landmarks?.initial.rmse.position)),
+    ("initial_position_mean", |_, r| Some(r.landmarks?.initial.mean.position)),
+    ("initial_shape", |_, r| Some(r.landmarks?.initial.mean.shape)),
+    ("initial_quality", |_, r| Some(r.landmarks?.initial.mean.quality)),
+    ("scored", |_, r| Some(r.landmarks?.objects as f64)),
+    ("c_vertical", |e, _| mean_alignment(e, "vertical_orientation")),
+    ("c_horizontal", |e, _| mean_alignment(e, "horizontal_orientation")),
+    ("sigma_rotation", |e, _| Some(e.components.last()?.odometry?[0])),
+    ("sigma_translation", |e, _| Some(e.components.last()?.odometry?[1])),
+    ("sigma_box_px", |e, _| {
+        let boxes = &e.components.last()?.boxes;
+        Some(boxes.values().map(|component| component.effective_px).sum::<f64>() / boxes.len() as f64)
+    }),
+    ("variance_rounds", |e, _| e.components.last().map(|_| e.components.len() as f64)),
+    ("objects_detected", |_, r| Some(r.counts.objects_detected as f64)),
+    ("objects", |_, r| Some(r.counts.objects as f64)),
+    ("boxes", |_, r| Some(r.counts.boxes as f64)),
+    ("semantic_factors", |_, r| Some(r.counts.semantic_factors as f64)),
+    ("unsound", |e, _| Some(unsound(e) as f64)),
+    ("inactive", |_, r| Some(r.solve.inactive as f64)),
+    ("initial_cost", |_, r| Some(r.solve.initial_cost)),
+    ("final_cost", |_, r| Some(r.solve.final_cost)),
+    ("iterations", |_, r| Some(r.solve.iterations as f64)),
+];
 
 /// Everything that is measured of an estimate, by name. What is not known, or not finite, is left out.
 ///
@@ -13,64 +57,29 @@ use manifactor_quadric::DualQuadric;
 /// `quality` are mean Jaccard distances; `initial_*` are of the objects before the solve. `c_vertical` is the mean of
 /// |m · up| over objects that the paper's Table I has as vertical, m their longest axis; `c_horizontal` likewise.
 pub fn measures(estimate: &Estimate, report: &VariantReport) -> IndexMap<String, f64> {
-    let mut all = IndexMap::new();
-    let mut put = |name: &str, value: f64| {
-        if value.is_finite() {
-            all.insert(name.to_owned(), value);
-        }
-    };
-    for trajectory in &report.trajectory {
-        let name = alignment_name(trajectory.alignment);
-        let (before, after) = (&trajectory.odometry, &trajectory.estimate);
-        put(&format!("ate_{name}"), after.ate.rmse);
-        put(&format!("odometry_ate_{name}"), before.ate.rmse);
-        put(&format!("gain_{name}"), 1.0 - after.ate.rmse / before.ate.rmse);
-        for (prefix, error) in [("", after), ("odometry_", before)] {
-            relative(error, |what, value| put(&format!("{prefix}rpe_{what}_{name}"), value));
-        }
-    }
-    if let Some(landmarks) = &report.landmarks {
-        for (prefix, summary) in [("", landmarks.estimate), ("initial_", landmarks.initial)] {
-            put(&format!("{prefix}position"), summary.rmse.position);
-            put(&format!("{prefix}position_mean"), summary.mean.position);
-            put(&format!("{prefix}shape"), summary.mean.shape);
-            put(&format!("{prefix}quality"), summary.mean.quality);
-        }
-        put("scored", landmarks.objects as f64);
-    }
-    for (name, factor) in [("c_vertical", "vertical_orientation"), ("c_horizontal", "horizontal_orientation")]
-    {
-        if let Some(c) = mean_alignment(estimate, factor) {
-            put(name, c);
-        }
-    }
-    if let Some(components) = estimate.components.last() {
-        if let Some([turn, shift]) = components.odometry {
-            put("sigma_rotation", turn);
-            put("sigma_translation", shift);
-        }
-        let boxes: Vec<f64> = components.boxes.values().map(|component| component.effective_px).collect();
-        put("sigma_box_px", boxes.iter().sum::<f64>() / boxes.len() as f64);
-        put("variance_rounds", estimate.components.len() as f64);
-    }
-    let (counts, solve) = (&report.counts, &report.solve);
-    put("objects_detected", counts.objects_detected as f64);
-    put("objects", counts.objects as f64);
-    put("boxes", counts.boxes as f64);
-    put("semantic_factors", counts.semantic_factors as f64);
-    put("unsound", unsound(estimate) as f64);
-    put("inactive", solve.inactive as f64);
-    put("initial_cost", solve.initial_cost);
-    put("final_cost", solve.final_cost);
-    put("iterations", solve.iterations as f64);
-    all
+    let aligned = report.trajectory.iter().flat_map(|trajectory| {
+        BY_ALIGNMENT.iter().map(|(name, of)| (aligned(name, trajectory.alignment), of(trajectory)))
+    });
+    let once = ONCE.iter().map(|(name, of)| ((*name).to_owned(), of(estimate, report)));
+    aligned.chain(once).filter_map(|(name, value)| Some((name, value.filter(|x| x.is_finite())?))).collect()
 }
 
-fn relative(error: &TrajectoryError, mut put: impl FnMut(&str, f64)) {
-    if let Some(rpe) = &error.rpe {
-        put("translation", rpe.translation.rmse);
-        put("rotation", rpe.rotation.rmse);
-    }
+/// The names of all that is measured under these alignments.
+pub fn measure_names(alignments: &[Alignment]) -> Vec<String> {
+    let by = alignments.iter().flat_map(|by| BY_ALIGNMENT.iter().map(|(name, _)| aligned(name, *by)));
+    by.chain(ONCE.iter().map(|(name, _)| (*name).to_owned())).collect()
+}
+
+/// All names in words: `*` stands for an alignment.
+pub(super) fn measure_names_in_words() -> String {
+    let stems = BY_ALIGNMENT.map(|(name, _)| format!("`{name}_*`")).join(", ");
+    let once = ONCE.map(|(name, _)| format!("`{name}`")).join(", ");
+    let alignments = quoted_list(&Alignment::ALL.map(alignment_name));
+    format!("{stems}, where `*` is an alignment of the run ({alignments}), {once}")
+}
+
+fn aligned(name: &str, alignment: Alignment) -> String {
+    format!("{name}_{}", alignment_name(alignment))
 }
 
 /// Objects with a semi-axis that is not positive, or a number that is none.
@@ -96,4 +105,20 @@ fn mean_alignment(estimate: &Estimate, factor: &str) -> Option<f64> {
     let cosines: Vec<f64> =
         landmarks.iter().filter(of_class).map(|l| l.quadric.major_axis().dot(&up).abs()).collect();
     (!cosines.is_empty()).then(|| cosines.iter().sum::<f64>() / cosines.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn every_alignment_has_its_measures_and_each_measure_a_name_of_its_own() {
+        let schema = schemars::schema_for!(Alignment);
+        let alignments = schema.get("oneOf").and_then(|each| each.as_array()).unwrap();
+        assert_eq!(alignments.len(), Alignment::ALL.len(), "{schema:?}");
+        let names = measure_names(&Alignment::ALL);
+        assert_eq!(names.iter().collect::<HashSet<_>>().len(), names.len());
+        assert_eq!(names.len(), BY_ALIGNMENT.len() * alignments.len() + ONCE.len());
+    }
 }

@@ -54,12 +54,12 @@ impl Summary {
         number("trials", rows.iter().map(|row| Some(row.0.trials as f64)).collect());
         number("failed", rows.iter().map(|row| Some(row.0.failed as f64)).collect());
         for (name, of) in BOUNDS {
-            number(name, rows.iter().map(|row| row.2.map(of)).collect());
+            number(name, rows.iter().map(|row| of(row.2?)).collect());
         }
         number("pairs", rows.iter().map(|row| Some(row.3?.pairs as f64)).collect());
         for (name, of) in BOUNDS {
             let difference = |c: &Comparison| of(&c.difference);
-            number(&format!("difference_{name}"), rows.iter().map(|row| row.3.map(difference)).collect());
+            number(&format!("difference_{name}"), rows.iter().map(|row| difference(row.3?)).collect());
         }
         number("relative", rows.iter().map(|row| Some(row.3?.relative())).collect());
         table
@@ -95,21 +95,21 @@ impl Summary {
     }
 }
 
-type Bound = (&'static str, fn(&Interval) -> f64);
-const BOUNDS: [Bound; 3] = [("mean", |i| i.mean), ("low", |i| i.low), ("high", |i| i.high)];
+type Bound = (&'static str, fn(&Interval) -> Option<f64>);
+const BOUNDS: [Bound; 3] = [("mean", |i| Some(i.mean)), ("low", |i| i.low), ("high", |i| i.high)];
 
-/// `-1.4 % [-1.9, -0.8]`: as shares of the baseline. A single pair has no interval.
+/// `-1.4 % [-1.9, -0.8]`: as shares of the baseline.
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Interval { mean, low, high } = self.difference;
         let percent = 100.0 / self.baseline.abs();
-        match (percent.is_finite(), self.pairs > 1) {
-            (true, true) => {
+        match (percent.is_finite(), low.zip(high)) {
+            (true, Some((low, high))) => {
                 write!(f, "{:+.1} % [{:+.1}, {:+.1}]", mean * percent, low * percent, high * percent)
             }
-            (true, false) => write!(f, "{:+.1} %", mean * percent),
-            (false, true) => write!(f, "{mean:+.4} [{low:+.4}, {high:+.4}]"),
-            (false, false) => write!(f, "{mean:+.4}"),
+            (true, None) => write!(f, "{:+.1} %", mean * percent),
+            (false, Some((low, high))) => write!(f, "{mean:+.4} [{low:+.4}, {high:+.4}]"),
+            (false, None) => write!(f, "{mean:+.4}"),
         }
     }
 }

@@ -1,3 +1,4 @@
+use super::measures::measure_names_in_words;
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,7 @@ pub struct SummarySettings {
     /// Trials that are alike in these columns are drawn together; each alone, where none is named.
     pub clusters: Vec<String>,
     /// What is averaged: columns of measures.
+    #[schemars(extend("description" = described()))]
     pub metrics: Vec<String>,
     /// A column of numbers in `by` that reports draw the metrics over.
     pub curve: Option<String>,
@@ -36,6 +38,11 @@ impl Default for SummarySettings {
             seed: 1,
         }
     }
+}
+
+/// The description of `metrics`, with all names.
+fn described() -> String {
+    format!("What is averaged: columns of measures. They are {}.", measure_names_in_words())
 }
 
 impl SummarySettings {

@@ -1,6 +1,7 @@
 use super::{Gravity, GravityError, MapFrame, first_frame};
 use crate::sequence::{Frame, Sequence};
 use manifactor_geometry::{NotARotation, So3};
+use manifactor_graph::checked::not_negative;
 use manifactor_graph::{Direction, register};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -20,6 +21,8 @@ use serde::{Deserialize, Serialize};
 pub struct Accelerometer {
     /// Readings this near in time to the first frame are averaged, in seconds: the longer, the less the pushes count, and
     /// the more the drift of the odometry.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub window: f64,
     /// Rotation from the sensor's frame to the camera's, a unit quaternion (x, y, z, w). The Kinect's of TUM RGB-D
     /// is half a turn about z, [0, 0, 1, 0].

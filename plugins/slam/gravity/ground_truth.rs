@@ -1,5 +1,6 @@
 use super::{Gravity, GravityError, MapFrame, first_frame};
 use crate::sequence::Sequence;
+use manifactor_graph::checked::not_negative;
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct GroundTruthPose {
     /// How near that pose has to be, in seconds.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub max_time_difference: f64,
 }
 

@@ -20,6 +20,11 @@ pub enum Alignment {
     None,
 }
 
+impl Alignment {
+    /// Each of them.
+    pub const ALL: [Self; 4] = [Self::Se3, Self::Sim3, Self::FirstPose, Self::None];
+}
+
 /// y = scale · R x + t
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {

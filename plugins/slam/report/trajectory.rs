@@ -39,7 +39,7 @@ pub(super) fn compare(
     let error = |trajectory: &[StampedPose], alignment| -> Result<TrajectoryError, MetricsError> {
         let pairs = associate(&truth.trajectory, trajectory, settings.max_time_difference)?;
         let (_, aligned) = align(&pairs, alignment)?;
-        let rpe = relative_error(&aligned, settings.relative_over, Pairing::All).ok();
+        let rpe = relative_error(&aligned, settings.relative_over.get(), Pairing::All).ok();
         Ok(TrajectoryError { ate: absolute_error(&aligned)?, rpe })
     };
     let report = |alignment: Alignment| -> Result<TrajectoryReport, MetricsError> {

@@ -2,6 +2,7 @@ use super::assemble::{read_ground_truth, read_matched};
 use super::camera::CameraChoice;
 use super::{Folders, Source, SourceError};
 use crate::sequence::Sequence;
+use manifactor_graph::checked::not_negative;
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -35,7 +36,8 @@ pub struct Recorded {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<Direction>,
     /// How far apart in time a detection and its pose may be, in seconds.
-    #[serde(default = "exact")]
+    #[serde(default = "exact", deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub max_time_difference: f64,
 }
 

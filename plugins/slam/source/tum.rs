@@ -3,6 +3,7 @@ use super::camera::{CameraChoice, by_folder};
 use super::{Folders, Source, SourceError};
 use crate::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
+use manifactor_graph::checked::not_negative;
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -36,7 +37,8 @@ pub struct TumRgbd {
     pub camera: Option<CameraChoice>,
     /// How far apart in time a detection and its pose may be, in seconds. Time stamps are written to the
     /// microsecond: as it stands, only equal ones match.
-    #[serde(default = "exact")]
+    #[serde(default = "exact", deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub max_time_difference: f64,
 }
 

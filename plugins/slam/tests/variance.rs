@@ -1,9 +1,11 @@
 //! Variance components on data whose noise is known.
 use manifactor_config::{Document, Format};
+use manifactor_graph::loss::Loss;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::variance::Components;
 use manifactor_solve::Silent;
+use std::sync::Arc;
 
 /// The noise that is found in a simulated recording, where the search begins at `sigma` and `sigma_px`.
 fn found(odometry: f64, sigma: f64, sigma_px: f64) -> Components {
@@ -44,4 +46,40 @@ fn the_noise_of_the_simulation_is_found_wherever_the_search_begins() {
 fn a_worse_odometry_is_found_to_be_worse() {
     let [good, bad] = [0.02, 0.1].map(|share| found(share, 0.01, 5.0).odometry.unwrap());
     assert!(bad[0] > 2.0 * good[0] && bad[1] > 2.0 * good[1], "{good:?} {bad:?}");
+}
+
+/// The losses of the boxes' factors after one round, with the correlation time that the round found.
+fn losses(loss: &str) -> (Vec<Arc<dyn Loss>>, f64) {
+    let text = format!(
+        "
+        source = {{ type = 'simulated', scene = {{ objects = 4 }}, trajectory = {{ frames = 40 }} }}
+        detections = {{ noise = {{ sigma = 4.0 }}, loss = {loss} }}
+        objects = {{ refinements = 0 }}
+        variance_components = {{ rounds = 1 }}"
+    );
+    let document = Document::parse("run.toml", text, Format::Toml).unwrap();
+    let run = RunDocument::read(&document).unwrap();
+    let (estimate, _) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+    let found = estimate.components.last().unwrap().boxes["all"];
+    let boxes = estimate.mapping.graph.factors().iter().filter_map(|factor| factor.loss.clone());
+    (boxes.collect(), found.correlation_time)
+}
+
+#[test]
+fn boxes_that_last_get_their_loss_in_units_of_one_box() {
+    for loss in ["{ type = 'dcs', scale = 5.0 }", "{ type = 'l1' }", "{ type = 'cauchy', scale = 2.8 }"] {
+        let (tempered, tau) = losses(loss);
+        assert!(tau > 1.5 && tempered.len() > 40, "{tau}, {} boxes", tempered.len());
+        let node = Document::parse("loss.toml", format!("loss = {loss}"), Format::Toml).unwrap();
+        let given = node.root().to_json().unwrap()["loss"].take();
+        let given: Box<dyn Loss> = serde_json::from_value(given).unwrap();
+        for s in [1e-3, 0.1, 1.0, 10.0, 1e4] {
+            let (rho, weight) = given.erased().rho(tau * s);
+            for loss in &tempered {
+                let found = loss.erased().rho(s);
+                assert!((found.0 * tau / rho - 1.0).abs() < 1e-12, "{loss:?} at {s}: {found:?}");
+                assert!((found.1 / weight - 1.0).abs() < 1e-12, "{loss:?} at {s}: {found:?}");
+            }
+        }
+    }
 }

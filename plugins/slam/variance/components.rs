@@ -2,10 +2,11 @@
 use super::correlation::autocorrelation_time;
 use super::{BoxGroups, VarianceSettings};
 use crate::estimate::Estimate;
-use crate::mapping::{MappedObject, Mapping, pose_key};
+use crate::mapping::{MappedObject, Mapping};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_graph::batch::FactorState;
+use manifactor_graph::checked::{NotPositive, Positive};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{FactorEntry, Key, Noise};
@@ -46,12 +47,15 @@ pub enum VarianceError {
     /// A standard deviation that is zero or not finite.
     #[error("the variance components cannot be estimated: {0}")]
     Noise(#[from] NoiseError),
+    /// A correlation time that is zero or not finite.
+    #[error("the correlation time of the boxes: {0}")]
+    CorrelationTime(#[from] NotPositive),
 }
 
 /// What a factor measures.
 enum Measures {
     Motion,
-    Box { object: Key, frame: usize },
+    Box { object: Key },
     Other,
 }
 
@@ -70,12 +74,11 @@ impl Components {
     pub fn of(estimate: &Estimate, settings: &VarianceSettings) -> Result<Self, VarianceError> {
         let graph = &estimate.mapping.graph;
         let leverages = estimate.solution.problem(graph).map_err(CovarianceError::from)?.leverages()?;
-        let frames = frames(estimate);
         let mut motion = [Motion::default(); 2];
         let mut boxes: IndexMap<Key, Rows> = IndexMap::new();
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
-            match measures(entry, &frames) {
+            match measures(entry) {
                 Measures::Motion => {
                     for (row, h) in leverage.iter().enumerate() {
                         if let Some(part) = motion.get_mut(row / 3) {
@@ -83,8 +86,9 @@ impl Components {
                         }
                     }
                 }
-                Measures::Box { object, frame } => {
-                    boxes.entry(object).or_default().add(frame, state, leverage, entry.noise.observed());
+                // factors are in the order of the graph: an object's boxes in the order of their frames
+                Measures::Box { object } => {
+                    boxes.entry(object).or_default().add(state, leverage, entry.noise.observed());
                 }
                 Measures::Other => {}
             }
@@ -105,18 +109,21 @@ impl Components {
         settings: &VarianceSettings,
         loss: Option<&Arc<dyn Loss>>,
     ) -> Result<(), VarianceError> {
-        let groups: HashMap<Key, &BoxComponent> = mapping
-            .mapped()
-            .filter_map(|object| Some((object.key.clone(), self.boxes.get(&group(object, settings.boxes))?)))
-            .collect();
+        let mut groups = HashMap::new();
+        for object in mapping.mapped() {
+            if let Some(component) = self.boxes.get(&group(object, settings.boxes)) {
+                let tau = Positive::new(component.correlation_time)?;
+                groups.insert(object.key.clone(), (component, loss.map(|loss| loss.erased().tempered(tau))));
+            }
+        }
         for entry in mapping.graph.factors_mut() {
-            let noise = match (measures(entry, &HashMap::new()), self.odometry) {
+            let noise = match (measures(entry), self.odometry) {
                 (Measures::Motion, Some([turn, shift])) => {
                     Noise::sigmas(&[turn, turn, turn, shift, shift, shift])?
                 }
-                (Measures::Box { object, .. }, _) => match groups.get(&object) {
-                    Some(component) => {
-                        entry.loss = loss.map(|loss| shared(loss, component.correlation_time));
+                (Measures::Box { object }, _) => match groups.get(&object) {
+                    Some((component, loss)) => {
+                        entry.loss.clone_from(loss);
                         Noise::sigma(component.effective_px)?
                     }
                     None => continue,
@@ -141,29 +148,12 @@ impl Components {
     }
 }
 
-/// ρ(τs)/τ, for a loss that has a scale; one without is as it is.
-fn shared(loss: &Arc<dyn Loss>, time: f64) -> Arc<dyn Loss> {
-    let rescaled = || {
-        let mut fields = serde_json::to_value(loss).ok()?;
-        let scale = fields.get("scale")?.as_f64()? / time.sqrt();
-        *fields.get_mut("scale")? = scale.into();
-        serde_json::from_value::<Box<dyn Loss>>(fields).ok()
-    };
-    rescaled().map_or_else(|| loss.clone(), Arc::from)
-}
-
-fn frames(estimate: &Estimate) -> HashMap<Key, usize> {
-    (0..estimate.sequence.frames.len()).map(|frame| (pose_key(frame), frame)).collect()
-}
-
-fn measures(entry: &FactorEntry, frames: &HashMap<Key, usize>) -> Measures {
+fn measures(entry: &FactorEntry) -> Measures {
     let (pose, object) = (TypeId::of::<Se3>(), TypeId::of::<DualQuadric>());
     let variables = entry.factor.erased().signature().variables;
     match (&entry.keys[..], &variables[..]) {
         ([_, _], [a, b]) if *a == pose && *b == pose => Measures::Motion,
-        ([camera, seen], [a, b]) if *a == pose && *b == object => {
-            Measures::Box { object: seen.clone(), frame: frames.get(camera).copied().unwrap_or_default() }
-        }
+        ([_, seen], [a, b]) if *a == pose && *b == object => Measures::Box { object: seen.clone() },
         _ => Measures::Other,
     }
 }
@@ -190,26 +180,20 @@ fn odometry(parts: &[Motion; 2]) -> Option<[f64; 2]> {
     enough.then(|| parts.map(|part| (part.squares / part.redundancy).sqrt()))
 }
 
-/// Errors of the boxes of an object, in pixels: by side, then by frame.
+/// Errors of the boxes of an object, in pixels: by side, then in the order of the boxes.
 #[derive(Default)]
 struct Rows {
-    errors: [Vec<Option<f64>>; 4],
-    first: usize,
+    errors: [Vec<f64>; 4],
 }
 
 impl Rows {
-    fn add(&mut self, frame: usize, state: &FactorState, leverage: &[f64], observed: Option<&[bool]>) {
-        if self.errors.iter().all(Vec::is_empty) {
-            self.first = frame;
-        }
-        let Some(place) = frame.checked_sub(self.first) else { return };
+    fn add(&mut self, state: &FactorState, leverage: &[f64], observed: Option<&[bool]>) {
         for (side, errors) in self.errors.iter_mut().enumerate() {
             let seen = observed.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
             let redundancy = 1.0 - leverage.get(side).copied().unwrap_or(1.0);
             if let (true, Some(residual)) = (seen && redundancy > LEAST_REDUNDANCY, state.residual.get(side))
             {
-                errors.resize(place, None);
-                errors.push(Some(residual / redundancy.sqrt()));
+                errors.push(residual / redundancy.sqrt());
             }
         }
     }
@@ -234,23 +218,23 @@ fn groups(
     if settings.boxes == BoxGroups::Given {
         return IndexMap::new();
     }
-    let mut series: IndexMap<String, Vec<Vec<Option<f64>>>> = IndexMap::new();
+    let mut series: IndexMap<String, Vec<Vec<f64>>> = IndexMap::new();
     let mut all = vec![];
     for object in mapping.mapped() {
         let Some(rows) = boxes.swap_remove(&object.key) else { continue };
         all.extend(rows.errors.iter().cloned());
         series.entry(group(object, settings.boxes)).or_default().extend(rows.errors);
     }
-    let rows = |series: &[Vec<Option<f64>>]| series.iter().flatten().flatten().count();
-    let component = |own: &[Vec<Option<f64>>]| {
+    let rows = |series: &[Vec<f64>]| series.iter().map(Vec::len).sum::<usize>();
+    let component = |own: &[Vec<f64>]| {
         // too few to tell: as all are
         box_component(if rows(own) < LEAST_ROWS { &all } else { own }, settings)
     };
     series.iter().filter_map(|(name, own)| Some((name.clone(), component(own)?))).collect()
 }
 
-fn box_component(series: &[Vec<Option<f64>>], settings: &VarianceSettings) -> Option<BoxComponent> {
-    let mut sizes: Vec<f64> = series.iter().flatten().flatten().map(|error| error.abs()).collect();
+fn box_component(series: &[Vec<f64>], settings: &VarianceSettings) -> Option<BoxComponent> {
+    let mut sizes: Vec<f64> = series.iter().flatten().map(|error| error.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     // robust: half of the boxes may be wrong
     let sigma_px = sizes.get(sizes.len() / 2)? / MEDIAN;
@@ -259,8 +243,9 @@ fn box_component(series: &[Vec<Option<f64>>], settings: &VarianceSettings) -> Op
     }
     let correlation_time = if settings.correlation {
         // gross errors are detections of something else, and not what lasts
-        let within = |error: &Option<f64>| error.filter(|error| error.abs() < 3.0 * sigma_px);
-        let within: Vec<Vec<_>> = series.iter().map(|errors| errors.iter().map(within).collect()).collect();
+        let within = |error: &&f64| error.abs() < 3.0 * sigma_px;
+        let within: Vec<Vec<f64>> =
+            series.iter().map(|errors| errors.iter().filter(within).copied().collect()).collect();
         autocorrelation_time(&within)
     } else {
         1.0

@@ -5,67 +5,108 @@ const LONGEST: usize = 300;
 /// A window of this many times τ (Sokal, Monte Carlo Methods in Statistical Mechanics, 1996).
 const WINDOW: f64 = 5.0;
 
-/// The integrated autocorrelation time τ = 1 + 2 Σ ρₖ of series of errors around zero, at least 1: as many consecutive
-/// errors say as much as one alone. Series are pooled; `None` in a series is a gap.
-pub(super) fn autocorrelation_time(series: &[Vec<Option<f64>>]) -> f64 {
-    let all = || series.iter().flatten().flatten();
-    let variance = all().map(|x| x * x).sum::<f64>() / all().count().max(1) as f64;
-    if variance.is_nan() || variance <= 0.0 {
-        return 1.0;
-    }
+/// The integrated autocorrelation time τ = 1 + 2 Σ ρₖ of series of errors around zero, at least 1: the mean of n errors has τ
+/// times the variance that it would have if they were independent. Series are pooled.
+///
+/// The lag k counts the errors of a series, and not the frames between them. τ says what the errors that there are have in
+/// common: those of a detector that runs on every fifth image, or that misses objects at random, have less of it than those
+/// of every image. ρₖ is Σᵢ xᵢ xᵢ₊ₖ / Σᵢ xᵢ², where a short series has few pairs at long lags: n errors are
+/// never fewer than one.
+pub(super) fn autocorrelation_time(series: &[Vec<f64>]) -> f64 {
+    let product = |lag: usize| -> f64 {
+        let later = |series: &Vec<f64>| -> f64 {
+            series.iter().zip(series.iter().skip(lag)).map(|(x, y)| x * y).sum()
+        };
+        series.iter().map(later).sum()
+    };
+    let power = product(0);
     let mut tau = 1.0;
     for lag in 1..=LONGEST {
-        let (mut sum, mut count) = (0.0, 0usize);
-        for series in series {
-            for (now, later) in series.iter().zip(series.iter().skip(lag)) {
-                if let (Some(now), Some(later)) = (now, later) {
-                    sum += now * later;
-                    count += 1;
-                }
-            }
-        }
+        let share = product(lag) / power;
         // past this, it is noise that is summed
-        if count == 0 || sum <= 0.0 || lag as f64 > WINDOW * tau {
+        if !(share > 0.0 && lag as f64 <= WINDOW * tau) {
             break;
         }
-        tau += 2.0 * sum / count as f64 / variance;
+        tau += 2.0 * share;
     }
-    f64::max(tau, 1.0)
+    tau
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
+    use rand::{RngExt, SeedableRng};
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64;
 
-    /// xₜ = a xₜ₋₁ + noise, of unit variance.
-    fn autoregressive(a: f64, n: usize) -> Vec<Option<f64>> {
-        let mut rng = Pcg64::seed_from_u64(1);
-        let mut x = 0.0;
-        let step = |_| {
+    /// xₜ = a xₜ₋₁ + noise, of unit variance, at the times that are kept.
+    fn autoregressive(a: f64, n: usize, seed: u64, mut kept: impl FnMut(usize) -> bool) -> Vec<f64> {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut x: f64 = StandardNormal.sample(&mut rng);
+        let mut step = || {
             let noise: f64 = StandardNormal.sample(&mut rng);
             x = a * x + (1.0 - a * a).sqrt() * noise;
-            Some(x)
+            x
         };
-        (0..n).map(step).collect()
+        let all: Vec<f64> = (0..n).map(|_| step()).collect();
+        (0..n).filter(|t| kept(*t)).map(|t| all[t]).collect()
+    }
+
+    #[track_caller]
+    fn assert_near(tau: f64, expected: f64) {
+        assert!((tau / expected - 1.0).abs() < 0.15, "{tau}, not {expected}");
     }
 
     #[test]
     fn an_autoregression_has_its_time() {
         for a in [0.0, 0.5, 0.9] {
-            let tau = autocorrelation_time(&[autoregressive(a, 40_000)]);
-            let expected = (1.0 + a) / (1.0 - a);
-            assert!((tau / expected - 1.0).abs() < 0.15, "{a}: {tau}, not {expected}");
+            let tau = autocorrelation_time(&[autoregressive(a, 40_000, 1, |_| true)]);
+            assert_near(tau, (1.0 + a) / (1.0 - a));
         }
     }
 
     #[test]
+    fn an_autoregression_seen_at_every_kth_time_has_the_time_of_what_is_seen() {
+        let a = 0.9f64;
+        for k in [2, 5, 20] {
+            let tau = autocorrelation_time(&[autoregressive(a, 20_000 * k, 2, |t| t % k == 0)]);
+            let between = a.powi(k as i32);
+            assert_near(tau, (1.0 + between) / (1.0 - between));
+        }
+    }
+
+    #[test]
+    fn an_autoregression_seen_at_random_has_the_time_of_what_is_seen() {
+        let a = 0.9;
+        for p in [0.1, 0.3, 0.7] {
+            let mut rng = Pcg64::seed_from_u64(3);
+            let tau = autocorrelation_time(&[autoregressive(a, 200_000, 4, |_| rng.random_bool(p))]);
+            // 1 + 2 Σₖ p aᵏ: any earlier error is there with probability p
+            assert_near(tau, 1.0 + 2.0 * p * a / (1.0 - a));
+        }
+    }
+
+    #[test]
+    fn an_autoregression_seen_in_visits_has_the_time_of_a_visit() {
+        // 20 images, and 500 without the object
+        let (a, n) = (0.9f64, 20);
+        let tau = autocorrelation_time(&[autoregressive(a, 520 * 1000, 5, |t| t % 520 < n)]);
+        let pairs = (1..n).map(|k| (1.0 - k as f64 / n as f64) * a.powi(k as i32));
+        assert_near(tau, 1.0 + 2.0 * pairs.sum::<f64>());
+    }
+
+    #[test]
+    fn a_few_errors_that_are_alike_say_as_much_as_one_and_no_less() {
+        let alike: Vec<Vec<f64>> =
+            (0..50).map(|i| vec![(-1f64).powi(i) * (1.0 + f64::from(i)); 10]).collect();
+        assert_near(autocorrelation_time(&alike), 10.0);
+    }
+
+    #[test]
     fn errors_that_take_turns_are_no_better_than_independent_ones() {
-        let series: Vec<_> = (0..100).map(|i| Some(if i % 2 == 0 { 1.0 } else { -1.0 })).collect();
+        let series: Vec<_> = (0..100).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
         assert_eq!(autocorrelation_time(&[series]), 1.0);
         assert_eq!(autocorrelation_time(&[]), 1.0);
-        assert_eq!(autocorrelation_time(&[vec![Some(0.0), None]]), 1.0);
+        assert_eq!(autocorrelation_time(&[vec![0.0], vec![0.0, 0.0]]), 1.0);
     }
 }

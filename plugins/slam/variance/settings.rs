@@ -1,5 +1,7 @@
+use manifactor_graph::checked::not_negative;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::num::NonZeroUsize;
 
 /// `[variance_components]`: the noise of odometry and boxes, estimated from the data. What `[odometry]` and
 /// `[detections]` say of noise is where it begins.
@@ -8,8 +10,10 @@ use serde::{Deserialize, Serialize};
 pub struct VarianceSettings {
     /// Most estimates of the noise, each followed by a solve. An odometry that is better than boxes can tell by far takes
     /// many small steps to get there.
-    pub rounds: usize,
+    pub rounds: NonZeroUsize,
     /// The last round is the one after which no standard deviation changes by more than this share.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub tolerance: f64,
     /// Which boxes have a noise in common.
     pub boxes: BoxGroups,
@@ -23,7 +27,8 @@ pub struct VarianceSettings {
 
 impl Default for VarianceSettings {
     fn default() -> Self {
-        Self { rounds: 30, tolerance: 0.02, boxes: BoxGroups::All, correlation: true, odometry: true }
+        let rounds = NonZeroUsize::MIN.saturating_add(29);
+        Self { rounds, tolerance: 0.02, boxes: BoxGroups::All, correlation: true, odometry: true }
     }
 }
 

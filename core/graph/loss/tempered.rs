@@ -1,0 +1,91 @@
+use super::{Loss, RobustLoss};
+use crate::checked::Positive;
+use crate::register_loss;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Another loss at another temperature: ρ(τs)/τ.
+///
+/// Where τ residuals of a kind say as much as one alone, their noise is made √τ times as large. This loss still counts
+/// in the σ of one: a residual is an outlier among the residuals, not among means of τ of them. Small residuals cost what
+/// they cost without it. A built-in loss is that loss with another scale, and cheaper so: `scale` / √τ, for `dcs`
+/// `scale` / τ.
+///
+/// ```toml
+/// loss = { type = "tempered", tau = 4.0, loss = { type = "huber", scale = 1.345 } }
+/// ```
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tempered {
+    /// τ: how many residuals say as much as one alone.
+    pub tau: Positive,
+    /// ρ.
+    #[schemars(schema_with = "any_loss")]
+    pub loss: Arc<dyn Loss>,
+}
+
+/// The definition that a document's schema has of all losses.
+fn any_loss(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "$ref": "#/$defs/loss", "description": "ρ." })
+}
+
+impl RobustLoss for Tempered {
+    fn rho(&self, s: f64) -> (f64, f64) {
+        let tau = self.tau.get();
+        let (rho, weight) = self.loss.erased().rho(tau * s);
+        (rho / tau, weight)
+    }
+    fn tempered(&self, tau: Positive) -> Option<Self> {
+        let tau = Positive::new(self.tau.get() * tau.get()).ok()?;
+        Some(Self { tau, loss: self.loss.clone() })
+    }
+}
+register_loss!("tempered", Tempered);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loss::{Cauchy, Dcs, L1};
+
+    /// Without a method of its own, as a loss of another plugin may be.
+    #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+    struct Outside {}
+    impl RobustLoss for Outside {
+        fn rho(&self, s: f64) -> (f64, f64) {
+            (3.0 * s.min(2.0), if s < 2.0 { 3.0 } else { 0.0 })
+        }
+    }
+    register_loss!("test_outside", Outside);
+
+    fn tempered(loss: &dyn Loss, tau: f64) -> Arc<dyn Loss> {
+        loss.erased().tempered(Positive::new(tau).unwrap())
+    }
+
+    #[test]
+    fn a_loss_without_a_method_of_its_own_is_tempered_by_the_wrapper() {
+        let loss = tempered(&Outside {}, 4.0);
+        assert_eq!(loss.erased().rho(0.25), (0.75, 3.0));
+        assert_eq!(loss.erased().rho(9.0), (1.5, 0.0));
+        let twice = tempered(&*loss, 2.0);
+        assert_eq!(twice.erased().rho(9.0), (0.75, 0.0));
+        let text = serde_json::to_string(&twice).unwrap();
+        assert_eq!(text, r#"{"type":"tempered","tau":8.0,"loss":{"type":"test_outside"}}"#);
+        let again: Box<dyn Loss> = serde_json::from_str(&text).unwrap();
+        assert_eq!(again.erased().rho(9.0), twice.erased().rho(9.0));
+    }
+
+    #[test]
+    fn a_built_in_loss_stays_of_its_type() {
+        let text = |loss: &dyn Loss| serde_json::to_string(&tempered(loss, 4.0)).unwrap();
+        assert_eq!(text(&Cauchy::new(2.8).unwrap()), r#"{"type":"cauchy","scale":1.4}"#);
+        assert_eq!(text(&Dcs::new(2.8).unwrap()), r#"{"type":"dcs","scale":0.7}"#);
+        assert_eq!(text(&L1::default()), r#"{"type":"l1","scale":0.5}"#);
+    }
+
+    #[test]
+    fn a_scale_that_is_no_number_any_more_is_left_to_the_wrapper() {
+        let loss = tempered(&Dcs::new(1e-300).unwrap(), 1e300);
+        assert_eq!((loss.typetag_name(), loss.erased().rho(0.0)), ("tempered", (0.0, 1.0)));
+    }
+}
