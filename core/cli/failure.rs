@@ -3,7 +3,7 @@ use crate::{output, text};
 use manifactor::config::{Diagnostic, Diagnostics, Problem, Source};
 use manifactor::formats::{FormatError, Malformed};
 use manifactor::slam::experiment::JournalError;
-use manifactor::slam::output::OutputError;
+use manifactor::slam::output::{FolderError, OutputError};
 use manifactor::slam::run::RunError;
 use manifactor::slam::source::SourceError;
 use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
@@ -126,6 +126,21 @@ impl From<OutputError> for Failure {
     }
 }
 
+impl From<FolderError> for Failure {
+    fn from(error: FolderError) -> Self {
+        match error {
+            FolderError::Io { path, source } => Self::File { path, source },
+            FolderError::InUse { .. } => {
+                Self::with_help(error, "wait until it has ended, or choose another folder with --out")
+            }
+            other => Self::with_help(
+                other,
+                "choose another folder with --out; --force writes into this one, over files of the same names",
+            ),
+        }
+    }
+}
+
 impl From<JournalError> for Failure {
     fn from(error: JournalError) -> Self {
         match error {
@@ -139,18 +154,17 @@ impl From<FormatError> for Failure {
     fn from(error: FormatError) -> Self {
         match error {
             FormatError::Io { path, source } => Self::File { path, source },
-            FormatError::Malformed(malformed) => Self::Documents(places(&malformed)),
+            FormatError::Malformed(malformed) => Self::Documents(places(malformed)),
             other => Self::input(other),
         }
     }
 }
 
 /// The lines of a file that are wrong, with what is written there.
-fn places(malformed: &Malformed) -> Diagnostics {
-    // what is no text is shown as far as it is
-    let bytes = std::fs::read(&malformed.path).unwrap_or_default();
-    let text = String::from_utf8_lossy(&bytes).into_owned();
-    let source = Source::new(malformed.path.display().to_string(), text.clone());
+fn places(mut malformed: Malformed) -> Diagnostics {
+    let text = std::mem::take(&mut malformed.text);
+    let source = Source::new(malformed.path.display().to_string(), text);
+    let text = source.text();
     let mut list: Vec<_> = malformed
         .problems
         .iter()

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use manifactor::config::{Document, Errors, Format, read_graph_section, write_graph};
 use manifactor::formats::pose_graph::{self, Options, Repair, Report};
 use manifactor::formats::whole::{can_write, write_whole};
-use manifactor::formats::{FormatError, bal, g2o};
+use manifactor::formats::{FormatError, bal, g2o, read_text};
 use manifactor::graph::{Graph, Key, Values};
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
 use std::collections::BTreeMap;
@@ -47,7 +47,11 @@ impl Reading {
     /// Reads a graph, and the solver and start that file and command line ask for.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         check_memory(path)?;
-        if Format::of_path(path).is_some() { literal(path, solver) } else { self.plain(path, solver) }
+        if Format::of_path(path).is_some() {
+            literal(Document::open(path)?, solver)
+        } else {
+            self.plain(path, solver)
+        }
     }
 
     /// g2o, TORO or BAL: solver and start are all that `--set` can set.
@@ -62,25 +66,27 @@ impl Reading {
             optimizer.zip(start)
         });
         let (optimizer, start) = errors.finish(chosen)?;
-        let (graph, values, notes) = if is_bal(path) { self.bundle(path)? } else { self.pose_graph(path)? };
+        // a pipe can be read once
+        let text = read_text(path)?;
+        let read = if is_bal(path, &text) { Self::bundle } else { Self::pose_graph };
+        let (graph, values, notes) = read(self, &text, path)?;
         Ok(GraphFile { graph, values, optimizer, start, notes })
     }
 
-    fn pose_graph(&self, path: &Path) -> Result<Noted, Failure> {
+    fn pose_graph(&self, text: &str, path: &Path) -> Result<Noted, Failure> {
         let repair = match self.repair {
             RepairChoice::Error => Repair::Error,
             RepairChoice::Reject => Repair::Reject,
             RepairChoice::Clamp => Repair::Clamp,
         };
         let options = Options { repair, anchor: !self.no_anchor, ..Options::default() };
-        let read = pose_graph::read(path, &options).map_err(Failure::from)?;
+        let read = pose_graph::parse(text, path, &options)?;
         let notes = notes(&read.report);
         Ok((read.graph, read.values, notes))
     }
 
-    fn bundle(&self, path: &Path) -> Result<Noted, Failure> {
-        let bal::Bundle { graph, values, report } =
-            bal::read(path, !self.no_anchor).map_err(Failure::from)?;
+    fn bundle(&self, text: &str, path: &Path) -> Result<Noted, Failure> {
+        let bal::Bundle { graph, values, report } = bal::parse(text, path, !self.no_anchor)?;
         let mut notes = Vec::new();
         if !report.unobserved.is_empty() {
             notes.push(format!("nothing observes {}: held", keys(&report.unobserved)));
@@ -99,9 +105,8 @@ impl Reading {
 type Noted = (Graph, Values, Vec<String>);
 
 /// `.bal`; or a text that begins like one, as such files are often called `.txt`.
-fn is_bal(path: &Path) -> bool {
-    is_named(path, "bal")
-        || (is_named(path, "txt") && std::fs::read_to_string(path).is_ok_and(|text| bal::begins(&text)))
+fn is_bal(path: &Path, text: &str) -> bool {
+    is_named(path, "bal") || (is_named(path, "txt") && bal::begins(text))
 }
 
 fn keys(keys: &[Key]) -> String {
@@ -109,8 +114,7 @@ fn keys(keys: &[Key]) -> String {
 }
 
 /// A literal graph, which may name its solver and its start.
-fn literal(path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
-    let mut document = Document::open(path)?;
+pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Result<GraphFile, Failure> {
     solver.apply(&mut document)?;
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
@@ -183,12 +187,32 @@ fn check_memory(path: &Path) -> Result<(), Failure> {
     ))
 }
 
-/// Whether a graph can be written here: asked before it is solved.
-pub(crate) fn check_place(path: &Path) -> Result<(), Failure> {
+/// Whether the graph of `input` can be written here, and over what is there: asked before it is solved.
+pub(crate) fn check_place(path: &Path, input: &Path, force: bool) -> Result<(), Failure> {
     if Format::of_path(path).is_none() && !is_named(path, "g2o") && !is_named(path, "bal") {
         return Err(no_format(path));
     }
+    if !force {
+        refuse_to_replace(path, input)?;
+    }
     can_write(path).map_err(Failure::at(path))
+}
+
+/// An error where a file would be lost.
+fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
+    let is_stream = path.metadata().is_ok_and(|at| !at.is_file() && !at.is_dir());
+    // a link that leads nowhere is something too
+    if is_stream || path.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    let is_input =
+        path.canonicalize().is_ok_and(|there| input.canonicalize().is_ok_and(|graph| graph == there));
+    let what =
+        if is_input { "is the graph itself, whose comments would be lost" } else { "is there already" };
+    Err(Failure::with_help(
+        format!("{} {what}", path.display()),
+        "choose another name, or write over it with --force",
+    ))
 }
 
 fn is_named(path: &Path, extension: &str) -> bool {

@@ -1,8 +1,9 @@
 //! Readings of an accelerometer as TUM RGB-D writes them: `timestamp ax ay az`, one a line.
 //!
 //! Several readings may share a time stamp (the sensor is read in bursts), but time does not run back.
-use crate::error::{FormatError, Mistake, Problems, read_text};
+use crate::error::{FormatError, Mistake, Problems};
 use crate::lines::{Fields, lines};
+use crate::text::read_text;
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -29,7 +30,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<Acceleration>, FormatError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Acceleration>, FormatError> {
-    let mut problems = Problems::of(path.as_ref());
+    let mut problems = Problems::of(path.as_ref(), text);
     let mut readings: Vec<Acceleration> = vec![];
     for (line, text) in lines(text) {
         let previous = readings.last().map_or(f64::NEG_INFINITY, |r| r.timestamp);

@@ -15,8 +15,9 @@
 //! Unless told not to, the reader [holds](read) the pose of one camera and, for the scale, one direction of the
 //! camera that is farthest from it; this changes no cost. Gauss-Newton needs it. Damped steps do not, but
 //! end with a note that something is undetermined.
-use crate::error::{FormatError, Mistake, Problems, read_text};
+use crate::error::{FormatError, Mistake, Problems};
 use crate::lines::{Fields, lines, number};
+use crate::text::read_text;
 use manifactor_geometry::{BalCamera, Coordinates, Point3, ProjectionBal, Se3, So3};
 use manifactor_graph::{Graph, Key, Values};
 use nalgebra::{Vector2, Vector3};
@@ -74,7 +75,7 @@ pub fn read(path: impl AsRef<Path>, anchor: bool) -> Result<Bundle, FormatError>
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle, FormatError> {
-    let mut problems = Problems::of(path.as_ref());
+    let mut problems = Problems::of(path.as_ref(), text);
     let mut lines = lines(text);
     let first = lines.next().unwrap_or((0, ""));
     let counts = problems.ok(first.0, header(first.1)).unwrap_or(Counts([0; 3]));

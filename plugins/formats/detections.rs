@@ -4,7 +4,8 @@
 //! order; and, where they are known, `frame_idx`, `frame_idx_as_published`, `object_key` (0 where the
 //! box is associated with no object), `class_id`, and `scores`, all classes with a score as
 //! `cup:0.7;bowl:0.2`.
-use crate::error::{FormatError, Mistake, Problems, io_error, read_text};
+use crate::error::{FormatError, Mistake, Problems, io_error};
+use crate::text::read_text;
 use crate::whole::write_whole;
 use csv::{ReaderBuilder, StringRecord, Trim, Writer};
 use serde::{Deserialize, Serialize};
@@ -102,7 +103,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<Detection>, FormatError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<Detection>, FormatError> {
-    let mut problems = Problems::of(path.as_ref());
+    let mut problems = Problems::of(path.as_ref(), text);
     let mut reader = ReaderBuilder::new().trim(Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let header = reader.headers().cloned().unwrap_or_default();
     let missing: Vec<_> = REQUIRED.into_iter().filter(|name| header.iter().all(|h| h != *name)).collect();

@@ -1,5 +1,4 @@
 //! What can be wrong with a file, and where.
-use crate::whole::write_whole;
 use manifactor_geometry::{NoCoordinates, NotARotation};
 use manifactor_graph::ValueError;
 use manifactor_graph::noise::NoiseError;
@@ -36,6 +35,8 @@ pub struct Malformed {
     pub problems: Vec<Problem>,
     /// How many more there are.
     pub more: usize,
+    /// What was read: a pipe cannot be read again to show its lines.
+    pub text: String,
 }
 
 /// One thing that is wrong.
@@ -182,17 +183,23 @@ impl fmt::Display for Malformed {
 impl std::error::Error for Malformed {}
 
 /// Collects problems while a file is read to its end.
-pub(crate) struct Problems(Malformed);
+pub(crate) struct Problems<'a> {
+    path: &'a Path,
+    text: &'a str,
+    list: Vec<Problem>,
+    more: usize,
+}
 
-impl Problems {
-    pub(crate) fn of(path: &Path) -> Self {
-        Self(Malformed { path: path.to_owned(), problems: vec![], more: 0 })
+impl<'a> Problems<'a> {
+    /// Of a file with this text.
+    pub(crate) fn of(path: &'a Path, text: &'a str) -> Self {
+        Self { path, text, list: vec![], more: 0 }
     }
     pub(crate) fn push(&mut self, line: usize, mistake: impl Into<Mistake>) {
-        if self.0.problems.len() < TOLD {
-            self.0.problems.push(Problem { line, mistake: mistake.into() });
+        if self.list.len() < TOLD {
+            self.list.push(Problem { line, mistake: mistake.into() });
         } else {
-            self.0.more += 1;
+            self.more += 1;
         }
     }
     /// The value, or the problem with it noted.
@@ -200,31 +207,19 @@ impl Problems {
         result.map_err(|mistake| self.push(line, mistake)).ok()
     }
     pub(crate) fn is_empty(&self) -> bool {
-        self.0.problems.is_empty()
+        self.list.is_empty()
     }
-    pub(crate) fn finish(mut self) -> Result<(), FormatError> {
+    pub(crate) fn finish(self) -> Result<(), FormatError> {
+        if self.is_empty() { Ok(()) } else { Err(self.into_error()) }
+    }
+    pub(crate) fn into_error(self) -> FormatError {
+        let Self { path, text, list: mut problems, more } = self;
         // passes over a file meet its lines in more than one order
-        self.0.problems.sort_by_key(|p| p.line);
-        if self.0.problems.is_empty() { Ok(()) } else { Err(self.0.into()) }
+        problems.sort_by_key(|p| p.line);
+        Malformed { path: path.to_owned(), problems, more, text: text.to_owned() }.into()
     }
 }
 
 pub(crate) fn io_error(path: &Path) -> impl FnOnce(io::Error) -> FormatError + '_ {
     move |source| FormatError::Io { path: path.to_owned(), source }
-}
-
-pub(crate) fn read_text(path: &Path) -> Result<String, FormatError> {
-    let bytes = std::fs::read(path).map_err(io_error(path))?;
-    tracing::debug!(file = %path.display(), bytes = bytes.len(), "read");
-    String::from_utf8(bytes).map_err(|e| {
-        let good = e.as_bytes().iter().take(e.utf8_error().valid_up_to());
-        let mut problems = Problems::of(path);
-        problems.push(1 + good.filter(|b| **b == b'\n').count(), Mistake::NotText);
-        let Problems(malformed) = problems;
-        malformed.into()
-    })
-}
-
-pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), FormatError> {
-    write_whole(path, text.as_bytes()).map_err(io_error(path))
 }

@@ -13,9 +13,11 @@ pub mod g2o;
 mod lines;
 pub mod pose_graph;
 pub mod table;
+mod text;
 pub mod timestamps;
 mod toro;
 pub mod tum;
 pub mod whole;
 
 pub use error::{FormatError, Malformed, Mistake, Problem};
+pub use text::read_text;

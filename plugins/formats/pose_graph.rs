@@ -8,8 +8,9 @@
 //!   none, the two are tied by a relative pose of zero with [`Options::equivalence_sigma`];
 //! - in each connected part of the graph that no `FIX` line holds, the first pose is held, unless
 //!   [`Options::anchor`] says not to.
-use crate::error::{FormatError, Mistake, Problems, read_text};
+use crate::error::{FormatError, Mistake, Problems};
 use crate::lines::lines;
+use crate::text::read_text;
 use crate::{g2o, toro};
 use manifactor_geometry::Tree;
 use manifactor_graph::checked::Positive;
@@ -115,7 +116,7 @@ pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, Form
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, FormatError> {
-    let mut problems = Problems::of(path.as_ref());
+    let mut problems = Problems::of(path.as_ref(), text);
     let mut unknown = BTreeMap::<String, usize>::new();
     let mut records: Vec<(usize, Record)> = vec![];
     for (line, text) in lines(text) {

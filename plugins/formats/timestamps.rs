@@ -1,6 +1,7 @@
 //! Lists of images as TUM RGB-D writes them: `timestamp filename`, one image a line (`rgb.txt`).
-use crate::error::{FormatError, Problems, read_text};
+use crate::error::{FormatError, Problems};
 use crate::lines::{Fields, lines};
+use crate::text::read_text;
 use crate::tum::increasing;
 use std::path::Path;
 
@@ -27,7 +28,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<StampedFile>, FormatError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Vec<StampedFile>, FormatError> {
-    let mut problems = Problems::of(path.as_ref());
+    let mut problems = Problems::of(path.as_ref(), text);
     let mut list: Vec<StampedFile> = vec![];
     for (line, text) in lines(text) {
         let previous = list.last().map(|f| f.timestamp);

@@ -3,8 +3,9 @@
 //! Seconds, metres and a unit quaternion; `world_from_camera`. Time has to increase, with what published
 //! files need: a line that is late by at most [`LATE`] is put where it belongs, of two lines with one
 //! time stamp the first stays. Both are reported.
-use crate::error::{FormatError, Mistake, Problems, read_text, write_text};
+use crate::error::{FormatError, Mistake, Problems};
 use crate::lines::{Fields, lines};
+use crate::text::{read_text, write_text};
 use manifactor_geometry::{Se3, So3};
 use std::fmt::Write;
 use std::path::Path;
@@ -47,7 +48,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Trajectory, FormatError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, path: impl AsRef<Path>) -> Result<Trajectory, FormatError> {
-    let mut problems = Problems::of(path.as_ref());
+    let mut problems = Problems::of(path.as_ref(), text);
     let mut trajectory = Trajectory::default();
     let mut empty = true;
     for (line, text) in lines(text) {

@@ -1,26 +1,23 @@
-//! Files that are written whole or not at all.
-use std::fs::File;
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+//! Files that are written whole or not at all: the one place that writes files.
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{self, ErrorKind, Write};
+use std::path::Path;
+use tempfile::{Builder, NamedTempFile};
 
-/// What the name of a file ends with that is not yet whole; one that is found was left by a program that was killed.
-pub const UNFINISHED: &str = ".unfinished";
+/// What the name of a file begins with that is not yet whole.
+const PREFIX: &str = ".manifactor-";
+/// How many random letters and digits follow.
+const RANDOM: usize = 16;
+/// What it ends with.
+const SUFFIX: &str = ".unfinished";
 
-/// Writes a file whole or not at all: under another name first, brought to the disk, and renamed then.
+/// Writes a file whole or not at all: under another name in the same folder first, brought to the disk, and renamed
+/// then. A file that is replaced keeps its permissions; a link is replaced, and what it points to is left alone.
 ///
 /// # Errors
 /// Where it cannot be written; what was there before is there still, and nothing else.
 pub fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
-    // a pipe or a terminal is written to as it stands
-    if path.metadata().is_ok_and(|at| !at.is_file()) {
-        return std::fs::write(path, content);
-    }
-    let unfinished = beside(path);
-    let written = fill(&unfinished, content).and_then(|()| std::fs::rename(&unfinished, path));
-    if written.is_err() {
-        // nothing better can be done about a leftover than about the failure itself
-        let _ = std::fs::remove_file(&unfinished);
-    }
+    let written = if is_stream(path) { write_stream(path, content) } else { replace(path, content) };
     tracing::debug!(file = %path.display(), bytes = content.len(), whole = written.is_ok(), "written");
     written
 }
@@ -30,92 +27,208 @@ pub fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
 /// # Errors
 /// Where it cannot, with what the system says.
 pub fn can_write(path: &Path) -> io::Result<()> {
-    let trial = beside(path);
-    let written = fill(&trial, b"?");
-    // it may not have been made
-    let _ = std::fs::remove_file(&trial);
-    written
+    if path.is_dir() {
+        return Err(ErrorKind::IsADirectory.into());
+    }
+    if is_stream(path) {
+        return Ok(());
+    }
+    unfinished(path, None)?.as_file_mut().write_all(b"?")
 }
 
-/// Whether files can be written into a folder, or where it is not there yet, into the one that it would be made in.
-///
-/// # Errors
-/// Where they cannot, with what the system says.
-pub fn can_write_into(folder: &Path) -> io::Result<()> {
-    let there = folder.ancestors().find(|place| place.exists()).unwrap_or(Path::new(""));
-    let there = if there.as_os_str().is_empty() { Path::new(".") } else { there };
-    can_write(&there.join("trial"))
-}
-
-/// Removes the files of a folder that a program which was killed has left unfinished. Only for folders that nobody else
-/// writes into.
+/// Removes what a killed program left of [`write_whole`] in a folder. The caller makes sure that no other process
+/// writes into it.
 pub fn remove_unfinished(folder: &Path) {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    for file in files.filter(|file| file.file_name().to_string_lossy().ends_with(UNFINISHED)) {
-        // what cannot be removed does no harm
-        let _ = std::fs::remove_file(file.path());
+    let is_ours = |name: &str| {
+        let random = name.strip_prefix(PREFIX).and_then(|rest| rest.strip_suffix(SUFFIX));
+        random.is_some_and(|r| r.len() == RANDOM && r.bytes().all(|b| b.is_ascii_alphanumeric()))
+    };
+    for file in files.filter(|file| file.file_name().to_str().is_some_and(is_ours)) {
+        if file.file_type().is_ok_and(|t| t.is_file()) {
+            // what cannot be removed does no harm
+            let _ = std::fs::remove_file(file.path());
+        }
     }
 }
 
-fn fill(path: &Path, content: &[u8]) -> io::Result<()> {
-    let mut file = File::create(path)?;
-    file.write_all(content)?;
-    file.sync_all()
+/// Opens a regular file for reading and for writing at its end, or makes it. It is never opened through a link, so
+/// that what is written stays in its folder.
+///
+/// # Errors
+/// Where it is a link or no regular file; where it cannot be opened.
+pub fn open_regular(path: &Path) -> io::Result<File> {
+    let refused = || io::Error::new(ErrorKind::InvalidInput, "it is a link, or not a regular file");
+    let mut options = OpenOptions::new();
+    options.read(true).append(true);
+    match options.clone().create_new(true).open(path) {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+        made => return made,
+    }
+    // opening a pipe would wait for somebody at its other end
+    if !path.symlink_metadata()?.is_file() {
+        return Err(refused());
+    }
+    let file = options.open(path)?;
+    // a link may have taken its place since
+    if is_same(&file.metadata()?, &path.symlink_metadata()?) { Ok(file) } else { Err(refused()) }
 }
 
-/// A name of this process's own in the same folder, as a rename does not cross file systems.
-fn beside(path: &Path) -> PathBuf {
-    let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-    path.with_file_name(format!(".{name}.{}{UNFINISHED}", std::process::id()))
+#[cfg(unix)]
+fn is_same(a: &Metadata, b: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    (a.dev(), a.ino()) == (b.dev(), b.ino())
+}
+
+#[cfg(not(unix))]
+fn is_same(_: &Metadata, b: &Metadata) -> bool {
+    b.is_file()
+}
+
+/// A pipe, a terminal or a device, which cannot be replaced.
+fn is_stream(path: &Path) -> bool {
+    path.metadata().is_ok_and(|at| !at.is_file() && !at.is_dir())
+}
+
+fn write_stream(path: &Path, content: &[u8]) -> io::Result<()> {
+    OpenOptions::new().write(true).open(path)?.write_all(content)
+}
+
+fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
+    let replaced = path.symlink_metadata().ok().filter(Metadata::is_file);
+    let mut file = unfinished(path, replaced.as_ref())?;
+    file.as_file_mut().write_all(content)?;
+    file.as_file().sync_all()?;
+    // the file is removed with the error
+    file.persist(path).map(drop).map_err(|error| error.error)
+}
+
+/// A new file beside `path`, as a rename does not cross file systems; removed when it is dropped.
+fn unfinished(path: &Path, replaced: Option<&Metadata>) -> io::Result<NamedTempFile<File>> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = Builder::new();
+    builder.prefix(PREFIX).rand_bytes(RANDOM).suffix(SUFFIX);
+    builder.make_in(folder, |path| create(path, replaced))
+}
+
+/// Makes a file that is not there, with the permissions of the one that it will replace.
+fn create(path: &Path, replaced: Option<&Metadata>) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    let Some(replaced) = replaced else { return options.open(path) };
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let file = options.open(path)?;
+    // a file system without permissions is no reason to lose results; what the owner alone can read hurts nobody
+    let _ = file.set_permissions(replaced.permissions());
+    Ok(file)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn folder(name: &str) -> PathBuf {
-        let folder = std::env::temp_dir().join(format!("manifactor-whole-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir(&folder).unwrap();
-        folder
-    }
+    use std::path::PathBuf;
+    use tempfile::tempdir;
 
     fn names(folder: &Path) -> Vec<String> {
         let files = std::fs::read_dir(folder).unwrap();
-        files.map(|file| file.unwrap().file_name().to_string_lossy().into_owned()).collect()
+        let mut names: Vec<_> =
+            files.map(|file| file.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
     }
 
     #[test]
     fn a_file_is_replaced_as_a_whole() {
-        let folder = folder("replaced");
-        let file = folder.join("a.txt");
+        let folder = tempdir().unwrap();
+        let file = folder.path().join("a.txt");
         write_whole(&file, b"first").unwrap();
         write_whole(&file, b"second").unwrap();
         assert_eq!(std::fs::read(&file).unwrap(), b"second");
-        assert_eq!(names(&folder), ["a.txt"]);
-        std::fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(names(folder.path()), ["a.txt"]);
     }
 
     #[test]
-    fn what_cannot_be_renamed_leaves_nothing() {
-        let folder = folder("refused");
-        let place = folder.join("not a folder");
+    fn what_cannot_be_written_leaves_nothing() {
+        let folder = tempdir().unwrap();
+        let place = folder.path().join("not a folder");
         std::fs::write(&place, "").unwrap();
         assert!(write_whole(&place.join("a.txt"), b"text").is_err());
-        assert!(can_write_into(&place).is_err() && can_write_into(&place.join("deeper")).is_err());
-        assert!(can_write_into(&folder.join("new/and/deep")).is_ok());
-        assert!(can_write(&folder.join("new/a.txt")).is_err());
-        assert_eq!(names(&folder), ["not a folder"]);
-        std::fs::remove_dir_all(&folder).unwrap();
+        assert!(can_write(&folder.path().join("new/a.txt")).is_err());
+        assert!(can_write(folder.path()).is_err() && write_whole(folder.path(), b"text").is_err());
+        assert!(can_write(&folder.path().join("a.txt")).is_ok());
+        assert_eq!(names(folder.path()), ["not a folder"]);
     }
 
     #[test]
-    fn leftovers_are_removed_and_nothing_else() {
-        let folder = folder("leftovers");
-        std::fs::write(beside(&folder.join("a.txt")), "ha").unwrap();
-        std::fs::write(folder.join("a.txt"), "whole").unwrap();
-        remove_unfinished(&folder);
-        assert_eq!(names(&folder), ["a.txt"]);
-        std::fs::remove_dir_all(&folder).unwrap();
+    fn only_what_this_program_left_unfinished_is_removed() {
+        let folder = tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let left = unfinished(&at("a.txt"), None).unwrap().into_temp_path().keep().unwrap();
+        assert!(left.exists());
+        let others =
+            [".manifactor-0123.unfinished", ".manifactor-01234567890-abcd.unfinished", "notes.unfinished"];
+        for name in others {
+            std::fs::write(at(name), "kept").unwrap();
+        }
+        std::fs::create_dir(at(".manifactor-0123456789abcdef.unfinished")).unwrap();
+        remove_unfinished(folder.path());
+        assert!(!left.exists());
+        assert_eq!(names(folder.path()).len(), 4);
+    }
+
+    #[cfg(unix)]
+    mod on_unix {
+        use super::*;
+        use std::fs::Permissions;
+        use std::os::unix::fs::{PermissionsExt, symlink};
+
+        fn mode(path: &Path) -> u32 {
+            path.metadata().unwrap().permissions().mode() & 0o777
+        }
+
+        #[test]
+        fn a_file_that_is_replaced_keeps_its_permissions() {
+            let folder = tempdir().unwrap();
+            let file = folder.path().join("secret.json");
+            for wanted in [0o600, 0o640, 0o444] {
+                std::fs::write(&file, "before").unwrap_or_default();
+                std::fs::set_permissions(&file, Permissions::from_mode(wanted)).unwrap();
+                write_whole(&file, b"after").unwrap();
+                assert_eq!((mode(&file), std::fs::read(&file).unwrap()), (wanted, b"after".to_vec()));
+            }
+            // a new one has those of any new file
+            let (ours, usual) = (folder.path().join("ours"), folder.path().join("usual"));
+            write_whole(&ours, b"").unwrap();
+            std::fs::write(&usual, "").unwrap();
+            assert_eq!(mode(&ours), mode(&usual));
+        }
+
+        #[test]
+        fn what_a_link_points_to_is_left_alone() {
+            let folder = tempdir().unwrap();
+            let [file, link]: [PathBuf; 2] = ["precious", "link"].map(|name| folder.path().join(name));
+            std::fs::write(&file, "precious").unwrap();
+            symlink(&file, &link).unwrap();
+            assert!(open_regular(&link).is_err());
+            write_whole(&link, b"ours").unwrap();
+            assert_eq!(std::fs::read(&link).unwrap(), b"ours");
+            assert_eq!(std::fs::read(&file).unwrap(), b"precious");
+            // a link to a file that is not there does not make it
+            let dangling = folder.path().join("dangling");
+            symlink(folder.path().join("nothing"), &dangling).unwrap();
+            assert!(open_regular(&dangling).is_err() && !folder.path().join("nothing").exists());
+        }
+
+        #[test]
+        fn a_device_is_written_to_and_stays() {
+            let folder = tempdir().unwrap();
+            let link = folder.path().join("null.json");
+            symlink("/dev/null", &link).unwrap();
+            can_write(&link).unwrap();
+            write_whole(&link, b"text").unwrap();
+            assert!(link.symlink_metadata().unwrap().is_symlink());
+            assert!(open_regular(Path::new("/dev/null")).is_err());
+        }
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! `report.json` for the run as a whole, and a folder for each variant with `config.toml` (all settings, ready to be
 //! run again), `trajectory.txt` (TUM's format), `objects.json`, `graph.json` (the literal graph at the estimate),
-//! `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all.
+//! `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
+//! into an [`OutputFolder`].
 use crate::estimate::Estimate;
 use crate::report::{RunReport, VariantReport};
 use crate::run_document::{RunDocument, Variant, absolute, slug};
@@ -15,6 +16,9 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
+
+mod folder;
+pub use folder::{FolderError, OutputFolder};
 
 /// Why results could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -52,14 +56,6 @@ pub enum OutputError {
 /// The folder of a variant.
 pub fn variant_folder(output: &Path, variant: &str) -> PathBuf {
     output.join(slug(variant))
-}
-
-/// Whether results can be written into a folder, there or not yet: asked before they are computed.
-///
-/// # Errors
-/// Where they cannot.
-pub fn check_folder(folder: &Path) -> Result<(), OutputError> {
-    whole::can_write_into(folder).map_err(|source| OutputError::Io { path: folder.to_owned(), source })
 }
 
 /// Writes a file whole or not at all, and the folders that it lies in, where they are not there.

@@ -77,14 +77,14 @@ mod tests {
         let mut settings = Simulated::default();
         settings.trajectory.frames = 30;
         let sequence = settings.simulate().unwrap();
-        let folder = std::env::temp_dir().join(format!("manifactor-recording-{}", std::process::id()));
-        write(&sequence, &folder).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        write(&sequence, folder).unwrap();
         let camera = serde_json::to_value(sequence.camera).unwrap();
         let recorded: Recorded =
             serde_json::from_value(json!({ "folder": folder, "camera": camera })).unwrap();
         assert_eq!(recorded.camera, CameraChoice::Camera(sequence.camera));
         let read = recorded.load(&Folders::default()).unwrap();
-        std::fs::remove_dir_all(&folder).unwrap();
         assert_eq!((read.frames.len(), read.detections.len()), (30, sequence.detections.len()));
         for (a, b) in read.detections.iter().zip(&sequence.detections) {
             assert_eq!((a.frame, a.object, &a.scores), (b.frame, b.object, &b.scores));

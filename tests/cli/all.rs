@@ -13,6 +13,7 @@ mod log;
 mod mistakes;
 mod names;
 mod new;
+mod overwriting;
 mod repeated;
 mod reports;
 mod run;

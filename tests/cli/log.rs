@@ -7,7 +7,8 @@ const GRAPH: &str = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.5\nEDGE_SE2 0 1 1 0 
 fn a_log_is_there_for_those_who_ask() {
     let folder = folder(&[("a.g2o", GRAPH)]);
     let (graph, out) = (path(&folder, "a.g2o"), path(&folder, "b.g2o"));
-    let said = |flags: &str| manifactor(&format!("solve {graph} --out {out} {flags}")).ended(0).stderr;
+    let said =
+        |flags: &str| manifactor(&format!("solve {graph} --out {out} --force {flags}")).ended(0).stderr;
     assert_eq!(said(""), "");
     let one = said("-v");
     assert!(one.contains("gradient") && one.contains("converged") && one.contains("pose graph"), "{one}");

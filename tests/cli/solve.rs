@@ -65,7 +65,7 @@ fn a_bundle_adjustment_is_known_by_its_extension_or_its_first_line() {
     let folder = folder(&[("problem.bal", &text), ("problem.txt", &text), ("short.bal", "2 1 1\n0 5 1 1\n")]);
     let solved = path(&folder, "solved.bal");
     for file in ["problem.bal", "problem.txt"] {
-        let ran = manifactor(&format!("solve {} --out {solved} --json", path(&folder, file)));
+        let ran = manifactor(&format!("solve {} --out {solved} --force --json", path(&folder, file)));
         ran.complains("nothing fixes the gauge: held pose and scale by c0, c1");
         ran.complains("BAL has no word for what is held: 2 left out");
         let json = ran.json();

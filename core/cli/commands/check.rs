@@ -1,6 +1,6 @@
 //! `manifactor check`: a document, without solving anything.
 use crate::failure::Failure;
-use crate::graph_file::{self, Reading};
+use crate::graph_file::{self, GraphFile, Reading};
 use crate::output;
 use crate::run_file::RunArguments;
 use crate::solver::SolverArguments;
@@ -34,9 +34,10 @@ impl Check {
             let document = Document::open(path)?;
             // a run may have variables of its own
             let is_graph = matches!(&document.root().value, Value::Table(t) if t.contains_key("variables") && !t.contains_key("source"));
-            if is_graph { self.graph()? } else { self.document(document)? }
+            let solver = SolverArguments::set_only(&self.run.set);
+            if is_graph { graph(&graph_file::literal(document, &solver)?) } else { self.document(document)? }
         } else {
-            self.graph()?
+            graph(&self.reading.open(path, &SolverArguments::set_only(&self.run.set))?)
         };
         if self.json {
             output::json(&json!({ "errors": [], "found": found }));
@@ -44,14 +45,6 @@ impl Check {
             output::print(&format!("{}: nothing wrong.\n{found}\n", path.display()));
         }
         Ok(Status::Done)
-    }
-
-    fn graph(&self) -> Result<String, Failure> {
-        let input = self.reading.open(&self.run.config, &SolverArguments::set_only(&self.run.set))?;
-        for note in &input.notes {
-            output::note(note);
-        }
-        Ok(graph_file::summary(&input).trim_end().to_owned())
     }
 
     fn document(&self, document: Document) -> Result<String, Failure> {
@@ -77,4 +70,12 @@ impl Check {
         }
         Ok(lines.join("\n"))
     }
+}
+
+/// What a graph has, with what the reader had to decide on stderr.
+fn graph(input: &GraphFile) -> String {
+    for note in &input.notes {
+        output::note(note);
+    }
+    graph_file::summary(input).trim_end().to_owned()
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use manifactor::config::Document;
 use manifactor::slam::experiment::{self, Experiment as Sweep, Journal, Progress, Summary};
-use manifactor::slam::output::write_whole;
+use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::slam::source::Folders;
 use manifactor::viz::{experiment_page, experiment_pictures};
 use std::io::IsTerminal;
@@ -33,6 +33,9 @@ pub(crate) struct Experiment {
     /// The folder for the results; that of the document, where nothing is said.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write into a folder that holds files of something else, over those of the same names.
+    #[arg(long)]
+    force: bool,
     /// Run the trials again that failed before.
     #[arg(long)]
     retry_failed: bool,
@@ -50,7 +53,8 @@ impl Experiment {
             sweep.output.clone_from(out);
         }
         let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
-        let mut journal = Journal::open(&sweep.output.join("trials.jsonl"))?;
+        let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
+        let mut journal = Journal::open(claimed)?;
         if self.retry_failed {
             journal.retry_failed();
         }

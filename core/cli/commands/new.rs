@@ -3,6 +3,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::status::Status;
 use clap::{Args, Subcommand};
+use manifactor::slam::output::write_whole;
 use std::path::{Path, PathBuf};
 
 /// Write the files of something new.
@@ -52,7 +53,8 @@ impl Plugin {
         let crate_name = folder.file_name().and_then(|n| n.to_str()).unwrap_or_default();
         let names = Names::of(crate_name)?;
         let (source, cli_source) = self.sources()?;
-        if folder.exists() {
+        // a link that leads nowhere is something too
+        if folder.symlink_metadata().is_ok() {
             let there = format!("{} is there already", folder.display());
             return Err(Failure::with_help(there, "choose another name, or remove the folder first"));
         }
@@ -66,9 +68,7 @@ impl Plugin {
                     .replace("{cli_source}", &cli_source)
             };
             let path = folder.join(fill(path));
-            let parent = path.parent().unwrap_or(folder);
-            std::fs::create_dir_all(parent).map_err(Failure::at(parent))?;
-            std::fs::write(&path, fill(text)).map_err(Failure::at(&path))?;
+            write_whole(&path, fill(text))?;
         }
         output::print(&format!("{0} is written. Next:\n  cd {0}\n  cargo test\n", folder.display()));
         Ok(Status::Done)

@@ -5,7 +5,7 @@ use crate::status::Status;
 use crate::watch::Watch;
 use crate::{interrupt, output, table};
 use clap::Args;
-use manifactor::slam::output::{check_folder, variant_folder, write_report, write_variant, write_whole};
+use manifactor::slam::output::{OutputFolder, variant_folder, write_report, write_variant, write_whole};
 use manifactor::slam::run::Run as Running;
 use manifactor::solve::All;
 use manifactor::viz::{RunPage, run_pictures};
@@ -23,6 +23,9 @@ pub(crate) struct Run {
     /// The folder for the results; that of the document, where nothing is said.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write into a folder that holds files of something else, over those of the same names.
+    #[arg(long)]
+    force: bool,
     /// Print JSON: the report that is also written.
     #[arg(long)]
     pub(crate) json: bool,
@@ -34,7 +37,8 @@ impl Run {
         if let Some(out) = &self.out {
             document.output.clone_from(out);
         }
-        check_folder(&document.output)?;
+        // held to the end
+        let _claimed = OutputFolder::claim(&document.output, "run", &self.run.config, self.force)?;
         let mut interrupt = interrupt::on_ctrl_c();
         let (mut status, mut page) = (Status::Done, RunPage::default());
         let mut run = Running::new(&document, self.run.data());

@@ -6,7 +6,7 @@ use crate::status::Status;
 use crate::text::count;
 use clap::Args;
 use manifactor::config::{Diagnostic, Problem, Source};
-use manifactor::slam::output::check_folder;
+use manifactor::slam::output::OutputFolder;
 use manifactor::slam::recording;
 use manifactor::slam::run::Run as Running;
 use std::path::PathBuf;
@@ -21,6 +21,9 @@ pub(crate) struct Simulate {
     /// The folder for the files.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
+    /// Write into a folder that holds files of something else, over those of the same names.
+    #[arg(long)]
+    force: bool,
 }
 
 impl Simulate {
@@ -31,7 +34,8 @@ impl Simulate {
             let problem = Problem::invalid("there is no variant to simulate");
             return Err(Failure::Documents(Diagnostic::new(source.place(0..0), problem).into()));
         };
-        check_folder(&self.out)?;
+        // held to the end
+        let _claimed = OutputFolder::claim(&self.out, "simulate", &self.run.config, self.force)?;
         let sequence = Running::new(&document, self.run.data()).sequence(variant)?;
         recording::write(&sequence, &self.out)?;
         let objects = sequence.ground_truth.as_ref().map_or(0, |truth| truth.objects.len());

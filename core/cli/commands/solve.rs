@@ -35,6 +35,9 @@ pub(crate) struct Solve {
     /// Write the solved graph here; the extension tells the format.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Write over a file that is there already.
+    #[arg(long, requires = "out")]
+    force: bool,
     /// Print JSON: costs, iterations, termination, seconds by stage; with -v a record for each step.
     #[arg(long)]
     pub(crate) json: bool,
@@ -43,7 +46,7 @@ pub(crate) struct Solve {
 impl Solve {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         if let Some(path) = &self.out {
-            graph_file::check_place(path)?;
+            graph_file::check_place(path, &self.graph, self.force)?;
         }
         let mut input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);

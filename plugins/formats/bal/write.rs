@@ -1,5 +1,6 @@
 //! Problems of bundle adjustment as BAL files.
-use crate::error::{FormatError, write_text};
+use crate::error::FormatError;
+use crate::text::write_text;
 use manifactor_geometry::{BalCamera, Point3, ProjectionBal};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use std::collections::{BTreeMap, HashMap};

@@ -1,6 +1,7 @@
 //! Graphs as g2o files.
-use crate::error::{FormatError, write_text};
+use crate::error::FormatError;
 use crate::pose_graph::record::exchange_halves;
+use crate::text::write_text;
 use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3};
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Manifold, Values, Variable};
 use nalgebra::DMatrix;

@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub(crate) fn build(
     records: &[(usize, Record)],
     options: &Options,
-    problems: &mut Problems,
+    problems: &mut Problems<'_>,
 ) -> Option<PoseGraph> {
     let mut builder = Builder::new(options);
     // vertices first: a file may use them before it defines them

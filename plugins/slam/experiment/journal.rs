@@ -1,14 +1,21 @@
 //! The log of trials that are done: one JSON document a line, appended and synced when a trial ends.
 //!
 //! A program that is killed leaves at most one line without an end, the last: it is dropped, and its trial run again.
-//! Of several lines for one trial the last counts, as a trial that failed may be run again, and lines of trials that the experiment does not have any more are
-//! passed over, so that a changed experiment runs what is new and keeps what is not.
+//! A file that is no such log is refused and not touched. Of several lines for one trial the last counts, as a trial that
+//! failed may be run again, and lines of trials that the experiment does not have any more are passed over, so that a
+//! changed experiment runs what is new and keeps what is not.
 use super::{Record, Trial};
-use manifactor_formats::whole::remove_unfinished;
+use crate::output::OutputFolder;
+use manifactor_formats::whole::open_regular;
 use std::collections::HashMap;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+
+/// The log's name in an experiment's folder.
+const NAME: &str = "trials.jsonl";
+/// How each line begins.
+const BEGINNING: &[u8] = br#"{"labels":["#;
 
 /// Why trials cannot be logged.
 #[derive(Debug, thiserror::Error)]
@@ -21,12 +28,6 @@ pub enum JournalError {
         path: PathBuf,
         /// What the system said.
         source: io::Error,
-    },
-    /// Somebody else writes to it.
-    #[error("{} is in use: another run of this experiment is under way", path.display())]
-    InUse {
-        /// Which.
-        path: PathBuf,
     },
     /// A whole line that is no record.
     #[error(
@@ -42,50 +43,32 @@ pub enum JournalError {
     },
 }
 
-/// A log that is open for writing. Nobody else can have it open at the same time.
+/// A log that is open for writing, in a folder that this process alone writes into.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
     file: File,
     records: HashMap<(Vec<String>, String), Record>,
+    /// Held as long as the log is open.
+    _folder: OutputFolder,
 }
 
 impl Journal {
-    /// Opens a log, or begins one.
+    /// Opens the log of a folder, `trials.jsonl`, or begins one.
     ///
     /// # Errors
-    /// Where it cannot be read or written, is in use, or is no log.
-    pub fn open(path: &Path) -> Result<Self, JournalError> {
-        let io = |source| JournalError::Io { path: path.to_owned(), source };
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(io)?;
-        }
-        let mut file = OpenOptions::new().read(true).append(true).create(true).open(path).map_err(io)?;
-        match file.try_lock() {
-            Err(TryLockError::WouldBlock) => return Err(JournalError::InUse { path: path.to_owned() }),
-            // a file system without locks is no reason not to run
-            Err(TryLockError::Error(_)) | Ok(()) => {}
-        }
-        if let Some(folder) = path.parent() {
-            remove_unfinished(folder);
-        }
+    /// Where it cannot be read or written, is a link, or is no log; it is unchanged then.
+    pub fn open(folder: OutputFolder) -> Result<Self, JournalError> {
+        let path = folder.path().join(NAME);
+        let io = |source| JournalError::Io { path: path.clone(), source };
+        let mut file = open_regular(&path).map_err(io)?;
         let mut bytes = vec![];
         file.read_to_end(&mut bytes).map_err(io)?;
-        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+        let (records, whole) = read(&bytes, &path)?;
         if whole < bytes.len() {
             file.set_len(whole as u64).map_err(io)?;
-            bytes.truncate(whole);
         }
-        let mut records = HashMap::new();
-        for (i, line) in bytes.split(|byte| *byte == b'\n').enumerate().filter(|(_, line)| !line.is_empty()) {
-            let record: Record = serde_json::from_slice(line).map_err(|error| JournalError::Line {
-                path: path.to_owned(),
-                line: i + 1,
-                message: error.to_string(),
-            })?;
-            records.insert((record.labels.clone(), record.fingerprint.clone()), record);
-        }
-        Ok(Self { path: path.to_owned(), file, records })
+        Ok(Self { path, file, records, _folder: folder })
     }
 
     /// What a trial came to, if it is done.
@@ -112,6 +95,34 @@ impl Journal {
     }
 }
 
+/// The records of a log, and how many of its bytes are whole lines.
+fn read(bytes: &[u8], path: &Path) -> Result<(HashMap<(Vec<String>, String), Record>, usize), JournalError> {
+    let mistake = |line: usize, message: String| JournalError::Line { path: path.to_owned(), line, message };
+    let mut records = HashMap::new();
+    let mut whole = 0;
+    for (i, line) in bytes.split_inclusive(|byte| *byte == b'\n').enumerate() {
+        let Some(line) = line.strip_suffix(b"\n") else {
+            if is_torn(line) {
+                break;
+            }
+            return Err(mistake(i + 1, "it has no end, and does not begin as a record does".into()));
+        };
+        whole += line.len() + 1;
+        if !line.is_empty() {
+            let record: Record =
+                serde_json::from_slice(line).map_err(|error| mistake(i + 1, error.to_string()))?;
+            records.insert((record.labels.clone(), record.fingerprint.clone()), record);
+        }
+    }
+    Ok((records, whole))
+}
+
+/// Whether a line is one of ours, cut short.
+fn is_torn(line: &[u8]) -> bool {
+    let begins = line.starts_with(BEGINNING) || BEGINNING.starts_with(line);
+    begins && serde_json::from_slice::<Record>(line).err().is_none_or(|error| error.is_eof())
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::Outcome;
@@ -122,46 +133,65 @@ mod tests {
         Record { labels: vec![label.into()], fingerprint: "0".into(), outcome, seconds: 0.1 }
     }
 
-    fn file(name: &str) -> PathBuf {
-        let path = std::env::temp_dir().join(format!("manifactor-journal-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_file(&path);
-        path
+    fn open(folder: &Path) -> Result<Journal, JournalError> {
+        Journal::open(OutputFolder::claim(folder, "experiment", Path::new("sweep.toml"), true).unwrap())
     }
 
     #[test]
     fn a_torn_line_is_dropped_and_nothing_counts_twice() {
-        let path = file("torn");
-        let mut journal = Journal::open(&path).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(NAME);
+        let mut journal = open(folder.path()).unwrap();
         for (label, reason) in [("a", "first"), ("b", "first"), ("a", "second")] {
             journal.append(record(label, reason)).unwrap();
         }
         drop(journal);
         let whole = std::fs::read(&path).unwrap();
-        std::fs::write(&path, [&whole[..], b"{\"labels\":[\"c\"],\"finger"].concat()).unwrap();
-        let journal = Journal::open(&path).unwrap();
-        assert_eq!(std::fs::read(&path).unwrap(), whole);
-        assert_eq!(journal.records.len(), 2);
-        assert_eq!(journal.records[&(vec!["a".to_owned()], "0".to_owned())], record("a", "second"));
-        std::fs::remove_file(&path).unwrap();
-    }
-
-    #[test]
-    fn two_runs_at_once_are_refused() {
-        let path = file("twice");
-        let first = Journal::open(&path).unwrap();
-        assert!(matches!(Journal::open(&path), Err(JournalError::InUse { .. })));
-        drop(first);
-        assert!(Journal::open(&path).is_ok());
-        std::fs::remove_file(&path).unwrap();
+        let line = serde_json::to_vec(&record("ü", "torn")).unwrap();
+        // wherever it was torn, within a character too
+        for end in 0..=line.len() {
+            std::fs::write(&path, [&whole[..], &line[..end]].concat()).unwrap();
+            let journal = open(folder.path()).unwrap();
+            assert_eq!(std::fs::read(&path).unwrap(), whole, "torn at {end}");
+            assert_eq!(journal.records.len(), 2);
+            assert_eq!(journal.records[&(vec!["a".to_owned()], "0".to_owned())], record("a", "second"));
+        }
+        let mut journal = open(folder.path()).unwrap();
+        journal.append(record("c", "third")).unwrap();
+        drop(journal);
+        assert_eq!(open(folder.path()).unwrap().records.len(), 3);
     }
 
     #[test]
     fn a_file_that_is_no_journal_is_left_alone() {
-        let path = file("other");
-        std::fs::write(&path, "notes\n").unwrap();
-        let error = Journal::open(&path).unwrap_err().to_string();
-        assert!(error.contains(":1 is not a record"), "{error}");
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), "notes\n");
-        std::fs::remove_file(&path).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(NAME);
+        let others = [
+            "notes",
+            "notes\n",
+            "{\"labels\": 1}",
+            "{\"labels\":[]}",
+            "{\"results\":[1",
+            "\n\nnotes",
+            "\0\0",
+        ];
+        for text in others {
+            std::fs::write(&path, text).unwrap();
+            let error = open(folder.path()).unwrap_err().to_string();
+            assert!(error.contains("is not a record"), "{error}");
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn what_a_journal_links_to_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let other = folder.path().join("precious");
+        std::fs::write(&other, "precious").unwrap();
+        std::os::unix::fs::symlink(&other, folder.path().join(NAME)).unwrap();
+        let error = open(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("it is a link"), "{error}");
+        assert_eq!(std::fs::read_to_string(&other).unwrap(), "precious");
     }
 }

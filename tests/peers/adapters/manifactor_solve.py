@@ -13,4 +13,5 @@ binary, method, source, output, iterations, relative_cost = sys.argv[1:]
 stop = {"max_iterations": iterations, "relative_cost": relative_cost}
 settings = [word for key, value in stop.items() for word in ("--set", f"solver.stop.{key}={value}")]
 settings += [word for name in start for word in ("--start", name)]
-os.execv(binary, [binary, "solve", source, "--json", "--out", output, "--solver", solver, *settings])
+place = ["--out", output, "--force"]
+os.execv(binary, [binary, "solve", source, "--json", *place, "--solver", solver, *settings])

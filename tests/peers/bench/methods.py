@@ -49,13 +49,13 @@ class Ours:
 
     def start(self, source, output):
         """Vertices for a file that has edges only: spanning trees of odometry."""
-        solve = [self.binary, "solve", source, "--out", output, "--json", "--solver", "gauss_newton"]
-        nothing = ["--set", "solver.stop.max_iterations=0"]
+        solve = [self.binary, "solve", source, "--out", output, "--force", "--json"]
+        nothing = ["--solver", "gauss_newton", "--set", "solver.stop.max_iterations=0"]
         subprocess.run([*solve, *nothing], capture_output=True, check=False)
         return pose_graph.read(Path(output)).vertices
 
     def begin(self, document, output, data):
         """Writes the graphs with which a run begins; what was said, in case they are not there."""
         nothing = ["--set", "solver.type=levenberg_marquardt", "--set", "solver.stop.max_iterations=0"]
-        command = [self.binary, "run", document, "--out", output, "--data", data, *nothing]
+        command = [self.binary, "run", document, "--out", output, "--force", "--data", data, *nothing]
         return subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()

@@ -1,0 +1,85 @@
+//! Texts from files: read once, and not without end.
+use crate::error::{FormatError, Mistake, Problems, io_error};
+use crate::whole::write_whole;
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+
+/// The most bytes that are read from a pipe or a device, which do not say how many there are: as many as a document
+/// may have. A regular file may be longer.
+const STREAM: u64 = 256 << 20;
+
+/// Reads a file, once: it may be a pipe.
+///
+/// # Errors
+/// A file that cannot be read or is not UTF-8; more than 256 MiB from what is no regular file.
+pub fn read_text(path: &Path) -> Result<String, FormatError> {
+    let bytes = read(path).map_err(io_error(path))?;
+    tracing::debug!(file = %path.display(), bytes = bytes.len(), "read");
+    String::from_utf8(bytes).map_err(|error| {
+        // what is no text is shown as far as it is
+        let text = String::from_utf8_lossy(error.as_bytes());
+        let good = error.as_bytes().iter().take(error.utf8_error().valid_up_to());
+        let mut problems = Problems::of(path, &text);
+        problems.push(1 + good.filter(|b| **b == b'\n').count(), Mistake::NotText);
+        problems.into_error()
+    })
+}
+
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), FormatError> {
+    write_whole(path, text.as_bytes()).map_err(io_error(path))
+}
+
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let file = File::open(path)?;
+    let about = file.metadata()?;
+    let length = if about.is_file() { about.len() } else { 0 };
+    // the system's own files, such as those of /proc, have a length of zero
+    read_bounded(file, length, length.max(STREAM))
+}
+
+/// Reads `length` bytes, or to the end, if that is not beyond `limit`.
+fn read_bounded(reader: impl Read, length: u64, limit: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let length = usize::try_from(length).map_err(|_| ErrorKind::OutOfMemory)?;
+    bytes.try_reserve_exact(length).map_err(|_| ErrorKind::OutOfMemory)?;
+    reader.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        let what =
+            format!("no end after {limit} bytes; what comes from a pipe or a device has to be shorter");
+        return Err(io::Error::new(ErrorKind::FileTooLarge, what));
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_end_is_not_read_to_its_end() {
+        let error = read_bounded(io::repeat(b'a'), 0, 1000).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::FileTooLarge);
+        assert_eq!(read_bounded(io::repeat(b'a').take(1000), 0, 1000).unwrap().len(), 1000);
+        assert_eq!(read_bounded(io::empty(), u64::MAX, u64::MAX).unwrap_err().kind(), ErrorKind::OutOfMemory);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_link_to_an_endless_device_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let link = folder.path().join("graph.g2o");
+        std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
+        let error = read_text(&link).unwrap_err().to_string();
+        assert!(error.contains("no end after 268435456 bytes"), "{error}");
+    }
+
+    #[test]
+    fn what_is_no_text_is_kept_for_its_message() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("graph.g2o");
+        std::fs::write(&file, b"first\n\xff\n").unwrap();
+        let Err(FormatError::Malformed(malformed)) = read_text(&file) else { panic!() };
+        assert_eq!((malformed.problems[0].line, &*malformed.text), (2, "first\n\u{fffd}\n"));
+    }
+}
