@@ -39,6 +39,19 @@ pub fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Positive::deserialize(from).map(Positive::get)
 }
 
+/// The same for a number that is zero or more.
+///
+/// # Errors
+/// Where it is negative, or not finite.
+pub fn zero_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let x = f64::deserialize(from)?;
+    if x >= 0.0 && x.is_finite() {
+        Ok(x)
+    } else {
+        Err(D::Error::custom(format!("expected a finite number, 0 or more, got {x}")))
+    }
+}
+
 /// The same for a number that is 1 or more.
 ///
 /// # Errors
