@@ -14,7 +14,16 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
     );
     if outcome.inactive > 0 {
         let (inactive, all) = (outcome.inactive, count(outcome.factors, "factor"));
-        out += &format!("{inactive} of {all} are not defined at these values and take no part\n");
+        let named = outcome.inactive_factors.iter();
+        let named: Vec<_> =
+            named.map(|f| format!("{} {} ({})", f.factor, f.name, text::keys(&f.keys))).collect();
+        let more = if inactive > named.len() { ", …" } else { "" };
+        let named = named.join(", ");
+        out +=
+            &format!("{inactive} of {all} are not defined at these values and take no part: {named}{more}\n");
+    }
+    if let Some(moving) = &outcome.moving {
+        out += &format!("{moving}\n");
     }
     if let Some(undetermined) = &outcome.undetermined {
         out += &format!("warning: {undetermined}\n");

@@ -99,6 +99,8 @@ pub trait Batch: Send + Sync {
     fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation;
     /// The cost of the factors that were active at the last linearization.
     fn cost(&self, columns: &Columns) -> Evaluation;
+    /// Visits the factors that were not defined at the last linearization, by their place in the graph.
+    fn inactive(&self, visit: &mut dyn FnMut(usize));
     /// ½ρ of each factor, to its place in the graph, whatever its weight; zero where it is not defined.
     fn costs(&self, columns: &Columns, to: &mut [f64]);
     /// Makes each factor count as often as the entry at its place in the graph says, on top of its loss.
@@ -240,6 +242,11 @@ impl<F: Kernel> Batch for BatchOf<F> {
                 .map(|n| self.chunk_cost(columns, n * CHUNK))
                 .fold(Evaluation::default(), Evaluation::and)
         }
+    }
+
+    fn inactive(&self, visit: &mut dyn FnMut(usize)) {
+        let entries = self.entries.iter().zip(&self.active);
+        entries.filter(|(_, active)| !**active).for_each(|(entry, _)| visit(*entry as usize));
     }
 
     fn costs(&self, columns: &Columns, to: &mut [f64]) {

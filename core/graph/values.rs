@@ -31,6 +31,12 @@ pub enum ValueError {
         /// The type that it has.
         found: &'static str,
     },
+    /// A value with a coordinate that is not finite.
+    #[error("the value of `{key}` is not finite")]
+    NotFinite {
+        /// Its key.
+        key: Key,
+    },
 }
 
 impl Values {

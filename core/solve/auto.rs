@@ -4,7 +4,7 @@ use crate::gauss_newton::GaussNewton;
 use crate::levenberg_marquardt::LevenbergMarquardt;
 use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
-use crate::optimizer::{Optimizer, Stopping};
+use crate::optimizer::{Optimizer, SettingError, Stopping};
 use crate::outcome::{IterationRecord, Outcome};
 use crate::problem::Problem;
 use crate::start::{Given, Start};
@@ -55,6 +55,11 @@ impl Optimizer for Auto {
         self.linear.clone()
     }
 
+    fn check(&self) -> Result<(), SettingError> {
+        self.stop.check()?;
+        self.linear.check()
+    }
+
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         self.damped(DAMPING).solve(problem, observer)
     }
@@ -87,7 +92,7 @@ impl Optimizer for Auto {
         outcome.times.total += looking;
         for point in points {
             tracing::debug!(cost = point.cost, inactive = point.inactive, "another start");
-            problem.set_values(&point.values);
+            problem.put(&point.values);
             let next = match point.refused {
                 true => self.damped(REFUSED).solve(&mut problem, &mut watch),
                 false => self.full_steps_first(&mut problem, &mut watch),
@@ -101,7 +106,7 @@ impl Optimizer for Auto {
                 break;
             }
         }
-        problem.set_values(&best);
+        problem.put(&best);
         problem.linearize();
         Ok(Solution::of(&problem, outcome))
     }
@@ -120,9 +125,7 @@ impl Auto {
         let outcome =
             GaussNewton { stop: self.stop.clone(), linear: self.linear.clone() }.solve(problem, observer);
         match outcome.termination {
-            Termination::Stalled { .. } | Termination::Indeterminate(_) => {
-                outcome.then(self.solve(problem, observer), true)
-            }
+            Termination::Stalled { .. } => outcome.then(self.solve(problem, observer), true),
             _ => outcome,
         }
     }
@@ -145,9 +148,9 @@ pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> V
             let start = entry.read::<dyn Start>(&Node::empty_table()).ok()?;
             // one that does not apply has nothing to offer
             let values = start.start(graph, values).ok()?;
-            problem.set_values(&values);
+            problem.set_values(&values).ok()?;
             let at = problem.linearize();
-            at.cost.is_finite().then_some(Point {
+            at.not_finite.is_none().then_some(Point {
                 inactive: at.inactive,
                 cost: at.cost,
                 values,
@@ -160,12 +163,14 @@ pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> V
 /// Whether another start may do better: no minimum, or one that does not fit the stated noise.
 fn leads_nowhere(graph: &Graph, problem: &Problem, outcome: &Outcome) -> bool {
     match outcome.termination {
-        Termination::Converged { .. } => {
+        Termination::Converged { .. } | Termination::Indeterminate(_) => {
             let rows = graph.factors().iter().map(|f| f.factor.erased().signature().rows.unwrap_or(0));
             let freedom = rows.sum::<usize>().saturating_sub(problem.dim());
             2.0 * outcome.final_cost > MISFIT * freedom as f64
         }
         Termination::MaxIterations | Termination::Stalled { .. } => true,
+        // not where the solve began, but where its steps led
+        Termination::NonFinite { .. } => outcome.final_cost.is_finite(),
         _ => false,
     }
 }
@@ -185,5 +190,9 @@ impl Observer for Watch<'_> {
         let refused = !record.accepted && record.iteration <= self.until;
         self.refused |= refused;
         if refused || self.stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+    fn poll(&mut self) -> ControlFlow<()> {
+        self.stopped |= self.observer.poll().is_break();
+        if self.stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }

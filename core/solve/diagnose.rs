@@ -85,7 +85,7 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
 }
 
 /// The direction in terms of variables and the names of their tangent directions.
-fn name(problem: &Problem, v: &[f64], scale: &[f64]) -> Undetermined {
+pub(crate) fn name(problem: &Problem, v: &[f64], scale: &[f64]) -> Undetermined {
     let mut moves: Vec<(usize, f64)> = vec![];
     for (i, place) in problem.variables.iter().enumerate() {
         if let Some(start) = place.start {

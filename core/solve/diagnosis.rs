@@ -60,7 +60,7 @@ impl Solution {
     pub fn problem(&self, graph: &Graph) -> Result<Problem, CompileError> {
         let mut problem = Problem::compile(graph, &self.values)?;
         if !self.weights.is_empty() {
-            problem.set_weights(&self.weights);
+            problem.weigh(&self.weights);
         }
         Ok(problem)
     }

@@ -1,8 +1,7 @@
 //! Powell's dogleg: a trust region between the gradient and the Gauss-Newton step.
-use crate::diagnose::undetermined;
 use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
-use crate::optimizer::{Optimizer, Session, Step, Stopping, Tried};
+use crate::optimizer::{Optimizer, Session, SettingError, Step, Stopping, Tried};
 use crate::outcome::Outcome;
 use crate::problem::Problem;
 use crate::system::{dot, norm};
@@ -16,7 +15,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// The step is the Gauss-Newton step where that is within the radius, else the point on the path from
 /// the minimum along the gradient to it. Lengths are measured by √diag H, so that radians and metres
-/// compare. A refused step costs neither a linearization nor a factorization.
+/// compare. A refused step costs neither a linearization nor a factorization. A direction that nothing constrains is
+/// left alone, and named by the outcome.
 ///
 /// ```toml
 /// solver = { type = "dogleg", stop = { max_iterations = 50 } }
@@ -43,13 +43,19 @@ impl Optimizer for Dogleg {
         self.linear.clone()
     }
 
+    fn check(&self) -> Result<(), SettingError> {
+        self.stop.check()?;
+        self.linear.check()
+    }
+
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let mut session = match Session::begin(problem, &self.stop, observer) {
             Ok(session) => session,
             Err(outcome) => return *outcome,
         };
         let termination = self.iterate(&mut session);
-        session.end(termination, None)
+        let open = session.open_direction();
+        session.end(termination, open)
     }
 }
 register!(dyn Optimizer, "dogleg", Dogleg);
@@ -63,11 +69,10 @@ struct Path {
 }
 
 impl Path {
-    fn new(problem: &mut Problem) -> Self {
-        let mut path = Self::default();
+    fn new(problem: &Problem, newton: &[f64]) -> Self {
+        let mut path = Self { newton: newton.to_vec(), ..Self::default() };
         problem.diagonal(&mut path.scale);
         path.scale.iter_mut().for_each(|d| *d = d.max(1e-12));
-        problem.newton_step(&mut path.newton);
         // steepest descent where lengths are measured by the diagonal: -D⁻¹g
         path.cauchy = problem.g.iter().zip(&path.scale).map(|(g, d)| -g / d).collect();
         let curvature = dot(&path.cauchy, &problem.multiply(&path.cauchy));
@@ -102,21 +107,23 @@ impl Path {
 impl Dogleg {
     fn iterate(&self, session: &mut Session<'_>) -> Termination {
         let mut radius = self.initial_radius.map(Positive::get);
+        let mut newton = vec![];
         'linearized: loop {
             if let Some(termination) = session.finished() {
                 return termination;
             }
             session.iterations += 1;
-            let factorized = session.problem.factorize(None);
-            if let Some(direction) = undetermined(session.problem, factorized.is_err(), 0.0) {
-                return Termination::Indeterminate(direction);
+            if !session.factorize_undamped() || !session.newton_step(&mut newton) {
+                return session.stalled(Stall::Damping);
             }
-            if factorized.is_err() && !regularize(session.problem) {
-                return Termination::Stalled { reason: Stall::Damping };
-            }
-            let path = Path::new(session.problem);
-            let mut within = radius.unwrap_or_else(|| path.length(&path.newton));
+            let path = Path::new(session.problem, &newton);
+            let whole = path.length(&path.newton);
+            // what the whole step would gain: where that is next to nothing, so is what the radius leaves of it
+            let promises = !session.is_small(-0.5 * dot(&newton, &session.problem.g));
+            let mut within = radius.unwrap_or(whole);
             loop {
+                // a step that the radius has made small says little of the cost around
+                let is_cut = promises && within < whole;
                 let delta = path.point(within);
                 let (g, length) = (dot(&delta, &session.problem.g), path.length(&delta));
                 let predicted = -g - 0.5 * dot(&delta, &session.problem.multiply(&delta));
@@ -131,15 +138,18 @@ impl Dogleg {
                         _ => within,
                     });
                     match session.take(&step) {
-                        Some(termination) => return termination,
-                        None => continue 'linearized,
+                        Some(termination) if !is_cut => return termination,
+                        _ => continue 'linearized,
                     }
                 }
-                if !matches!(tried, Tried::Undefined) && session.settled(&step) {
+                if !is_cut && !matches!(tried, Tried::Undefined) && session.settled(&step) {
                     return Termination::Converged { reason: Tolerance::RelativeCost };
                 }
                 if step.norm <= session.stop.step {
-                    return Termination::Stalled { reason: session.stall(Stall::TrustRegion) };
+                    return match is_cut {
+                        true => session.stalled(Stall::TrustRegion),
+                        false => Termination::Converged { reason: Tolerance::Step },
+                    };
                 }
                 if session.interrupted() {
                     return Termination::Interrupted;
@@ -148,14 +158,4 @@ impl Dogleg {
             }
         }
     }
-}
-
-/// Factorizes with just enough added to the diagonal; whether that was possible.
-fn regularize(problem: &mut Problem) -> bool {
-    let mut diagonal = vec![];
-    problem.diagonal(&mut diagonal);
-    [1e-12, 1e-9, 1e-6, 1e-3].into_iter().any(|share| {
-        let added: Vec<f64> = diagonal.iter().map(|d| share * d.max(1e-6)).collect();
-        problem.factorize(Some(&added)).is_ok()
-    })
 }

@@ -1,8 +1,7 @@
 //! Gauss-Newton: full steps.
-use crate::diagnose::undetermined;
 use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
-use crate::optimizer::{Best, Optimizer, Session, Step, Stopping, Tried};
+use crate::optimizer::{Best, Optimizer, Session, SettingError, Step, Stopping, Tried};
 use crate::outcome::Outcome;
 use crate::problem::Problem;
 use crate::system::{dot, norm};
@@ -15,7 +14,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// The fastest where the start is good. A step may raise the cost; one that leaves the domain of a
 /// factor is halved until it does not. Five rises in a row end the solve, with the best estimate so
-/// far. A system that something leaves open ends it with the direction that is open.
+/// far. A direction that nothing constrains is left alone, and named by the outcome.
 ///
 /// ```toml
 /// solver = { type = "gauss_newton", stop = { max_iterations = 50 } }
@@ -40,6 +39,11 @@ impl Optimizer for GaussNewton {
         self.linear.clone()
     }
 
+    fn check(&self) -> Result<(), SettingError> {
+        self.stop.check()?;
+        self.linear.check()
+    }
+
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let mut session = match Session::begin(problem, &self.stop, observer) {
             Ok(session) => session,
@@ -48,7 +52,8 @@ impl Optimizer for GaussNewton {
         let mut best = Best::new(&session);
         let termination = iterate(&mut session, &mut best);
         best.restore(&mut session);
-        session.end(termination, None)
+        let open = session.open_direction();
+        session.end(termination, open)
     }
 }
 register!(dyn Optimizer, "gauss_newton", GaussNewton);
@@ -61,14 +66,9 @@ fn iterate(session: &mut Session<'_>, best: &mut Best) -> Termination {
             return termination;
         }
         session.iterations += 1;
-        let factorized = session.problem.factorize(None);
-        if let Some(direction) = undetermined(session.problem, factorized.is_err(), 0.0) {
-            return Termination::Indeterminate(direction);
+        if !session.factorize_undamped() || !session.newton_step(&mut delta) {
+            return session.stalled(Stall::Damping);
         }
-        if factorized.is_err() {
-            return Termination::Stalled { reason: Stall::Damping };
-        }
-        session.problem.newton_step(&mut delta);
         let mut step =
             Step { predicted: -0.5 * dot(&delta, &session.problem.g), norm: norm(&delta), control: 1.0 };
         let mut halvings = 0;
@@ -79,7 +79,7 @@ fn iterate(session: &mut Session<'_>, best: &mut Best) -> Termination {
                 return Termination::Interrupted;
             }
             if halvings > HALVINGS {
-                return Termination::Stalled { reason: Stall::Domain };
+                return session.stalled(Stall::Domain);
             }
             delta.iter_mut().for_each(|d| *d *= 0.5);
             step = Step { norm: 0.5 * step.norm, control: 0.5 * step.control, ..step };

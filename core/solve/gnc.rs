@@ -4,7 +4,7 @@ use crate::auto::Auto;
 use crate::compile::CompileError;
 use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
-use crate::optimizer::Optimizer;
+use crate::optimizer::{Optimizer, SettingError};
 use crate::outcome::Outcome;
 use crate::problem::Problem;
 use graduation::Graduation;
@@ -94,6 +94,10 @@ impl Optimizer for Gnc {
 
     fn linear(&self) -> LinearSolver {
         self.solver.linear()
+    }
+
+    fn check(&self) -> Result<(), SettingError> {
+        self.solver.check()
     }
 
     fn solve_graph(

@@ -2,12 +2,12 @@
 use crate::diagnose::undetermined;
 use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
-use crate::optimizer::{Optimizer, Session, Step, Stopping, Tried};
+use crate::optimizer::{Optimizer, Session, SettingError, Step, Stopping, Tried, check, positive};
 use crate::outcome::Outcome;
 use crate::problem::Problem;
 use crate::system::{dot, norm};
 use crate::termination::{Stall, Termination, Tolerance};
-use manifactor_graph::checked::{Positive, least_and_most, one_or_more, positive};
+use manifactor_graph::checked::{self, Positive, least_and_most, one_or_more};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,15 +25,15 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct LevenbergMarquardt {
     /// Damping of the first step, as a share of the diagonal.
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "checked::positive")]
     #[schemars(with = "Positive")]
     pub initial_lambda: f64,
     /// Least damping.
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "checked::positive")]
     #[schemars(with = "Positive")]
     pub min_lambda: f64,
     /// Damping at which a solve gives up.
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "checked::positive")]
     #[schemars(with = "Positive")]
     pub max_lambda: f64,
     /// Largest factor by which one good step lowers the damping.
@@ -78,6 +78,19 @@ impl Optimizer for LevenbergMarquardt {
         self.linear.clone()
     }
 
+    fn check(&self) -> Result<(), SettingError> {
+        let Self { initial_lambda, min_lambda, max_lambda, decrease, diagonal: [least, most], .. } = *self;
+        positive(&[
+            ("initial_lambda", initial_lambda),
+            ("min_lambda", min_lambda),
+            ("max_lambda", max_lambda),
+        ])?;
+        check(&[("decrease", decrease)], "1 or more", |x| x >= 1.0)?;
+        check(&[("diagonal", least)], "0 or more, and the second one no less", |x| 0.0 <= x && x <= most)?;
+        self.stop.check()?;
+        self.linear.check()
+    }
+
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let mut session = match Session::begin(problem, &self.stop, observer) {
             Ok(session) => session,
@@ -87,7 +100,7 @@ impl Optimizer for LevenbergMarquardt {
         let termination = self.iterate(&mut session, &mut lambda);
         // damping hides what nothing else holds; by now there is little left of it
         let open = match termination {
-            Termination::Interrupted => None,
+            Termination::Interrupted | Termination::NonFinite { .. } => None,
             _ if session.iterations == 0 => None,
             _ => undetermined(session.problem, false, lambda * session.problem.dim() as f64),
         };
@@ -109,9 +122,7 @@ impl LevenbergMarquardt {
                 session.problem.diagonal(&mut added);
                 let [least, most] = self.diagonal;
                 added.iter_mut().for_each(|d| *d = *lambda * d.max(least).min(most));
-                let factorized = session.problem.factorize(Some(&added));
-                if factorized.is_ok() {
-                    session.problem.newton_step(&mut delta);
+                if session.factorize(Some(&added)).is_ok() && session.newton_step(&mut delta) {
                     let damping = delta.iter().zip(&added).map(|(d, a)| a * d * d).sum::<f64>();
                     let predicted = 0.5 * (damping - dot(&delta, &session.problem.g));
                     let step = Step { predicted, norm: norm(&delta), control: *lambda };
@@ -123,9 +134,13 @@ impl LevenbergMarquardt {
                         (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
                         let ended = session.take(&step);
                         // a step that damping has made small says little of the cost around
-                        let small = ended.is_some() && step.control <= TRUSTED;
+                        let is_trusted = step.control <= TRUSTED;
+                        let small = ended.is_some() && is_trusted;
                         match ended {
                             Some(termination) if small && (small_before || step.control <= LIGHT) => {
+                                return termination;
+                            }
+                            Some(termination) if !is_trusted && session.is_at_rest(&mut delta) => {
                                 return termination;
                             }
                             _ => small_before = small,
@@ -139,13 +154,16 @@ impl LevenbergMarquardt {
                     if step.control <= TRUSTED && step.norm <= session.stop.step {
                         return Termination::Converged { reason: Tolerance::Step };
                     }
-                    if session.interrupted() {
-                        return Termination::Interrupted;
-                    }
+                }
+                if session.interrupted() {
+                    return Termination::Interrupted;
                 }
                 (*lambda, rise) = ((*lambda * rise).max(NEGLIGIBLE), rise * 2.0);
                 if *lambda > self.max_lambda {
-                    return Termination::Stalled { reason: session.stall(Stall::Damping) };
+                    return match session.is_at_rest(&mut delta) {
+                        true => Termination::Converged { reason: Tolerance::RelativeCost },
+                        false => session.stalled(Stall::Damping),
+                    };
                 }
             }
         }

@@ -39,9 +39,9 @@ pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linear::memory::{Bytes, available_memory, memory_limit};
 pub use linear_solver::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
 pub use observer::{All, Interrupt, Observer, Silent};
-pub use optimizer::{Optimizer, Stopping};
-pub use outcome::{IterationRecord, Outcome, Rejected, Times};
-pub use problem::Problem;
+pub use optimizer::{Optimizer, SettingError, Stopping};
+pub use outcome::{InactiveFactor, IterationRecord, Moving, Outcome, Rejected, Times, Untouched};
+pub use problem::{Problem, WeightError};
 pub use start::{Given, Start, StartError};
 pub use termination::{Stall, Termination, Tolerance, Undetermined};
 
@@ -64,7 +64,7 @@ pub struct Solution {
 /// Compiles and solves.
 ///
 /// # Errors
-/// Where graph and values do not fit each other. Numerical trouble is no error: see
+/// Where graph and values do not fit each other, or a setting of the solver is outside its domain. Numerical trouble is no error: see
 /// [`Outcome::termination`].
 pub fn solve(
     graph: &Graph,
@@ -72,6 +72,7 @@ pub fn solve(
     optimizer: &dyn Optimizer,
     observer: &mut dyn Observer,
 ) -> Result<Solution, CompileError> {
+    optimizer.check()?;
     let solution = optimizer.solve_graph(graph, values, observer)?;
     let Outcome { termination, iterations, initial_cost, final_cost, times, .. } = &solution.outcome;
     let (solver, seconds) = (optimizer.typetag_name(), times.total);

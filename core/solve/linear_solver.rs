@@ -1,5 +1,6 @@
 //! How the linear system of each step is solved, as a config says it.
 use manifactor_graph::Key;
+use manifactor_graph::checked::not_negative;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,8 +17,9 @@ pub struct LinearSolver {
     pub method: Method,
     /// The order of elimination.
     pub ordering: Ordering,
-    /// Steps of iterative refinement after each solve, by Cholesky: each brings the residual of a badly conditioned
-    /// system down to rounding, for the time of a solve.
+    /// Most steps of iterative refinement after each solve, by Cholesky: each brings the residual of a badly
+    /// conditioned system down, for the time of a solve. They end once a correction is more than half of the one
+    /// before: what is left is rounding.
     pub refinements: usize,
     /// When conjugate gradients stop, and what they are preconditioned by.
     pub conjugate_gradients: ConjugateGradients,
@@ -53,6 +55,8 @@ pub struct ConjugateGradients {
     /// What the preconditioner knows.
     pub preconditioner: Preconditioner,
     /// Stop once the residual is this share of the right-hand side, in the preconditioner's norm.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub tolerance: f64,
     /// Most iterations; the step is then the best found, which lowers the quadratic model all the same.
     pub max_iterations: usize,

@@ -8,6 +8,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub trait Observer {
     /// After a step was tried.
     fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()>;
+
+    /// Within a step that takes long: before each iteration of conjugate gradients, and each refinement. `Break` ends
+    /// the solve with the best values so far.
+    fn poll(&mut self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
 }
 
 /// Sees nothing.
@@ -26,6 +32,9 @@ pub struct Interrupt(pub Arc<AtomicBool>);
 
 impl Observer for Interrupt {
     fn iteration(&mut self, _: &IterationRecord) -> ControlFlow<()> {
+        self.poll()
+    }
+    fn poll(&mut self) -> ControlFlow<()> {
         if self.0.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
@@ -49,6 +58,22 @@ impl Observer for All<'_> {
             }
         }
         flow
+    }
+    fn poll(&mut self) -> ControlFlow<()> {
+        let stops = self.0.iter_mut().any(|observer| observer.poll().is_break());
+        if stops { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// Sees no record of a solve within a solve, but may end it.
+pub(crate) struct Quiet<'a>(pub &'a mut dyn Observer);
+
+impl Observer for Quiet<'_> {
+    fn iteration(&mut self, _: &IterationRecord) -> ControlFlow<()> {
+        self.0.poll()
+    }
+    fn poll(&mut self) -> ControlFlow<()> {
+        self.0.poll()
     }
 }
 

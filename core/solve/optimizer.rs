@@ -1,18 +1,26 @@
 //! What solvers have in common: the trait, when to stop, and the account of a solve.
+mod setting;
+mod undamped;
+
 use crate::Solution;
 use crate::compile::CompileError;
+use crate::linear::NotPositiveDefinite;
 use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
 use crate::outcome::{IterationRecord, Outcome};
 use crate::problem::Problem;
 use crate::termination::{Stall, Termination, Tolerance, Undetermined};
 use manifactor_graph::batch::Evaluation;
+use manifactor_graph::checked::not_negative;
 use manifactor_graph::column::Columns;
 use manifactor_graph::{Graph, Values};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 use std::time::Instant;
+
+pub use setting::SettingError;
+pub(crate) use setting::{check, positive};
 
 /// A strategy that lowers the cost of a problem. Chosen by name.
 #[typetag::serialize(tag = "type")]
@@ -24,6 +32,15 @@ pub trait Optimizer: Debug + Send + Sync {
     /// How the linear system of each step is solved.
     fn linear(&self) -> LinearSolver {
         LinearSolver::default()
+    }
+
+    /// Whether each setting is within its domain. [`solve`](crate::solve()) asks before it begins; a config is checked
+    /// when it is read.
+    ///
+    /// # Errors
+    /// Names the setting that is not.
+    fn check(&self) -> Result<(), SettingError> {
+        Ok(())
     }
 
     /// Compiles a graph and solves it. Override to begin somewhere else than at `values`.
@@ -51,12 +68,20 @@ pub struct Stopping {
     /// Most linearizations.
     pub max_iterations: usize,
     /// Stop once a step changes the cost by less than this share of it.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub relative_cost: f64,
     /// Stop once the cost is below this.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub absolute_cost: f64,
     /// Stop once no entry of the gradient is larger than this.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub gradient: f64,
     /// Stop once the Euclidean norm of a step is below this.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
     pub step: f64,
 }
 
@@ -102,6 +127,8 @@ pub(crate) struct Session<'a> {
     compile: f64,
     history: Vec<IterationRecord>,
     interrupted: bool,
+    /// Something is open: steps that are not damped cannot be had.
+    is_open: bool,
 }
 
 impl<'a> Session<'a> {
@@ -127,20 +154,46 @@ impl<'a> Session<'a> {
             compile,
             history: Vec::with_capacity(stop.max_iterations.min(HISTORY)),
             interrupted: false,
+            is_open: false,
         };
-        match at.not_finite {
+        match session.not_finite() {
             None => Ok(session),
-            Some(factor) => {
-                let keys = session.problem.factor_keys(factor);
-                Err(Box::new(session.end(Termination::NonFinite { factor, keys }, None)))
-            }
+            Some(termination) => Err(Box::new(session.end(termination, None))),
         }
+    }
+
+    /// The factor that makes the linearization not finite, if one does.
+    fn not_finite(&self) -> Option<Termination> {
+        self.at.not_finite.map(|factor| self.blame(factor))
+    }
+
+    fn blame(&self, factor: usize) -> Termination {
+        Termination::NonFinite { factor, keys: self.problem.factor_keys(factor) }
+    }
+
+    /// Factorizes H + diag(added), and takes -g half the way to the step.
+    pub(crate) fn factorize(&mut self, added: Option<&[f64]>) -> Result<(), NotPositiveDefinite> {
+        let Self { problem, observer, interrupted, .. } = self;
+        problem.factorize_while(added, &mut || go_on(*observer, interrupted))
+    }
+
+    /// The step of the last factorization; whether it is finite, and no interrupt has cut it short.
+    pub(crate) fn newton_step(&mut self, step: &mut Vec<f64>) -> bool {
+        let Self { problem, observer, interrupted, .. } = self;
+        problem.newton_step(step, &mut || go_on(*observer, interrupted));
+        let finite = step.iter().all(|x| x.is_finite());
+        if !finite {
+            self.trial = Evaluation { cost: f64::NAN, ..Evaluation::default() };
+        }
+        finite && !self.interrupted
     }
 
     /// A reason to stop before another step, if there is one.
     pub(crate) fn finished(&self) -> Option<Termination> {
         let gradient = self.gradient();
-        if self.interrupted {
+        if let Some(termination) = self.not_finite() {
+            Some(termination)
+        } else if self.interrupted {
             Some(Termination::Interrupted)
         } else if self.at.cost <= self.stop.absolute_cost {
             Some(Termination::Converged { reason: Tolerance::AbsoluteCost })
@@ -158,7 +211,8 @@ impl<'a> Session<'a> {
     }
 
     fn gradient(&self) -> f64 {
-        self.problem.g.iter().fold(0.0, |m, g| f64::max(m, g.abs()))
+        // `f64::max` would drop what is not a number
+        self.problem.g.iter().fold(0.0, |m, g| if m.is_nan() || g.abs() <= m { m } else { g.abs() })
     }
 
     /// Evaluates a step.
@@ -174,20 +228,30 @@ impl<'a> Session<'a> {
 
     /// Whether the last trial and its model both say that there is nothing left to gain.
     pub(crate) fn settled(&self, step: &Step) -> bool {
-        let small = self.stop.relative_cost * self.at.cost.abs();
-        (self.at.cost - self.trial.cost).abs() <= small && step.predicted.abs() <= small
+        self.is_small(self.at.cost - self.trial.cost) && self.is_small(step.predicted)
+    }
+
+    /// Whether a change of the cost is within the tolerance.
+    pub(crate) fn is_small(&self, change: f64) -> bool {
+        change.abs() <= self.stop.relative_cost * self.at.cost.abs()
     }
 
     /// Why no step is good enough, as the last one shows, which is next to nothing; else `other`.
-    pub(crate) fn stall(&self, other: Stall) -> Stall {
+    pub(crate) fn stalled(&self, other: Stall) -> Termination {
         const ROUNDING: f64 = 1e-10;
-        if self.trial.left > 0 {
+        let Evaluation { cost, left, not_finite, .. } = self.trial;
+        let reason = if self.interrupted {
+            return Termination::Interrupted;
+        } else if left > 0 {
             Stall::Domain
-        } else if self.trial.cost - self.at.cost > ROUNDING * self.at.cost.abs() {
+        } else if !cost.is_finite() {
+            return self.blame(not_finite.unwrap_or_else(|| self.problem.not_finite_factor()));
+        } else if cost - self.at.cost > ROUNDING * self.at.cost.abs() {
             Stall::Jump
         } else {
             other
-        }
+        };
+        Termination::Stalled { reason }
     }
 
     /// Takes the trial as the estimate and linearizes there; a reason to stop, if it brings one.
@@ -196,6 +260,10 @@ impl<'a> Session<'a> {
         let (before, after) = (self.at.cost, self.trial.cost);
         let inactive = self.at.inactive;
         self.at = self.problem.linearize();
+        self.trial = self.at;
+        if let Some(termination) = self.not_finite() {
+            return Some(termination);
+        }
         // factors that come back into their domain change the cost: go on with them
         if self.at.inactive != inactive {
             return None;
@@ -235,19 +303,41 @@ impl<'a> Session<'a> {
         let solve = self.clock.elapsed().as_secs_f64();
         times.total = solve + self.compile;
         times.other = (solve - times.stages()).max(0.0);
+        let untouched = self.problem.untouched();
+        let moving = match termination {
+            Termination::MaxIterations if self.iterations > 0 => self.problem.moving(),
+            _ => None,
+        };
+        let termination = match (&untouched, termination) {
+            // a minimum, but not of what these variables are
+            (
+                Some(untouched),
+                Termination::Converged { .. } | Termination::Stalled { reason: Stall::Jump },
+            ) => Termination::Indeterminate(untouched.clone()),
+            (_, termination) => termination,
+        };
         Outcome {
             initial_cost: self.initial_cost,
             final_cost: self.at.cost,
             iterations: self.iterations,
             termination,
             undetermined,
+            moving,
+            untouched,
             factors: self.problem.factors(),
             inactive: self.at.inactive,
+            inactive_factors: self.problem.inactive_factors(),
             rejected: vec![],
             times,
             history: std::mem::take(&mut self.history),
         }
     }
+}
+
+/// Whether an observer lets a step go on.
+fn go_on(observer: &mut dyn Observer, interrupted: &mut bool) -> bool {
+    *interrupted |= observer.poll().is_break();
+    !*interrupted
 }
 
 /// The best estimate so far, for solvers whose steps may raise the cost.

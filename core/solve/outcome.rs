@@ -1,7 +1,13 @@
 //! What a solve has to tell.
+mod moving;
+mod untouched;
+
 use crate::termination::{Termination, Undetermined};
 use manifactor_graph::Key;
 use serde::Serialize;
+
+pub use moving::Moving;
+pub use untouched::{InactiveFactor, Untouched};
 
 /// What a solve did and how it ended.
 #[derive(Debug, Clone, Serialize)]
@@ -17,10 +23,19 @@ pub struct Outcome {
     /// A direction that nothing but damping constrains.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub undetermined: Option<Undetermined>,
+    /// What the last step still moved, where iterations ran out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moving: Option<Moving>,
+    /// Free variables that no factor which takes part touches. A solve with such is never converged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub untouched: Option<Untouched>,
     /// Factors in the problem.
     pub factors: usize,
     /// Factors that are not defined at the final values, and take no part in the cost.
     pub inactive: usize,
+    /// The first ten of these.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inactive_factors: Vec<InactiveFactor>,
     /// Factors that a solver has found to be outliers, in the order of the graph.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rejected: Vec<Rejected>,

@@ -1,4 +1,7 @@
 //! A compiled graph: indexed, columnar, with the structure of its linear system.
+mod estimate;
+mod not_finite;
+
 use crate::compile::{self, CompileError};
 use crate::layout::Layout;
 use crate::linear::Method;
@@ -9,6 +12,8 @@ use manifactor_graph::column::Columns;
 use manifactor_graph::normal_equations::NormalEquations;
 use manifactor_graph::{Graph, Key, Values, VariableIndices};
 use std::time::Instant;
+
+pub use estimate::WeightError;
 
 /// A variable in a problem.
 #[derive(Debug, Clone)]
@@ -82,15 +87,6 @@ impl Problem {
         values
     }
 
-    /// Sets the estimate of the variables that `values` has, by key and type; the structure stays.
-    pub fn set_values(&mut self, values: &Values) {
-        for place in &self.variables {
-            if let Some(value) = values.variable(place.key.as_str()) {
-                self.columns.column_mut(place.column).set(place.index, value);
-            }
-        }
-    }
-
     /// Number of scalar unknowns.
     pub fn dim(&self) -> usize {
         self.layout.dim()
@@ -103,7 +99,12 @@ impl Problem {
 
     /// The variables of a factor.
     pub(crate) fn factor_keys(&self, factor: usize) -> Vec<Key> {
-        self.factor_variables[factor].iter().map(|v| self.variables[*v as usize].key.clone()).collect()
+        self.factor_variables
+            .get(factor)
+            .into_iter()
+            .flatten()
+            .map(|v| self.variables[*v as usize].key.clone())
+            .collect()
     }
 
     /// Scalar unknowns of a variable: `None` where there is no such variable, or it is held.
@@ -112,7 +113,8 @@ impl Problem {
         place.start.map(|s| s..s + place.tangent.len())
     }
 
-    /// Fills H and g at the estimate, and decides which factors take part.
+    /// Fills H and g at the estimate, and decides which factors take part. Where something is not finite, a factor is
+    /// named that it comes from.
     pub fn linearize(&mut self) -> Evaluation {
         let clock = Instant::now();
         self.h.fill(0.0);
@@ -124,6 +126,9 @@ impl Problem {
         }
         for &i in &self.held {
             self.h[self.layout.diagonal()[i]] = 1.0;
+        }
+        if !total.cost.is_finite() || !self.is_finite() {
+            total.not_finite = total.not_finite.or_else(|| Some(self.not_finite_factor()));
         }
         self.times.linearize += clock.elapsed().as_secs_f64();
         total
@@ -145,14 +150,6 @@ impl Problem {
     pub fn factor_costs(&self, costs: &mut Vec<f64>) {
         costs.resize(self.factors(), 0.0);
         self.batches.iter().for_each(|b| b.costs(&self.columns, costs));
-    }
-
-    /// Makes each factor count as often as its weight says, on top of its loss; those without a weight once.
-    pub fn set_weights(&mut self, weights: &[f64]) {
-        self.weights.clear();
-        self.weights.extend_from_slice(weights);
-        self.weights.resize(self.factors(), 1.0);
-        self.batches.iter_mut().for_each(|b| b.set_weights(&self.weights));
     }
 
     /// The weight of each factor, in the order of the graph; empty, where none was set.

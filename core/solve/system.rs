@@ -7,13 +7,22 @@ use std::time::Instant;
 impl Problem {
     /// Factorizes H + diag(added), and takes -g half the way to the step.
     pub(crate) fn factorize(&mut self, added: Option<&[f64]>) -> Result<(), NotPositiveDefinite> {
+        self.factorize_while(added, &mut || true)
+    }
+
+    /// The same; iterations end where `go_on` is false, with the step as far as it is.
+    pub(crate) fn factorize_while(
+        &mut self,
+        added: Option<&[f64]>,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), NotPositiveDefinite> {
         let clock = Instant::now();
         self.forward.clear();
         self.forward.extend(self.g.iter().map(|g| -g));
         let system = Damped { layout: &self.layout, h: &self.h, added };
         let done = match &mut self.method {
             Method::Cholesky(cholesky) => cholesky.factorize(&self.h, added, &mut self.forward),
-            Method::ConjugateGradients(iterative) => iterative.solve(system, &mut self.forward),
+            Method::ConjugateGradients(iterative) => iterative.solve(system, &mut self.forward, go_on),
             Method::Qr(qr) => {
                 qr.clear();
                 let (batches, columns) = (&self.batches, &self.columns);
@@ -33,20 +42,34 @@ impl Problem {
         done
     }
 
-    /// -(H + diag(added))⁻¹ g of the last factorization, into `step`.
-    pub(crate) fn newton_step(&mut self, step: &mut Vec<f64>) {
+    /// -(H + diag(added))⁻¹ g of the last factorization, into `step`, refined as often as is asked for, as long as each
+    /// correction is less than half of the one before (Higham, *Accuracy and Stability of Numerical Algorithms*,
+    /// chapter 12): what follows is rounding.
+    pub(crate) fn newton_step(&mut self, step: &mut Vec<f64>, go_on: &mut dyn FnMut() -> bool) {
         let clock = Instant::now();
         step.clear();
         step.extend_from_slice(&self.forward);
         if let Method::Cholesky(cholesky) = &mut self.method {
             cholesky.solve_upper(step);
+            let mut before = f64::INFINITY;
             for _ in 0..self.refinements {
+                if !go_on() {
+                    break;
+                }
                 // what is left of -g - (H + diag(added)) δ
                 let added = self.added.as_deref().filter(|added| !added.is_empty());
                 Damped { layout: &self.layout, h: &self.h, added }.multiply(step, &mut self.forward);
                 self.forward.iter_mut().zip(&self.g).for_each(|(r, g)| *r = -g - *r);
                 cholesky.solve(&mut self.forward);
+                let correction = norm(&self.forward);
+                if correction.is_nan() || 2.0 * correction > before {
+                    break;
+                }
                 step.iter_mut().zip(&self.forward).for_each(|(s, r)| *s += r);
+                if correction == 0.0 {
+                    break;
+                }
+                before = correction;
             }
         }
         self.times.solve += clock.elapsed().as_secs_f64();

@@ -1,4 +1,5 @@
 //! How a solve ended, and why.
+use crate::outcome::Untouched;
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::fmt;
@@ -20,9 +21,9 @@ pub enum Termination {
         /// Why there is no step.
         reason: Stall,
     },
-    /// Something is not constrained by any factor.
-    Indeterminate(Undetermined),
-    /// A residual that is not finite at the values to start from.
+    /// Some variables are touched by no factor that takes part; the others are at a minimum.
+    Indeterminate(Untouched),
+    /// A residual, a derivative or a step that is not finite: at the values, or wherever a step leads.
     NonFinite {
         /// The factor's place in the graph, from 0.
         factor: usize,
@@ -118,7 +119,8 @@ impl fmt::Display for Termination {
             Self::Indeterminate(u) => write!(f, "indeterminate: {u}"),
             Self::NonFinite { factor, keys } => {
                 let keys: Vec<_> = keys.iter().map(ToString::to_string).collect();
-                write!(f, "the residual of factor {factor} ({}) is not finite", keys.join(", "))
+                let keys = keys.join(", ");
+                write!(f, "not finite: the residual of factor {factor} ({keys}), or its derivative")
             }
             Self::Interrupted => f.write_str("interrupted"),
         }

@@ -43,13 +43,18 @@ fn sort<T: Scalar>(s: &mut Vector3<T>) {
 /// σ is relative: 0.2 is some 20 %. With `order = "sorted"`, semi-axes are compared by size, so that it
 /// does not matter how the object's axes are numbered; where two of them are equally long, the residual
 /// is continuous, its derivative jumps from the one axis to the other, the first as it stands being
-/// taken for the shorter. With `order = "as_given"`, x is compared with the first, and so on. Defined
+/// taken for the shorter. Where the two usual lengths are equal as well, the cost has no kink there. With `order = "as_given"`, x is compared with the first, and so on. Defined
 /// everywhere.
+///
+/// Two equal lengths, as of a bottle, pull the object towards one that is round about its third axis. How it is
+/// turned about that axis is then open, or hard to find: near the round shape this angle is like the angle of polar
+/// coordinates near their origin. Where boxes from two places alone say how the object is turned, solvers may take
+/// hundreds of steps, in which the cost hardly falls. `prior_quadric`, or boxes from more sides, hold that angle.
 ///
 /// ```toml
 /// [[factors]]
 /// keys   = ["q0"]
-/// factor = { type = "size_prior", semi_axes = [0.04, 0.04, 0.12] }
+/// factor = { type = "size_prior", semi_axes = [0.03, 0.04, 0.12] }
 /// noise  = { sigma = 0.3 }
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -75,7 +80,7 @@ register_factor!("size_prior", SizePrior);
 /// An object has the proportions of those of its class, at any size: r = log(s/s₀) less its mean.
 ///
 /// Three rows that add up to zero, so they constrain two directions and leave the size free. The order
-/// of the axes is as in `size_prior`, and so are its kinks. Defined everywhere.
+/// of the axes is as in `size_prior`, and so are its kinks and what equal lengths bring about. Defined everywhere.
 ///
 /// ```toml
 /// [[factors]]

@@ -69,7 +69,9 @@ impl<'a> Refiner<'a> {
         let mut best = (rank(&problem), start);
         for candidate in self.starts(&start) {
             values.insert(key.clone(), candidate);
-            problem.set_values(&values);
+            if problem.set_values(&values).is_err() {
+                continue;
+            }
             solver().solve(&mut problem, &mut Silent);
             let found = problem.values().get::<DualQuadric>(key).copied();
             if let (Ok(found), rank) = (found, rank(&problem))

@@ -182,7 +182,8 @@ impl SolveReport {
         let outcome = &estimate.solution.outcome;
         let Outcome { inactive, factors, .. } = *outcome;
         if !outcome.termination.is_converged() {
-            warnings.push(Warning::NotConverged { termination: outcome.termination.to_string() });
+            let moving = outcome.moving.as_ref().map_or_else(String::new, |moving| format!("; {moving}"));
+            warnings.push(Warning::NotConverged { termination: format!("{}{moving}", outcome.termination) });
         }
         if inactive > 0 {
             warnings.push(Warning::Inactive { inactive, factors });

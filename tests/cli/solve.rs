@@ -103,9 +103,24 @@ fn solver_and_settings_come_from_the_command_line() {
 fn what_nothing_constrains_is_named() {
     let folder = folder(&[("graph.toml", &GRAPH.replace("fixed = true", ""))]);
     let file = path(&folder, "graph.toml");
-    let json = manifactor(&format!("solve {file} --solver gauss_newton --json")).ended(1).json();
+    for solver in ["gauss_newton", "auto"] {
+        let json = manifactor(&format!("solve {file} --solver {solver} --json")).ended(0).json();
+        assert_eq!(json["termination"]["status"], "converged");
+        assert!(!json["undetermined"]["keys"].as_array().unwrap().is_empty());
+    }
+}
+
+#[test]
+fn what_no_factor_touches_is_not_converged() {
+    let loose = r#"
+[[variables]]
+key = "loose"
+value = { type = "se2", translation = [3.0, 1.0], angle = 0.4 }
+"#;
+    let folder = folder(&[("graph.toml", &format!("{GRAPH}{loose}"))]);
+    let json = manifactor(&format!("solve {} --json", path(&folder, "graph.toml"))).ended(1).json();
     assert_eq!(json["termination"]["status"], "indeterminate");
-    assert!(!json["termination"]["keys"].as_array().unwrap().is_empty());
+    assert_eq!(json["untouched"]["keys"][0], "loose");
 }
 
 #[test]

@@ -66,9 +66,15 @@ impl<F: Kernel> BatchOf<F> {
         work.evaluation = Evaluation { cost, inactive, left: 0, not_finite };
     }
 
+    /// The factor that makes the cost of a chunk not finite; the one that costs the most where only their sum is not.
     fn find_not_finite(&self, first: usize, active: &[bool], work: &Work<F>) -> Option<usize> {
-        let bad = |k: &usize| active[*k] && work.r[*k].as_slice().iter().any(|x| !x.is_finite());
-        let k = (0..active.len()).find(bad).unwrap_or(0);
+        let cost = |k: usize| {
+            let squared = work.r[k].as_slice().iter().map(|x| x * x).sum();
+            self.weigh(first + k, &mut [squared], &[true])
+        };
+        let active = (0..active.len()).filter(|k| active[*k]);
+        let bad = active.clone().find(|k| !cost(*k).is_finite());
+        let k = bad.or_else(|| active.max_by(|a, b| cost(*a).total_cmp(&cost(*b))))?;
         Some(self.entries[first + k] as usize)
     }
 

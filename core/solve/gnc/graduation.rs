@@ -2,7 +2,7 @@
 use super::Gnc;
 use crate::auto::starts;
 use crate::levenberg_marquardt::LevenbergMarquardt;
-use crate::observer::{Observer, Silent};
+use crate::observer::{Observer, Quiet};
 use crate::optimizer::{Optimizer, Stopping};
 use crate::outcome::{Outcome, Rejected};
 use crate::problem::Problem;
@@ -52,7 +52,7 @@ impl<'a> Graduation<'a> {
 
     pub(super) fn run(mut self) -> Outcome {
         let (clock, compile) = (Instant::now(), self.problem.times.compile);
-        self.problem.set_weights(&self.weights);
+        self.problem.weigh(&self.weights);
         let mut outcome = match self.graduate() {
             ControlFlow::Continue(()) => {
                 self.weigh(self.gnc.cost.last());
@@ -103,14 +103,14 @@ impl<'a> Graduation<'a> {
         for i in 0..self.weights.len() {
             self.weights[i] = if self.excess(i) <= Some(share) { 1.0 } else { 0.0 };
         }
-        self.problem.set_weights(&self.weights);
+        self.problem.weigh(&self.weights);
         if !self.begin_elsewhere(f64::INFINITY) {
             self.solve()?;
         }
         self.settle()?;
         let improved = self.robust_cost() < before * (1.0 - LESS);
         if !improved {
-            self.problem.set_values(&values);
+            self.problem.put(&values);
             self.problem.factor_costs(&mut self.costs);
         }
         ControlFlow::Continue(improved)
@@ -178,12 +178,13 @@ impl<'a> Graduation<'a> {
         let points = starts(&weighed, &here, self.problem);
         let best = points.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         if let Some(point) = &best {
-            self.problem.set_values(&point.values);
-            if self.inner.solve(self.problem, &mut Silent).final_cost < cost {
+            self.problem.put(&point.values);
+            let there = self.inner.solve(self.problem, &mut Quiet(self.observer));
+            if there.final_cost < cost && !matches!(there.termination, Termination::NonFinite { .. }) {
                 return true;
             }
         }
-        self.problem.set_values(&here);
+        self.problem.put(&here);
         false
     }
 
@@ -196,7 +197,7 @@ impl<'a> Graduation<'a> {
         for i in 0..self.weights.len() {
             self.weights[i] = self.excess(i).map_or(1.0, |u| self.gnc.cost.weight(mu, u));
         }
-        self.problem.set_weights(&self.weights);
+        self.problem.weigh(&self.weights);
     }
 
     fn robust_cost(&self) -> f64 {

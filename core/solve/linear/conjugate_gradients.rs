@@ -99,8 +99,13 @@ impl ConjugateGradients {
         }
     }
 
-    /// x ← (H + diag(added))⁻¹ x, as far as it gets.
-    pub(crate) fn solve(&mut self, system: Damped<'_>, x: &mut [f64]) -> Result<(), NotPositiveDefinite> {
+    /// x ← (H + diag(added))⁻¹ x, as far as it gets while `go_on` is true.
+    pub(crate) fn solve(
+        &mut self,
+        system: Damped<'_>,
+        x: &mut [f64],
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), NotPositiveDefinite> {
         self.precondition(system)?;
         let n = x.len();
         // the right-hand side of the complement: b_u − H_um H_mm⁻¹ b_m
@@ -113,7 +118,7 @@ impl ConjugateGradients {
             self.eliminated_part[i] = if self.is_eliminated[i] { x[i] } else { 0.0 };
         }
         let mut step = vec![0.0; n];
-        self.iterate(system, &mut step);
+        self.iterate(system, &mut step, go_on);
         // back to what was eliminated: H_mm⁻¹ (b_m − H_mu x_u)
         system.multiply(&step, &mut self.q);
         for i in 0..n {
@@ -127,13 +132,13 @@ impl ConjugateGradients {
     }
 
     /// x ← S⁻¹ r, from zero.
-    fn iterate(&mut self, system: Damped<'_>, x: &mut [f64]) {
+    fn iterate(&mut self, system: Damped<'_>, x: &mut [f64], go_on: &mut dyn FnMut() -> bool) {
         let mut rho = self.preconditioned_residual();
         let target = rho * self.settings.tolerance.powi(2);
         self.p.copy_from_slice(&self.z);
         for _ in 0..self.settings.max_iterations {
             // the right-hand side may be zero
-            if rho <= target {
+            if rho <= target || !go_on() {
                 break;
             }
             self.multiply_complement(system);

@@ -1,6 +1,8 @@
 //! Solvers on problems whose answer is known.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+mod checked;
 mod covariance;
+mod endings;
 mod gnc;
 mod solvers;
 mod toy;

@@ -98,7 +98,7 @@ fn a_weight_counts_like_so_many_factors() {
     let mut twice = graph.clone();
     twice.push(graph.factors()[3].clone());
     let mut weighed = Problem::compile(&graph, &values).unwrap();
-    weighed.set_weights(&[1.0, 1.0, 1.0, 2.0]);
+    weighed.set_weights(&[1.0, 1.0, 1.0, 2.0]).unwrap();
     let mut doubled = Problem::compile(&twice, &values).unwrap();
     let (a, b) = (weighed.linearize(), doubled.linearize());
     assert!((a.cost - b.cost).abs() < 1e-9 * b.cost && (weighed.cost().cost - b.cost).abs() < 1e-9 * b.cost);
@@ -108,7 +108,7 @@ fn a_weight_counts_like_so_many_factors() {
     let (a, b) = (weighed.marginals().unwrap(), doubled.marginals().unwrap());
     assert!((&a[0].1 - &b[0].1).norm() < 1e-12);
     // zero is to leave the factor out
-    weighed.set_weights(&[1.0, 1.0, 1.0, 0.0]);
+    weighed.set_weights(&[1.0, 1.0, 1.0, 0.0]).unwrap();
     let mut without = graph.clone();
     without.factors_mut().pop();
     let mut without = Problem::compile(&without, &values).unwrap();

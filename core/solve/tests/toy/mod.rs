@@ -1,10 +1,10 @@
 //! A manifold and factors that are simple enough to solve by hand.
 #![allow(dead_code, missing_docs, unreachable_pub)]
 use manifactor_graph::{
-    Dimension, Jet, JetOf, Lifted, List, Manifold, Many, Refs, Residual, Scalar, register_factor,
+    Dimension, Jacobians, Jet, JetOf, Lifted, List, Manifold, Many, Refs, Residual, Scalar, register_factor,
     register_manifold,
 };
-use nalgebra::{U1, U2, Vector1, Vector2};
+use nalgebra::{Matrix2, U1, U2, Vector1, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -137,3 +137,40 @@ impl Residual for Careless {
     }
 }
 register_factor!("toy_careless", Careless);
+
+/// r = √x − less, whose derivative is not finite at 0.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub struct Root {
+    pub less: f64,
+}
+impl Residual for Root {
+    type Variables = (Plane,);
+    type Dim = U1;
+    fn residual<T: Scalar>(&self, (p,): Lifted<Self::Variables, T>) -> Vector1<T> {
+        Vector1::new(p.x.sqrt() - T::from(self.less))
+    }
+}
+register_factor!("toy_root", Root);
+
+/// r = x − at, with a Jacobian of the wrong sign.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub struct WrongSign {
+    pub at: f64,
+}
+impl Residual for WrongSign {
+    type Variables = (Plane,);
+    type Dim = U2;
+    fn residual<T: Scalar>(&self, (p,): Lifted<Self::Variables, T>) -> Vector2<T> {
+        Vector2::new(p.x - T::from(self.at), p.y)
+    }
+    fn linearize(
+        &self,
+        (p,): Refs<'_, Self::Variables>,
+        _: &[bool],
+        (jacobian,): &mut Jacobians<Self>,
+    ) -> Vector2<f64> {
+        *jacobian = Matrix2::new(-1.0, 0.0, 0.0, 1.0);
+        Vector2::new(p.x - self.at, p.y)
+    }
+}
+register_factor!("toy_wrong_sign", WrongSign);

@@ -1,0 +1,91 @@
+//! Values and weights that are put into a compiled problem, checked.
+use crate::problem::Problem;
+use manifactor_graph::{ValueError, Values};
+
+/// Why weights of factors are refused. The problem keeps those that it had.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WeightError {
+    /// Too many or too few of them.
+    #[error("expected a weight for each of the {factors} factors, in the order of the graph, got {weights}")]
+    Count {
+        /// Weights that were given.
+        weights: usize,
+        /// Factors in the problem.
+        factors: usize,
+    },
+    /// A weight that no factor can have.
+    #[error("factor {factor}: expected a finite weight, 0 or more, got {weight}")]
+    Domain {
+        /// The factor's place in the graph, from 0.
+        factor: usize,
+        /// What was given.
+        weight: f64,
+    },
+}
+
+impl Problem {
+    /// Sets the estimate of the variables that `values` has; the others keep theirs, and the structure stays.
+    ///
+    /// # Errors
+    /// Where `values` has a key that the problem does not know, another type, or a value that is not finite. The
+    /// estimate is then as it was.
+    pub fn set_values(&mut self, values: &Values) -> Result<(), ValueError> {
+        let mut known = 0;
+        for place in &self.variables {
+            let Some(value) = values.variable(place.key.as_str()) else { continue };
+            known += 1;
+            let (erased, key) = (value.erased(), place.key.clone());
+            if self.columns.position(erased.type_id()) != Some(place.column) {
+                let before = self.columns.column(place.column).get(place.index);
+                let expected = before.map_or("another type", |value| value.typetag_name());
+                return Err(ValueError::WrongType { key, expected, found: value.typetag_name() });
+            }
+            if !erased.is_finite() {
+                return Err(ValueError::NotFinite { key });
+            }
+        }
+        if known < values.len() {
+            let is_unknown = |key: &str| self.variables.iter().all(|place| place.key.as_str() != key);
+            if let Some((key, _)) = values.iter().find(|(key, _)| is_unknown(key.as_str())) {
+                return Err(ValueError::Missing { key: key.clone() });
+            }
+        }
+        self.put(values);
+        Ok(())
+    }
+
+    /// Sets the estimate to values that are known to fit.
+    pub(crate) fn put(&mut self, values: &Values) {
+        for place in &self.variables {
+            if let Some(value) = values.variable(place.key.as_str()) {
+                self.columns.column_mut(place.column).set(place.index, value);
+            }
+        }
+    }
+
+    /// Makes each factor count as often as its weight says, on top of its loss.
+    ///
+    /// # Errors
+    /// Where there is not one weight for each factor, or one is negative or not finite.
+    pub fn set_weights(&mut self, weights: &[f64]) -> Result<(), WeightError> {
+        let factors = self.factors();
+        if weights.len() != factors {
+            return Err(WeightError::Count { weights: weights.len(), factors });
+        }
+        let bad = |weight: &f64| !(*weight >= 0.0 && weight.is_finite());
+        if let Some(factor) = weights.iter().position(bad) {
+            return Err(WeightError::Domain { factor, weight: weights[factor] });
+        }
+        self.weigh(weights);
+        Ok(())
+    }
+
+    /// Sets weights that are known to fit; a factor without one counts once.
+    pub(crate) fn weigh(&mut self, weights: &[f64]) {
+        self.weights.clear();
+        self.weights.extend_from_slice(weights);
+        self.weights.resize(self.factors(), 1.0);
+        self.batches.iter_mut().for_each(|b| b.set_weights(&self.weights));
+    }
+}
