@@ -86,8 +86,11 @@ fn iterate(session: &mut Session<'_>, best: &mut Best) -> Termination {
         }
         rises = if session.trial.cost > session.at.cost && !session.settled(&step) { rises + 1 } else { 0 };
         session.record(&step, true);
-        if let Some(termination) = session.take(&step) {
-            return termination;
+        // a step that was halved is small for another reason
+        let is_cut = halvings > 0 && !session.is_small(step.predicted);
+        match session.take(&step) {
+            Some(termination) if !is_cut => return termination,
+            _ => {}
         }
         best.update(session);
         if rises >= RISES {

@@ -67,7 +67,7 @@ impl Default for LevenbergMarquardt {
 const GAIN: f64 = 1e-4;
 /// Damping that changes a step by next to nothing: one that is refused with less calls for more than twice as much.
 const NEGLIGIBLE: f64 = 1e-3;
-/// Damping above which a small step is no sign of a minimum, as a share of the diagonal.
+/// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal.
 const TRUSTED: f64 = 1.0;
 /// Damping up to which one small step is sign enough; above, it takes two.
 const LIGHT: f64 = 1e-2;

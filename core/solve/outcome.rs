@@ -47,7 +47,11 @@ pub struct Outcome {
 
 impl Outcome {
     /// The account of two solves of one problem, the first and the `next`, whose end counts if it is `better`.
-    pub(crate) fn then(self, next: Self, better: bool) -> Self {
+    pub(crate) fn then(self, mut next: Self, better: bool) -> Self {
+        // one that takes no step does not look for what is open: that is as the first has left it
+        if next.iterations == 0 {
+            next.undetermined = next.undetermined.or_else(|| self.undetermined.clone());
+        }
         let (initial_cost, iterations) = (self.initial_cost, self.iterations + next.iterations);
         let times = self.times.and(next.times);
         let history = [&self.history[..], &next.history].concat();

@@ -178,6 +178,8 @@ fn graphs_that_cannot_be_solved() {
             "{ type = \"gauss_newton\", stop = { max_iterations = -1 } }",
         ),
         solver("no iterations", "{ type = \"gauss_newton\", stop = { max_iterations = 0 } }"),
+        solver("tolerance below zero", "{ type = \"auto\", stop = { relative_cost = -1e-9 } }"),
+        solver("tolerance not a number", "{ type = \"auto\", stop = { gradient = nan } }"),
         solver("negative damping", "{ type = \"levenberg_marquardt\", initial_lambda = -1.0 }"),
         solver("damping that does not fall", "{ type = \"levenberg_marquardt\", decrease = 0.5 }"),
         solver("diagonal upside down", "{ type = \"levenberg_marquardt\", diagonal = [2.0, 1.0] }"),

@@ -174,3 +174,16 @@ impl Residual for WrongSign {
     }
 }
 register_factor!("toy_wrong_sign", WrongSign);
+
+/// r = x + 1, and not a number from 0 on downwards, with no word about it.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub struct Cliff {}
+impl Residual for Cliff {
+    type Variables = (Plane,);
+    type Dim = U1;
+    fn residual<T: Scalar>(&self, (p,): Lifted<Self::Variables, T>) -> Vector1<T> {
+        let beyond = p.x <= T::zero();
+        Vector1::new(if beyond { T::from(f64::NAN) } else { p.x + T::one() })
+    }
+}
+register_factor!("toy_cliff", Cliff);
