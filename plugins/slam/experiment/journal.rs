@@ -43,12 +43,15 @@ pub enum JournalError {
     },
 }
 
+/// By labels and fingerprint of the trial.
+type Records = HashMap<(Vec<String>, String), Record>;
+
 /// A log that is open for writing, in a folder that this process alone writes into.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
     file: File,
-    records: HashMap<(Vec<String>, String), Record>,
+    records: Records,
     /// Held as long as the log is open.
     _folder: OutputFolder,
 }
@@ -96,9 +99,9 @@ impl Journal {
 }
 
 /// The records of a log, and how many of its bytes are whole lines.
-fn read(bytes: &[u8], path: &Path) -> Result<(HashMap<(Vec<String>, String), Record>, usize), JournalError> {
+fn read(bytes: &[u8], path: &Path) -> Result<(Records, usize), JournalError> {
     let mistake = |line: usize, message: String| JournalError::Line { path: path.to_owned(), line, message };
-    let mut records = HashMap::new();
+    let mut records = Records::new();
     let mut whole = 0;
     for (i, line) in bytes.split_inclusive(|byte| *byte == b'\n').enumerate() {
         let Some(line) = line.strip_suffix(b"\n") else {
