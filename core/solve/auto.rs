@@ -1,29 +1,31 @@
 //! The default: what needs no tuning.
+mod search;
+mod watch;
+
+use crate::Solution;
 use crate::compile::CompileError;
 use crate::gauss_newton::GaussNewton;
 use crate::levenberg_marquardt::LevenbergMarquardt;
 use crate::linear_solver::LinearSolver;
 use crate::observer::Observer;
-use crate::optimizer::{Optimizer, SettingError, Stopping};
-use crate::outcome::{IterationRecord, Outcome};
+use crate::optimizer::{Optimizer, Session, SettingError, Stopping};
+use crate::outcome::Outcome;
 use crate::problem::Problem;
-use crate::start::{Given, Start};
-use crate::{Solution, Termination};
-use manifactor_graph::catalogue::{self, Kind};
+use crate::termination::Termination;
 use manifactor_graph::{Graph, Values, register};
-use manifactor_tree::Node;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::cmp::Ordering;
-use std::ops::ControlFlow;
-use std::time::Instant;
+use watch::{Pause, Watch};
+
+pub(crate) use search::starts;
 
 /// Gauss-Newton steps that are damped once one fails, and another start where the first leads nowhere.
 ///
-/// Begins at the given values. Where one of the first steps has to be refused, or the minimum does not fit
-/// the stated noise (2F is more than 1.5 times the residual's degrees of freedom), every registered start that
-/// applies to the graph is tried, those of the lowest cost first, until one leads to a minimum that fits. The
-/// best minimum found is the estimate. Where no start applies, it is Levenberg-Marquardt with next to no damping.
+/// Begins at the given values. Where a full step raises the cost and the next is not much shorter, where the cost has not
+/// settled after ten steps, or where a registered start doubts the minimum, every registered start that applies to the
+/// graph is tried, those of the lowest cost first, until one leads to a minimum. The best minimum found is the estimate.
+/// None of this depends on the unit of the noise: covariances that are too small by a factor change nothing. Where no
+/// start applies, it is Levenberg-Marquardt with next to no damping.
 ///
 /// ```toml
 /// solver = { type = "auto", stop = { relative_cost = 1e-6 } }
@@ -39,15 +41,14 @@ pub struct Auto {
 
 /// Damping of the first step, as a share of the diagonal: none to speak of.
 const DAMPING: f64 = 1e-10;
-/// The same where next to none has been tried.
-const REFUSED: f64 = 1e-5;
-/// Bounds of the diagonal that is damped by: the same for all directions but weak ones. By the diagonal itself, steps run
-/// off along what little constrains, as the size of an object that is seen from one side, and out of factors' domains.
-const DIAGONAL: [f64; 2] = [1e-6, 1.0];
-/// A step that is refused by this iteration is a sign of a bad start.
-const EARLY: usize = 3;
-/// 2F by degrees of freedom: about 1 where the noise is as stated, and the minimum the right one.
-const MISFIT: f64 = 1.5;
+/// All directions are damped alike, but those that the factors leave a standard deviation of more than this, in metres or
+/// radians, the noise scaled to fit the residuals. By the diagonal of H itself, steps run off along what little constrains,
+/// as the size of an object that is seen from one side, and out of factors' domains.
+const WEAK: f64 = 0.1;
+/// No direction is damped by less than this share of the others.
+const LEAST: f64 = 1e-6;
+/// Nor by less than this share of the largest entry of H's diagonal, however well the estimate fits.
+const FLOOR: f64 = 1e-12;
 
 #[typetag::serialize(name = "auto")]
 impl Optimizer for Auto {
@@ -61,7 +62,7 @@ impl Optimizer for Auto {
     }
 
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        self.damped(DAMPING).solve(problem, observer)
+        self.damped(DAMPING, problem, observer)
     }
 
     fn solve_graph(
@@ -71,128 +72,64 @@ impl Optimizer for Auto {
         observer: &mut dyn Observer,
     ) -> Result<Solution, CompileError> {
         let mut problem = Problem::compile_for(graph, values, &self.linear)?;
-        let mut watch = Watch { observer, until: EARLY, refused: false, stopped: false };
+        let mut watch = Watch::new(observer);
         let mut outcome = self.solve(&mut problem, &mut watch);
-        let unfinished = watch.refused && !watch.stopped;
-        if !unfinished && !leads_nowhere(graph, &problem, &outcome) {
-            return Ok(Solution::of(&problem, outcome));
+        if let (Some(Pause::Rise { step }), Termination::Interrupted) = (watch.pause, &outcome.termination)
+            && !watch.stopped
+        {
+            outcome = self.go_on(step, &mut problem, &mut watch, outcome);
         }
-        let clock = Instant::now();
-        let mut best = problem.values();
-        let (inactive, cost) = (outcome.inactive, outcome.final_cost);
-        let here = Point { inactive, cost, values: best.clone(), refused: true };
-        // of two alike, where it is already
-        let mut points = Vec::from_iter(unfinished.then_some(here));
-        points.extend(starts(graph, values, &mut problem));
-        points.sort_by(|a, b| {
-            (a.inactive, a.cost).partial_cmp(&(b.inactive, b.cost)).unwrap_or(Ordering::Equal)
-        });
-        let looking = clock.elapsed().as_secs_f64();
-        (watch.until, outcome.times.other) = (0, outcome.times.other + looking);
-        outcome.times.total += looking;
-        for point in points {
-            tracing::debug!(cost = point.cost, inactive = point.inactive, "another start");
-            problem.put(&point.values);
-            let next = match point.refused {
-                true => self.damped(REFUSED).solve(&mut problem, &mut watch),
-                false => self.full_steps_first(&mut problem, &mut watch),
-            };
-            let better = (next.inactive, next.final_cost) <= (outcome.inactive, outcome.final_cost);
-            if better {
-                best = problem.values();
+        let is_over = match outcome.termination {
+            _ if watch.stopped => true,
+            Termination::Converged { .. } | Termination::Indeterminate(_) => {
+                !search::is_doubted(graph, &problem)
             }
-            outcome = outcome.then(next, better);
-            if watch.stopped || !leads_nowhere(graph, &problem, &outcome) {
-                break;
-            }
+            // not where the solve began, but where its steps led
+            Termination::NonFinite { .. } => !outcome.final_cost.is_finite(),
+            Termination::Interrupted | Termination::MaxIterations | Termination::Stalled { .. } => false,
+            _ => true,
+        };
+        if !is_over {
+            outcome = self.search((graph, values), &mut problem, &mut watch, outcome);
         }
-        problem.put(&best);
-        problem.linearize();
-        Ok(Solution::of(&problem, outcome))
+        Ok(Solution::of(problem, outcome))
     }
 }
 register!(dyn Optimizer, "auto", Auto);
 
 impl Auto {
-    /// Damped steps, the first by so much.
-    fn damped(&self, initial_lambda: f64) -> LevenbergMarquardt {
-        let stop = self.stop.clone();
-        LevenbergMarquardt { initial_lambda, diagonal: DIAGONAL, stop, ..Default::default() }
+    /// Damped steps, the first by so much. The damping follows the noise: (H + λ D) δ = -g is the same for any unit of it.
+    fn damped(&self, initial_lambda: f64, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        let rows: usize = problem.factor_types.iter().map(|(_, rows)| rows).sum();
+        let bounds = |session: &Session<'_>| {
+            let variance = 2.0 * session.at.cost / rows.max(1) as f64;
+            let diagonal = session.problem.layout.diagonal().iter();
+            let largest = diagonal.fold(0.0, |most, i| f64::max(most, session.problem.h[*i]));
+            let most = (variance / WEAK.powi(2)).max(FLOOR * largest);
+            [LEAST * most, most]
+        };
+        let damped =
+            LevenbergMarquardt { initial_lambda, stop: self.stop.clone(), ..LevenbergMarquardt::default() };
+        damped.solve_within(&bounds, problem, observer)
     }
 
-    /// From a good start full steps are there in a few, where damping creeps along narrow valleys.
-    fn full_steps_first(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        let outcome =
-            GaussNewton { stop: self.stop.clone(), linear: self.linear.clone() }.solve(problem, observer);
-        match outcome.termination {
-            Termination::Stalled { .. } => outcome.then(self.solve(problem, observer), true),
-            _ => outcome,
+    fn full_steps(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        GaussNewton { stop: self.stop.clone(), linear: self.linear.clone() }.solve(problem, observer)
+    }
+
+    /// Takes a step of this length that has raised the cost, and goes on by full ones, if the next is much shorter: weights
+    /// that span many digits make the cost of a good step rise. Back to before it, where that leads to no minimum.
+    fn go_on(&self, step: f64, problem: &mut Problem, watch: &mut Watch<'_>, outcome: Outcome) -> Outcome {
+        let (before, pause) = (problem.columns.clone(), watch.pause);
+        problem.accept();
+        watch.expect_shorter_than(step);
+        let next = self.full_steps(problem, watch);
+        let better = search::is_minimum(&next.termination);
+        if !better {
+            watch.pause = pause;
+            problem.columns = before;
+            problem.linearize();
         }
-    }
-}
-
-/// Values to begin with.
-pub(crate) struct Point {
-    pub inactive: usize,
-    pub cost: f64,
-    pub values: Values,
-    /// A step from here has been refused.
-    pub refused: bool,
-}
-
-/// What the registered starts have to offer.
-pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> Vec<Point> {
-    let others = catalogue::entries(<dyn Start>::NAME).into_iter().filter(|e| e.name != Given::NAME);
-    others
-        .filter_map(|entry| {
-            let start = entry.read::<dyn Start>(&Node::empty_table()).ok()?;
-            // one that does not apply has nothing to offer
-            let values = start.start(graph, values).ok()?;
-            problem.set_values(&values).ok()?;
-            let at = problem.linearize();
-            at.not_finite.is_none().then_some(Point {
-                inactive: at.inactive,
-                cost: at.cost,
-                values,
-                refused: false,
-            })
-        })
-        .collect()
-}
-
-/// Whether another start may do better: no minimum, or one that does not fit the stated noise.
-fn leads_nowhere(graph: &Graph, problem: &Problem, outcome: &Outcome) -> bool {
-    match outcome.termination {
-        Termination::Converged { .. } | Termination::Indeterminate(_) => {
-            let rows = graph.factors().iter().map(|f| f.factor.erased().signature().rows.unwrap_or(0));
-            let freedom = rows.sum::<usize>().saturating_sub(problem.dim());
-            2.0 * outcome.final_cost > MISFIT * freedom as f64
-        }
-        Termination::MaxIterations | Termination::Stalled { .. } => true,
-        // not where the solve began, but where its steps led
-        Termination::NonFinite { .. } => outcome.final_cost.is_finite(),
-        _ => false,
-    }
-}
-
-/// Ends a solve where a step is refused early on, or where who watches asks for it.
-struct Watch<'a> {
-    observer: &'a mut dyn Observer,
-    /// Iterations that count as early.
-    until: usize,
-    refused: bool,
-    stopped: bool,
-}
-
-impl Observer for Watch<'_> {
-    fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
-        self.stopped |= self.observer.iteration(record).is_break();
-        let refused = !record.accepted && record.iteration <= self.until;
-        self.refused |= refused;
-        if refused || self.stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    }
-    fn poll(&mut self) -> ControlFlow<()> {
-        self.stopped |= self.observer.poll().is_break();
-        if self.stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        outcome.then(next, better)
     }
 }

@@ -8,6 +8,7 @@ use crate::termination::Undetermined;
 use manifactor_graph::{Graph, Key};
 use nalgebra::DMatrix;
 use serde::{Serialize, Serializer};
+use std::collections::HashSet;
 
 /// Why there are no covariances.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -61,13 +62,22 @@ impl Solution {
         if let Some(unknown) = keys.iter().find(|key| !self.values.contains(key)) {
             return Err(CovarianceError::Unknown((*unknown).to_owned()));
         }
-        let all = self.problem(graph)?.marginals()?;
-        let wanted = all.into_iter().filter(|(key, _)| keys.is_empty() || keys.contains(&key.as_str()));
+        let keys: HashSet<&str> = keys.iter().copied().collect();
+        let all = self.ask(graph, Problem::marginals)??;
+        let wanted = all.into_iter().filter(|(key, _)| keys.is_empty() || keys.contains(key.as_str()));
         let marginal = |(key, covariance): (Key, _)| {
             let tangent = self.values.variable(key.as_str())?.erased().tangent();
             Some(Marginal { key, tangent, covariance })
         };
         Ok(wanted.filter_map(marginal).collect())
+    }
+
+    /// The leverage of each row of each factor; see [`Problem::leverages`].
+    ///
+    /// # Errors
+    /// Those of [`Problem::leverages`], and where `graph` is not the one that was solved.
+    pub fn leverages(&self, graph: &Graph) -> Result<Vec<Vec<f64>>, CovarianceError> {
+        self.ask(graph, Problem::leverages)?
     }
 }
 

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 /// Factors in the table of the worst.
 const WORST: usize = 10;
-/// Variables up to which the linear system is looked at: it takes another compilation and some factorizations.
+/// Variables up to which the linear system is looked at: it takes some factorizations.
 const LARGE: usize = 50_000;
 
 /// What is worth a look after a solve.
@@ -53,29 +53,18 @@ impl Problem {
 }
 
 impl Solution {
-    /// The problem at the estimate, with the weights that the solver has left: for covariances, and to look at.
-    ///
-    /// # Errors
-    /// Where `graph` is not the one that was solved.
-    pub fn problem(&self, graph: &Graph) -> Result<Problem, CompileError> {
-        let mut problem = Problem::compile(graph, &self.values)?;
-        if !self.weights.is_empty() {
-            problem.weigh(&self.weights);
-        }
-        Ok(problem)
-    }
-
     /// Looks for what is wrong: the factors that fit worst, and a linear system that is close to open.
     ///
     /// # Errors
     /// Where `graph` is not the one that was solved.
     pub fn diagnose(&self, graph: &Graph) -> Result<Diagnosis, CompileError> {
-        let (mut undetermined, mut condition) = (None, None);
-        if self.values.len() <= LARGE {
-            let mut problem = self.problem(graph)?;
-            undetermined = problem.undetermined();
-            condition = if undetermined.is_none() { problem.condition() } else { None };
-        }
+        let look = |problem: &mut Problem| {
+            let undetermined = problem.undetermined();
+            let condition = if undetermined.is_none() { problem.condition() } else { None };
+            (undetermined, condition)
+        };
+        let is_small = self.values.len() <= LARGE;
+        let (undetermined, condition) = if is_small { self.ask(graph, look)? } else { (None, None) };
         let mut costly: Vec<_> = self.factors.iter().filter(|f| f.cost > 0.0).collect();
         costly.sort_by(|a, b| b.cost.total_cmp(&a.cost));
         let row = |(state, entry): (&FactorState, &FactorEntry)| FactorCost {

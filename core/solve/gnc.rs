@@ -112,7 +112,7 @@ impl Optimizer for Gnc {
         }
         let mut problem = Problem::compile_for(graph, values, &self.linear())?;
         let outcome = Graduation::new(self, &mut problem, Some(graph), observer).run();
-        Ok(Solution::of(&problem, outcome))
+        Ok(Solution::of(problem, outcome))
     }
 }
 register!(dyn Optimizer, "gnc", Gnc);

@@ -92,12 +92,28 @@ impl Optimizer for LevenbergMarquardt {
     }
 
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        self.solve_within(&|_| self.diagonal, problem, observer)
+    }
+}
+register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
+
+/// The least and the largest entry of the diagonal that is used for damping, at a linearization.
+pub(crate) type Bounds<'a> = &'a dyn Fn(&Session<'_>) -> [f64; 2];
+
+impl LevenbergMarquardt {
+    /// As `solve`, with bounds of the diagonal that may follow the cost.
+    pub(crate) fn solve_within(
+        &self,
+        bounds: Bounds<'_>,
+        problem: &mut Problem,
+        observer: &mut dyn Observer,
+    ) -> Outcome {
         let mut session = match Session::begin(problem, &self.stop, observer) {
             Ok(session) => session,
             Err(outcome) => return *outcome,
         };
         let mut lambda = self.initial_lambda;
-        let termination = self.iterate(&mut session, &mut lambda);
+        let termination = self.iterate(&mut session, &mut lambda, bounds);
         // damping hides what nothing else holds; by now there is little left of it
         let open = match termination {
             Termination::Interrupted | Termination::NonFinite { .. } => None,
@@ -106,11 +122,8 @@ impl Optimizer for LevenbergMarquardt {
         };
         session.end(termination, open)
     }
-}
-register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
 
-impl LevenbergMarquardt {
-    fn iterate(&self, session: &mut Session<'_>, lambda: &mut f64) -> Termination {
+    fn iterate(&self, session: &mut Session<'_>, lambda: &mut f64, bounds: Bounds<'_>) -> Termination {
         let (mut rise, mut small_before) = (2.0, false);
         let (mut delta, mut added) = (vec![], vec![]);
         'linearized: loop {
@@ -120,7 +133,7 @@ impl LevenbergMarquardt {
             session.iterations += 1;
             loop {
                 session.problem.diagonal(&mut added);
-                let [least, most] = self.diagonal;
+                let [least, most] = bounds(session);
                 added.iter_mut().for_each(|d| *d = *lambda * d.max(least).min(most));
                 if session.factorize(Some(&added)).is_ok() && session.newton_step(&mut delta) {
                     let damping = delta.iter().zip(&added).map(|(d, a)| a * d * d).sum::<f64>();

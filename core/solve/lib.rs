@@ -13,6 +13,7 @@ mod diagnosis;
 mod dogleg;
 mod gauss_newton;
 mod gnc;
+mod kept;
 mod layout;
 mod levenberg_marquardt;
 mod leverage;
@@ -59,6 +60,8 @@ pub struct Solution {
     pub factors: Vec<FactorState>,
     /// How often the solver has let each factor count, on top of its loss; empty, where it does not weigh them.
     pub weights: Vec<f64>,
+    /// What was solved, for questions about the estimate.
+    problem: kept::Kept,
 }
 
 /// Compiles and solves.
@@ -82,8 +85,8 @@ pub fn solve(
 
 impl Solution {
     /// The problem's estimate, at the end of a solve.
-    fn of(problem: &Problem, outcome: Outcome) -> Self {
-        let weights = problem.weights().to_vec();
-        Self { values: problem.values(), factors: problem.inspect(), outcome, weights }
+    fn of(problem: Problem, outcome: Outcome) -> Self {
+        let (values, factors, weights) = (problem.values(), problem.inspect(), problem.weights().to_vec());
+        Self { values, outcome, factors, weights, problem: kept::Kept::new(problem) }
     }
 }

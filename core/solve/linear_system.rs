@@ -6,6 +6,7 @@ use crate::linear::{Cholesky, ConjugateGradients, Method, Qr, memory};
 use crate::linear_solver::{self as chosen, LinearSolver, Ordering, Preconditioner};
 use crate::problem::Place;
 use manifactor_graph::{Key, Values};
+use std::collections::HashMap;
 
 /// Systems of at most so many unknowns are factorized as one dense matrix.
 const DENSE: usize = 24;
@@ -46,15 +47,13 @@ impl<'a> Blocks<'a> {
     }
 
     fn listed(&self, keys: &[Key]) -> Result<Vec<usize>, CompileError> {
-        let mut seen = vec![false; self.keys.len()];
+        // by key: its block, until it is listed
+        let mut blocks: HashMap<&Key, Option<usize>> =
+            self.keys.iter().enumerate().map(|(block, key)| (*key, Some(block))).collect();
         let place = |key: &Key| {
             let error = |what: &str| CompileError::LinearSolver(format!("ordering: `{key}` {what}"));
-            let block = self.keys.iter().position(|k| *k == key);
-            let block = block.ok_or_else(|| error("is no variable to solve for"))?;
-            if std::mem::replace(&mut seen[block], true) {
-                return Err(error("is listed twice"));
-            }
-            Ok(block)
+            let block = blocks.get_mut(key).ok_or_else(|| error("is no variable to solve for"))?;
+            block.take().ok_or_else(|| error("is listed twice"))
         };
         keys.iter().map(place).collect()
     }
@@ -163,4 +162,24 @@ fn largest_uncoupled(blocks: &Blocks<'_>, layout: &Layout) -> Vec<bool> {
     let kinds = (0..blocks.names.len()).filter(|_| several).map(of_kind);
     let uncoupled = kinds.filter(|marked| coupled(layout, marked).is_none());
     uncoupled.max_by_key(|marked| unknowns(marked)).unwrap_or_else(|| vec![false; blocks.kinds.len()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_list_of_keys_is_looked_up_key_by_key() {
+        let keys: Vec<Key> = (0..100_000).map(|i| Key::indexed("x", i)).collect();
+        let blocks = Blocks { keys: keys.iter().collect(), kinds: vec![], names: vec![] };
+        let backwards: Vec<Key> = keys.iter().rev().cloned().collect();
+        let expected: Vec<usize> = (0..keys.len()).rev().collect();
+        assert_eq!(blocks.listed(&backwards).unwrap(), expected);
+        for (wrong, what) in [("y", "is no variable to solve for"), ("x7", "is listed twice")] {
+            let mut listed = backwards.clone();
+            listed.push(wrong.into());
+            let error = blocks.listed(&listed).unwrap_err().to_string();
+            assert!(error.contains(wrong) && error.contains(what), "{error}");
+        }
+    }
 }

@@ -55,7 +55,7 @@ pub trait Optimizer: Debug + Send + Sync {
     ) -> Result<Solution, CompileError> {
         let mut problem = Problem::compile_for(graph, values, &self.linear())?;
         let outcome = self.solve(&mut problem, observer);
-        Ok(Solution::of(&problem, outcome))
+        Ok(Solution::of(problem, outcome))
     }
 }
 

@@ -1,5 +1,6 @@
 //! Initial values from relative measurements: along spanning trees, and by chordal relaxation.
 mod chordal;
+mod loops;
 pub(crate) mod network;
 pub(crate) mod parts;
 pub(crate) mod pose;

@@ -146,10 +146,13 @@ impl Estimate {
                 || components.last().is_some_and(|before| found.change(before) < variance.tolerance);
             found.apply(&mut estimate.mapping, variance, settings.detections.loss.as_ref())?;
             components.push(found);
-            let Self { sequence, mapping, solution, .. } = estimate;
+            let Self { sequence, mapping, mut solution, .. } = estimate;
+            let values = std::mem::take(&mut solution.values);
+            // what was compiled for it gives its memory back before the next solve
+            drop(solution);
             // near enough to go on from, until the last
             let refinements = if settled { most } else { 0 };
-            estimate = Self::solve(sequence, mapping, solution.values, refinements, settings, observer)?;
+            estimate = Self::solve(sequence, mapping, values, refinements, settings, observer)?;
             estimate.components.clone_from(&components);
         }
         Ok(estimate)
@@ -182,7 +185,9 @@ impl Estimate {
             let mut joint = rounds.solve(&mapping.graph, &values, settings, observer)?;
             let settled = rounds.settled(&joint.outcome) || rounds.joint >= most;
             if let Some(held) = held.as_ref().filter(|_| !settled) {
-                values = rounds.solve(held, &joint.values, settings, observer)?.values;
+                let from = std::mem::take(&mut joint.values);
+                drop(joint);
+                values = rounds.solve(held, &from, settings, observer)?.values;
                 continue;
             }
             let refinement_seconds = rounds.refinement_seconds;

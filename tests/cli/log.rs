@@ -33,3 +33,11 @@ fn objects_that_are_not_mapped_are_logged() {
     let ran = manifactor(&format!("run examples/desk/desk.toml --out {out} {set} -v"));
     assert!(ran.stderr.contains("not mapped") && ran.stderr.contains("at least 1000"), "{}", ran.stderr);
 }
+
+#[test]
+fn a_solve_compiles_its_graph_once() {
+    let folder = folder(&[("a.g2o", GRAPH)]);
+    let said =
+        manifactor(&format!("solve {} --covariances --json -vv", path(&folder, "a.g2o"))).ended(0).stderr;
+    assert_eq!(said.matches("compiled").count(), 1, "{said}");
+}

@@ -29,6 +29,9 @@ pub(crate) enum Order {
 const WORTH_TRIES: f64 = 2e4;
 /// The same of nested dissection, which takes about 6 µs a block and pays on large graphs in space.
 const WORTH_DISSECTION: f64 = 1e6;
+/// The same where a factor has so many times the entries of its matrix: no order has fewer than the matrix, and one that
+/// fills nothing in takes the fewest operations. A dense graph is such a one, whatever the order.
+const WORTH_FILL: f64 = 1.1;
 
 impl Order {
     /// Blocks in an order of elimination, subtrees together; `None` where there is no memory for it.
@@ -53,7 +56,7 @@ impl Order {
 /// Minimum degree depends on the order that breaks its ties: tried are the given one, and breadth first from either end.
 fn best(graph: &Adjacency) -> Option<Elimination> {
     let mut best = Elimination::new(graph, &minimum_degree::minimum_degree(graph)?);
-    let operations = best.flops / graph.len() as f64;
+    let operations = best.worth();
     let mut consider = |order: Vec<usize>| {
         let other = Elimination::new(graph, &order);
         if other.flops < best.flops {
@@ -96,6 +99,8 @@ pub(crate) struct Elimination {
     pub rows: Vec<u32>,
     /// Multiplications and additions of a factorization, without the zeros of merged supernodes.
     pub flops: f64,
+    /// Entries of the factor, by those of the matrix.
+    pub fill: f64,
 }
 
 impl Elimination {
@@ -105,11 +110,23 @@ impl Elimination {
         let tree = Tree::new(draft.pattern(), |rank| dim(draft.order[rank]));
         let order = tree.postorder().into_iter().map(|rank| draft.order[rank as usize]).collect();
         let mut elimination = Self::lower_triangle(graph, order);
+        let (mut of_matrix, mut of_factor) = (0, 0);
         for (rank, height) in tree.height.iter().enumerate() {
-            let columns = (0..dim(draft.order[rank])).map(|c| (height - c) as f64);
+            let width = dim(draft.order[rank]);
+            let columns = (0..width).map(|c| (height - c) as f64);
             elimination.flops += columns.map(|below| below * below).sum::<f64>();
+            let pattern = draft.pattern();
+            let rows = pattern.column(rank).iter().map(|row| dim(draft.order[*row as usize]));
+            of_matrix += rows.sum::<usize>() * width;
+            of_factor += height * width;
         }
+        elimination.fill = of_factor as f64 / of_matrix.max(1) as f64;
         elimination
+    }
+
+    /// Operations a block that another order may save some of.
+    fn worth(&self) -> f64 {
+        if self.fill > WORTH_FILL { self.flops / self.order.len() as f64 } else { 0.0 }
     }
 
     pub(crate) fn pattern(&self) -> Pattern<'_> {
@@ -131,7 +148,7 @@ impl Elimination {
             rows[begin..].sort_unstable();
             ptr.push(rows.len());
         }
-        Self { order, rank, ptr, rows, flops: 0.0 }
+        Self { order, rank, ptr, rows, flops: 0.0, fill: 1.0 }
     }
 }
 
@@ -139,6 +156,21 @@ impl Elimination {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn another_order_is_tried_where_the_factor_fills_in_and_not_in_a_dense_graph() {
+        let clique: Vec<_> = (0..300).flat_map(|a| (0..a).map(move |b| (a, b))).collect();
+        let dense = Elimination::new(&Adjacency::new(vec![6; 300], &clique), &Vec::from_iter(0..300));
+        assert!(dense.fill == 1.0 && dense.worth() == 0.0, "{}", dense.fill);
+        let (side, mut edges) = (30, vec![]);
+        for v in 0..side * side {
+            edges.extend((v % side > 0).then(|| (v, v - 1)));
+            edges.extend((v >= side).then(|| (v, v - side)));
+        }
+        let grid = Adjacency::new(vec![6; (side * side) as usize], &edges);
+        let elimination = Elimination::new(&grid, &minimum_degree::minimum_degree(&grid).unwrap());
+        assert!(elimination.fill > 2.0 && elimination.worth() > WORTH_TRIES, "{}", elimination.fill);
+    }
 
     proptest! {
         #[test]

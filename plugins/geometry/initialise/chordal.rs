@@ -8,6 +8,7 @@
 //!
 //! Martinec and Pajdla, *Robust rotation and translation estimation in multiview reconstruction*, CVPR 2007;
 //! Carlone, Tron, Daniilidis and Dellaert, *Initialization techniques for 3D SLAM*, ICRA 2015.
+use super::loops::is_wound;
 use super::network::{Edge, Information, Network};
 use super::pose::Pose;
 use super::relaxation::{Relaxation, Term};
@@ -27,7 +28,7 @@ use serde::{Deserialize, Serialize};
 /// positions minimise the full cost, rotations held. Held variables keep their values; a connected part
 /// without any, and without a prior, keeps its first pose. Points are placed from where they were first seen,
 /// anything else stays. Close to the best estimate where rotations are measured well, whatever the values
-/// that came with the graph.
+/// that came with the graph. It doubts a minimum in which the rotations of some loop go around once too often.
 ///
 /// ```toml
 /// start = { type = "chordal" }
@@ -48,6 +49,10 @@ impl Start for Chordal {
             }
             done => done,
         }
+    }
+
+    fn doubts(&self, graph: &Graph, minimum: &Values) -> bool {
+        is_wound(graph, minimum)
     }
 }
 register!(dyn Start, "chordal", Chordal);

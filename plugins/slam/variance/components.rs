@@ -73,7 +73,7 @@ impl Components {
     /// Where the estimate has no covariance.
     pub fn of(estimate: &Estimate, settings: &VarianceSettings) -> Result<Self, VarianceError> {
         let graph = &estimate.mapping.graph;
-        let leverages = estimate.solution.problem(graph).map_err(CovarianceError::from)?.leverages()?;
+        let leverages = estimate.solution.leverages(graph)?;
         let mut motion = [Motion::default(); 2];
         let mut boxes: IndexMap<Key, Rows> = IndexMap::new();
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {

@@ -1,5 +1,8 @@
 //! Which blocks are coupled, as a graph.
 
+/// The rest of a graph is dense once it has so many times the couplings of the whole.
+const DENSE: usize = 32;
+
 /// An undirected graph with weights, in compressed rows; no loops, no repeated edges.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Adjacency {
@@ -112,7 +115,7 @@ impl Adjacency {
     }
 
     /// The rest of a graph (ascending) once other vertices are eliminated: what touches the same part of them becomes
-    /// coupled.
+    /// coupled. Where that is most of it, the couplings are left out: no order of a dense rest is better than another.
     pub(crate) fn without(&self, eliminated: &[usize], rest: &[usize]) -> Self {
         const NONE: u32 = u32::MAX;
         let mut place = vec![NONE; self.len()];
@@ -141,7 +144,11 @@ impl Adjacency {
             boundary.dedup();
             around.push(boundary);
         }
-        let mut seen = vec![NONE; self.len()];
+        let coupled: usize = around.iter().map(|around| around.len().pow(2)).sum();
+        if coupled > DENSE * (self.neighbours.len() + self.len()) {
+            return self.induced(rest);
+        }
+        let (mut seen, mut seen_part) = (vec![NONE; self.len()], vec![NONE; around.len()]);
         let mut graph = Self { ptr: vec![0], ..Self::default() };
         for (i, &v) in rest.iter().enumerate() {
             let begin = graph.neighbours.len();
@@ -150,6 +157,7 @@ impl Adjacency {
                 let own = [u];
                 let reached = match part_of[u as usize] {
                     NONE => &own[..],
+                    part if std::mem::replace(&mut seen_part[part as usize], i as u32) == i as u32 => &[],
                     part => &around[part as usize],
                 };
                 for &u in reached {
@@ -207,5 +215,35 @@ impl Adjacency {
             graph.weights.push(both.iter().map(|v| self.weights[*v as usize]).sum());
         }
         (graph, into)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path(n: u32) -> Adjacency {
+        let edges: Vec<_> = (1..n).map(|v| (v, v - 1)).collect();
+        Adjacency::new(vec![1; n as usize], &edges)
+    }
+
+    #[test]
+    fn what_is_eliminated_couples_what_is_around_it() {
+        let rest = path(7).without(&[1, 4, 3], &[0, 2, 5, 6]);
+        let neighbours: Vec<_> = (0..4).map(|v| rest.neighbours(v).to_vec()).collect();
+        assert_eq!(neighbours, [vec![1], vec![0, 2], vec![1, 3], vec![2]]);
+    }
+
+    #[test]
+    fn a_rest_that_would_be_dense_is_not_written_down() {
+        // a path, each of whose vertices has a leaf: eliminated, it couples all leaves
+        let n = 2000;
+        let mut edges: Vec<_> = (1..n).map(|v| (v, v - 1)).collect();
+        edges.extend((0..n).map(|v| (n + v, v)));
+        edges.sort_unstable();
+        let graph = Adjacency::new(vec![1; 2 * n as usize], &edges);
+        let (path, leaves): (Vec<usize>, Vec<usize>) = (0..2 * n as usize).partition(|v| *v < n as usize);
+        let rest = graph.without(&path, &leaves);
+        assert_eq!((rest.len(), rest.neighbours.len()), (leaves.len(), 0));
     }
 }

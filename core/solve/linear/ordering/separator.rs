@@ -96,7 +96,13 @@ struct State<'a> {
     sides: Vec<u8>,
     /// Of side 0, side 1 and the separator.
     weights: [u64; 3],
+    /// By vertex: what its neighbours on side 0 and on side 1 weigh, and those in the separator. Kept up to date, as to add
+    /// them up anew for each gain takes cubic time on a dense graph.
+    around: Vec<[u64; 3]>,
     largest: u64,
+    /// Edges that were looked at, and moves that were put into heaps.
+    #[cfg(test)]
+    work: usize,
 }
 
 /// How much lighter the separator gets by a move; the vertex; the side that it goes to.
@@ -107,7 +113,23 @@ impl<'a> State<'a> {
         let mut weights = [0; 3];
         sides.iter().zip(&graph.weights).for_each(|(side, w)| weights[*side as usize] += u64::from(*w));
         let largest = (graph.total_weight() as f64 * LARGEST) as u64;
-        Self { graph, sides, weights, largest }
+        let around = |v: usize| {
+            let mut around = [0; 3];
+            for u in graph.neighbours(v).iter().map(|u| *u as usize) {
+                around[sides[u] as usize] += u64::from(graph.weights[u]);
+            }
+            around
+        };
+        let around = (0..graph.len()).map(around).collect();
+        Self {
+            graph,
+            sides,
+            weights,
+            around,
+            largest,
+            #[cfg(test)]
+            work: 0,
+        }
     }
 
     /// What is to be small: first the excess of a side, then the separator, then the difference of the sides.
@@ -118,16 +140,23 @@ impl<'a> State<'a> {
 
     /// How much lighter the separator gets when a vertex of it goes to a side, and draws in its neighbours beyond.
     fn gain(&self, v: usize, side: u8) -> i64 {
-        let beyond = self.graph.neighbours(v).iter().filter(|u| self.sides[**u as usize] == 1 - side);
-        let drawn: i64 = beyond.map(|u| i64::from(self.graph.weights[*u as usize])).sum();
-        i64::from(self.graph.weights[v]) - drawn
+        i64::from(self.graph.weights[v]) - self.around[v][1 - side as usize] as i64
     }
 
     fn assign(&mut self, v: usize, side: u8, log: &mut Vec<(u32, u8)>) {
-        let weight = u64::from(self.graph.weights[v]);
+        let (weight, from, to) = (u64::from(self.graph.weights[v]), self.sides[v] as usize, side as usize);
         log.push((v as u32, self.sides[v]));
-        self.weights[self.sides[v] as usize] -= weight;
-        self.weights[side as usize] += weight;
+        self.weights[from] -= weight;
+        self.weights[to] += weight;
+        for u in self.graph.neighbours(v) {
+            let around = &mut self.around[*u as usize];
+            around[from] -= weight;
+            around[to] += weight;
+        }
+        #[cfg(test)]
+        {
+            self.work += self.graph.neighbours(v).len();
+        }
         self.sides[v] = side;
     }
 
@@ -151,22 +180,28 @@ impl<'a> State<'a> {
                 heaps[side as usize].push((self.gain(v, side), v as u32, side));
             }
         }
+        let mut drawn: Vec<usize> = vec![];
+        // by vertex: the last move that made a move of it to the same side gain more
+        let mut gained = vec![0; self.sides.len()];
         let mut in_vain = 0;
         while in_vain < PATIENCE {
             let Some((_, v, side)) = self.next(&mut heaps, &locked) else { break };
             let v = v as usize;
             locked[v] = true;
             self.assign(v, side, &mut log);
-            for &u in self.graph.neighbours(v) {
-                let u = u as usize;
-                if self.sides[u] != 1 - side {
-                    continue;
+            drawn.clear();
+            let beyond = self.graph.neighbours(v).iter().map(|u| *u as usize);
+            drawn.extend(beyond.filter(|u| self.sides[*u] == 1 - side));
+            drawn.iter().for_each(|u| self.assign(*u, SEPARATOR, &mut log));
+            // they may move on, and their neighbours in the separator draw in fewer
+            let is_open = |u: usize| self.sides[u] == SEPARATOR && !locked[u];
+            for &u in &drawn {
+                if is_open(u) {
+                    heaps[1 - side as usize].push((self.gain(u, 1 - side), u as u32, 1 - side));
                 }
-                self.assign(u, SEPARATOR, &mut log);
-                // it may move on, and its neighbours in the separator draw in one less
                 let neighbours = self.graph.neighbours(u).iter().map(|x| *x as usize);
-                for x in neighbours.chain([u]).filter(|x| self.sides[*x] == SEPARATOR && !locked[*x]) {
-                    for side in [0, 1] {
+                for x in neighbours.chain([u]).filter(|x| is_open(*x)) {
+                    if std::mem::replace(&mut gained[x], log.len()) != log.len() {
                         heaps[side as usize].push((self.gain(x, side), x as u32, side));
                     }
                 }
@@ -175,6 +210,10 @@ impl<'a> State<'a> {
             if self.score() < best {
                 (best, best_at, in_vain) = (self.score(), log.len(), 0);
             }
+        }
+        #[cfg(test)]
+        {
+            self.work += heaps.iter().map(BinaryHeap::len).sum::<usize>();
         }
         for &(v, side) in log[best_at..].iter().rev() {
             self.assign(v as usize, side, &mut vec![]);
@@ -252,6 +291,21 @@ mod tests {
         let count = |side: u8| sides.iter().filter(|s| **s == side).count();
         assert!(count(SEPARATOR) <= 46, "{}", count(SEPARATOR));
         assert!(count(0) <= 960 && count(1) <= 960, "{} {}", count(0), count(1));
+    }
+
+    #[test]
+    fn a_dense_graph_is_refined_in_linear_time() {
+        let clique =
+            |n: u32| -> Vec<(u32, u32)> { (0..n).flat_map(|a| (0..a).map(move |b| (a, b))).collect() };
+        for n in [100, 200, 400] {
+            let edges = clique(n);
+            let graph = Adjacency::new(vec![1; n as usize], &edges);
+            let mut state = State::new(&graph, grown(&graph, 0));
+            state.refine();
+            assert!(state.work < 20 * edges.len(), "{} for {} edges", state.work, edges.len());
+            let fresh = State::new(&graph, state.sides.clone());
+            assert_eq!((state.around, state.weights), (fresh.around, fresh.weights), "sums are up to date");
+        }
     }
 
     proptest! {
