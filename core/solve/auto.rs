@@ -87,7 +87,6 @@ impl Optimizer for Auto {
             // not where the solve began, but where its steps led
             Termination::NonFinite { .. } => !outcome.final_cost.is_finite(),
             Termination::Interrupted | Termination::MaxIterations | Termination::Stalled { .. } => false,
-            _ => true,
         };
         if !is_over {
             outcome = self.search((graph, values), &mut problem, &mut watch, outcome);
