@@ -124,6 +124,13 @@ fn mistakes_of_an_experiment_are_told_at_their_line() {
     let fixed = wrong.replace("variant = \"R\"", "variant = \"Q\"");
     std::fs::write(&config, fixed).unwrap();
     run(["experiment", &config], &[]).ended(2).complains("unknown field `sed`");
+    let metric = |name: &str| SWEEP.replace("\"shape\"", &format!("\"{name}\""));
+    std::fs::write(&config, metric("ate_se33")).unwrap();
+    run(["experiment", &config], &[]).ended(2).complains("unknown metric `ate_se33`");
+    std::fs::write(&config, metric("ate_sim3")).unwrap();
+    run(["experiment", &config], &[]).ended(2).complains("no trial has the metric `ate_sim3`");
+    std::fs::write(&config, SWEEP.replace("rows = [1, 2]", "rows = [1, 0x1]")).unwrap();
+    run(["experiment", &config], &[]).ended(2).complains("`0x1` sets the same as `1`");
     std::fs::write(&config, SWEEP.replace("base.toml", "bass.toml")).unwrap();
     run(["experiment", &config], &[]).ended(2).complains("bass.toml");
 }

@@ -16,7 +16,7 @@ macro_rules! loss {
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields, default)]
         pub struct $type {
-            /// Where the loss departs from squares, in σ's.
+            /// The scale k of the formula above, in σ's.
             pub scale: Positive,
         }
         impl $type {
@@ -167,7 +167,7 @@ loss! {
 loss! {
     /// Dynamic covariance scaling: squares up to s = k, weight (2k/(k + s))² beyond.
     ///
-    /// Unlike the others its scale Φ = k is that of s itself (Agarwal et al., ICRA 2013, eq. 15). The cost
+    /// Unlike the others its scale Φ = k is in units of s itself, squares of σ's (Agarwal et al., ICRA 2013, eq. 15). The cost
     /// is the integral of the weight, ρ = k (3s - k)/(k + s) beyond k, and saturates at 3k: the paper gives
     /// a weight only.
     ///
