@@ -77,6 +77,20 @@ pub fn least_and_most<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 2], D:
     Err(D::Error::custom(format!("expected two numbers, 0 ≤ least ≤ most, got [{least}, {most}]")))
 }
 
+/// A count that is at most `MOST`, for fields that are plain numbers in code:
+/// `#[serde(deserialize_with = "at_most::<1000, _>")]`.
+///
+/// # Errors
+/// Where it is larger.
+pub fn at_most<'de, const MOST: usize, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
+    let n = usize::deserialize(from)?;
+    if n <= MOST {
+        Ok(n)
+    } else {
+        Err(D::Error::custom(format!("expected a number of at most {MOST}, got {n}")))
+    }
+}
+
 impl TryFrom<f64> for Positive {
     type Error = NotPositive;
     fn try_from(x: f64) -> Result<Self, NotPositive> {

@@ -55,7 +55,7 @@ impl Column {
     /// A cell as CSV has it; numbers read back as the same bits.
     fn cell(&self, row: usize) -> String {
         match self {
-            Self::Text(cells) => cells.get(row).cloned().unwrap_or_default(),
+            Self::Text(cells) => cells.get(row).map(|text| no_formula(text)).unwrap_or_default(),
             Self::Number(cells) => cells.get(row).copied().flatten().map_or(String::new(), |x| x.to_string()),
         }
     }
@@ -76,7 +76,8 @@ impl Table {
         }
     }
 
-    /// As CSV with a header. What is not there is an empty cell.
+    /// As CSV with a header. What is not there is an empty cell. A text that a spreadsheet would take for a formula has an
+    /// apostrophe before it: one that begins with `=`, `+`, `-`, `@`, a tab or a line break, and is no number.
     ///
     /// # Errors
     /// Where columns differ in length.
@@ -84,7 +85,7 @@ impl Table {
         let fail = |error: &dyn std::fmt::Display| TableError::Writer(error.to_string());
         let rows = self.rows()?;
         let mut writer = csv::Writer::from_writer(vec![]);
-        writer.write_record(self.columns.iter().map(|(name, _)| name)).map_err(|e| fail(&e))?;
+        writer.write_record(self.columns.iter().map(|(name, _)| no_formula(name))).map_err(|e| fail(&e))?;
         for row in 0..rows {
             let cells = self.columns.iter().map(|(_, column)| column.cell(row));
             writer.write_record(cells).map_err(|e| fail(&e))?;
@@ -92,6 +93,12 @@ impl Table {
         let bytes = writer.into_inner().map_err(|e| fail(&e))?;
         String::from_utf8(bytes).map_err(|e| fail(&e))
     }
+}
+
+/// A text that no spreadsheet runs: what others call a class or a variant may be a formula that fetches or sends.
+fn no_formula(text: &str) -> String {
+    let begins_one = text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n']);
+    if begins_one && text.parse::<f64>().is_err() { format!("'{text}") } else { text.to_owned() }
 }
 
 #[cfg(test)]
@@ -115,6 +122,21 @@ mod tests {
         };
         assert_eq!(rows.iter().map(|row| row.1).collect::<Vec<_>>(), *numbers);
         assert_eq!(rows[2].0, "with \"quotes\"");
+    }
+
+    #[test]
+    fn texts_are_no_formulas() {
+        let texts = ["=1+1", "+cmd", "-2+3", "@sum", "\t=1", "-0.5", "+1e3", "a=b", ""].map(str::to_owned);
+        let columns = vec![("=x".to_owned(), Column::Text(texts.into()))];
+        let text = Table { columns }.to_csv().unwrap();
+        let rows: Vec<String> = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .from_reader(text.as_bytes())
+            .deserialize()
+            .map(|row| row.map(|(cell,): (String,)| cell).unwrap())
+            .collect();
+        let safe = ["'=x", "'=1+1", "'+cmd", "'-2+3", "'@sum", "'\t=1", "-0.5", "+1e3", "a=b", ""];
+        assert_eq!(rows, safe);
     }
 
     #[test]

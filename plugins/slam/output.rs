@@ -115,8 +115,8 @@ fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> 
     #[derive(Serialize)]
     struct Resolved<'a> {
         title: &'a str,
-        output: &'a Path,
-        folder: &'a Path,
+        output: String,
+        folder: String,
         #[serde(flatten)]
         settings: &'a crate::settings::Settings,
         variants: [Named<'a>; 1],
@@ -125,11 +125,12 @@ fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> 
     struct Named<'a> {
         name: &'a str,
     }
-    let output = variant_folder(&run.output, &variant.name);
-    let folder = absolute(&run.folder);
+    // names that are not UTF-8 have no other form in a document
+    let output = variant_folder(&run.output, &variant.name).display().to_string();
+    let folder = absolute(&run.folder).display().to_string();
     let variants = [Named { name: &variant.name }];
     let title = &run.title;
-    to_toml(&Resolved { title, output: &output, folder: &folder, settings: &variant.settings, variants })
+    to_toml(&Resolved { title, output, folder, settings: &variant.settings, variants })
 }
 
 fn iterations(history: &[IterationRecord]) -> String {

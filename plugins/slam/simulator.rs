@@ -211,11 +211,14 @@ impl Simulated {
             bad.map(|(field, found)| SimulationError::Setting { field, expected, found: *found })
         };
         let frames = [("trajectory.frames", t.frames as f64)];
+        // each is placed apart from all others
+        let objects = [("scene.objects", s.objects as f64)];
         let found = wrong(&shares, |x| (0.0..=1.0).contains(&x), "from 0 to 1")
             .or_else(|| wrong(&sizes, |x| x >= 0.0, "a finite number, not negative"))
             .or_else(|| wrong(&positive, |x| x > 0.0, "a finite number above zero"))
             .or_else(|| wrong(&finite, |_| true, "a finite number"))
-            .or_else(|| wrong(&frames, |x| (2.0..=1e6).contains(&x), "from 2 to a million"));
+            .or_else(|| wrong(&frames, |x| (2.0..=1e6).contains(&x), "from 2 to a million"))
+            .or_else(|| wrong(&objects, |x| x <= 1e4, "at most ten thousand"));
         found.map_or(Ok(()), Err)
     }
 }
@@ -339,6 +342,7 @@ mod tests {
         assert!(refused(|s| s.scene.tilted = 1.5).contains("scene.tilted"));
         assert!(refused(|s| s.detector.sigma_px = f64::NAN).contains("detector.sigma_px"));
         assert!(refused(|s| s.scene.objects = 5000).contains("no room"));
+        assert!(refused(|s| s.scene.objects = usize::MAX).contains("at most ten thousand"));
         assert!(refused(|s| s.scene.classes = vec!["unicorn".into()]).contains("unicorn"));
         assert!(refused(|s| s.trajectory.frames = 0).contains("trajectory.frames"));
     }

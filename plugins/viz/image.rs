@@ -33,9 +33,16 @@ pub fn frames_seen(estimate: &Estimate, count: usize) -> Vec<usize> {
     let objects = estimate.mapping.measurements.objects.iter().filter(|object| mapped.contains(&object.id));
     let frames: BTreeSet<usize> =
         objects.flat_map(|object| object.views.iter().map(|view| view.frame)).collect();
-    let (frames, last) = (Vec::from_iter(frames), count.saturating_sub(1).max(1));
-    let places: BTreeSet<usize> = (0..count).map(|k| k * frames.len().saturating_sub(1) / last).collect();
-    places.into_iter().filter_map(|place| frames.get(place).copied()).collect()
+    spread(&Vec::from_iter(frames), count)
+}
+
+/// So many of a list, its first and its last among them; all, where there are no more.
+fn spread(frames: &[usize], count: usize) -> Vec<usize> {
+    let count = count.min(frames.len());
+    let last = count.saturating_sub(1).max(1);
+    // a number of frames squared is far from the largest number
+    let places = (0..count).map(|k| k * (frames.len() - 1) / last);
+    places.filter_map(|place| frames.get(place).copied()).collect()
 }
 
 /// One image: measured boxes dashed, estimated ones and the ellipses inside of them solid, by class. Pixels, y downward.
@@ -111,4 +118,20 @@ fn corners([xmin, ymin, xmax, ymax]: [f64; 4]) -> [Point2<f64>; 5] {
 /// The outline of an ellipse; y upward.
 fn outline(of: &Ellipse) -> Option<Vec<Point2<f64>>> {
     ellipse(&Point2::new(of.centre.x, -of.centre.y), &Matrix2::new(of.xx, -of.xy, -of.xy, of.yy))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spread;
+
+    #[test]
+    fn frames_are_spread_from_the_first_to_the_last() {
+        let frames = [2, 3, 5, 7, 11];
+        assert_eq!(spread(&frames, 3), [2, 5, 11]);
+        assert_eq!(spread(&frames, 1), [2]);
+        for all in [5, 6, usize::MAX] {
+            assert_eq!(spread(&frames, all), frames);
+        }
+        assert!(spread(&frames, 0).is_empty() && spread(&[], usize::MAX).is_empty());
+    }
 }

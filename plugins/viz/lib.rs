@@ -13,6 +13,7 @@ mod run;
 mod run_page;
 mod scene;
 mod view;
+mod xml;
 
 pub use chart::{Chart, Distribution};
 pub use experiment_page::{experiment_page, experiment_pictures};
@@ -24,3 +25,4 @@ pub use plot::plot;
 pub use run_page::{RunPage, run_pictures};
 pub use scene::{Object, Scene, Track, TrackKind};
 pub use view::View;
+pub use xml::escape;

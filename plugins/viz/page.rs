@@ -1,5 +1,6 @@
 //! A page of HTML with everything in it: it opens without a network, and fetches nothing.
 use crate::picture::{Picture, numbered};
+use crate::xml::escape;
 use std::fmt::Write as _;
 
 /// A page that grows from top to bottom.
@@ -105,10 +106,6 @@ impl Page {
 fn is_number(cell: &str) -> bool {
     cell.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+')
         && cell.chars().filter(char::is_ascii_digit).count() * 2 >= cell.chars().count()
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
 //! A picture, before it is a file.
+use crate::xml::visible;
 use kuva::backend::raster::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::legend::{LegendEntry, LegendShape};
@@ -93,9 +94,9 @@ pub(crate) fn entry(label: &str, color: &str, shape: LegendShape, dashes: Option
     LegendEntry { label: plain(label), color: color.into(), shape, dasharray: dashes.map(Into::into) }
 }
 
-/// A dollar sign would begin a formula.
+/// A label as kuva takes it, which makes entities of markup and nothing else: a dollar sign would begin a formula.
 pub(crate) fn plain(label: &str) -> String {
-    label.replace('$', "\\$")
+    visible(label).collect::<String>().replace('$', "\\$")
 }
 
 #[cfg(test)]

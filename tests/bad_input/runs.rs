@@ -31,6 +31,8 @@ fn documents_of_runs() {
         change("more frames than memory", "frames = 30", "frames = 99999999999999"),
         change("share above one", "objects = 3", "objects = 3\ntilted = 1.5"),
         change("share not a number", "objects = 3", "objects = 3\ntilted = nan"),
+        change("more objects than can be placed", "objects = 3", "objects = 9223372036854775807"),
+        with("more images than a page holds", "[report]\nimages = 4611686018427387904"),
         with("noise negative", "[detections]\nnoise = { sigma = -5.0 }"),
         with("noise of another size", "[detections]\nnoise = { sigmas = [1.0, 1.0] }"),
         with("unknown model", "[detections]\nmodel = \"round\""),

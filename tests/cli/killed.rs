@@ -1,15 +1,15 @@
-//! Sweeps that are killed at random moments, and go on.
+//! Sweeps that are killed at random moments of their work, and go on.
 use crate::experiment::tables;
 use crate::{folder, manifactor, path, root};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// Kills in all; `MANIFACTOR_KILLS` asks for more.
+/// Moments in all; `MANIFACTOR_KILLS` asks for more.
 const KILLS: usize = 20;
-/// Kills for each time that a sweep takes.
-const OFTEN: f64 = 8.0;
+/// Most trials from one kill to the next.
+const APART: usize = 60;
 
 const BASE: &str = r#"
 semantics = "table_one"
@@ -32,17 +32,56 @@ fn sweep() -> String {
     )
 }
 
-/// Runs a sweep until it ends or is killed; whether it ended.
-fn ends_within(config: &str, out: &str, time: Duration) -> bool {
+/// When a sweep is killed: by what can be seen of it, and not by a time, which is another on each machine.
+enum Moment {
+    /// So many trials are in the journal.
+    Trials(usize),
+    /// This file is there.
+    File(&'static str),
+}
+
+impl Moment {
+    /// One of any; the tables are written in no time, and are one moment in eight all the same.
+    fn any(rng: &mut StdRng, done: usize) -> Self {
+        const FILES: [&str; 6] = [
+            "repeat/base.toml",
+            "trials.csv",
+            "trials.parquet",
+            "summary.json",
+            "position.svg",
+            "report.html",
+        ];
+        match rng.random_range(0..8) {
+            0 => Self::File(FILES[rng.random_range(0..FILES.len())]),
+            _ => Self::Trials(done + rng.random_range(0..APART)),
+        }
+    }
+
+    fn has_come(&self, out: &Path) -> bool {
+        match self {
+            Self::Trials(n) => trials(out) >= *n,
+            Self::File(name) => out.join(name).exists(),
+        }
+    }
+}
+
+/// Whole lines of the journal.
+fn trials(out: &Path) -> usize {
+    let journal = std::fs::read(out.join("trials.jsonl")).unwrap_or_default();
+    journal.iter().filter(|byte| **byte == b'\n').count()
+}
+
+/// Runs a sweep until it ends or the moment has come to kill it; whether it ended.
+fn ends_before(config: &str, out: &Path, moment: &Moment) -> bool {
     let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
         .current_dir(root())
-        .args(["experiment", config, "--out", out, "--threads", "2"])
+        .args(["experiment", config, "--threads", "2", "--out"])
+        .arg(out)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let clock = Instant::now();
-    while clock.elapsed() < time {
+    while !moment.has_come(out) {
         if let Some(status) = child.try_wait().unwrap() {
             assert!(status.success(), "{status}");
             return true;
@@ -57,9 +96,7 @@ fn ends_within(config: &str, out: &str, time: Duration) -> bool {
 fn sweeps_that_are_killed_at_any_moment_end_with_the_same_tables() {
     let folder = folder(&[("base.toml", BASE), ("sweep.toml", &sweep())]);
     let (config, whole) = (path(&folder, "sweep.toml"), path(&folder, "whole"));
-    let clock = Instant::now();
     manifactor(&format!("experiment {config} --out {whole} --threads 2")).ended(0);
-    let undisturbed = clock.elapsed();
     let expected = tables(&whole);
     assert_eq!(String::from_utf8_lossy(&expected[0]).lines().count(), 251);
 
@@ -70,8 +107,9 @@ fn sweeps_that_are_killed_at_any_moment_end_with_the_same_tables() {
         let out = path(&folder, &format!("killed{sweeps}"));
         let mut ended = false;
         while left > 0 && !ended {
-            ended = ends_within(&config, &out, undisturbed.mul_f64(rng.random_range(0.0..2.0) / OFTEN));
-            left -= usize::from(!ended);
+            let place = Path::new(&out);
+            ended = ends_before(&config, place, &Moment::any(&mut rng, trials(place)));
+            left -= 1;
         }
         manifactor(&format!("experiment {config} --out {out} --threads 2")).ended(0);
         assert!(tables(&out) == expected, "after {sweeps} sweeps");
@@ -83,5 +121,4 @@ fn sweeps_that_are_killed_at_any_moment_end_with_the_same_tables() {
         }
         sweeps += 1;
     }
-    eprintln!("{sweeps} sweeps, {undisturbed:.1?} each undisturbed");
 }

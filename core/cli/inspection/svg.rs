@@ -1,5 +1,6 @@
 //! A picture of a graph, seen from above: variables where they are, factors between them.
 use super::{Inspection, VariableRow};
+use manifactor::viz::escape;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -37,7 +38,7 @@ pub(super) fn write(inspection: &Inspection) -> String {
         let _ = writeln!(
             out,
             "<g stroke=\"{color}\" fill=\"{color}\"><title>{}</title>",
-            escaped(&title(inspection, i))
+            escape(&title(inspection, i))
         );
         for [kx, ky] in &ends {
             let _ = writeln!(out, "<line x1=\"{x:.1}\" y1=\"{y:.1}\" x2=\"{kx:.1}\" y2=\"{ky:.1}\"/>");
@@ -52,7 +53,7 @@ pub(super) fn write(inspection: &Inspection) -> String {
             out,
             "<g><title>{0}: {1}</title><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"{fill}\" stroke=\"black\"/>\
              <text x=\"{2:.1}\" y=\"{3:.1}\">{0}</text></g>",
-            escaped(&row.key),
+            escape(&row.key),
             row.of_type,
             x + 7.0,
             y - 5.0
@@ -107,8 +108,4 @@ fn scaled(places: Places<'_>) -> Places<'_> {
     let scale = (SIZE - 2.0 * MARGIN) / (x1 - x0).max(y1 - y0).max(1e-9);
     let to = |[x, y]: [f64; 2]| [MARGIN + (x - x0) * scale, SIZE - MARGIN - (y - y0) * scale];
     places.into_iter().map(|(key, p)| (key, to(p))).collect()
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

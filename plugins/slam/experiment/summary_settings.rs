@@ -1,5 +1,6 @@
 use super::measures::measure_names_in_words;
 use indexmap::IndexMap;
+use manifactor_graph::checked::at_most;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +21,10 @@ pub struct SummarySettings {
     pub metrics: Vec<String>,
     /// A column of numbers in `by` that reports draw the metrics over.
     pub curve: Option<String>,
-    /// How often trials are drawn anew.
+    /// How often trials are drawn anew. At most a million: with that many the ends of an interval are settled to a
+    /// thousandth of its width.
+    #[serde(deserialize_with = "at_most::<1_000_000, _>")]
+    #[schemars(extend("maximum" = 1_000_000))]
     pub resamples: usize,
     /// Of the random numbers that they are drawn by.
     pub seed: u64,

@@ -1,3 +1,4 @@
+use manifactor_graph::checked::at_most;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -8,6 +9,9 @@ pub struct ReportSettings {
     /// `covariances.json`: the marginal covariance of each pose and each object, in its tangent space.
     pub covariances: bool,
     /// How many images are drawn with their boxes, measured and estimated; spread over all frames where objects are seen.
+    /// At most 1000: the page of the run holds all of them.
+    #[serde(deserialize_with = "at_most::<1000, _>")]
+    #[schemars(extend("maximum" = 1000))]
     pub images: usize,
 }
 

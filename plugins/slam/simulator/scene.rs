@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 pub struct SceneSettings {
     /// What the scene depends on, and nothing else does.
     pub seed: u64,
-    /// How many objects.
+    /// How many objects: at most ten thousand, as each is placed apart from all others.
     pub objects: usize,
     /// Their classes, in turn; all that are known, where none is given.
     pub classes: Vec<String>,
