@@ -8,6 +8,7 @@ use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::sequence::Sequence;
 use manifactor::slam::simulator::Simulated;
 use manifactor::solve::{Auto, IterationRecord};
+use std::num::NonZero;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 
@@ -109,7 +110,7 @@ pub fn run(data: &[u8]) {
         let mut settings = variant.settings;
         settings.objects.refinements = settings.objects.refinements.min(1);
         if let Some(variance) = &mut settings.variance_components {
-            variance.rounds = variance.rounds.min(2);
+            variance.rounds = variance.rounds.min(NonZero::<usize>::MIN.saturating_add(1));
         }
         let Ok((found, report)) = estimate("fuzzed", SEQUENCE.clone(), &settings, &mut third()) else {
             continue;
