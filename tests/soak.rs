@@ -1,5 +1,5 @@
 //! Ten thousand solves in one process leave no more behind than a hundred; the steps of a large one take no more and no more.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stderr)]
 use manifactor::geometry::{Between, Prior, Se2};
 use manifactor::prelude::*;
 use manifactor::solve::{Auto, IterationRecord};

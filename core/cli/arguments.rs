@@ -8,18 +8,21 @@ use crate::watch;
 use clap::{ArgAction, Parser, Subcommand};
 use manifactor::graph::catalogue::{all, check_names};
 use manifactor::solve::{Bytes, memory_limit};
+use std::num::NonZero;
 
 /// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 ///
-/// Exit codes: 0 done; 1 a solve ended without converging (its best values are written), or a factor breaks a law; 2 the command line or a
-/// document is wrong; 3 a file could not be read or written; 130 interrupted (the best values so far are written).
+/// Exit codes: 0 done; 1 a solve ended without converging (its best values are written), nothing that was detected is mapped, or a factor
+/// breaks a law; 2 the command line or a document is wrong; 3 a file is not there, or it or standard output could not be read or written;
+/// 130 interrupted before all was done (the best values so far are written).
 #[derive(Debug, Parser)]
 #[command(name = "manifactor", version, max_term_width = 100)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Threads to compute with; all processors by default. Results are the same for any number.
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    /// Threads to compute with, 1 to 1024; else what RAYON_NUM_THREADS says, else all processors. Results are the same for
+    /// any number.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=i64::from(MOST_THREADS)))]
     threads: Option<u16>,
     /// Say more on stderr: each step (-v), then all that is read, compiled and written (-vv).
     #[arg(long, short, global = true, action = ArgAction::Count)]
@@ -51,7 +54,7 @@ impl Cli {
         watch::log(self.verbose);
         // this thread is one of them: what it has in its caches stays there
         let pool = rayon::ThreadPoolBuilder::new().use_current_thread();
-        let pool = pool.num_threads(self.threads.map_or(0, Into::into)).build_global();
+        let pool = pool.num_threads(self.threads()?).build_global();
         if self.threads.is_some() {
             pool.map_err(Failure::input)?;
         }
@@ -73,6 +76,16 @@ impl Cli {
         }
     }
 
+    /// How many threads to compute with.
+    fn threads(&self) -> Result<usize, Failure> {
+        let asked = match self.threads {
+            Some(threads) => Some(threads.into()),
+            None => asked_of_rayon(std::env::var("RAYON_NUM_THREADS").ok().as_deref())?,
+        };
+        // rayon would look at variables of its own, and take any number
+        Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, NonZero::get)))
+    }
+
     /// Whether results are to be JSON.
     pub fn json(&self) -> bool {
         match &self.command {
@@ -88,6 +101,24 @@ impl Cli {
             Command::New(_) | Command::Simulate(_) => false,
             Command::Schema(_) => true,
         }
+    }
+}
+
+/// A thread takes a stack and buffers, whether it has work or not: more than this is a mistake.
+const MOST_THREADS: u16 = 1024;
+
+/// Threads by RAYON_NUM_THREADS. As rayon has it, 0 and what is no number ask for nothing.
+fn asked_of_rayon(variable: Option<&str>) -> Result<Option<usize>, Failure> {
+    let Some(text) = variable.map(str::trim).filter(|text| !text.is_empty()) else { return Ok(None) };
+    let whole = text.bytes().all(|digit| digit.is_ascii_digit());
+    match text.parse::<u16>() {
+        Ok(0) => Ok(None),
+        Ok(threads) if threads <= MOST_THREADS => Ok(Some(threads.into())),
+        Err(_) if !whole => Ok(None),
+        _ => Err(Failure::with_help(
+            format!("RAYON_NUM_THREADS is {text}: at most {MOST_THREADS} threads are started"),
+            "set it to the number of processors, or unset it",
+        )),
     }
 }
 
@@ -112,5 +143,17 @@ mod tests {
     fn the_command_line_is_consistent() {
         use clap::CommandFactory;
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn threads_without_a_bound_are_refused() {
+        for nothing in [None, Some(""), Some("0"), Some("-3"), Some("many")] {
+            assert_eq!(asked_of_rayon(nothing).unwrap(), None, "{nothing:?}");
+        }
+        assert_eq!(asked_of_rayon(Some(" 7 ")).unwrap(), Some(7));
+        for too_many in ["1025", "99999", "99999999999999999999999"] {
+            let refused = asked_of_rayon(Some(too_many)).unwrap_err().to_string();
+            assert!(refused.contains(too_many) && refused.contains("1024"), "{refused}");
+        }
     }
 }

@@ -15,7 +15,7 @@ use std::process::ExitCode;
 /// What keeps a command from doing what it was asked to do.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// Documents that are not as they should be: exit code 2.
+    /// Documents that are not as they should be: exit code 2; that cannot be read, all of them: exit code 3.
     #[error("{0}")]
     Documents(Diagnostics),
     /// Anything else that is wrong with the input, in its own words: exit code 2.
@@ -26,8 +26,14 @@ pub enum Failure {
         /// What to do about it.
         help: Option<String>,
     },
+    /// A folder of data that is not there: exit code 3.
+    #[error("{message}")]
+    NotThere {
+        /// Which, where it was looked for, and what to do about it.
+        message: String,
+    },
     /// A file that could not be written or read: exit code 3.
-    #[error("{path}: {source}")]
+    #[error("{}: {source}", path.display())]
     File {
         /// The file.
         path: PathBuf,
@@ -52,16 +58,23 @@ impl Failure {
         move |source| Self::File { path: path.to_owned(), source }
     }
 
+    /// That of a command line that is wrong: 2.
+    pub(crate) fn usage() -> ExitCode {
+        ExitCode::from(2)
+    }
+
     /// That of files that could not be written or read: 3.
     pub(crate) fn files() -> ExitCode {
         ExitCode::from(3)
     }
 
-    /// 2 for bad input, 3 for files.
+    /// 2 for bad input, 3 for files that are not there or cannot be read or written, whoever names them.
     pub fn exit_code(&self) -> ExitCode {
+        let unreadable = |one: &Diagnostic| matches!(one.problem, Problem::Unreadable(_));
         match self {
-            Self::Documents(_) | Self::Input { .. } => ExitCode::from(2),
-            Self::File { .. } => Self::files(),
+            Self::Documents(list) if list.iter().all(unreadable) => Self::files(),
+            Self::Documents(_) | Self::Input { .. } => Self::usage(),
+            Self::NotThere { .. } | Self::File { .. } => Self::files(),
         }
     }
 
@@ -71,7 +84,7 @@ impl Failure {
             output::json(&self.to_json());
         }
         for report in self.reports() {
-            eprintln!("{report}");
+            output::say_styled(&report);
         }
     }
 
@@ -79,7 +92,10 @@ impl Failure {
         let errors = match self {
             Self::Documents(list) => list.iter().map(place_as_json).collect(),
             Self::Input { message, help } => vec![json!({ "message": message, "help": help })],
-            Self::File { path, source } => vec![json!({ "message": source.to_string(), "file": path })],
+            Self::NotThere { message } => vec![json!({ "message": message })],
+            Self::File { path, source } => {
+                vec![json!({ "message": source.to_string(), "file": path.display().to_string() })]
+            }
         };
         json!({ "errors": errors })
     }
@@ -88,7 +104,7 @@ impl Failure {
         match self {
             Self::Documents(list) => list.iter().map(render).collect(),
             Self::Input { message, help } => vec![fancy(plain(message, help.as_deref()).into())],
-            Self::File { .. } => vec![fancy(plain(&self.to_string(), None).into())],
+            Self::NotThere { .. } | Self::File { .. } => vec![fancy(plain(&self.to_string(), None).into())],
         }
     }
 }
@@ -103,6 +119,7 @@ impl From<SourceError> for Failure {
     fn from(error: SourceError) -> Self {
         match error {
             SourceError::Format(error) => error.into(),
+            error @ SourceError::NoFolder { .. } => Self::NotThere { message: error.to_string() },
             other => Self::input(other),
         }
     }
@@ -200,15 +217,14 @@ pub(crate) fn render(diagnostic: &Diagnostic) -> String {
     let mut message = message;
     if let Some((place, label)) = &diagnostic.related {
         if place.source == *source {
-            labels.push(LabeledSpan::at(place.span.clone(), label.clone()));
+            labels.push(LabeledSpan::at(place.span.clone(), text::shortened(label)));
         } else {
-            message.message += &format!("; {label}: {place}");
+            message.message += &text::shortened(&format!("; {label}: {place}"));
         }
     }
     let report = Report::from(message.with_labels(labels));
-    // one byte for one byte: places stay where they are
-    let visible = source.text().replace(|c: char| c.is_ascii_control() && !"\n\r\t".contains(c), "?");
-    fancy(report.with_source_code(NamedSource::new(source.name(), visible)))
+    let name = text::on_one_line(source.name());
+    fancy(report.with_source_code(NamedSource::new(name, text::same_length(source.text()))))
 }
 
 /// Bytes beyond which a line is not shown: a place and a message say more.
@@ -224,9 +240,9 @@ fn lines_around<'a>(text: &'a str, span: &std::ops::Range<usize>) -> &'a str {
 }
 
 fn plain(message: &str, help: Option<&str>) -> MietteDiagnostic {
-    let diagnostic = MietteDiagnostic::new(text::printable(message));
+    let diagnostic = MietteDiagnostic::new(text::shortened(message));
     match help {
-        Some(help) => diagnostic.with_help(help),
+        Some(help) => diagnostic.with_help(text::shortened(help)),
         None => diagnostic,
     }
 }

@@ -3,7 +3,7 @@ mod dot;
 mod svg;
 
 use crate::failure::Failure;
-use crate::text;
+use crate::text::Table;
 use manifactor::graph::{Fixed, Graph, Values};
 use manifactor::solve::Problem;
 use serde::Serialize;
@@ -97,11 +97,11 @@ impl Inspection {
     /// The factors of each key, with what they cost.
     pub(crate) fn table(&self) -> String {
         let header = ["factor", "keys", "cost before", "after", "weight", "residual"];
-        let mut table = text::table(&header);
+        let mut table = Table::of_numbers(&header);
         for row in &self.factors {
             let last = row.after.as_ref().unwrap_or(&row.before);
             let residual: Vec<_> = last.residual.iter().map(|r| format!("{r:.3}")).collect();
-            table.add_row([
+            table.row([
                 format!("{} {}", row.number, row.of_type),
                 row.keys.join(", "),
                 format!("{:.4}", row.before.cost),
@@ -111,7 +111,7 @@ impl Inspection {
             ]);
         }
         let after = self.cost.after.map(|c| format!(" -> {c:.6}")).unwrap_or_default();
-        format!("{}\ncost {:.6}{after}\n", table.trim_fmt(), self.cost.before)
+        format!("{}\ncost {:.6}{after}\n", table.text(), self.cost.before)
     }
 
     /// In the language of Graphviz.

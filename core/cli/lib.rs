@@ -9,7 +9,7 @@
 //! }
 //! ```
 //!
-//! Exit codes are those of [`Status`] and [`Failure`]: 0 done, 1 no convergence, 2 bad input, 3 files, 130 interrupted.
+//! Exit codes are those of [`Status`] and [`Failure`]; `docs/reliability.md` has a table of them.
 // strangers' input comes in here: no place of it is taken for granted
 #![warn(clippy::indexing_slicing)]
 mod arguments;
@@ -40,11 +40,23 @@ pub use failure::Failure;
 pub use status::Status;
 
 use clap::Parser;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Reads the command line, does what it says, and says how it ended.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    interrupt::fail_at_the_limit_of_files();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) if error.use_stderr() => {
+            output::say(error.render().to_string().trim_end());
+            return Failure::usage();
+        }
+        Err(help) => {
+            output::printed(help.print().and_then(|()| std::io::stdout().flush()));
+            return if output::is_lost() { Failure::files() } else { ExitCode::SUCCESS };
+        }
+    };
     match cli.run() {
         Ok(_) if output::is_lost() => Failure::files(),
         Ok(status) => status.into(),

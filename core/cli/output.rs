@@ -1,10 +1,12 @@
-//! Standard output: results only; everything else goes to stderr. And pictures, which go to files.
+//! What is said: results on standard output, everything else on standard error. And pictures, which go to files.
+//!
+//! Nothing else in this crate writes to the two: `print!` and `eprintln!` panic where they cannot write.
 use crate::failure::Failure;
 use crate::text;
 use manifactor::slam::output::write_whole;
 use manifactor::viz::Picture;
 use serde::Serialize;
-use std::io::{ErrorKind, Write};
+use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,29 +18,44 @@ pub(crate) fn is_lost() -> bool {
     LOST.load(Ordering::Relaxed)
 }
 
-/// Prints text. A reader that has heard enough, such as `head`, is no error.
+/// Prints results.
 pub(crate) fn print(text: &str) {
-    let mut out = std::io::stdout().lock();
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    if let Err(error) = written
-        && error.kind() != ErrorKind::BrokenPipe
-    {
-        LOST.store(true, Ordering::Relaxed);
-        eprintln!("cannot write to standard output: {error}");
-    }
+    let mut out = io::stdout().lock();
+    printed(out.write_all(text::printable(text).as_bytes()).and_then(|()| out.flush()));
 }
 
-/// Says something that is worth knowing, on stderr.
-pub(crate) fn note(note: &str) {
-    eprintln!("note: {}", text::printable(note));
+/// Keeps in mind that something could not be printed, and says so.
+pub(crate) fn printed(result: io::Result<()>) {
+    let Err(error) = result else { return };
+    LOST.store(true, Ordering::Relaxed);
+    // a reader that has heard enough, such as `head`, needs no message
+    if error.kind() != ErrorKind::BrokenPipe {
+        say(&format!("cannot write to standard output: {error}"));
+    }
 }
 
 /// Prints one JSON document.
 pub(crate) fn json(value: &impl Serialize) {
     match serde_json::to_string_pretty(value) {
-        Ok(text) => print(&(text + "\n")),
-        Err(error) => eprintln!("cannot write JSON: {error}"),
+        Ok(text) => print(&(text::json(&text) + "\n")),
+        Err(error) => printed(Err(error.into())),
     }
+}
+
+/// Says something on standard error, and ends the line.
+pub(crate) fn say(text: &str) {
+    say_styled(&text::printable(text));
+}
+
+/// The same for text with colours: what others wrote in it was made printable before it got them.
+pub(crate) fn say_styled(text: &str) {
+    // one write, so that lines of two threads do not mix; the work goes on if it fails
+    let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
+}
+
+/// Says something that is worth knowing.
+pub(crate) fn note(note: &str) {
+    say(&format!("note: {}", text::shortened(note)));
 }
 
 /// Writes pictures into a folder, each as SVG and as PNG.

@@ -1,5 +1,5 @@
 //! What a solve has to tell, for people.
-use crate::text::{self, count, list, seconds};
+use crate::text::{self, Table, count, list, seconds};
 use manifactor::solve::{Diagnosis, FactorCost, Marginal, Outcome};
 
 /// A few lines: how it ended, what it cost, where the time went.
@@ -49,23 +49,23 @@ pub(crate) fn diagnosis(diagnosis: &Diagnosis) -> String {
     if diagnosis.worst.is_empty() {
         return condition;
     }
-    let mut table = text::table(&["costs the most", "cost", "weight", "residual"]);
+    let mut table = Table::of_numbers(&["costs the most", "cost", "weight", "residual"]);
     for FactorCost { factor, name, keys, residual, cost, weight } in &diagnosis.worst {
         let residual: Vec<_> = residual.iter().map(|x| format!("{x:.3}")).collect();
         let name = format!("{factor} {name} ({})", text::keys(keys));
-        table.add_row([name, format!("{cost:.4}"), format!("{weight:.3}"), residual.join(" ")]);
+        table.row([name, format!("{cost:.4}"), format!("{weight:.3}"), residual.join(" ")]);
     }
-    format!("{condition}{}\n", table.trim_fmt())
+    format!("{condition}{}\n", table.text())
 }
 
 /// Standard deviations by direction.
 pub(crate) fn marginals(marginals: &[Marginal]) -> String {
-    let mut table = text::words(&["variable", "standard deviations"]);
+    let mut table = Table::of_words(&["variable", "standard deviations"]);
     for Marginal { key, tangent, covariance } in marginals {
         let sigmas = covariance.diagonal().map(f64::sqrt);
         let parts: Vec<_> =
             tangent.iter().zip(&sigmas).map(|(name, sigma)| format!("{name} {sigma:.3e}")).collect();
-        table.add_row([key.to_string(), parts.join("  ")]);
+        table.row([key.to_string(), parts.join("  ")]);
     }
-    format!("{}\n", table.trim_fmt())
+    format!("{}\n", table.text())
 }

@@ -1,31 +1,24 @@
 //! Exit codes.
+use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::solve::{Stall, Termination};
 use std::process::ExitCode;
 
 /// How a command ended that did what it was asked to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+///
+/// In order: of several, the last counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
     /// All went well: exit code 0. An estimate beside a jump of the cost counts: it is the least there is nearby, and
     /// the report says what it is.
     Done,
     /// A solve ended without a minimum; its best values are written all the same: exit code 1.
     NotConverged,
+    /// Objects were detected, and none is in the map: exit code 1.
+    NothingMapped,
     /// A factor was checked, and breaks a law: exit code 1.
     Broken,
-    /// Ctrl-C; the best values so far are written: exit code 130.
+    /// Ctrl-C before all was done; the best values so far are written: exit code 130.
     Interrupted,
-}
-
-impl Status {
-    /// The worse of two.
-    #[must_use]
-    pub fn and(self, other: Self) -> Self {
-        match (self, other) {
-            (Self::Interrupted, _) | (_, Self::Interrupted) => Self::Interrupted,
-            (Self::Done, other) => other,
-            (status, _) => status,
-        }
-    }
 }
 
 impl From<&Termination> for Status {
@@ -38,11 +31,27 @@ impl From<&Termination> for Status {
     }
 }
 
+impl From<&RunReport> for Status {
+    /// That of its worst variant. A signal that comes when all is done interrupts nothing.
+    fn from(report: &RunReport) -> Self {
+        let variants = report.variants.iter().map(Self::from).max().unwrap_or(Self::Done);
+        if report.complete { variants } else { Self::Interrupted }
+    }
+}
+
+impl From<&VariantReport> for Status {
+    fn from(report: &VariantReport) -> Self {
+        let nothing = report.counts.detections > 0 && report.counts.objects == 0;
+        let mapped = if nothing { Self::NothingMapped } else { Self::Done };
+        mapped.max(Self::from(&report.solve.termination))
+    }
+}
+
 impl From<Status> for ExitCode {
     fn from(status: Status) -> ExitCode {
         match status {
             Status::Done => ExitCode::SUCCESS,
-            Status::NotConverged | Status::Broken => ExitCode::from(1),
+            Status::NotConverged | Status::NothingMapped | Status::Broken => ExitCode::from(1),
             Status::Interrupted => ExitCode::from(130),
         }
     }

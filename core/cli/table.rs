@@ -1,19 +1,19 @@
 //! The table that a run prints.
-use crate::text::{self, seconds};
+use crate::text::{self, Table, on_one_line, seconds};
 use manifactor::slam::report::{RunReport, VariantReport};
 
 /// What a run came to, in a table and a few lines.
 pub(crate) fn of_run(report: &RunReport) -> String {
     let header =
         ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
-    let mut table = text::table(&header);
+    let mut table = Table::of_numbers(&header);
     if let Some(first) = report.variants.first() {
-        table.add_row(before(first));
+        table.row(before(first));
     }
     for variant in &report.variants {
-        table.add_row(after(variant));
+        table.row(after(variant));
     }
-    let mut out = format!("{}\n{}\n", report.title, table.trim_fmt());
+    let mut out = format!("{}\n{}\n", on_one_line(&report.title), table.text());
     if let Some(alignment) = report.variants.iter().find_map(|v| v.row().alignment) {
         out += &format!("ATE: RMSE of the camera's positions, aligned by {alignment}.\n");
     }
@@ -26,7 +26,8 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     }
     for variant in &report.variants {
         for warning in &variant.warnings {
-            out += &format!("warning: {}: {warning}\n", variant.name);
+            let (name, warning) = (on_one_line(&variant.name), warning.to_string());
+            out += &format!("warning: {name}: {}\n", on_one_line(&warning));
         }
     }
     out
@@ -35,9 +36,10 @@ pub(crate) fn of_run(report: &RunReport) -> String {
 /// A line: the condition, what is rejected, and the factor that costs the most. The report has the whole table.
 fn diagnosis(variant: &VariantReport) -> String {
     let Some(diagnosis) = &variant.solve.diagnosis else { return String::new() };
+    let name = on_one_line(&variant.name);
     let mut line = match diagnosis.condition {
-        Some(condition) => format!("{}: condition {condition:.1e}", variant.name),
-        None => format!("{}: condition infinite or unknown", variant.name),
+        Some(condition) => format!("{name}: condition {condition:.1e}"),
+        None => format!("{name}: condition infinite or unknown"),
     };
     if !variant.solve.rejected.is_empty() {
         line += &format!(", {} rejected as outliers", text::count(variant.solve.rejected.len(), "factor"));

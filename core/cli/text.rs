@@ -1,47 +1,11 @@
 //! Numbers and words for people.
-use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use manifactor::graph::Key;
 
-/// Lines above and below the header, none between rows.
-const STYLE: TableStyle = TableStyle::new().top_border(LINE).header_separator(LINE).bottom_border(LINE);
-const LINE: LineStyle = LineStyle::none().fill('─').junction('─');
+mod printable;
+mod table;
 
-/// What others wrote, fit for a terminal: without control characters, and not without end.
-pub(crate) fn printable(text: &str) -> String {
-    const MOST: usize = 2000;
-    let mut out = String::new();
-    for c in text.chars() {
-        if out.len() > MOST {
-            out.push('…');
-            break;
-        }
-        if c.is_control() && c != '\n' { out.extend(c.escape_default()) } else { out.push(c) }
-    }
-    out
-}
-
-/// A table with a header, its numbers to the right: all columns but the first.
-pub(crate) fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table.load_style(STYLE).set_content_arrangement(ContentArrangement::Dynamic);
-    table.set_header(header.to_vec());
-    for column in table.column_iter_mut().skip(1) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table
-}
-
-/// A table of words, all to the left.
-pub(crate) fn words(header: &[&str]) -> Table {
-    let mut table = table(header);
-    for column in table.column_iter_mut() {
-        column.set_cell_alignment(CellAlignment::Left);
-    }
-    if table.width().is_none() {
-        table.set_width(WIDTH);
-    }
-    table
-}
+pub(crate) use printable::{json, on_one_line, printable, same_length, shortened};
+pub(crate) use table::Table;
 
 /// Columns where nobody says how wide the terminal is.
 const WIDTH: u16 = 110;
@@ -77,7 +41,7 @@ pub(crate) fn list(items: impl ExactSizeIterator<Item = String>) -> String {
 
 /// `x0, x1`.
 pub(crate) fn keys(keys: &[Key]) -> String {
-    keys.iter().map(Key::as_str).collect::<Vec<_>>().join(", ")
+    keys.iter().map(|key| on_one_line(key.as_str())).collect::<Vec<_>>().join(", ")
 }
 
 /// Seconds, with three digits that say something.

@@ -1,12 +1,14 @@
 //! Watching a program at work, on stderr: a progress bar, a line for each step, or the log of all parts.
-use crate::text::seconds;
+use crate::output;
+use crate::text::{on_one_line, seconds};
 use indicatif::{ProgressBar, ProgressStyle};
 use manifactor::solve::{IterationRecord, Observer};
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::time::Duration;
 use tracing::Level;
-use tracing_subscriber::fmt::time::uptime;
+use tracing_subscriber::field::MakeExt;
+use tracing_subscriber::fmt::{format::debug_fn, time::uptime};
 
 /// What `-v` and a terminal ask for. All of it goes to stderr.
 pub(crate) enum Watch {
@@ -26,7 +28,7 @@ impl Watch {
             1 => return Self::Lines { begun: false },
             _ => return Self::Nothing,
         }
-        let bar = ProgressBar::new_spinner().with_prefix(title.to_owned());
+        let bar = ProgressBar::new_spinner().with_prefix(on_one_line(title).into_owned());
         // the template is a literal: without it the default style is as good
         if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix} {elapsed} {msg}") {
             bar.set_style(style);
@@ -46,6 +48,13 @@ pub(crate) fn log(verbose: u8) {
     };
     let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     let log = tracing_subscriber::fmt().with_max_level(level).with_ansi(colours).with_timer(uptime());
+    let fields = debug_fn(|out, field, value| {
+        let value = format!("{value:?}");
+        let value = on_one_line(&value);
+        if field.name() == "message" { write!(out, "{value}") } else { write!(out, "{field}={value}") }
+    });
+    // a line that cannot be written is left out: an error of the log's own would go the same way, by `eprintln!`
+    let log = log.fmt_fields(fields.delimited(" ")).log_internal_errors(false);
     // a program that brings a log of its own keeps it
     let _ = log.with_writer(std::io::stderr).try_init();
 }
@@ -59,9 +68,9 @@ impl Observer for Watch {
             }
             Self::Lines { begun } => {
                 if !std::mem::replace(begun, true) {
-                    eprintln!("{HEADER}");
+                    output::say(HEADER);
                 }
-                eprintln!("{}", line(record));
+                output::say(&line(record));
             }
         }
         ControlFlow::Continue(())

@@ -36,7 +36,7 @@ impl Document {
         let text = String::from_utf8(bytes).map_err(|error| {
             let at = error.utf8_error().valid_up_to();
             let text = error.as_bytes().get(..at).map(String::from_utf8_lossy).unwrap_or_default();
-            let problem = Problem::Unreadable("the text is not UTF-8 from here on".into());
+            let problem = Problem::invalid("cannot be read: the text is not UTF-8 from here on");
             Diagnostics::from(Diagnostic::new(Source::new(&name, text).place(at..at), problem))
         })?;
         Document::parse(name, text, format)

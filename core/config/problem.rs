@@ -16,7 +16,7 @@ pub enum Problem {
     /// The file's extension says no format that is known.
     #[error("the extension of this file names no known format")]
     UnknownFormat,
-    /// The file could not be read.
+    /// The file is not there, or could not be read; what it says does not matter.
     #[error("cannot be read: {0}")]
     Unreadable(String),
     /// The text is longer than any document should be.

@@ -1,10 +1,11 @@
 //! The command line, end to end: the binary, its files and its exit codes.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 mod book;
 mod check_factor;
 mod disk;
 mod documents;
 mod evaluate;
+mod exit_codes;
 mod experiment;
 mod graph;
 mod interrupt;
@@ -18,6 +19,7 @@ mod reports;
 mod run;
 mod schema;
 mod solve;
+mod terminal;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,12 +1,15 @@
-//! Disks that are full, files that may not grow, folders that nobody may write into.
+//! Disks that are full, files that may not grow, folders for reading only, and streams without a reader.
 use crate::experiment::tables;
 use crate::{folder, manifactor, path, root};
+use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Output};
 
 const RUN: &str = r#"
 source = { type = "simulated", scene = { objects = 3 }, trajectory = { frames = 40 } }
 "#;
+
+const GRAPH: &str = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.5\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nFIX 0\n";
 
 const SWEEP: &str = r#"
 base = "run.toml"
@@ -27,9 +30,9 @@ fn after(line: &str, arguments: &str) -> Output {
     command.current_dir(root()).env("NO_COLOR", "1").output().unwrap()
 }
 
-/// No file grows beyond so many blocks of 512 bytes; the signal that comes with it is not for us.
+/// No file grows beyond so many blocks of 512 bytes, and a signal comes with a write that would.
 fn small_files(blocks: usize) -> String {
-    format!("trap '' XFSZ; ulimit -f {blocks}")
+    format!("ulimit -f {blocks}")
 }
 
 #[track_caller]
@@ -98,6 +101,57 @@ fn a_full_standard_output_is_an_error() {
     refused(&ran, &["standard output", "No space left on device"]);
     let ran = after("exec > /dev/full", "list factors --json");
     refused(&ran, &["standard output", "No space left on device"]);
+    let ran = after("exec > /dev/full", "solve --help");
+    refused(&ran, &["standard output", "No space left on device"]);
+    let ran = after("exec > /dev/full", "--version");
+    refused(&ran, &["standard output", "No space left on device"]);
+}
+
+/// Runs the binary with a pipe without a reader as one of its streams: the other stream, and the exit code.
+fn unheard(stderr: bool, arguments: &str) -> (String, Option<i32>) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_manifactor"));
+    command.args(arguments.split_whitespace()).current_dir(root()).env("NO_COLOR", "1");
+    let (reader, writer) = std::io::pipe().unwrap();
+    let (mut heard, other) = std::io::pipe().unwrap();
+    match stderr {
+        true => command.stderr(writer).stdout(other),
+        false => command.stdout(writer).stderr(other),
+    };
+    drop(reader);
+    let mut child = command.spawn().unwrap();
+    // with its ends of the pipes
+    drop(command);
+    let mut text = String::new();
+    heard.read_to_string(&mut text).unwrap();
+    (text, child.wait().unwrap().code())
+}
+
+#[test]
+fn a_standard_output_without_a_reader_is_an_error() {
+    let folder = folder(&[("a.g2o", GRAPH)]);
+    let out = path(&folder, "b.g2o");
+    let (said, code) = unheard(false, &format!("solve {} --out {out} --json", path(&folder, "a.g2o")));
+    assert_eq!((said.as_str(), code), ("", Some(3)));
+    assert!(Path::new(&out).is_file());
+}
+
+#[test]
+fn a_standard_error_that_cannot_be_written_changes_nothing() {
+    let folder = folder(&[("run.toml", RUN), ("sweep.toml", SWEEP)]);
+    let [run, sweep] = ["run.toml", "sweep.toml"].map(|name| path(&folder, name));
+    for (i, log) in ["", "-v", "-vv"].into_iter().enumerate() {
+        let out = path(&folder, &format!("run{i}"));
+        let (said, code) = unheard(true, &format!("run {run} --out {out} {log}"));
+        assert!(code == Some(0) && said.contains("Written to"), "{code:?} {said}");
+        assert!(Path::new(&out).join("report.html").is_file());
+    }
+    let out = path(&folder, "sweep");
+    let ran = after("exec 2> /dev/full", &format!("experiment {sweep} --out {out} -v"));
+    assert_eq!(ran.status.code(), Some(0));
+    assert!(Path::new(&out).join("report.html").is_file());
+    // what is wrong is told by the exit code
+    assert_eq!(after("exec 2> /dev/full", "solve nowhere.g2o").status.code(), Some(3));
+    assert_eq!(after("exec 2> /dev/full", "solve --nothing").status.code(), Some(2));
 }
 
 /// Runs the binary with a file system of its own at `place`; what is there at the end follows the marker.

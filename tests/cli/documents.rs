@@ -48,7 +48,7 @@ fn a_run_with_a_mistake_is_not_run() {
 
 #[test]
 fn data_that_are_not_there_are_looked_for_by_name() {
-    let ran = manifactor("run examples/tum/fr1_desk.toml").ended(2);
+    let ran = manifactor("run examples/tum/fr1_desk.toml").ended(3);
     ran.complains("MANIFACTOR_DATA");
 }
 

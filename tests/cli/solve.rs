@@ -156,7 +156,7 @@ fn information_that_is_not_positive_definite_is_repaired_on_request() {
 #[test]
 fn files_that_are_not_there_are_named() {
     manifactor("solve nowhere.g2o").ended(3).complains("nowhere.g2o");
-    manifactor("solve nowhere.toml").ended(2).complains("nowhere.toml");
+    manifactor("solve nowhere.toml").ended(3).complains("nowhere.toml");
     let folder = folder(&[("graph.toml", GRAPH)]);
     let ran = manifactor(&format!("solve {} --out {}", path(&folder, "graph.toml"), path(&folder, "a.txt")));
     ran.ended(2).complains("use .toml, .json, .yaml, .g2o or .bal");

@@ -62,7 +62,7 @@ impl Check {
             let sequence = run.sequence(variant)?;
             let mapping = Mapping::new(&sequence, &variant.settings).map_err(Failure::input)?;
             for warning in &mapping.warnings {
-                eprintln!("warning: {}: {warning}", variant.name);
+                output::say(&format!("warning: {}: {warning}", variant.name));
             }
             lines.push(format!(
                 "{}: {}, {}, {}, {} of which {} mapped, {}",

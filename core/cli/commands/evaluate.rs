@@ -1,7 +1,8 @@
 //! `manifactor evaluate`: a trajectory against the truth.
 use crate::failure::Failure;
+use crate::output;
 use crate::status::Status;
-use crate::{output, text};
+use crate::text::{self, Table};
 use clap::{Args, ValueEnum};
 use manifactor::formats::tum;
 use manifactor::graph::checked::Positive;
@@ -82,12 +83,12 @@ impl Evaluate {
             }));
             return Ok(Status::Done);
         }
-        let mut table = text::table(&["error", "rmse", "mean", "median", "std", "min", "max"]);
-        table.add_row(row("ATE, m", &ate));
-        table.add_row(row("RPE translation, m", &rpe.translation));
-        table.add_row(row("RPE rotation, rad", &rpe.rotation));
+        let mut table = Table::of_numbers(&["error", "rmse", "mean", "median", "std", "min", "max"]);
+        table.row(row("ATE, m", &ate));
+        table.row(row("RPE translation, m", &rpe.translation));
+        table.row(row("RPE rotation, rad", &rpe.rotation));
         let pairs = text::count(pairs, "matched pose");
-        output::print(&format!("{pairs}, scale {scale:.6}\n{}\n", table.trim_fmt()));
+        output::print(&format!("{pairs}, scale {scale:.6}\n{}\n", table.text()));
         Ok(Status::Done)
     }
 }

@@ -1,7 +1,7 @@
 //! `manifactor experiment`: a sweep from its document to its tables.
 use crate::failure::Failure;
 use crate::status::Status;
-use crate::text::count;
+use crate::text::{count, on_one_line};
 use crate::{interrupt, output, summary_table};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -78,7 +78,8 @@ impl Experiment {
             output::print(&format!("\nWritten to {}.\n", sweep.output.display()));
         }
         if summary.open > 0 {
-            eprintln!("{} still to be run: the same command goes on.", count(summary.open, "trial"));
+            let open = count(summary.open, "trial");
+            output::say(&format!("{open} still to be run: the same command goes on."));
         }
     }
 }
@@ -94,7 +95,7 @@ impl Bar {
         if !std::io::stderr().is_terminal() {
             return Self::Lines;
         }
-        let bar = ProgressBar::new(0).with_prefix(title.to_owned());
+        let bar = ProgressBar::new(0).with_prefix(on_one_line(title).into_owned());
         let template = "{prefix} {wide_bar} {pos}/{len} trials, {elapsed} gone, {eta} left {msg}";
         // the template is a literal: without it the default style is as good
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -120,7 +121,7 @@ impl Bar {
             }
             // twenty lines or so
             Self::Lines if done == kept || done == trials || done % trials.div_ceil(20) == 0 => {
-                eprintln!("{done} of {} done, {kept} of them before", count(trials, "trial"));
+                output::say(&format!("{done} of {} done, {kept} of them before", count(trials, "trial")));
             }
             Self::Lines => {}
         }

@@ -4,7 +4,7 @@ use crate::fields::fields;
 use crate::output;
 use crate::reference::notes;
 use crate::status::Status;
-use crate::text;
+use crate::text::{self, Table};
 use clap::Args;
 use manifactor::config::nearest;
 use manifactor::graph::catalogue::{self, Entry};
@@ -57,13 +57,13 @@ fn explain(entry: &Entry) -> String {
     }
     let fields = fields((entry.schema)().as_value());
     if !fields.is_empty() {
-        let mut table = text::words(&["field", "type", "default", "what it is"]);
+        let mut table = Table::of_words(&["field", "type", "default", "what it is"]);
         for field in fields {
             let default =
                 field.default.unwrap_or_else(|| if field.required { "required" } else { "" }.into());
-            table.add_row([field.name, field.kind, default, field.docs]);
+            table.row([field.name, field.kind, default, field.docs]);
         }
-        out += &format!("\n{}\n", table.trim_fmt());
+        out += &format!("\n{}\n", table.text());
     }
     if let Some(example) = entry.example() {
         out += &format!("\nExample:\n\n{}\n", indent(&example));

@@ -42,7 +42,7 @@ impl ShowGraph {
         let mut input = self.reading.open(&path, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
-            eprintln!("note: {note}");
+            output::note(note);
         }
         let mut status = Status::Done;
         let mut after = None;

@@ -3,7 +3,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::reference;
 use crate::status::Status;
-use crate::text;
+use crate::text::Table;
 use clap::Args;
 use manifactor::config::nearest;
 use manifactor::graph::catalogue;
@@ -40,11 +40,11 @@ impl List {
         }
         let mut out = String::new();
         for of_kind in entries.chunk_by(|a, b| a.kind == b.kind) {
-            let mut table = text::words(&[of_kind.first().map_or("", |e| e.kind), "what it is"]);
+            let mut table = Table::of_words(&[of_kind.first().map_or("", |e| e.kind), "what it is"]);
             for entry in of_kind {
-                table.add_row([entry.name, &entry.summary()]);
+                table.row([entry.name, &entry.summary()]);
             }
-            out += &format!("{}\n\n", table.trim_fmt());
+            out += &format!("{}\n\n", table.text());
         }
         output::print(&(out + "`manifactor explain NAME` says more.\n"));
         Ok(Status::Done)

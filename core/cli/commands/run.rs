@@ -36,7 +36,7 @@ impl Run {
         }
         check_folder(&document.output)?;
         let mut interrupt = interrupt::on_ctrl_c();
-        let (mut status, mut page) = (Status::Done, RunPage::default());
+        let mut page = RunPage::default();
         let mut run = Running::new(&document, self.run.data());
         for variant in &document.variants {
             tracing::info!("variant {}", variant.name);
@@ -44,7 +44,6 @@ impl Run {
             let mut observer = All(vec![&mut watch, &mut interrupt]);
             let (estimate, report) = run.variant(variant, &mut observer)?;
             drop(watch);
-            status = status.and(Status::from(&report.solve.termination));
             let folder = write_variant(&document, variant, &estimate, &report)?;
             let title = format!("{}: {}", document.title, variant.name);
             let pictures = run_pictures(&title, &estimate, &variant.settings);
@@ -52,7 +51,6 @@ impl Run {
             let config = std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?;
             page.variant(&estimate, &report, &pictures, &config);
             if interrupt.0.load(Ordering::Relaxed) {
-                status = Status::Interrupted;
                 break;
             }
         }
@@ -67,6 +65,6 @@ impl Run {
             let picture = folder.map(|f| f.join("map_top.svg").display().to_string()).unwrap_or_default();
             output::print(&format!("\nWritten to {}; a picture is {picture}.\n", document.output.display()));
         }
-        Ok(status)
+        Ok(Status::from(&report))
     }
 }

@@ -99,7 +99,7 @@ impl Solve {
     fn as_json(&self, input: &GraphFile, solution: &Solution, start: f64) -> Value {
         let outcome = &solution.outcome;
         json!({
-            "graph": self.graph,
+            "graph": self.graph.display().to_string(),
             "variables": input.values.len(),
             "factors": outcome.factors,
             "start": { "type": input.start.typetag_name(), "seconds": start },

@@ -1,5 +1,6 @@
 //! The language of Graphviz.
 use super::Inspection;
+use crate::text::printable;
 use std::fmt::Write;
 
 /// Variables as ellipses, factors as boxes; the more a factor costs, the wider its lines.
@@ -36,7 +37,7 @@ pub(super) fn write(inspection: &Inspection) -> String {
 }
 
 fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n"))
+    format!("\"{}\"", printable(text).replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n"))
 }
 
 #[cfg(test)]
@@ -46,5 +47,6 @@ mod tests {
     #[test]
     fn names_of_any_kind_stay_in_their_quotes() {
         assert_eq!(quoted("a \"b\" \\\n"), r#""a \"b\" \\\n""#);
+        assert_eq!(quoted("\0\u{9b}"), r#""\\u{0}\\u{9b}""#);
     }
 }

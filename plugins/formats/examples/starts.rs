@@ -2,7 +2,7 @@
 //! then, whether that is the global minimum.
 //!
 //! `cargo run --release -p manifactor-formats --example starts -- FILE...`
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
 use manifactor_solve::{GaussNewton, Given, LevenbergMarquardt, Optimizer, Silent, Start, solve};

@@ -1,5 +1,5 @@
 //! The default solver on published pose graphs: no tuning, the best known minimum of each.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 use manifactor_formats::pose_graph::{Options, read};
 use manifactor_solve::{Auto, Silent, solve};
 use std::path::PathBuf;

@@ -1,5 +1,5 @@
 //! Graduated non-convexity on published pose graphs with false loop closures among the true ones.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 use manifactor_formats::pose_graph::{Options, PoseGraph, read};
 use manifactor_geometry::{Between, Se2, Se3};
 use manifactor_graph::Key;

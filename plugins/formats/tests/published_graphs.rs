@@ -1,5 +1,5 @@
 //! The published pose graphs of `MANIFACTOR_DATA/g2o`: how much each holds, and what it costs at its start.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use std::path::PathBuf;
 

@@ -1,5 +1,5 @@
 //! The published sequences of `MANIFACTOR_DATA/tum`: every file loads whole.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
 use manifactor_formats::{accelerometer, detections, timestamps, tum};
 use std::path::PathBuf;
 

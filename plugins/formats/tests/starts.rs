@@ -1,5 +1,5 @@
 //! The published pose graphs of `MANIFACTOR_DATA/g2o` from a chordal start: to the best known cost, all of them.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
 use manifactor_graph::Graph;

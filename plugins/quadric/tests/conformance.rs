@@ -1,5 +1,6 @@
 //! Numeric cases of another implementation and of closed forms, from the file that the environment
 //! variable MANIFACTOR_CONFORMANCE names. Values to 1e-9 of the largest entry, Jacobians to 1e-8.
+#![allow(clippy::print_stdout)]
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::{Direction, Factor, Manifold, Residual};
 use manifactor_quadric::*;

@@ -1,5 +1,5 @@
 //! What nothing constrains is named, with its directions.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 mod scene;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};

@@ -1,6 +1,6 @@
 //! Solves with quadrics: objects are found from their boxes, and places where a factor degenerates are
 //! survived.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Factor, Graph, Manifold, Noise, Values};

@@ -1,6 +1,6 @@
 //! Trajectory errors agree with those of `evo` to 1e-6, on published trajectories. `evo/figures.py` made
 //! the figures.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 use manifactor_formats::tum;
 use manifactor_slam::metrics::{
     Alignment, Pairing, Statistics, absolute_error, align, associate, relative_error,

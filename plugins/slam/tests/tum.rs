@@ -1,7 +1,7 @@
 //! The TUM RGB-D sequences of the paper, read where `MANIFACTOR_DATA` says that they lie.
 //!
 //! Settings and reference: gtsam-quadrics 0.3.0 with GTSAM's Levenberg-Marquardt on the same input.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 use manifactor_config::Document;
 use manifactor_slam::estimate::Estimate;
 use manifactor_slam::mapping::Mapping;

@@ -1,0 +1,97 @@
+//! What others wrote, fit for a terminal: titles, keys and names of files may hold control characters, and a terminal
+//! obeys those.
+use std::borrow::Cow;
+use std::fmt::Write;
+
+/// Control characters (C0 but for line breaks, DEL, C1) as escapes: `\u{1b}`.
+pub(crate) fn printable(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| c.is_control() && c != '\n')
+}
+
+/// The same on one line, for names in tables and sentences: line breaks are escaped too.
+pub(crate) fn on_one_line(text: &str) -> Cow<'_, str> {
+    escaped(text, char::is_control)
+}
+
+/// The same, and not without end: for messages that quote what they found.
+pub(crate) fn shortened(text: &str) -> String {
+    /// Bytes that are shown.
+    const MOST: usize = 2000;
+    let end = text.char_indices().map(|(at, _)| at).find(|at| *at > MOST).unwrap_or(text.len());
+    let more = if end < text.len() { "…" } else { "" };
+    printable(text.get(..end).unwrap_or_default()).into_owned() + more
+}
+
+/// A JSON document, in which the serializer leaves DEL and C1 as they are; they only occur in its texts.
+pub(crate) fn json(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            // writing to a text cannot fail
+            '\u{7f}'..='\u{9f}' => _ = write!(out, "\\u{:04x}", u32::from(c)),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// The text of a document that is shown around a mistake, byte for byte as long, so that places stay where they are.
+pub(crate) fn same_length(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
+        let ends_line = c == '\n' || (c == '\r' && rest.peek() == Some(&'\n'));
+        if c.is_control() && !ends_line && c != '\t' {
+            out.extend(std::iter::repeat_n('?', c.len_utf8()));
+        } else {
+            out.push(c);
+        }
+    }
+    out
+}
+
+fn escaped(text: &str, hidden: fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(hidden) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if hidden(c) { out.extend(c.escape_default()) } else { out.push(c) }
+    }
+    Cow::Owned(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Clears the screen, by C0 and by C1, rings, rubs out, and goes back to the start of the line.
+    const NASTY: &str = "a\u{1b}[2J\u{9b}2J\u{7}\u{7f}\rb\nc";
+
+    #[test]
+    fn no_control_character_reaches_a_terminal() {
+        assert_eq!(printable(NASTY), "a\\u{1b}[2J\\u{9b}2J\\u{7}\\u{7f}\\rb\nc");
+        assert_eq!(on_one_line(NASTY), "a\\u{1b}[2J\\u{9b}2J\\u{7}\\u{7f}\\rb\\nc");
+        assert!(matches!(printable("Tasse α\n"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn json_stays_json() {
+        let text = serde_json::to_string(NASTY).unwrap();
+        let safe = json(&text);
+        assert!(text.contains('\u{9b}') && !safe.contains(char::is_control));
+        assert_eq!(serde_json::from_str::<String>(&safe).unwrap(), NASTY);
+    }
+
+    #[test]
+    fn lines_of_a_document_keep_their_places() {
+        assert_eq!(same_length(NASTY), "a?[2J??2J???b\nc");
+        assert_eq!(same_length("a\tb\r\nc"), "a\tb\r\nc");
+    }
+
+    #[test]
+    fn long_texts_are_cut_between_characters() {
+        let text = shortened(&"α".repeat(3000));
+        assert!(text.ends_with("α…") && text.len() < 2010);
+    }
+}

@@ -1,0 +1,132 @@
+//! The table of exit codes in `docs/reliability.md`.
+use crate::interrupt::{AtWork, ENDLESS, RUN};
+use crate::{folder, path, root, run};
+use std::process::{Command, Stdio};
+use tempfile::TempDir;
+
+const SEEN: &str = "source = { type = 'simulated', scene = { objects = 2 }, trajectory = { frames = 12 } }\n";
+
+/// A variable with one factor: `residual` of x, from 0.7.
+fn graph(residual: &str, domain: &str) -> String {
+    format!(
+        "[[variables]]\nkey = 'x'\nvalue = {{ type = 'point1', position = [0.7] }}\n[[factors]]\nkeys = ['x']\n\
+         factor = {{ type = 'expression', variables = {{ x = 'point1' }}, residual = ['{residual}'], domain = [{domain}] }}\n"
+    )
+}
+
+fn files() -> TempDir {
+    let sweep = "base = 'seen.toml'\nset = { objects = { min_views = 1 } }\n\
+                 axes = [{ columns = { area = 'source.scene.area' }, rows = [[2.4, 1.6], [0.1, 0.1]] }]\n";
+    folder(&[
+        ("good.toml", &graph("x - 1", "")),
+        ("root.toml", &graph("sqrt(x - 1)", "")),
+        ("open.toml", &(graph("x - 1", "") + &graph("x - 1", "'-1 - x * x'").replace("'x'", "'y'"))),
+        ("word.toml", &graph("x - one", "")),
+        ("rising.toml", &graph("sqrt(sqrt(sqrt(x * x)))", "")),
+        ("endless.toml", ENDLESS),
+        ("bad.g2o", "VERTEX_SE2 0 0 zero 0\n"),
+        ("run.toml", RUN),
+        ("seen.toml", SEEN),
+        ("sweep.toml", sweep),
+        (
+            "elsewhere.toml",
+            "source = { type = 'recorded', folder = 'nowhere', camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }\n",
+        ),
+        ("unread.toml", "base = 'nowhere.toml'\n"),
+    ])
+}
+
+/// The exit codes of commands that end so.
+fn codes(ending: &str) -> Vec<i32> {
+    let folder = files();
+    let at = |name: &str| path(&folder, name);
+    let code = |command: &str| {
+        let words = command.split_whitespace().map(|word| word.strip_prefix('@').map_or(word.to_owned(), at));
+        let words: Vec<String> = words.collect();
+        run(words.iter().map(String::as_str), &[]).code
+    };
+    let codes = |commands: &[&str]| commands.iter().map(|command| code(command)).collect();
+    match ending {
+        "done" => codes(&[
+            "solve @good.toml",
+            "graph @good.toml --solve",
+            "check @good.toml",
+            "run @seen.toml --out @out --set objects.min_views=1",
+            "--help",
+            "list --help",
+            "--version",
+        ]),
+        "interrupted, when all was done" => {
+            let work = AtWork::begin(&format!("run {} --out {}", at("run.toml"), at("out")));
+            vec![work.until("converged", 0).ended_by("-INT").code]
+        }
+        "a sweep is complete, though trials of it failed" => codes(&["experiment @sweep.toml --out @out"]),
+        "stalled" => codes(&["solve @rising.toml --solver gauss_newton"]),
+        "the allowed iterations are used up" => {
+            codes(&["solve @endless.toml --set solver.stop.max_iterations=3"])
+        }
+        "indeterminate" => codes(&["solve @open.toml --solver gauss_newton"]),
+        "a residual is not finite" => codes(&["solve @root.toml"]),
+        "objects were detected, and none is mapped" => {
+            codes(&["run @seen.toml --out @out --set objects.min_views=1000"])
+        }
+        "a factor breaks a law" => codes(&["check-factor --config @root.toml"]),
+        "the command line is wrong" => {
+            codes(&["solve", "solv @good.toml", "solve @good.toml --set", "explain nothing"])
+        }
+        "a document or a file of data is wrong" => {
+            codes(&["solve @word.toml", "run @good.toml", "solve @bad.g2o"])
+        }
+        "a file or folder is not there, or cannot be read" => codes(&[
+            "solve nowhere.toml",
+            "solve nowhere.g2o",
+            "check nowhere.yaml",
+            "run nowhere.toml",
+            "run @elsewhere.toml --out @out",
+            "experiment nowhere.toml",
+            "experiment @unread.toml --out @out",
+            "evaluate nowhere.txt nowhere.txt",
+        ]),
+        "a file cannot be written" => {
+            codes(&["solve @good.toml --out @nowhere/a.json", "run @run.toml --out @run.toml/out"])
+        }
+        "standard output cannot be written, or its reader has gone" => {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_manifactor"));
+            command.args(["list", "factors"]).stderr(Stdio::null());
+            let (reader, unheard) = std::io::pipe().unwrap();
+            drop(reader);
+            let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+            let mut code = |out: Stdio| command.stdout(out).status().unwrap().code().unwrap();
+            vec![code(unheard.into()), code(full.into())]
+        }
+        "interrupted before that; the best so far is written" => {
+            let work = AtWork::begin(&format!("solve {} --out {}", at("endless.toml"), at("out.json")));
+            vec![work.until("iteration", 5).ended_by("-TERM").code]
+        }
+        _ => panic!("nothing here ends so: {ending}"),
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn every_ending_of_the_table_has_its_code() {
+    let page = std::fs::read_to_string(root().join("docs/reliability.md")).unwrap();
+    let (_, table) = page.split_once("## Exit codes\n").unwrap();
+    let table = table.split("\n\n").find(|part| part.starts_with('|')).unwrap();
+    let rows: Vec<(&str, i32)> = table
+        .lines()
+        .skip(2)
+        .map(|line| {
+            let (ending, code) = line.trim_matches(['|', ' ']).rsplit_once('|').unwrap();
+            (ending.trim(), code.trim().parse().unwrap())
+        })
+        .collect();
+    assert!(rows.len() >= 15, "{rows:?}");
+    for (ending, expected) in rows {
+        let found = codes(ending);
+        assert!(
+            !found.is_empty() && found.iter().all(|code| *code == expected),
+            "{ending}: {expected}, {found:?}"
+        );
+    }
+}
