@@ -21,9 +21,10 @@ fn a_new_plugin_compiles_and_passes_outside_of_the_workspace() {
     cargo.args(["test", "--offline", "--quiet"]).current_dir(&name).env("CARGO_TARGET_DIR", target());
     // all of ours are built anew for a crate outside: quickly, rather than well
     cargo.env("CARGO_INCREMENTAL", "0").args(["--config", "profile.dev.opt-level=0"]);
-    for part in ["", "-graph", "-solve", "-config", "-testing", "-cli", "-geometry", "-quadric", "-semantic"]
-        .iter()
-        .chain(&["-formats", "-slam", "-viz", "-expression"])
+    for part in
+        ["", "-tree", "-graph", "-solve", "-config", "-testing", "-cli", "-geometry", "-quadric", "-semantic"]
+            .iter()
+            .chain(&["-formats", "-slam", "-viz", "-expression"])
     {
         cargo.args(["--config", &format!("profile.dev.package.manifactor{part}.opt-level=0")]);
     }

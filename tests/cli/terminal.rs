@@ -69,7 +69,7 @@ fn pictures_and_pages_hold_what_they_may() {
 #[test]
 fn a_name_in_a_table_is_no_formula() {
     let base = "source = { type = 'simulated', scene = { objects = 1 }, trajectory = { frames = 6 } }\n\
-                [[variants]]\nname = '=HYPERLINK(1)'\n[[variants]]\nname = '-2.5'\n";
+                [[variants]]\nname = '=HYPERLINK(1)'\n[[variants]]\nname = '-2.5'\nset = { objects = { refinements = 1 } }\n";
     let sweep =
         "base = 'base.toml'\nsummary = { by = ['variant'], metrics = ['position'], resamples = 10 }\n";
     let folder = folder(&[("base.toml", base), ("sweep.toml", sweep)]);

@@ -164,8 +164,8 @@ mod tests {
         assert!(dense.fill == 1.0 && dense.worth() == 0.0, "{}", dense.fill);
         let (side, mut edges) = (30, vec![]);
         for v in 0..side * side {
-            edges.extend((v % side > 0).then(|| (v, v - 1)));
             edges.extend((v >= side).then(|| (v, v - side)));
+            edges.extend((v % side > 0).then(|| (v, v - 1)));
         }
         let grid = Adjacency::new(vec![6; (side * side) as usize], &edges);
         let elimination = Elimination::new(&grid, &minimum_degree::minimum_degree(&grid).unwrap());

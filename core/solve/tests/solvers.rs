@@ -326,3 +326,19 @@ fn the_condition_is_that_of_the_scaled_matrix() {
     let (graph, values) = chain(5);
     assert_eq!(Problem::compile(&graph, &values).unwrap().condition(), None);
 }
+
+#[test]
+fn a_factor_on_a_thousand_variables_is_compiled() {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    let keys: Vec<String> = (0..1000).map(|i| format!("p{i}")).collect();
+    for (i, key) in keys.iter().enumerate() {
+        values.insert(key.as_str(), Plane { x: i as f64, y: 0.0 });
+        graph.add([key.as_str()], At { at: [0.0, 0.0] });
+    }
+    graph.add(keys.iter().map(String::as_str), Centre { at: [0.0, 1.0] });
+    let mut problem = Problem::compile(&graph, &values).unwrap();
+    let (entries, unknowns) = (problem.normal_equations().1.len(), problem.dim());
+    assert_eq!((entries, unknowns), (unknowns * (unknowns + 1) / 2, 2000), "all are coupled");
+    let sum: f64 = (0..1000).map(|i| f64::from(i).powi(2)).sum();
+    assert!((problem.linearize().cost - 0.5 * (sum + 499.5_f64.powi(2) + 1.0)).abs() < 1e-3);
+}

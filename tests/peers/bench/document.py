@@ -1,5 +1,7 @@
 """docs/benchmarks.md, as the benchmark writes it."""
 
+from pathlib import Path
+
 from bench import tables
 
 INTRODUCTION = """# Benchmarks
@@ -25,6 +27,8 @@ Measured on a machine of the same kind, by hand, and so not in the ratios: SymFo
 sphere2500 0.54 s; it stops M3500 at 339.8 with its default λ), and gtsam-quadrics (a scene of the size of fifty_objects:
 5.3 µs to linearise a box, 1.41 s in all; Ceres there 2.4 µs and 1.05 s).
 """
+# how it is made, and what came out: by an example of our own, which has no peers
+AUTO = Path(__file__).resolve().parent.parent / "auto.md"
 
 
 def render(all_measured, stop, machine, solvers, repeat):
@@ -37,6 +41,7 @@ def render(all_measured, stop, machine, solvers, repeat):
         tables.growth(all_measured, *GROWING[0]),
         "Bundle adjustment: for each camera 100 points, each seen by five cameras on average.",
         tables.growth(all_measured, *GROWING[1]),
+        AUTO.read_text(),
         QUOTED,
         "## Every method",
         *(tables.of_problem(measured) for measured in all_measured),
