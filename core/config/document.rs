@@ -87,6 +87,26 @@ impl Document {
     }
 
     /// The document as a table to be read; an error if it is none.
+    ///
+    /// ```
+    /// use manifactor_config::{Document, Errors, Format};
+    ///
+    /// let document = Document::parse("run.toml", "seed = 1\nsteps = 'many'\nspeeed = 2", Format::Toml)?;
+    /// let errors = Errors::new();
+    /// let run = document.section(&errors).and_then(|mut run| {
+    ///     let seed: Option<u64> = run.required("seed");
+    ///     let steps: Option<u32> = run.required("steps");
+    ///     let speed: Option<f64> = run.optional("speed");
+    ///     run.finish();
+    ///     Some((seed?, steps?, speed.unwrap_or(1.0)))
+    /// });
+    /// assert_eq!(
+    ///     errors.finish(run).unwrap_err().to_string(),
+    ///     "run.toml:2:9: expected a whole number, 0 or more, found the text \"many\"\n\
+    ///      run.toml:3:1: unknown field `speeed` (did you mean `speed`? there are `seed`, `steps` and `speed`)"
+    /// );
+    /// # Ok::<(), manifactor_config::Diagnostics>(())
+    /// ```
     pub fn section<'e>(&self, errors: &'e Errors) -> Option<Section<'e>> {
         Section::new(self.root.clone(), errors)
     }

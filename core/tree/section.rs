@@ -9,26 +9,6 @@ use serde::de::DeserializeOwned;
 
 /// A table that is being read. Each method takes a field out; [`finish`](Section::finish) reports those that nobody
 /// asked for. A method that returns `None` for a field that is required, or that is there, has reported why.
-///
-/// ```
-/// use manifactor_config::{Document, Errors, Format};
-///
-/// let document = Document::parse("run.toml", "seed = 1\nsteps = 'many'\nspeeed = 2", Format::Toml)?;
-/// let errors = Errors::new();
-/// let run = document.section(&errors).and_then(|mut run| {
-///     let seed: Option<u64> = run.required("seed");
-///     let steps: Option<u32> = run.required("steps");
-///     let speed: Option<f64> = run.optional("speed");
-///     run.finish();
-///     Some((seed?, steps?, speed.unwrap_or(1.0)))
-/// });
-/// assert_eq!(
-///     errors.finish(run).unwrap_err().to_string(),
-///     "run.toml:2:9: expected a whole number, 0 or more, found the text \"many\"\n\
-///      run.toml:3:1: unknown field `speeed` (did you mean `speed`? there are `seed`, `steps` and `speed`)"
-/// );
-/// # Ok::<(), manifactor_config::Diagnostics>(())
-/// ```
 #[must_use = "finish it, so that unknown fields are reported"]
 #[derive(Debug)]
 pub struct Section<'e> {

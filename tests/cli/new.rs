@@ -21,6 +21,8 @@ fn a_new_plugin_compiles_and_passes_outside_of_the_workspace() {
     cargo.args(["test", "--offline", "--quiet"]).current_dir(&name).env("CARGO_TARGET_DIR", target());
     // all of ours are built anew for a crate outside: quickly, rather than well
     cargo.env("CARGO_INCREMENTAL", "0").args(["--config", "profile.dev.opt-level=0"]);
+    // with it, the dependencies would not be those that are built already
+    cargo.args(["--config", "profile.dev.debug=false"]);
     for part in
         ["", "-tree", "-graph", "-solve", "-config", "-testing", "-cli", "-geometry", "-quadric", "-semantic"]
             .iter()

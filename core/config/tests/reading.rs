@@ -49,6 +49,20 @@ impl Shape for Rectangle {
 }
 register!(dyn Shape, "rectangle", Rectangle);
 
+/// Several shapes as one.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Group {
+    #[schemars(with = "Vec<serde_json::Value>")]
+    shapes: Vec<Box<dyn Shape>>,
+}
+impl Shape for Group {
+    fn area(&self) -> f64 {
+        self.shapes.iter().map(|shape| shape.area()).sum()
+    }
+}
+register!(dyn Shape, "group", Group);
+
 /// Black.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -98,6 +112,28 @@ fn registered_types_are_read_by_name() {
 }
 
 #[test]
+fn errors_of_a_type_within_a_type_are_at_their_place() {
+    let text = "
+[[shapes]]
+type = 'group'
+shapes = [
+    { type = 'disc', radius = 1 },
+    { type = 'group', shapes = [{ type = 'disc', radius = 'one' }] },
+]
+[[shapes]]
+type = 'group'
+shapes = [{ type = 'group', shapes = [{ type = 'dics' }] }]
+";
+    assert_eq!(
+        said(Format::Toml, text, shapes),
+        "file:6:59: expected a number, found the text \"one\"\n\
+         file:10:48: unknown shape `dics` (did you mean `disc`? there are `disc`, `group` and `rectangle`)"
+    );
+    let mended = text.replace("'one'", "2").replace("'dics'", "'disc', radius = 3");
+    assert_eq!(read(Format::Toml, &mended, shapes), Ok(42.0));
+}
+
+#[test]
 fn all_errors_of_a_document_are_told_at_once() {
     let text = "
 [[shapes]]
@@ -125,12 +161,12 @@ type = 'black'
 ";
     assert_eq!(
         said(Format::Toml, text, shapes),
-        "file:3:8: unknown shape `dics` (did you mean `disc`? there are `disc` and `rectangle`)\n\
+        "file:3:8: unknown shape `dics` (did you mean `disc`? there are `disc`, `group` and `rectangle`)\n\
          file:8:1: unknown field `raduis` (did you mean `radius`? there are `radius` and `centre`)\n\
          file:9:1: unknown field `center` (did you mean `centre`? there are `radius` and `centre`)\n\
          file:13:44: expected a number, found the text \"tall\"\n\
          file:18:16: `inf` is not a finite number\n\
-         file:21:8: `black` is an ink, not a shape (there are `disc` and `rectangle`)\n\
+         file:21:8: `black` is an ink, not a shape (there are `disc`, `group` and `rectangle`)\n\
          file:23:2: unknown field `sheet` (there is only `shapes`)"
     );
 }
