@@ -132,7 +132,7 @@ impl Node {
     }
 }
 
-/// As it was read, without places; what is null is left out of tables. [`Format::write`](crate::Format::write) writes a
+/// As it was read, without places; what is null is left out of tables. `Format::write` of the crate `manifactor-config` writes a
 /// document so after overrides.
 impl Serialize for Node {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

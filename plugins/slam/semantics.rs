@@ -170,7 +170,7 @@ fn read_rule(mut section: Section<'_>, own: &Values) -> Option<Rule> {
         .into_iter()
         .filter_map(|node| Some((node.place.clone(), Key::from(node.read::<String>(errors)?))))
         .collect();
-    let factor = section.take_required("factor").and_then(|node| RuleFactor::read(node, errors));
+    let factor = section.take_required("factor").and_then(|node| RuleFactor::read(&node, errors));
     let noise = section.or_default::<Noise>("noise");
     let loss = section.optional::<Box<dyn Loss>>("loss").map(Arc::from);
     let (place, of_noise) = (section.place_of("factor"), section.place_of("noise"));

@@ -7,7 +7,7 @@
 //! chordal start, in turns; each solve is a whole one, compilation included. Times are the least of at least nine turns,
 //! and of as many as fit into three seconds, at most a hundred: CPU time. Last comes a graph that
 //! is not a file: a sphere of poses with so much rotational noise that its odometry leads nowhere.
-#![allow(missing_docs, clippy::unwrap_used)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_geometry::{Between, Chordal, Se3};
 use manifactor_graph::{Graph, Key, Noise, Values};

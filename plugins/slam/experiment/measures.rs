@@ -8,8 +8,13 @@ use indexmap::IndexMap;
 use manifactor_config::quoted_list;
 use manifactor_quadric::DualQuadric;
 
+/// A name, and what it measures of a trajectory.
+type OfTrajectory = (&'static str, fn(&TrajectoryReport) -> Option<f64>);
+/// A name, and what it measures of a whole estimate.
+type OfEstimate = (&'static str, fn(&Estimate, &VariantReport) -> Option<f64>);
+
 /// What is measured under each alignment: `ate` is `ate_se3`, `ate_sim3`, ….
-const BY_ALIGNMENT: [(&str, fn(&TrajectoryReport) -> Option<f64>); 7] = [
+const BY_ALIGNMENT: [OfTrajectory; 7] = [
     ("ate", |t| Some(t.estimate.ate.rmse)),
     ("odometry_ate", |t| Some(t.odometry.ate.rmse)),
     ("gain", |t| Some(1.0 - t.estimate.ate.rmse / t.odometry.ate.rmse)),
@@ -20,7 +25,7 @@ const BY_ALIGNMENT: [(&str, fn(&TrajectoryReport) -> Option<f64>); 7] = [
 ];
 
 /// What is measured once.
-const ONCE: [(&str, fn(&Estimate, &VariantReport) -> Option<f64>); 24] = [
+const ONCE: [OfEstimate; 24] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
     ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),

@@ -67,7 +67,7 @@ pub enum RuleError {
 
 impl RuleFactor {
     /// Reads and checks a factor; what is wrong is reported.
-    pub(super) fn read(node: Node, errors: &Errors) -> Option<Self> {
+    pub(super) fn read(node: &Node, errors: &Errors) -> Option<Self> {
         let (place, json) = (node.place.clone(), node.to_json());
         let name = match &node.value {
             NodeValue::Table(table) => match table.get("type").map(|field| &field.node.value) {
