@@ -16,9 +16,21 @@ impl Kept {
     }
 }
 
+impl Problem {
+    /// Whether the graph's factors have the same types and variables. Their measurements are not compared.
+    fn is_of(&self, graph: &Graph) -> bool {
+        let variables = self.factor_variables.iter().zip(&self.factor_types);
+        self.factors() == graph.factors().len()
+            && graph.factors().iter().zip(variables).all(|(entry, (variables, (name, _)))| {
+                let keys = variables.iter().map(|v| &self.variables[*v as usize].key);
+                entry.factor.typetag_name() == *name && entry.keys.iter().eq(keys)
+            })
+    }
+}
+
 impl Solution {
-    /// Asks the problem at the estimate, with the weights that the solver has left: the one that was solved. Where
-    /// that has no factorization of its own, or is busy, a new one.
+    /// Asks the problem that was solved, at the estimate and with the weights that the solver has left; a new one where
+    /// that has no factorization of its own, is busy, or is of other factors than `graph`.
     ///
     /// # Errors
     /// Where `graph` is not the one that was solved.
@@ -29,7 +41,7 @@ impl Solution {
     ) -> Result<R, CompileError> {
         if let Ok(mut problem) = self.problem.0.try_lock()
             && !matches!(problem.method, Method::ConjugateGradients(_))
-            && problem.factors() == graph.factors().len()
+            && problem.is_of(graph)
         {
             problem.put(&self.values);
             return Ok(question(&mut problem));
