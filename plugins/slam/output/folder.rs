@@ -1,7 +1,7 @@
 //! Folders of results: what may be written into one, and that only one process does.
 //!
 //! A command that writes a folder leaves the file `.manifactor` in it, which names the command and its document:
-//! `manifactor run "/work/desk.toml"`. The two may write there again. A folder that holds other files and no such marker,
+//! `manifactor run "/robot/desk.toml"`. The two may write there again. A folder that holds other files and no such marker,
 //! or a marker of something else, is refused. The marker is locked while the command runs, and says which process has
 //! the lock. The folder of a variant lies in that of its run, and may be written by runs of any document.
 use manifactor_formats::whole::{open_regular, remove_unfinished};

@@ -3,7 +3,7 @@ use std::fs;
 use tempfile::{TempDir, tempdir};
 
 fn claim(folder: &Path, command: &str, force: bool) -> Result<OutputFolder, FolderError> {
-    OutputFolder::claim(folder, command, Path::new("/work/desk.toml"), force)
+    OutputFolder::claim(folder, command, Path::new("/robot/desk.toml"), force)
 }
 
 /// A folder in which there is one file.
@@ -27,7 +27,7 @@ fn the_same_command_may_write_again() {
     drop(claim(&out, "run", false).unwrap());
     fs::write(out.join("report.json"), "{}").unwrap();
     drop(claim(&out, "run", false).unwrap());
-    assert_eq!(fs::read_to_string(out.join(MARKER)).unwrap(), "manifactor run \"/work/desk.toml\"\n");
+    assert_eq!(fs::read_to_string(out.join(MARKER)).unwrap(), "manifactor run \"/robot/desk.toml\"\n");
 }
 
 #[test]
@@ -37,7 +37,7 @@ fn another_command_or_document_may_not() {
     fs::write(folder.path().join("report.json"), "{}").unwrap();
     let refused = claim(folder.path(), "simulate", false).unwrap_err().to_string();
     let expected =
-        r#"the results of `manifactor run "/work/desk.toml"`, and `manifactor simulate "/work/desk.toml"`"#;
+        r#"the results of `manifactor run "/robot/desk.toml"`, and `manifactor simulate "/robot/desk.toml"`"#;
     assert!(refused.contains(expected), "{refused}");
     let other = Path::new("/other/desk.toml");
     assert!(matches!(
