@@ -18,6 +18,8 @@ use std::sync::Arc;
 /// Pixels of the picture for each of the image's width.
 const WIDTH: f64 = 760.0;
 const MARGINS: (f64, f64) = (190.0, 100.0);
+/// Most pixels upward: a camera that is higher is drawn flatter, as a PNG takes memory for each pixel.
+const HEIGHT: f64 = 4.0 * WIDTH;
 
 /// An object in one image.
 struct Seen<'a> {
@@ -43,6 +45,11 @@ fn spread(frames: &[usize], count: usize) -> Vec<usize> {
     // a number of frames squared is far from the largest number
     let places = (0..count).map(|k| k * (frames.len() - 1) / last);
     places.filter_map(|place| frames.get(place).copied()).collect()
+}
+
+/// Pixels upward of the picture of a camera's image, without margins.
+fn drawn_height([width, height]: [f64; 2]) -> f64 {
+    (WIDTH * height / width).min(HEIGHT)
 }
 
 /// One image: measured boxes dashed, estimated ones and the ellipses inside of them solid, by class. Pixels, y downward.
@@ -73,7 +80,7 @@ pub fn image(estimate: &Estimate, frame: usize) -> Picture {
     let kinds = kinds.map(|(name, dashes)| entry(name, INK, LegendShape::Line, dashes));
     let mut layout = Layout::auto_from_plots(&plots)
         .with_width(WIDTH + MARGINS.0)
-        .with_height(WIDTH * height / width + MARGINS.1)
+        .with_height(drawn_height([width, height]) + MARGINS.1)
         .with_title(format!("image {frame}, at {stamp:.3} s"))
         .with_title_size(15)
         .with_x_label("x (px)")
@@ -122,7 +129,13 @@ fn outline(of: &Ellipse) -> Option<Vec<Point2<f64>>> {
 
 #[cfg(test)]
 mod tests {
-    use super::spread;
+    use super::{HEIGHT, WIDTH, drawn_height, spread};
+
+    #[test]
+    fn a_picture_of_a_high_image_is_flatter() {
+        assert_eq!(drawn_height([640.0, 480.0]), 0.75 * WIDTH);
+        assert_eq!(drawn_height([1.0, f64::from(u32::MAX)]), HEIGHT);
+    }
 
     #[test]
     fn frames_are_spread_from_the_first_to_the_last() {

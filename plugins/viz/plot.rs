@@ -14,6 +14,8 @@ use nalgebra::{Point2, Vector2};
 const WIDTH: f64 = 900.0;
 /// Most pixels, unless the legend is longer.
 const HEIGHT: f64 = 800.0;
+/// Classes in the legend: a picture is as high as its legend.
+const CLASSES: usize = 60;
 /// What axes, legend and title take, in pixels: about that much.
 const MARGINS: (f64, f64) = (190.0, 110.0);
 
@@ -70,7 +72,12 @@ pub fn plot(scene: &Scene, view: View) -> Picture {
     if !estimates.is_empty() {
         kinds.push(entry("estimated", INK, LegendShape::Line, None));
     }
-    kinds.extend(classes.iter().map(|(name, color)| entry(name, color, LegendShape::Rect, None)));
+    let shown = classes.iter().take(CLASSES);
+    kinds.extend(shown.map(|(name, color)| entry(name, color, LegendShape::Rect, None)));
+    if classes.len() > CLASSES {
+        let more = format!("and {} more", classes.len() - CLASSES);
+        kinds.push(entry(&more, INK, LegendShape::Rect, None));
+    }
     let entries = tracks.len() + kinds.len();
     let mut layout = layout(scene, &plots, &plane, &frame, outside, entries);
     for (title, entries) in [("Trajectories", tracks), ("Objects", kinds)] {

@@ -55,6 +55,16 @@ fn every_class_and_trajectory_is_in_the_legend() {
 }
 
 #[test]
+fn a_legend_of_many_classes_ends() {
+    let mut scene = desk();
+    let object = scene.objects[0].clone();
+    scene.objects = (0..5000).map(|i| Object { class: format!("class {i:04}"), ..object.clone() }).collect();
+    scene.objects.iter_mut().skip(1).for_each(|object| (object.truth, object.estimate) = (None, None));
+    let svg = plot(&scene, View::Side).svg();
+    assert!(svg.contains("class 0059") && !svg.contains("class 0060") && svg.contains("and 4940 more"));
+}
+
+#[test]
 fn an_estimate_far_away_does_not_shrink_the_rest() {
     let mut scene = desk();
     scene.objects[0].estimate = Some(ellipsoid([1e5, 0.0, 0.0], [1.0, 1.0, 1.0], 0.0));
