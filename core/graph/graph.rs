@@ -4,6 +4,7 @@ use crate::factor::{Factor, FactorEntry};
 use crate::key::Key;
 use crate::noise::{Noise, NoiseError, Whitener};
 use crate::values::Values;
+use crate::version::Version;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
@@ -16,6 +17,9 @@ pub struct Graph {
     factors: Vec<FactorEntry>,
     #[serde(skip_serializing_if = "IndexMap::is_empty")]
     fixed: IndexMap<Key, Fixed>,
+    /// Renewed by every method that lets the content be changed.
+    #[serde(skip)]
+    version: Version,
 }
 
 /// How much of a variable is held at its initial value.
@@ -135,6 +139,7 @@ impl Graph {
     }
     /// Adds a factor.
     pub fn push(&mut self, entry: FactorEntry) -> &mut FactorEntry {
+        self.version = Version::default();
         self.factors.push(entry);
         let last = self.factors.len() - 1;
         &mut self.factors[last]
@@ -145,20 +150,22 @@ impl Graph {
     }
     /// The factors, to be changed.
     pub fn factors_mut(&mut self) -> &mut Vec<FactorEntry> {
+        self.version = Version::default();
         &mut self.factors
     }
     /// Holds a variable at its initial value.
     pub fn fix(&mut self, key: impl Into<Key>) {
-        self.fixed.insert(key.into(), Fixed::Whole(true));
+        self.set_fixed(key, Fixed::Whole(true));
     }
     /// Holds some directions of a variable's tangent space, by name. The directions are those at the
     /// variable's own estimate.
     pub fn fix_directions(&mut self, key: impl Into<Key>, directions: &[&str]) {
         let directions = directions.iter().map(|d| (*d).to_owned()).collect();
-        self.fixed.insert(key.into(), Fixed::Directions(directions));
+        self.set_fixed(key, Fixed::Directions(directions));
     }
     /// Sets how much of a variable is held.
     pub fn set_fixed(&mut self, key: impl Into<Key>, fixed: Fixed) {
+        self.version = Version::default();
         match fixed {
             Fixed::Whole(false) => self.fixed.shift_remove(&key.into()),
             fixed => self.fixed.insert(key.into(), fixed),
@@ -167,6 +174,10 @@ impl Graph {
     /// The variables that are held, wholly or in part.
     pub fn fixed(&self) -> &IndexMap<Key, Fixed> {
         &self.fixed
+    }
+    /// Tells whether the graph has been changed: see [`Version`].
+    pub fn version(&self) -> Version {
+        self.version
     }
 
     /// Everything that is wrong between this graph and `values`; empty, where it can be compiled.

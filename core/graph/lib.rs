@@ -30,6 +30,7 @@ mod scalar;
 mod values;
 mod variable;
 mod variables;
+mod version;
 
 pub use dimension::{Block, Dimension, Matrix, Vector};
 pub use direction::{Direction, NoDirection};
@@ -46,6 +47,7 @@ pub use scalar::{Jet, JetOf, Lift, Scalar};
 pub use values::{ValueError, Values};
 pub use variable::{AsVariable, ErasedManifold, Variable, as_variable};
 pub use variables::Variables;
+pub use version::Version;
 
 #[doc(hidden)]
 pub mod __private {

@@ -142,6 +142,7 @@ pub(crate) fn compile(
     );
     Ok(Problem {
         variables,
+        version: graph.version(),
         factor_variables,
         factor_types,
         weights: vec![],

@@ -16,21 +16,9 @@ impl Kept {
     }
 }
 
-impl Problem {
-    /// Whether the graph's factors have the same types and variables. Their measurements are not compared.
-    fn is_of(&self, graph: &Graph) -> bool {
-        let variables = self.factor_variables.iter().zip(&self.factor_types);
-        self.factors() == graph.factors().len()
-            && graph.factors().iter().zip(variables).all(|(entry, (variables, (name, _)))| {
-                let keys = variables.iter().map(|v| &self.variables[*v as usize].key);
-                entry.factor.typetag_name() == *name && entry.keys.iter().eq(keys)
-            })
-    }
-}
-
 impl Solution {
     /// Asks the problem that was solved, at the estimate and with the weights that the solver has left; a new one where
-    /// that has no factorization of its own, is busy, or is of other factors than `graph`.
+    /// that has no factorization of its own, is busy, or `graph` has been changed since.
     ///
     /// # Errors
     /// Where `graph` is not the one that was solved.
@@ -41,7 +29,7 @@ impl Solution {
     ) -> Result<R, CompileError> {
         if let Ok(mut problem) = self.problem.0.try_lock()
             && !matches!(problem.method, Method::ConjugateGradients(_))
-            && problem.is_of(graph)
+            && problem.version == graph.version()
         {
             problem.put(&self.values);
             return Ok(question(&mut problem));

@@ -10,7 +10,7 @@ use crate::outcome::Times;
 use manifactor_graph::batch::{Batch, Evaluation, FactorRows, FactorState};
 use manifactor_graph::column::Columns;
 use manifactor_graph::normal_equations::NormalEquations;
-use manifactor_graph::{Graph, Key, Values, VariableIndices};
+use manifactor_graph::{Graph, Key, Values, VariableIndices, Version};
 use std::time::Instant;
 
 pub use estimate::WeightError;
@@ -32,6 +32,8 @@ pub(crate) struct Place {
 /// A graph, compiled. The structure lives as long as the problem; solves reuse it.
 pub struct Problem {
     pub(crate) variables: Vec<Place>,
+    /// Of the graph that was compiled.
+    pub(crate) version: Version,
     /// By factor: which variables.
     pub(crate) factor_variables: Vec<VariableIndices>,
     /// By factor: its type's name, and the rows of its residual that were observed.

@@ -1,7 +1,7 @@
 //! Covariances against the inverse of the dense Hessian.
 use crate::toy::*;
 use manifactor_graph::{Graph, Noise, Values};
-use manifactor_solve::{CovarianceError, Problem};
+use manifactor_solve::{CovarianceError, GaussNewton, Problem, Silent, solve};
 use nalgebra::DMatrix;
 
 /// A chain of points with a measurement of the first, and a loop.
@@ -27,6 +27,19 @@ fn uncertainty_adds_up_along_a_chain() {
         let expected = DMatrix::identity(2, 2) * (0.25 + 0.01 * i as f64);
         assert!((covariance - expected).amax() < 1e-12, "{key}: {covariance}");
     }
+}
+
+#[test]
+fn a_graph_that_was_changed_since_the_solve_is_asked_as_it_is() {
+    let (mut graph, values) = chain(3);
+    let solution = solve(&graph, &values, &GaussNewton::default(), &mut Silent).unwrap();
+    let of_p0 = |graph: &Graph| solution.marginals(graph, &["p0"]).unwrap()[0].covariance[(0, 0)];
+    assert!((of_p0(&graph) - 0.25).abs() < 1e-12);
+    assert!((of_p0(&graph.clone()) - 0.25).abs() < 1e-12);
+    graph.factors_mut()[0].noise = Noise::sigma(3.0).unwrap();
+    assert!((of_p0(&graph) - 9.0).abs() < 1e-9);
+    graph.fix("p0");
+    assert_eq!(of_p0(&graph), 0.0);
 }
 
 #[test]
