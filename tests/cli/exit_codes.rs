@@ -21,6 +21,7 @@ fn files() -> TempDir {
         ("good.toml", &graph("x - 1", "")),
         ("root.toml", &graph("sqrt(x - 1)", "")),
         ("open.toml", &(graph("x - 1", "") + &graph("x - 1", "'-1 - x * x'").replace("'x'", "'y'"))),
+        ("asleep.toml", &graph("x - 1", "'-1 - x * x'")),
         ("word.toml", &graph("x - one", "")),
         ("rising.toml", &graph("sqrt(sqrt(sqrt(x * x)))", "")),
         ("endless.toml", ENDLESS),
@@ -66,6 +67,7 @@ fn codes(ending: &str) -> Vec<i32> {
             codes(&["solve @endless.toml --set solver.stop.max_iterations=3"])
         }
         "indeterminate" => codes(&["solve @open.toml --solver gauss_newton"]),
+        "no factor takes part" => codes(&["solve @good.toml --drop 0", "solve @asleep.toml"]),
         "a residual is not finite" => codes(&["solve @root.toml"]),
         "objects were detected, and none is mapped" => {
             codes(&["run @seen.toml --out @out --set objects.min_views=1000"])
