@@ -1,18 +1,25 @@
 //! Factors in a graph: any registered residual, with its keys, noise and loss.
-use crate::batch::{Batch, BatchOf};
-use crate::catalogue::Signature;
-use crate::dimension::Dimension;
-use crate::key::Key;
+pub mod batch;
+mod dynamic;
+pub mod invariance;
+mod kernel;
+
+use crate::algebra::Dimension;
+use crate::factor::batch::{Batch, BatchOf};
 use crate::loss::Loss;
 use crate::noise::{Noise, Whitener};
+use crate::registry::catalogue::Signature;
 use crate::residual::Residual;
+use crate::residual::Variables;
+use crate::variable::Key;
 use crate::variable::Variable;
-use crate::variables::Variables;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
 use std::sync::Arc;
+
+pub use dynamic::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows};
 
 /// A registered residual. Implemented by [`register_factor!`](crate::register_factor).
 #[diagnostic::on_unimplemented(

@@ -1,14 +1,17 @@
 //! The dynamic view of a graph: what people build, edit, read and write.
-use crate::catalogue::manifold_name;
+mod version;
+
 use crate::factor::{Factor, FactorEntry};
-use crate::key::Key;
 use crate::noise::{Noise, NoiseError, Whitener};
-use crate::values::Values;
-use crate::version::Version;
+use crate::registry::catalogue::manifold_name;
+use crate::variable::Key;
+use crate::variable::Values;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use std::sync::Arc;
+
+pub use version::Version;
 
 /// Factors between named variables, and which variables are held.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]

@@ -6,48 +6,26 @@
 //! where a type is registered.
 //!
 //! The way in for authors is [`Residual`]; for new types of variables, [`Manifold`].
-pub mod batch;
-pub mod catalogue;
-pub mod checked;
-pub mod column;
-mod dimension;
-mod direction;
-mod dynamic;
+mod algebra;
 mod factor;
 mod graph;
-pub mod invariance;
-mod kernel;
-mod key;
 pub mod loss;
-mod manifold;
-mod many;
 pub mod noise;
-pub mod normal_equations;
 pub mod quantity;
-mod registered;
+mod registry;
 mod residual;
-mod scalar;
-mod values;
 mod variable;
-mod variables;
-mod version;
 
-pub use dimension::{Block, Dimension, Matrix, Vector};
-pub use direction::{Direction, NoDirection};
-pub use dynamic::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows};
+pub use algebra::{Block, Dimension, Direction, Jet, JetOf, Lift, Matrix, NoDirection, Scalar, Vector};
+pub use factor::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows, batch, invariance};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
-pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices};
-pub use key::Key;
+pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices, Version};
 pub use manifactor_tree::TextError;
-pub use manifold::{Manifold, Tangent};
-pub use many::{List, Many};
 pub use noise::Noise;
-pub use residual::{Jacobians, Lifted, Refs, Residual};
-pub use scalar::{Jet, JetOf, Lift, Scalar};
-pub use values::{ValueError, Values};
-pub use variable::{AsVariable, ErasedManifold, Variable, as_variable};
-pub use variables::Variables;
-pub use version::Version;
+pub use registry::{catalogue, checked};
+pub use residual::{Jacobians, Lifted, List, Many, Refs, Residual, Variables, normal_equations};
+pub use variable::{AsVariable, ErasedManifold, Variable, as_variable, column};
+pub use variable::{Key, Manifold, Tangent, ValueError, Values};
 
 #[doc(hidden)]
 pub mod __private {

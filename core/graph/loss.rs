@@ -3,8 +3,8 @@
 //! One convention throughout. A factor with whitened residual r costs ½ρ(s), s = ‖r‖², and enters
 //! the normal equations with the weight ρ'(s). Each ρ has ρ(0) = 0 and, but for L1, ρ(s) ≈ s near 0:
 //! a small residual costs what it costs without a loss.
-use crate::checked::Positive;
-use crate::column::Plain;
+use crate::registry::checked::Positive;
+use crate::variable::column::Plain;
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
 use std::sync::Arc;

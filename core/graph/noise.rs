@@ -2,7 +2,7 @@
 //!
 //! A closed set: every Gaussian noise is one of four forms of a square-root information W, with
 //! whitened residual W r and Ω = WᵀW. Rows that are not observed have a zero row and column in W.
-use crate::dimension::{Block, Dimension, Matrix, Vector};
+use crate::algebra::{Block, Dimension, Matrix, Vector};
 use nalgebra::{Cholesky, DMatrix, U1};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

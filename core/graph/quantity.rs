@@ -3,8 +3,8 @@
 //! A [`Quantity`] is a type with a flat form, so many scalars in a row. A [`Manifold`](crate::Manifold) whose points are
 //! quantities is entered by [`register_quantity!`](crate::register_quantity), and functions of quantities by
 //! [`register_functions!`](crate::register_functions): with both, a formula in a config can use them by name.
-use crate::dimension::Dimension;
-use crate::scalar::{JetOf, Scalar};
+use crate::algebra::Dimension;
+use crate::algebra::{JetOf, Scalar};
 use nalgebra::{Const, SVector, U3};
 use std::any::{Any, TypeId};
 use std::fmt;
@@ -256,7 +256,7 @@ macro_rules! register_functions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scalar::Jet;
+    use crate::algebra::Jet;
     use nalgebra::Vector3;
 
     register_functions! {

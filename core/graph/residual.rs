@@ -1,8 +1,14 @@
 //! The author's trait: a residual as a function of its variables.
-use crate::dimension::{Dimension, Vector};
-use crate::scalar::Scalar;
-use crate::variables::Variables;
+mod many;
+pub mod normal_equations;
+mod variables;
+
+use crate::algebra::Scalar;
+use crate::algebra::{Dimension, Vector};
 use std::fmt::Debug;
+
+pub use many::{List, Many};
+pub use variables::Variables;
 
 /// The variables `V` over the scalar `T`: what [`Residual::residual`] gets.
 pub type Lifted<V, T> = <V as Variables>::Lifted<T>;

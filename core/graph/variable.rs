@@ -1,9 +1,17 @@
 //! Values in a graph: points of any registered manifold.
-use crate::column::{Column, Plain};
-use crate::dimension::Dimension;
-use crate::manifold::Manifold;
+pub mod column;
+mod key;
+mod manifold;
+mod values;
+
+use crate::algebra::Dimension;
+use crate::variable::column::{Column, Plain};
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
+
+pub use key::Key;
+pub use manifold::{Manifold, Tangent};
+pub use values::{ValueError, Values};
 
 /// A point of a registered manifold. Implemented by [`register_manifold!`](crate::register_manifold).
 #[diagnostic::on_unimplemented(

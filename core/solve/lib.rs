@@ -3,48 +3,25 @@
 //! [`Problem::compile`] turns a [`Graph`] and its [`Values`] into columns of variables, batches of
 //! factors and the structure of their normal equations, once. An [`Optimizer`] moves the problem's
 //! estimate; an [`Observer`] watches. [`solve`] does it all.
-mod auto;
-mod block_system;
-mod compile;
-mod condition;
-mod covariance;
-mod diagnose;
-mod diagnosis;
-mod dogleg;
-mod gauss_newton;
-mod gnc;
-mod kept;
-mod layout;
-mod levenberg_marquardt;
-mod leverage;
+mod inspect;
 mod linear;
-mod linear_solver;
-mod linear_system;
 mod observer;
-mod optimizer;
 mod outcome;
 mod problem;
-mod start;
-mod system;
-mod termination;
+mod strategy;
 
-pub use auto::Auto;
-pub use block_system::{BlockSystem, BlockSystemError};
-pub use compile::CompileError;
-pub use covariance::{CovarianceError, Marginal};
-pub use diagnosis::{Diagnosis, FactorCost};
-pub use dogleg::Dogleg;
-pub use gauss_newton::GaussNewton;
-pub use gnc::{BadParameter, Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor};
-pub use levenberg_marquardt::LevenbergMarquardt;
+pub use inspect::{CovarianceError, Diagnosis, FactorCost, Marginal};
 pub use linear::memory::{Bytes, available_memory, memory_limit};
-pub use linear_solver::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
+pub use linear::settings::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
+pub use linear::{BlockSystem, BlockSystemError};
 pub use observer::{All, Interrupt, Observer, Silent};
-pub use optimizer::{Optimizer, SettingError, Stopping};
 pub use outcome::{InactiveFactor, IterationRecord, Moving, Outcome, Rejected, Times, Untouched};
-pub use problem::{Problem, WeightError};
-pub use start::{Given, Start, StartError};
-pub use termination::{Stall, Termination, Tolerance, Undetermined};
+pub use outcome::{Stall, Termination, Tolerance, Undetermined};
+pub use problem::{CompileError, Problem, WeightError};
+pub use strategy::{
+    Auto, BadParameter, Candidates, Dogleg, FactorType, GaussNewton, Given, Gnc, Growth, LevenbergMarquardt,
+    Optimizer, Probability, SettingError, Start, StartError, Stopping, Truncation, UnknownFactor,
+};
 
 use manifactor_graph::batch::FactorState;
 use manifactor_graph::{Graph, Values};
@@ -61,7 +38,7 @@ pub struct Solution {
     /// How often the solver has let each factor count, on top of its loss; empty, where it does not weigh them.
     pub weights: Vec<f64>,
     /// What was solved, for questions about the estimate.
-    problem: kept::Kept,
+    problem: problem::Kept,
 }
 
 /// Compiles and solves.
@@ -87,6 +64,6 @@ impl Solution {
     /// The problem's estimate, at the end of a solve.
     fn of(problem: Problem, outcome: Outcome) -> Self {
         let (values, factors, weights) = (problem.values(), problem.inspect(), problem.weights().to_vec());
-        Self { values, outcome, factors, weights, problem: kept::Kept::new(problem) }
+        Self { values, outcome, factors, weights, problem: problem::Kept::new(problem) }
     }
 }

@@ -1,16 +1,17 @@
-//! Sparse linear algebra; knows no manifold.
+//! The linear systems of steps: their structure, their settings and the methods that solve them.
+mod block_system;
+pub(crate) mod choice;
 mod cholesky;
-pub(crate) mod conjugate_gradients;
-mod dense;
-pub(crate) mod elimination;
-mod inverse;
-mod kernel;
-mod large;
+mod conjugate_gradients;
+mod elimination;
+pub(crate) mod layout;
 pub(crate) mod memory;
 pub(crate) mod ordering;
 mod qr;
-pub(crate) mod structure;
-mod subtrees;
+pub(crate) mod settings;
+pub(crate) mod system;
+
+pub use block_system::{BlockSystem, BlockSystemError};
 pub(crate) use cholesky::Cholesky;
 pub(crate) use conjugate_gradients::{ConjugateGradients, Damped};
 pub(crate) use qr::Qr;

@@ -1,12 +1,13 @@
 //! What a solve has to tell.
 mod moving;
+mod termination;
 mod untouched;
 
-use crate::termination::{Termination, Undetermined};
 use manifactor_graph::Key;
 use serde::Serialize;
 
 pub use moving::Moving;
+pub use termination::{Stall, Termination, Tolerance, Undetermined};
 pub use untouched::{InactiveFactor, Untouched};
 
 /// What a solve did and how it ended.

@@ -1,11 +1,12 @@
 //! A compiled graph: indexed, columnar, with the structure of its linear system.
+mod compile;
 mod estimate;
+mod kept;
 mod not_finite;
 
-use crate::compile::{self, CompileError};
-use crate::layout::Layout;
 use crate::linear::Method;
-use crate::linear_solver::LinearSolver;
+use crate::linear::layout::Layout;
+use crate::linear::settings::LinearSolver;
 use crate::outcome::Times;
 use manifactor_graph::batch::{Batch, Evaluation, FactorRows, FactorState};
 use manifactor_graph::column::Columns;
@@ -13,7 +14,9 @@ use manifactor_graph::normal_equations::NormalEquations;
 use manifactor_graph::{Graph, Key, Values, VariableIndices, Version};
 use std::time::Instant;
 
+pub use compile::CompileError;
 pub use estimate::WeightError;
+pub(crate) use kept::Kept;
 
 /// A variable in a problem.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! The losses themselves. `scale` is in units of the whitened residual, so σ's: dimensionless.
 use super::RobustLoss;
-use crate::checked::Positive;
 use crate::register_loss;
+use crate::registry::checked::Positive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ macro_rules! loss {
             ///
             /// # Errors
             /// Where `scale` is not positive and finite.
-            pub fn new(scale: f64) -> Result<Self, crate::checked::NotPositive> {
+            pub fn new(scale: f64) -> Result<Self, crate::registry::checked::NotPositive> {
                 Ok(Self { scale: Positive::new(scale)? })
             }
         }

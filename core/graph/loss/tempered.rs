@@ -1,6 +1,6 @@
 use super::{Loss, RobustLoss};
-use crate::checked::Positive;
 use crate::register_loss;
+use crate::registry::checked::Positive;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

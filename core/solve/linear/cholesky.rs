@@ -1,11 +1,17 @@
 //! Supernodal sparse Cholesky: structure once, numbers many times, in memory that is reused.
-use super::structure::{Node, Structure};
-use super::subtrees::subtrees;
-use super::{NotPositiveDefinite, kernel, large};
+mod inverse;
+mod kernel;
+mod large;
+pub(crate) mod structure;
+mod subtrees;
+
+use crate::linear::NotPositiveDefinite;
 use faer::dyn_stack::MemBuffer;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::ops::Range;
+use structure::{Node, Structure};
+use subtrees::subtrees;
 
 /// A factorization of a symmetric matrix with a fixed pattern, already ordered.
 pub(crate) struct Cholesky {
@@ -354,7 +360,7 @@ impl WithSimd for Solve<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::Layout;
+    use crate::linear::layout::Layout;
     use crate::linear::ordering::Order;
 
     /// A square grid of blocks: dimensions and couplings.

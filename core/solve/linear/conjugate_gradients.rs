@@ -2,10 +2,12 @@
 //!
 //! The complement S = H_uu − H_um H_mm⁻¹ H_mu is never formed: H_mm, of blocks that are not coupled among each other, is
 //! inverted block by block (Agarwal, Snavely, Seitz and Szeliski, *Bundle adjustment in the large*, 2010).
-use super::NotPositiveDefinite;
-use super::dense::DiagonalBlocks;
-use crate::layout::Layout;
-use crate::linear_solver::ConjugateGradients as Settings;
+mod diagonal_blocks;
+
+use crate::linear::NotPositiveDefinite;
+use crate::linear::layout::Layout;
+use crate::linear::settings::ConjugateGradients as Settings;
+use diagonal_blocks::DiagonalBlocks;
 use manifactor_graph::normal_equations::Slot;
 
 /// Vectors and blocks of an iteration, in memory that is reused.

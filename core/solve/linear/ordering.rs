@@ -5,7 +5,7 @@ mod dissection;
 mod minimum_degree;
 mod separator;
 
-use super::elimination::{Pattern, Tree};
+use crate::linear::elimination::{Pattern, Tree};
 use adjacency::Adjacency;
 
 /// How to find an order of elimination of blocks.

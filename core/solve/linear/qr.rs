@@ -1,5 +1,5 @@
 //! Least squares by the sparse QR factorization of J: min ‖J δ + r‖, without squaring its condition.
-use super::NotPositiveDefinite;
+use crate::linear::NotPositiveDefinite;
 use faer::Col;
 use faer::linalg::solvers::SolveLstsq;
 use faer::sparse::linalg::solvers::{Qr as Factor, SymbolicQr};

@@ -1,7 +1,7 @@
 //! What still moves where a solve runs out of iterations.
-use crate::diagnose::name;
+use crate::inspect::null_space::name;
+use crate::outcome::Undetermined;
 use crate::problem::Problem;
-use crate::termination::Undetermined;
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::fmt;

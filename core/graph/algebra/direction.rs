@@ -1,0 +1,106 @@
+//! A unit vector in 3D that is checked when it is read.
+use crate::algebra::{Lift, Scalar};
+use nalgebra::{UnitVector3, Vector3};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::ops::Deref;
+
+/// A direction in 3D: a unit vector. Read from any three finite numbers but zero, and normalised.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "[f64; 3]", into = "[f64; 3]")]
+pub struct Direction(UnitVector3<f64>);
+
+/// A vector that points nowhere.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("expected a direction, three finite numbers not all zero; got {0:?}")]
+pub struct NoDirection(pub [f64; 3]);
+
+impl Direction {
+    /// The z axis: up, where nothing else is said.
+    pub const Z: Direction = Direction(UnitVector3::new_unchecked(Vector3::new(0.0, 0.0, 1.0)));
+
+    /// The direction of `v`.
+    ///
+    /// # Errors
+    /// Where `v` is zero or not finite.
+    pub fn new(v: Vector3<f64>) -> Result<Self, NoDirection> {
+        // scale first: the squares of tiny and of huge entries leave the range of f64
+        let scale = v.amax();
+        if !(scale > 0.0 && v.iter().all(|x| x.is_finite())) {
+            return Err(NoDirection(v.into()));
+        }
+        // a vector that is normal already stays as it is, bit for bit: documents round trip
+        if (v.norm() - 1.0).abs() < 4.0 * f64::EPSILON {
+            return Ok(Self(UnitVector3::new_unchecked(v)));
+        }
+        Ok(Self(UnitVector3::new_normalize(v / scale)))
+    }
+}
+
+impl Default for Direction {
+    fn default() -> Self {
+        Self::Z
+    }
+}
+
+impl Deref for Direction {
+    type Target = Vector3<f64>;
+    fn deref(&self) -> &Vector3<f64> {
+        &self.0
+    }
+}
+
+impl Lift for Direction {
+    type Of<T: Scalar> = Vector3<T>;
+    #[inline(always)]
+    fn lift<T: Scalar>(&self) -> Vector3<T> {
+        self.0.map(T::from)
+    }
+}
+
+impl TryFrom<[f64; 3]> for Direction {
+    type Error = NoDirection;
+    fn try_from(v: [f64; 3]) -> Result<Self, NoDirection> {
+        Self::new(v.into())
+    }
+}
+
+impl From<Direction> for [f64; 3] {
+    fn from(d: Direction) -> [f64; 3] {
+        d.0.into_inner().into()
+    }
+}
+
+impl JsonSchema for Direction {
+    fn schema_name() -> Cow<'static, str> {
+        "Direction".into()
+    }
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "A direction in 3D, of any length but zero.",
+            "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_length_but_zero_will_do() {
+        assert_eq!(Direction::new(Vector3::new(0.0, 0.0, 1e-200)).unwrap(), Direction::Z);
+        assert_eq!(Direction::new(Vector3::new(0.0, 0.0, 1e200)).unwrap(), Direction::Z);
+        for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
+            assert!(Direction::try_from(bad).is_err());
+        }
+    }
+
+    #[test]
+    fn a_document_round_trips_exactly() {
+        let d = Direction::new(Vector3::new(0.1, -0.7, 0.3)).unwrap();
+        let text = serde_json::to_string(&d).unwrap();
+        assert_eq!(serde_json::from_str::<Direction>(&text).unwrap(), d);
+    }
+}

@@ -1,0 +1,310 @@
+//! Factors of one concrete type, side by side.
+mod pass;
+mod threads;
+
+use crate::algebra::Block;
+use crate::factor::kernel::Kernel;
+use crate::loss::{Loss, LossColumn};
+use crate::noise::{Whitener, Whiteners};
+use crate::residual::normal_equations::{NormalEquations, Slot};
+use crate::variable::column::{Columns, FIXED};
+use pass::{CHUNK, COST, Work};
+use pulp::Arch;
+use std::any::Any;
+use std::time::Instant;
+
+/// A factor on its way into a batch.
+pub struct Member<'a> {
+    /// Its place in the graph.
+    pub entry: usize,
+    /// The residual.
+    pub factor: &'a dyn Any,
+    /// Its variables' places in their columns.
+    pub index: &'a [u32],
+    /// Where its variables begin in the linear system; [`FIXED`] for those that are held.
+    pub starts: &'a [u32],
+    /// By variable, a bit for each tangent direction that is held.
+    pub held: &'a [u32],
+    /// Where its blocks of H go.
+    pub slots: &'a [Slot],
+    /// Its noise.
+    pub whitener: &'a Whitener,
+    /// Its loss.
+    pub loss: Option<&'a dyn Loss>,
+}
+
+/// What came out of a pass over factors.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Evaluation {
+    /// ½ Σ ρ(‖r‖²) over the active factors.
+    pub cost: f64,
+    /// Factors that were not defined at the last linearization, and take no part.
+    pub inactive: usize,
+    /// Active factors that are not defined here.
+    pub left: usize,
+    /// Place in the graph of a factor whose cost is not finite.
+    pub not_finite: Option<usize>,
+}
+
+impl Evaluation {
+    /// Both together; `self` comes first.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            cost: self.cost + other.cost,
+            inactive: self.inactive + other.inactive,
+            left: self.left + other.left,
+            not_finite: self.not_finite.or(other.not_finite),
+        }
+    }
+}
+
+/// One factor, for people to look at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FactorState {
+    /// Its place in the graph.
+    pub entry: usize,
+    /// Whether it is defined at these values.
+    pub defined: bool,
+    /// The residual, not whitened.
+    pub residual: Vec<f64>,
+    /// The residual in standard deviations.
+    pub whitened: Vec<f64>,
+    /// The weight that the loss gives it, 1 without a loss.
+    pub weight: f64,
+    /// ½ρ(‖whitened‖²); zero where it is not defined.
+    pub cost: f64,
+}
+
+/// One factor's whitened Jacobian, each row scaled by the root of the robust weight.
+#[derive(Debug)]
+pub struct FactorRows<'a> {
+    /// Its place in the graph.
+    pub entry: usize,
+    /// Whitened and weighted residual.
+    pub residual: &'a [f64],
+    /// By free variable: where it begins in the linear system, and its block, column-major.
+    pub blocks: Vec<(usize, Vec<f64>)>,
+}
+
+/// All factors of one concrete type, one kind of noise and one type of loss.
+pub trait Batch: Send + Sync {
+    /// Whether a factor of the same type belongs here, by its noise and loss.
+    fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool;
+    /// Makes room for so many factors, with so many variables in all.
+    fn reserve(&mut self, factors: usize, variables: usize);
+    /// Adds a factor of this batch's type; others are left out.
+    fn push(&mut self, member: &Member<'_>);
+    /// Decides which factors are active, and adds their parts of H and g.
+    fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation;
+    /// The cost of the factors that were active at the last linearization.
+    fn cost(&self, columns: &Columns) -> Evaluation;
+    /// Visits the factors that were not defined at the last linearization, by their place in the graph.
+    fn inactive(&self, visit: &mut dyn FnMut(usize));
+    /// ½ρ of each factor, to its place in the graph, whatever its weight; zero where it is not defined.
+    fn costs(&self, columns: &Columns, to: &mut [f64]);
+    /// Makes each factor count as often as the entry at its place in the graph says, on top of its loss.
+    fn set_weights(&mut self, weights: &[f64]);
+    /// Each factor as it stands, in order of the batch.
+    fn inspect(&self, columns: &Columns) -> Vec<FactorState>;
+    /// Each defined factor's rows of the Jacobian.
+    fn rows(&self, columns: &Columns, visit: &mut dyn FnMut(FactorRows<'_>));
+}
+
+/// The batch of a residual type.
+pub(crate) struct BatchOf<F: Kernel> {
+    factors: Vec<F>,
+    entries: Vec<u32>,
+    /// Factor i's variables are `ends[i-1]..ends[i]` of `index`, `starts`, `free` and `held`.
+    ends: Vec<u32>,
+    index: Vec<u32>,
+    starts: Vec<u32>,
+    free: Vec<bool>,
+    /// Empty where no direction of any variable is held.
+    held: Vec<u32>,
+    slot_ends: Vec<u32>,
+    slots: Vec<Slot>,
+    whiteners: Whiteners<F::Dim>,
+    losses: Option<Box<dyn LossColumn>>,
+    /// What each factor's cost is multiplied by; empty, where nobody weighs them.
+    weights: Vec<f64>,
+    active: Vec<bool>,
+    /// One for each chunk of a window, and of the next, for threads; empty until they are used.
+    work: [Vec<Work<F>>; 2],
+    /// Seconds that the last linearization by one thread took.
+    alone: f64,
+    /// What registers there are: loops over entries of blocks are compiled for each width.
+    arch: Arch,
+}
+
+impl<F: Kernel> BatchOf<F> {
+    /// An empty batch, for factors with such a noise and loss.
+    pub(crate) fn new(noise: &Whitener, loss: Option<&dyn Loss>) -> Self {
+        Self {
+            factors: vec![],
+            entries: vec![],
+            ends: vec![],
+            index: vec![],
+            starts: vec![],
+            free: vec![],
+            held: vec![],
+            slot_ends: vec![],
+            slots: vec![],
+            whiteners: Whiteners::like(noise),
+            losses: loss.map(|l| l.erased().column()),
+            weights: vec![],
+            active: vec![],
+            work: [vec![], vec![]],
+            alone: 0.0,
+            arch: Arch::new(),
+        }
+    }
+
+    #[inline(always)]
+    fn range(ends: &[u32], i: usize) -> std::ops::Range<usize> {
+        let first = if i == 0 { 0 } else { ends[i - 1] as usize };
+        first..ends[i] as usize
+    }
+}
+
+impl<F: Kernel> Batch for BatchOf<F> {
+    fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool {
+        self.whiteners.fits(noise)
+            && self.losses.as_ref().map(|l| l.loss_type()) == loss.map(|l| l.erased().as_any().type_id())
+    }
+
+    fn reserve(&mut self, factors: usize, variables: usize) {
+        self.factors.reserve_exact(factors);
+        self.entries.reserve_exact(factors);
+        self.ends.reserve_exact(factors);
+        self.index.reserve_exact(variables);
+        self.starts.reserve_exact(variables);
+        self.free.reserve_exact(variables);
+        self.slot_ends.reserve_exact(factors);
+        // as many as there are, where all have as many variables
+        let each = variables / factors.max(1);
+        self.slots.reserve_exact(factors * each * (each + 1) / 2);
+        self.whiteners.reserve(factors);
+        self.active.reserve_exact(factors);
+    }
+
+    fn push(&mut self, member: &Member<'_>) {
+        let Some(factor) = F::of(member.factor) else { return };
+        if !member.held.iter().all(|h| *h == 0) {
+            self.held.resize(self.index.len(), 0);
+            self.held.extend_from_slice(member.held);
+        } else if !self.held.is_empty() {
+            self.held.extend(member.index.iter().map(|_| 0));
+        }
+        self.factors.push(factor);
+        self.entries.push(member.entry as u32);
+        self.index.extend_from_slice(member.index);
+        self.starts.extend_from_slice(member.starts);
+        self.free.extend(member.starts.iter().map(|s| *s != FIXED));
+        self.ends.push(self.index.len() as u32);
+        self.slots.extend_from_slice(member.slots);
+        self.slot_ends.push(self.slots.len() as u32);
+        self.whiteners.push(member.whitener);
+        if let (Some(losses), Some(loss)) = (&mut self.losses, member.loss) {
+            losses.push(loss);
+        }
+        self.active.push(true);
+    }
+
+    fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation {
+        let columns = F::columns(columns);
+        let mut active = std::mem::take(&mut self.active);
+        let total = if self.in_parallel(1.0) {
+            let mut work = std::mem::take(&mut self.work);
+            let mut total = Evaluation::default();
+            threads::enter(&mut || total = self.linearize_together(columns, &mut active, &mut work, to));
+            self.work = work;
+            total
+        } else {
+            let clock = Instant::now();
+            let total = self.linearize_alone(columns, &mut active, to);
+            self.alone = clock.elapsed().as_secs_f64();
+            total
+        };
+        self.active = active;
+        total
+    }
+
+    fn cost(&self, columns: &Columns) -> Evaluation {
+        let columns = F::columns(columns);
+        let chunks = self.factors.len().div_ceil(CHUNK);
+        if self.in_parallel(COST) {
+            let mut costs = vec![Evaluation::default(); chunks];
+            threads::enter(&mut || self.chunk_costs(columns, 0, &mut costs));
+            costs.into_iter().fold(Evaluation::default(), Evaluation::and)
+        } else {
+            (0..chunks)
+                .map(|n| self.chunk_cost(columns, n * CHUNK))
+                .fold(Evaluation::default(), Evaluation::and)
+        }
+    }
+
+    fn inactive(&self, visit: &mut dyn FnMut(usize)) {
+        let entries = self.entries.iter().zip(&self.active);
+        entries.filter(|(_, active)| !**active).for_each(|(entry, _)| visit(*entry as usize));
+    }
+
+    fn costs(&self, columns: &Columns, to: &mut [f64]) {
+        let columns = F::columns(columns);
+        for (i, entry) in self.entries.iter().enumerate() {
+            let squared = self.squared(columns, i);
+            to[*entry as usize] = squared.map_or(0.0, |s| self.robust(i, &mut [s]));
+        }
+    }
+
+    fn set_weights(&mut self, weights: &[f64]) {
+        self.weights.clear();
+        self.weights.extend(self.entries.iter().map(|entry| weights[*entry as usize]));
+    }
+
+    fn inspect(&self, columns: &Columns) -> Vec<FactorState> {
+        let columns = F::columns(columns);
+        let one = |i: usize| {
+            let x = self.factors[i].load(columns, &self.index[Self::range(&self.ends, i)]);
+            let defined = self.factors[i].is_defined(x.clone());
+            let value = self.factors[i].value(&x);
+            let residual = value.as_ref().to_vec();
+            let mut whitened = residual.clone();
+            self.whiteners.whiten(i, &mut whitened);
+            let mut weight = [if defined { whitened.iter().map(|x| x * x).sum() } else { 0.0 }];
+            let cost = self.weigh(i, &mut weight, &[defined]);
+            let cost = if defined { cost } else { 0.0 };
+            FactorState {
+                entry: self.entries[i] as usize,
+                defined,
+                residual,
+                whitened,
+                weight: weight[0],
+                cost,
+            }
+        };
+        (0..self.factors.len()).map(one).collect()
+    }
+
+    fn rows(&self, columns: &Columns, visit: &mut dyn FnMut(FactorRows<'_>)) {
+        let columns = F::columns(columns);
+        let mut work = Work::<F>::new();
+        let mut active = self.active.clone();
+        for (n, active) in active.chunks_mut(CHUNK).enumerate() {
+            self.evaluate(columns, n * CHUNK, active, &mut work);
+            for (k, _) in active.iter().enumerate().filter(|(_, active)| **active) {
+                let i = n * CHUNK + k;
+                let (starts, root) = (&self.starts[Self::range(&self.ends, i)], work.w[k].sqrt());
+                work.r[k].as_mut_slice().iter_mut().for_each(|x| *x *= root);
+                let mut blocks = vec![];
+                F::each(&mut work.j[k], |a, block| {
+                    if starts[a] != FIXED {
+                        blocks.push((starts[a] as usize, block.iter().map(|x| x * root).collect()));
+                    }
+                });
+                let residual = work.r[k].as_slice();
+                visit(FactorRows { entry: self.entries[i] as usize, residual, blocks });
+            }
+        }
+    }
+}

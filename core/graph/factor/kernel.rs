@@ -1,0 +1,77 @@
+//! What a batch runs: a residual, with the way to its variables and to its places in the normal equations.
+use crate::algebra::{Dimension, Vector};
+use crate::residual::Residual;
+use crate::residual::Variables;
+use crate::residual::normal_equations::{NormalEquations, Places};
+use crate::variable::column::Columns;
+use std::any::Any;
+
+/// Implemented for every [`Residual`], and for [`DynamicResidual`](crate::DynamicResidual)s by their number of rows.
+pub(crate) trait Kernel: Clone + Send + Sync + 'static {
+    /// Number of rows.
+    type Dim: Dimension;
+    /// The columns that its variables are in.
+    type Columns<'a>: Copy + Send + Sync;
+    /// One factor's variables, by reference.
+    type Refs<'a>: Clone;
+    /// One factor's Jacobian blocks.
+    type Blocks: Clone + Send + Sync;
+
+    /// A copy of a factor of this type; `None` for another.
+    fn of(factor: &dyn Any) -> Option<Self>;
+    fn columns(columns: &Columns) -> Self::Columns<'_>;
+    /// The variables, by their places in their columns.
+    fn load<'a>(&self, columns: Self::Columns<'a>, index: &[u32]) -> Self::Refs<'a>;
+    fn is_defined(&self, x: Self::Refs<'_>) -> bool;
+    fn value(&self, x: &Self::Refs<'_>) -> Vector<Self::Dim>;
+    /// Blocks to be written by [`Kernel::linearize`].
+    fn blocks() -> Self::Blocks;
+    fn linearize(&self, x: Self::Refs<'_>, free: &[bool], blocks: &mut Self::Blocks) -> Vector<Self::Dim>;
+    /// Visits each block.
+    fn each(blocks: &mut Self::Blocks, visit: impl FnMut(usize, &mut [f64]));
+    /// Adds w JᵀJ and w Jᵀr.
+    fn scatter(blocks: &Self::Blocks, r: &[f64], w: f64, places: Places<'_>, to: &mut NormalEquations<'_>);
+}
+
+impl<F: Residual> Kernel for F {
+    type Dim = F::Dim;
+    type Columns<'a> = <F::Variables as Variables>::Columns<'a>;
+    type Refs<'a> = <F::Variables as Variables>::Refs<'a>;
+    type Blocks = <F::Variables as Variables>::Jacobians<F::Dim>;
+
+    fn of(factor: &dyn Any) -> Option<Self> {
+        factor.downcast_ref::<F>().cloned()
+    }
+    fn columns(columns: &Columns) -> Self::Columns<'_> {
+        F::Variables::columns(columns)
+    }
+    #[inline(always)]
+    fn load<'a>(&self, columns: Self::Columns<'a>, index: &[u32]) -> Self::Refs<'a> {
+        F::Variables::load(columns, index)
+    }
+    #[inline(always)]
+    fn is_defined(&self, x: Self::Refs<'_>) -> bool {
+        Residual::is_defined(self, x)
+    }
+    #[inline(always)]
+    fn value(&self, x: &Self::Refs<'_>) -> Vector<F::Dim> {
+        self.residual::<f64>(F::Variables::lift(x))
+    }
+    #[inline(always)]
+    fn blocks() -> Self::Blocks {
+        F::Variables::blocks::<F::Dim>(0)
+    }
+    #[inline(always)]
+    fn linearize(&self, x: Self::Refs<'_>, free: &[bool], blocks: &mut Self::Blocks) -> Vector<F::Dim> {
+        F::Variables::resize::<F::Dim>(blocks, free.len());
+        Residual::linearize(self, x, free, blocks)
+    }
+    #[inline(always)]
+    fn each(blocks: &mut Self::Blocks, visit: impl FnMut(usize, &mut [f64])) {
+        F::Variables::each::<F::Dim>(blocks, visit);
+    }
+    #[inline(always)]
+    fn scatter(blocks: &Self::Blocks, r: &[f64], w: f64, places: Places<'_>, to: &mut NormalEquations<'_>) {
+        F::Variables::scatter::<F::Dim>(blocks, r, w, places, to);
+    }
+}

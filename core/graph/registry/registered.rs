@@ -1,0 +1,89 @@
+//! Trait objects that a document chooses by name: `solver = { type = "gauss_newton", max_iterations = 20 }`.
+use crate::registry::catalogue::{Entry, Kind, TAG, all, entries, find};
+use manifactor_tree::{Field, Node, Place, Problem, ReadError, Value, advice, nearest};
+
+/// Reads a table as the registered type of kind `K` that its `type` names.
+///
+/// # Errors
+/// No `type`, one that is not registered, and whatever is wrong with the fields; each at its place.
+pub fn read<K: Kind + ?Sized>(node: &Node) -> Result<Box<K>, ReadError> {
+    let tag = match &node.value {
+        Value::Table(table) => table.get(TAG),
+        _ => None,
+    };
+    let entry = match tag {
+        Some(Field { node: tag, .. }) => {
+            entry_of(tag, K::NAME).map_err(|problem| (tag.place.clone(), problem))
+        }
+        None => Err(untagged(node, K::NAME)),
+    };
+    entry.map_err(|(place, problem)| ReadError::new(place, problem))?.read(node)
+}
+
+/// The entry that a tag names.
+fn entry_of(tag: &Node, kind: &str) -> Result<&'static Entry, Problem> {
+    let a = article(kind);
+    Err(match &tag.value {
+        Value::String(name) => match find(kind, name) {
+            Some(entry) => return Ok(entry),
+            None => match all().into_iter().find(|e| e.name == name) {
+                Some(other) => {
+                    let (b, other) = (article(other.kind), other.kind);
+                    let message = format!("`{name}` is {b} {other}, not {a} {kind}");
+                    Problem::Invalid { message, help: advice("", &known(kind)) }
+                }
+                None => unknown(kind, name),
+            },
+        },
+        _ => Problem::wrong_type(format!("the name of {a} {kind}"), tag.in_words()),
+    })
+}
+
+/// A name that nothing has: misspelt, or of a plugin that is not there.
+fn unknown(kind: &str, name: &str) -> Problem {
+    let known = known(kind);
+    if nearest(name, known.iter().map(String::as_str)).is_some() {
+        return Problem::UnknownName { what: kind.to_owned(), name: name.to_owned(), known };
+    }
+    let link =
+        "if a plugin brings it, the binary has to link the plugin: `use the_plugin as _;` beside its `main`";
+    let help = advice(name, &known).map_or_else(|| link.to_owned(), |known| format!("{known}; {link}"));
+    Problem::with_help(format!("unknown {kind} `{name}`"), help)
+}
+
+/// What is wrong where there is no `type`.
+fn untagged(node: &Node, kind: &str) -> (Place, Problem) {
+    let a = article(kind);
+    let (place, problem) = match &node.value {
+        Value::Table(table) => match table.iter().find(|(name, _)| nearest(name, [TAG]).is_some()) {
+            Some((name, field)) => {
+                let problem = Problem::UnknownField { field: name.clone(), known: vec![TAG.to_owned()] };
+                (&field.key, problem)
+            }
+            None => {
+                let message = format!("missing field `type`, the name of {a} {kind}");
+                (&node.place, Problem::Invalid { message, help: advice("", &known(kind)) })
+            }
+        },
+        value => {
+            let expected = format!("a table with the `type` of {a} {kind}");
+            let problem = Problem::wrong_type(expected, node.in_words());
+            match value {
+                Value::String(name) if find(kind, name).is_some() => {
+                    let help = format!("write {{ type = {name:?} }}");
+                    (&node.place, Problem::with_help(problem.to_string(), help))
+                }
+                _ => (&node.place, problem),
+            }
+        }
+    };
+    (place.clone(), problem)
+}
+
+fn known(kind: &str) -> Vec<String> {
+    entries(kind).iter().map(|e| e.name.to_owned()).collect()
+}
+
+fn article(noun: &str) -> &'static str {
+    if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" }
+}

@@ -1,0 +1,129 @@
+//! Variables of one type, side by side.
+use crate::algebra::Dimension;
+use crate::variable::Manifold;
+use crate::variable::Variable;
+use std::any::{Any, TypeId};
+
+/// Start of a variable that is held fixed: it has no place in the linear system.
+pub const FIXED: u32 = u32::MAX;
+
+/// A plain vector as a trait object; a type of our own, so that impls do not meet those for `Vec`.
+#[derive(Debug, Clone)]
+pub(crate) struct Plain<T>(pub(crate) Vec<T>);
+
+/// All variables of one type, contiguous.
+pub trait Column: Send + Sync {
+    /// For a downcast to the typed column.
+    fn as_any(&self) -> &dyn Any;
+    /// Appends a variable of this column's type; others are left out.
+    fn push(&mut self, value: &dyn Variable);
+    /// Overwrites a variable by one of this column's type.
+    fn set(&mut self, index: usize, value: &dyn Variable);
+    /// A variable, for a downcast to its type.
+    fn value(&self, index: usize) -> Option<&dyn Any>;
+    /// A copy of a variable.
+    fn get(&self, index: usize) -> Option<Box<dyn Variable>>;
+    /// `self ← from ⊞ step`, where variable i's part of the step begins at `starts[i]`.
+    fn retract_from(&mut self, from: &dyn Column, starts: &[u32], step: &[f64]);
+    /// The first variable with a coordinate that is not finite.
+    fn first_not_finite(&self) -> Option<usize>;
+    /// `self ← from`, a column of the same type, in the memory that is there.
+    fn copy_from(&mut self, from: &dyn Column);
+    /// The same column again.
+    fn clone_box(&self) -> Box<dyn Column>;
+}
+
+impl<M: Manifold + Variable> Column for Plain<M> {
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+    fn push(&mut self, value: &dyn Variable) {
+        self.0.extend(value.erased().as_any().downcast_ref::<M>().cloned());
+    }
+    fn set(&mut self, index: usize, value: &dyn Variable) {
+        if let (Some(x), Some(value)) = (self.0.get_mut(index), value.erased().as_any().downcast_ref::<M>()) {
+            *x = value.clone();
+        }
+    }
+    fn value(&self, index: usize) -> Option<&dyn Any> {
+        self.0.get(index).map(|x| x as &dyn Any)
+    }
+    fn get(&self, index: usize) -> Option<Box<dyn Variable>> {
+        self.0.get(index).map(|x| Box::new(x.clone()) as Box<dyn Variable>)
+    }
+    fn retract_from(&mut self, from: &dyn Column, starts: &[u32], step: &[f64]) {
+        let Some(from) = from.as_any().downcast_ref::<Plain<M>>() else { return };
+        for ((x, old), &start) in self.0.iter_mut().zip(&from.0).zip(starts) {
+            *x = if start == FIXED {
+                old.clone()
+            } else {
+                old.retract(&M::Dim::vector(|i| step[start as usize + i]))
+            };
+        }
+    }
+    fn first_not_finite(&self) -> Option<usize> {
+        self.0.iter().position(|x| !x.is_finite())
+    }
+    fn copy_from(&mut self, from: &dyn Column) {
+        if let Some(from) = from.as_any().downcast_ref::<Plain<M>>() {
+            self.0.clone_from(&from.0);
+        }
+    }
+    fn clone_box(&self) -> Box<dyn Column> {
+        Box::new(self.clone())
+    }
+}
+
+/// One column for each type of variable in a problem.
+#[derive(Default)]
+pub struct Columns(Vec<(TypeId, Box<dyn Column>)>);
+
+impl Columns {
+    /// Adds a column, and returns its place.
+    pub fn add(&mut self, id: TypeId, column: Box<dyn Column>) -> usize {
+        self.0.push((id, column));
+        self.0.len() - 1
+    }
+    /// The place of the column of a type.
+    pub fn position(&self, id: TypeId) -> Option<usize> {
+        self.0.iter().position(|(i, _)| *i == id)
+    }
+    /// The column at a place that [`Columns::add`] returned.
+    pub fn column(&self, place: usize) -> &dyn Column {
+        &*self.0[place].1
+    }
+    /// The column at a place, to be changed.
+    pub fn column_mut(&mut self, place: usize) -> &mut dyn Column {
+        &mut *self.0[place].1
+    }
+    /// Number of columns.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+    /// Whether there is no column.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+    /// A variable of any type, for a downcast to it.
+    pub fn value(&self, id: TypeId, index: usize) -> Option<&dyn Any> {
+        self.0.iter().find(|(i, _)| *i == id)?.1.value(index)
+    }
+    /// The variables of type `M`; empty where there are none.
+    pub fn typed<M: Manifold>(&self) -> &[M] {
+        let column = self.0.iter().find(|(id, _)| *id == TypeId::of::<M>());
+        column.and_then(|(_, c)| c.as_any().downcast_ref::<Plain<M>>()).map_or(&[], |c| &c.0)
+    }
+}
+
+impl Clone for Columns {
+    fn clone(&self) -> Self {
+        Columns(self.0.iter().map(|(id, c)| (*id, c.clone_box())).collect())
+    }
+    fn clone_from(&mut self, from: &Self) {
+        if self.0.iter().map(|(id, _)| id).eq(from.0.iter().map(|(id, _)| id)) {
+            self.0.iter_mut().zip(&from.0).for_each(|((_, to), (_, from))| to.copy_from(&**from));
+        } else {
+            *self = from.clone();
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The estimate: a point for each key.
+use crate::registry::catalogue::manifold_name;
+use crate::variable::Key;
+use crate::variable::Variable;
+use indexmap::IndexMap;
+use serde::{Deserialize, Serialize};
+use std::any::TypeId;
+
+/// A value for each key, in the order of insertion.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Values(IndexMap<Key, Box<dyn Variable>, foldhash::fast::RandomState>);
+
+/// Why a value could not be had.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ValueError {
+    /// No variable of that name.
+    #[error("there is no variable `{key}`")]
+    Missing {
+        /// The key that was asked for.
+        key: Key,
+    },
+    /// A variable of another type.
+    #[error("the variable `{key}` is of type {found}, not {expected}")]
+    WrongType {
+        /// The key that was asked for.
+        key: Key,
+        /// The type that was asked for.
+        expected: &'static str,
+        /// The type that it has.
+        found: &'static str,
+    },
+    /// A value with a coordinate that is not finite.
+    #[error("the value of `{key}` is not finite")]
+    NotFinite {
+        /// Its key.
+        key: Key,
+    },
+}
+
+impl Values {
+    /// No values.
+    pub fn new() -> Self {
+        Self::default()
+    }
+    /// Sets the value of a key, and returns the one that it had.
+    pub fn insert(
+        &mut self,
+        key: impl Into<Key>,
+        value: impl Variable + 'static,
+    ) -> Option<Box<dyn Variable>> {
+        self.insert_boxed(key.into(), Box::new(value))
+    }
+    /// Sets the value of a key, and returns the one that it had.
+    pub fn insert_boxed(&mut self, key: Key, value: Box<dyn Variable>) -> Option<Box<dyn Variable>> {
+        self.0.insert(key, value)
+    }
+    /// The value of a key, of any type.
+    pub fn variable(&self, key: &str) -> Option<&dyn Variable> {
+        self.0.get(key).map(|v| &**v)
+    }
+    /// The value of a key.
+    ///
+    /// # Errors
+    /// Where there is none, or one of another type.
+    pub fn get<M: Variable + 'static>(&self, key: impl AsRef<str>) -> Result<&M, ValueError> {
+        let key = key.as_ref();
+        let value = self.variable(key).ok_or_else(|| ValueError::Missing { key: key.into() })?;
+        value.erased().as_any().downcast_ref().ok_or_else(|| ValueError::WrongType {
+            key: key.into(),
+            expected: manifold_name(TypeId::of::<M>()),
+            found: value.typetag_name(),
+        })
+    }
+    /// All values of one type, in order.
+    pub fn all<M: Variable + 'static>(&self) -> impl Iterator<Item = (&Key, &M)> {
+        self.iter().filter_map(|(key, v)| Some((key, v.erased().as_any().downcast_ref()?)))
+    }
+    /// All values, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (&Key, &dyn Variable)> {
+        self.0.iter().map(|(key, value)| (key, &**value))
+    }
+    /// The value of a key, of any type, and its place in the order.
+    pub fn find(&self, key: &str) -> Option<(usize, &dyn Variable)> {
+        self.0.get_full(key).map(|(place, _, value)| (place, &**value))
+    }
+    /// The place of a key in the order.
+    pub fn position(&self, key: &str) -> Option<usize> {
+        self.0.get_index_of(key)
+    }
+    /// Removes a key; the others keep their order.
+    pub fn remove(&mut self, key: &str) -> Option<Box<dyn Variable>> {
+        self.0.shift_remove(key)
+    }
+    /// Whether there is a value of that key.
+    pub fn contains(&self, key: &str) -> bool {
+        self.0.contains_key(key)
+    }
+    /// Number of values.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+    /// Whether there is no value.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}

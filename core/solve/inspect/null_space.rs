@@ -1,0 +1,114 @@
+//! Which variables, in which direction, nothing constrains.
+use crate::linear::Method;
+use crate::outcome::Undetermined;
+use crate::problem::Problem;
+use std::time::Instant;
+
+/// A pivot below this share of its diagonal entry calls for a closer look.
+const PIVOT: f64 = 1e-11;
+/// A direction in which ‖J v‖² is below this, where v has length one by the diagonal, is open.
+const OPEN: f64 = 1e-15;
+/// An entry of the diagonal below this share of the largest is nothing but rounding.
+const ROUNDING: f64 = 1e-24;
+/// Lengths are measured by the diagonal, or by this share of its largest entry where it is less.
+const FLOOR: f64 = 1e-9;
+/// Damping that lets the matrix be factorized for the search.
+const SHIFT: f64 = 1e-10;
+/// Variables named in a report.
+const NAMED: usize = 3;
+
+/// Looks for an open direction of the linearized problem, where its last factorization failed or has
+/// pivots that little but rounding and `damping` keeps from zero: a share of the diagonal, times the
+/// number of unknowns that it may have added up over.
+///
+/// Overwrites the factorization if it looks closer.
+pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
+    let (clock, before) = (Instant::now(), problem.times.stages());
+    let found = match problem.method {
+        Method::Cholesky(_) => search(problem, failed, damping),
+        // others have no pivots to look at
+        Method::Qr(_) => problem.directly(|problem| {
+            let failed = problem.factorize(None).is_err();
+            search(problem, failed, 0.0)
+        })?,
+        Method::ConjugateGradients(_) if failed => {
+            problem.directly(|problem| search(problem, true, damping))?
+        }
+        Method::ConjugateGradients(_) => None,
+    };
+    problem.times.diagnose += clock.elapsed().as_secs_f64() - (problem.times.stages() - before);
+    found
+}
+
+fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
+    let largest = problem.layout.diagonal().iter().fold(0.0, |most, i| f64::max(most, problem.h[*i]));
+    if !failed {
+        let mut suspicious = false;
+        let share = PIVOT.max(10.0 * damping);
+        let (h, diagonal) = (&problem.h, problem.layout.diagonal());
+        let Method::Cholesky(cholesky) = &problem.method else { return None };
+        cholesky.pivots(&mut |i, pivot| {
+            let entry = h[diagonal[i]];
+            // a pivot that is not a number is suspicious too
+            suspicious |= pivot.is_nan() || pivot < share * entry || entry <= ROUNDING * largest;
+        });
+        if !suspicious {
+            return None;
+        }
+    }
+    let mut scale = vec![];
+    problem.diagonal(&mut scale);
+    let floor = if largest > 0.0 { FLOOR * largest } else { 1.0 };
+    scale.iter_mut().for_each(|d| *d = d.max(floor));
+    let shift: Vec<f64> = scale.iter().map(|d| SHIFT * d).collect();
+    problem.factorize(Some(&shift)).ok()?;
+    // inverse iteration from a start with a part in every direction
+    let mut v: Vec<f64> = (0..scale.len()).map(|i| ((i * 7919 % 104_729) as f64 + 1.0).sin()).collect();
+    for _ in 0..6 {
+        v.iter_mut().zip(&scale).for_each(|(v, d)| *v *= d);
+        problem.cholesky()?.solve(&mut v);
+        let length = v.iter().zip(&scale).map(|(v, d)| v * v * d).sum::<f64>().sqrt();
+        v.iter_mut().for_each(|v| *v /= length);
+    }
+    // through the rows of J: the quadratic form of H would drown in rounding
+    let mut bent: f64 = problem.held.iter().map(|i| v[*i] * v[*i]).sum();
+    problem.rows(&mut |factor| {
+        let rows = factor.residual.len();
+        for row in 0..rows {
+            let along = |(start, block): &(usize, Vec<f64>)| -> f64 {
+                block.iter().skip(row).step_by(rows).zip(&v[*start..]).map(|(j, v)| j * v).sum()
+            };
+            bent += factor.blocks.iter().map(along).sum::<f64>().powi(2);
+        }
+    });
+    (bent < OPEN).then(|| name(problem, &v, &scale))
+}
+
+/// The direction in terms of variables and the names of their tangent directions.
+pub(crate) fn name(problem: &Problem, v: &[f64], scale: &[f64]) -> Undetermined {
+    let mut moves: Vec<(usize, f64)> = vec![];
+    for (i, place) in problem.variables.iter().enumerate() {
+        if let Some(start) = place.start {
+            let range = start..start + place.tangent.len();
+            let square = v[range.clone()].iter().zip(&scale[range]).map(|(v, d)| v * v * d).sum::<f64>();
+            moves.push((i, square.sqrt()));
+        }
+    }
+    moves.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let most = moves.first().map_or(0.0, |m| m.1);
+    let moving = moves.iter().filter(|m| m.1 > 1e-3 * most).count();
+    moves.truncate(NAMED.min(moving));
+    let mut direction = vec![];
+    for (i, _) in &moves {
+        let place = &problem.variables[*i];
+        let Some(start) = place.start else { continue };
+        let part = &v[start..start + place.tangent.len()];
+        let largest = part.iter().fold(0.0, |m, x| f64::max(m, x.abs()));
+        // a direction has no sign: let its largest entry be positive
+        let sign = part.iter().find(|x| x.abs() == largest).map_or(1.0, |x| x.signum());
+        let entries = part.iter().zip(place.tangent).filter(|(x, _)| x.abs() > 0.1 * largest);
+        direction.extend(entries.map(|(x, name)| (place.key.clone(), *name, sign * x / largest)));
+    }
+    let keys = moves.iter().map(|(i, _)| problem.variables[*i].key.clone()).collect();
+    Undetermined { keys, direction, moving }
+}

@@ -1,0 +1,51 @@
+//! Subtrees of supernodes that can be factorized at the same time.
+use crate::linear::cholesky::structure::Structure;
+use std::ops::Range;
+
+/// Largest share of the work that one subtree has, so that several threads have about as much to do.
+const LARGEST: f64 = 1.0 / 12.0;
+/// Smallest share that is worth a task.
+const SMALLEST: f64 = 1.0 / 400.0;
+
+/// Smallest share of all work that has to be saved by it, as threads have to meet.
+const SAVED: f64 = 0.05;
+/// Work that a value costs which a subtree hands on: it has left the caches when its parent takes it.
+const HANDED_ON: f64 = 20.0;
+
+/// Disjoint ranges of nodes, each a whole subtree, whose root is its last; the others are above them, or small. None,
+/// where so many threads would save next to nothing.
+pub(crate) fn subtrees(structure: &Structure, threads: usize) -> Vec<Range<usize>> {
+    let n = structure.nodes.len();
+    let (mut work, mut begin, mut parent) = (vec![0.0; n], vec![0; n], vec![None; n]);
+    let mut open: Vec<usize> = vec![];
+    for (i, node) in structure.nodes.iter().enumerate() {
+        let (m, k) = (node.height() as f64, node.width as f64);
+        (work[i], begin[i]) = (k * m * m, i);
+        for child in open.drain(open.len() - node.children..) {
+            work[i] += work[child];
+            begin[i] = begin[i].min(begin[child]);
+            parent[child] = Some(i);
+        }
+        open.push(i);
+    }
+    let total: f64 = open.iter().map(|root| work[*root]).sum();
+    let mut is_above = vec![false; n];
+    let mut found = vec![];
+    let (mut shared, mut largest, mut handed_on) = (0.0, 0.0_f64, 0.0);
+    for i in (0..n).rev() {
+        let is_free = parent[i].is_none_or(|p: usize| is_above[p]);
+        if is_free && work[i] > LARGEST * total {
+            is_above[i] = true;
+        } else if is_free && work[i] > SMALLEST * total {
+            found.push(begin[i]..i + 1);
+            (shared, largest) = (shared + work[i], largest.max(work[i]));
+            handed_on += (structure.nodes[i].below as f64).powi(2);
+        }
+    }
+    let saved = shared - largest.max(shared / threads as f64) - HANDED_ON * handed_on;
+    if saved < SAVED * total {
+        return vec![];
+    }
+    found.reverse();
+    found
+}

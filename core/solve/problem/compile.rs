@@ -1,0 +1,274 @@
+//! From the dynamic view of a graph to the columnar one.
+use crate::linear::choice::{self, Blocks};
+use crate::linear::layout::Layout;
+use crate::linear::memory::{self, Bytes};
+use crate::linear::settings::LinearSolver;
+use crate::outcome::Times;
+use crate::problem::{Place, Problem};
+use manifactor_graph::batch::{Batch, Member};
+use manifactor_graph::column::{Columns, FIXED};
+use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values};
+use std::any::TypeId;
+use std::collections::HashMap;
+use std::time::Instant;
+
+/// Why a graph cannot be compiled.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompileError {
+    /// Factors, values and what is held do not fit each other: everything that is wrong.
+    #[error("the graph does not fit its values:{}", list(.0))]
+    Graph(Vec<GraphError>),
+    /// There is nothing to solve for.
+    #[error("there is no variable to solve for: {0}")]
+    Empty(&'static str),
+    /// The linear solver does not fit the graph.
+    #[error("the linear solver does not fit the graph: {0}")]
+    LinearSolver(String),
+    /// A setting of the solver is outside its domain.
+    #[error(transparent)]
+    Setting(#[from] crate::SettingError),
+    /// A solver that names a factor which is not there.
+    #[error("there is no factor {factor}: the graph has {factors}, from 0")]
+    NoFactor {
+        /// What was asked for.
+        factor: usize,
+        /// How many there are.
+        factors: usize,
+    },
+    /// The graph does not fit into memory.
+    #[error("no memory for a graph of {factors} factors: it takes at least {}, and there are {}; allow more, or take fewer threads", Bytes(*.needed), Bytes(*.available))]
+    TooLarge {
+        /// How many it has.
+        factors: usize,
+        /// Bytes that it takes once it is compiled, without a factorization.
+        needed: u64,
+        /// Bytes that there are.
+        available: u64,
+    },
+    /// The linear system does not fit into memory.
+    #[error("no memory for a linear system of {unknowns} unknowns{}", shortage(*.needed, *.available))]
+    OutOfMemory {
+        /// Its size.
+        unknowns: usize,
+        /// Bytes that its factor takes, where that is known.
+        needed: Option<u64>,
+        /// Bytes that there are for it.
+        available: u64,
+    },
+}
+
+fn shortage(needed: Option<u64>, available: u64) -> String {
+    needed.map_or(String::new(), |needed| {
+        let (needed, available) = (Bytes(needed), Bytes(available));
+        format!(
+            ": its factor takes {needed}, and there are {available}; \
+             take another ordering, or linear = {{ method = \"conjugate_gradients\" }}, or allow more by memory_gib"
+        )
+    })
+}
+
+fn list(errors: &[GraphError]) -> String {
+    const SHOWN: usize = 20;
+    let mut text: String = errors.iter().take(SHOWN).map(|e| format!("\n  {e}")).collect();
+    if errors.len() > SHOWN {
+        text += &format!("\n  and {} more", errors.len() - SHOWN);
+    }
+    text
+}
+
+pub(crate) fn compile(
+    graph: &Graph,
+    values: &Values,
+    linear: &LinearSolver,
+) -> Result<Problem, CompileError> {
+    let clock = Instant::now();
+    check_memory(graph, values)?;
+    let resolved = graph.resolve(values).map_err(CompileError::Graph)?;
+    let (mut variables, columns) = columns(graph, values);
+
+    // the free variables are the blocks of the linear system
+    let is_free = |place: &Place| place.held.count_ones() < place.tangent.len() as u32;
+    let free: Vec<usize> = (0..variables.len()).filter(|i| is_free(&variables[*i])).collect();
+    if free.is_empty() {
+        let why = if variables.is_empty() { "there are no values" } else { "all are held fixed" };
+        return Err(CompileError::Empty(why));
+    }
+    let mut block = vec![None; variables.len()];
+    free.iter().enumerate().for_each(|(b, v)| block[*v] = Some(b));
+    let dims: Vec<usize> = free.iter().map(|v| variables[*v].tangent.len()).collect();
+    let unknowns = dims.iter().sum();
+    let count = |factor: &Resolved| factor.variables.len() * factor.variables.len().saturating_sub(1) / 2;
+    let mut pairs = Vec::with_capacity(resolved.iter().map(count).sum());
+    let mut blocks: Vec<u32> = vec![];
+    for factor in &resolved {
+        blocks.clear();
+        blocks.extend(factor.variables.iter().filter_map(|i| block[*i as usize].map(|b| b as u32)));
+        for (n, &a) in blocks.iter().enumerate() {
+            pairs.extend(blocks[..n].iter().map(|&b| (a, b)));
+        }
+    }
+    let of_block: Vec<&Place> = free.iter().map(|v| &variables[*v]).collect();
+    let blocks = Blocks::new(&of_block, values);
+    let order = choice::order(linear, &blocks)?;
+    let out_of_memory = CompileError::OutOfMemory { unknowns, needed: None, available: 0 };
+    let layout = Layout::new(&dims, pairs, &order).ok_or(out_of_memory)?;
+    let method = choice::method(linear, &blocks, &layout)?;
+    for (variable, block) in variables.iter_mut().zip(&block) {
+        variable.start = block.map(|b| layout.start[b] as usize);
+    }
+    let mut starts: Vec<Vec<u32>> = vec![vec![]; columns.len()];
+    let mut held = vec![];
+    for place in &variables {
+        starts[place.column].push(place.start.map_or(FIXED, |s| s as u32));
+        if let Some(start) = place.start {
+            held.extend((0..place.tangent.len()).filter(|d| place.held >> d & 1 == 1).map(|d| start + d));
+        }
+    }
+    let batches = batches(graph, &resolved, &variables, &block, &layout);
+    let (h, g) = (vec![0.0; layout.row_idx.len()], vec![0.0; unknowns]);
+    let factor_variables = resolved.into_iter().map(|factor| factor.variables).collect();
+    let factor_types = graph.factors().iter().map(|f| (f.factor.typetag_name(), observed_rows(f))).collect();
+    let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };
+    let trial = columns.clone();
+    let (factors, entries) = (graph.factors().len(), layout.row_idx.len());
+    tracing::debug!(
+        variables = variables.len(),
+        factors,
+        unknowns,
+        entries,
+        seconds = times.compile,
+        "compiled"
+    );
+    Ok(Problem {
+        variables,
+        version: graph.version(),
+        factor_variables,
+        factor_types,
+        weights: vec![],
+        columns,
+        trial,
+        starts,
+        batches,
+        layout,
+        h,
+        g,
+        held,
+        method,
+        refinements: linear.refinements,
+        added: None,
+        forward: vec![],
+        times,
+    })
+}
+
+/// Refuses a graph for which there is no memory, before any of it is taken.
+fn check_memory(graph: &Graph, values: &Values) -> Result<(), CompileError> {
+    // fewer are had without asking, which takes longer than they do
+    const FEW: usize = 100_000;
+    let factors = graph.factors().len();
+    if factors < FEW && memory::memory_limit().is_none() {
+        return Ok(());
+    }
+    let (needed, available) = (memory::of_graph(graph, values), memory::available_memory());
+    match needed > available {
+        true => Err(CompileError::TooLarge { factors, needed, available }),
+        false => Ok(()),
+    }
+}
+
+fn observed_rows(entry: &FactorEntry) -> usize {
+    let all = entry.factor.erased().signature().rows.unwrap_or(0);
+    entry.noise.observed().map_or(all, |observed| observed.iter().filter(|o| **o).count())
+}
+
+/// Values into columns, by type.
+fn columns(graph: &Graph, values: &Values) -> (Vec<Place>, Columns) {
+    let mut columns = Columns::default();
+    let mut sizes: Vec<usize> = vec![];
+    let place = |(key, value): (&Key, &dyn manifactor_graph::Variable)| {
+        let erased = value.erased();
+        let id = erased.type_id();
+        let column = columns.position(id).unwrap_or_else(|| {
+            sizes.push(0);
+            columns.add(id, erased.new_column())
+        });
+        columns.column_mut(column).push(value);
+        sizes[column] += 1;
+        let tangent = erased.tangent();
+        let held = graph.fixed().get(key).map_or(0, |f| held_bits(f, tangent));
+        Place { key: key.clone(), column, index: sizes[column] - 1, tangent, start: None, held }
+    };
+    let variables = values.iter().map(place).collect();
+    (variables, columns)
+}
+
+fn held_bits(fixed: &Fixed, tangent: &[&str]) -> u32 {
+    let bit = |name: &str| tangent.iter().position(|t| *t == name).map_or(0, |i| 1 << i);
+    match fixed {
+        Fixed::Whole(true) => u32::MAX.checked_shr(32 - tangent.len().min(32) as u32).unwrap_or(0),
+        Fixed::Whole(false) => 0,
+        Fixed::Directions(names) => names.iter().fold(0, |bits, name| bits | bit(name)),
+    }
+}
+
+/// Factors into batches, by residual type, kind of noise and type of loss.
+fn batches(
+    graph: &Graph,
+    resolved: &[Resolved],
+    variables: &[Place],
+    block: &[Option<usize>],
+    layout: &Layout,
+) -> Vec<Box<dyn Batch>> {
+    let mut batches: Vec<Box<dyn Batch>> = vec![];
+    let mut of_type: HashMap<TypeId, Vec<usize>> = HashMap::new();
+    // by factor its batch, and by batch the numbers of factors and of their variables: room is made once
+    let mut batch_of = Vec::with_capacity(resolved.len());
+    let mut sizes: Vec<(usize, usize)> = vec![];
+    for (factor, Resolved { variables, whitener }) in graph.factors().iter().zip(resolved) {
+        let (erased, loss) = (factor.factor.erased(), factor.loss.as_deref());
+        let candidates = of_type.entry(erased.type_id()).or_default();
+        let found = candidates.iter().copied().find(|b| batches[*b].fits(whitener, loss));
+        let batch = found.unwrap_or_else(|| {
+            batches.push(erased.new_batch(whitener, loss));
+            candidates.push(batches.len() - 1);
+            sizes.push((0, 0));
+            batches.len() - 1
+        });
+        sizes[batch].0 += 1;
+        sizes[batch].1 += variables.len();
+        batch_of.push(batch);
+    }
+    for (batch, (factors, variables)) in batches.iter_mut().zip(sizes) {
+        batch.reserve(factors, variables);
+    }
+    let (mut index, mut starts, mut held, mut slots) = (vec![], vec![], vec![], vec![]);
+    for (entry, (factor, Resolved { variables: ids, whitener })) in
+        graph.factors().iter().zip(resolved).enumerate()
+    {
+        index.clear();
+        starts.clear();
+        held.clear();
+        slots.clear();
+        for (n, a) in ids.iter().map(|a| *a as usize).enumerate() {
+            index.push(variables[a].index as u32);
+            starts.push(variables[a].start.map_or(FIXED, |s| s as u32));
+            held.push(if variables[a].start.is_some() { variables[a].held } else { 0 });
+            for &b in &ids[..=n] {
+                let both = block[a].zip(block[b as usize]);
+                slots.push(both.and_then(|(a, b)| layout.slot(a, b)).unwrap_or_default());
+            }
+        }
+        batches[batch_of[entry]].push(&Member {
+            entry,
+            factor: factor.factor.erased().as_any(),
+            index: &index,
+            starts: &starts,
+            held: &held,
+            slots: &slots,
+            whitener,
+            loss: factor.loss.as_deref(),
+        });
+    }
+    batches
+}

@@ -1,0 +1,16 @@
+//! How an estimate is moved to a minimum: one file for each solver, and what they share.
+mod auto;
+mod dogleg;
+mod gauss_newton;
+mod gnc;
+mod levenberg_marquardt;
+mod optimizer;
+mod start;
+
+pub use auto::Auto;
+pub use dogleg::Dogleg;
+pub use gauss_newton::GaussNewton;
+pub use gnc::{BadParameter, Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor};
+pub use levenberg_marquardt::LevenbergMarquardt;
+pub use optimizer::{Optimizer, SettingError, Stopping};
+pub use start::{Given, Start, StartError};

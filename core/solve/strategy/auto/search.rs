@@ -1,0 +1,134 @@
+//! Other starts, where the given values lead nowhere.
+use super::watch::{Pause, Watch};
+use super::{Auto, DAMPING};
+use crate::observer::Observer;
+use crate::outcome::Outcome;
+use crate::outcome::Termination;
+use crate::problem::Problem;
+use crate::strategy::start::{Given, Start};
+use manifactor_graph::catalogue::{self, Kind};
+use manifactor_graph::{Graph, Values};
+use manifactor_tree::Node;
+use std::cmp::Ordering;
+use std::time::Instant;
+
+/// Damping of the first step where next to none has been tried.
+const REFUSED: f64 = 1e-5;
+
+/// Values to begin with.
+pub(crate) struct Point {
+    pub inactive: usize,
+    pub cost: f64,
+    pub values: Values,
+    /// Damping of the first step, from where full ones have been tried.
+    pub damping: Option<f64>,
+}
+
+/// The registered starts, with their defaults, but for the values as they are given.
+fn registered() -> impl Iterator<Item = Box<dyn Start>> {
+    let others = catalogue::entries(<dyn Start>::NAME).into_iter().filter(|e| e.name != Given::NAME);
+    others.filter_map(|entry| entry.read::<dyn Start>(&Node::empty_table()).ok())
+}
+
+/// What the registered starts have to offer.
+pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> Vec<Point> {
+    let point = |start: Box<dyn Start>| {
+        // one that does not apply has nothing to offer
+        let values = start.start(graph, values).ok()?;
+        problem.set_values(&values).ok()?;
+        let at = problem.linearize();
+        let point = Point { inactive: at.inactive, cost: at.cost, values, damping: None };
+        at.not_finite.is_none().then_some(point)
+    };
+    registered().filter_map(point).collect()
+}
+
+/// Whether a start doubts the minimum that the problem is in.
+pub(super) fn is_doubted(graph: &Graph, problem: &Problem) -> bool {
+    let mut starts = registered().peekable();
+    if starts.peek().is_none() {
+        return false;
+    }
+    let minimum = problem.values();
+    starts.any(|start| start.doubts(graph, &minimum))
+}
+
+impl Auto {
+    /// Solves from other starts, and goes on from where a solve has paused, in the order of their costs, until one leads
+    /// to a minimum.
+    pub(super) fn search(
+        &self,
+        (graph, values): (&Graph, &Values),
+        problem: &mut Problem,
+        watch: &mut Watch<'_>,
+        mut outcome: Outcome,
+    ) -> Outcome {
+        let clock = Instant::now();
+        let mut best = problem.values();
+        // of two alike, where it is already
+        let mut points = Vec::from_iter(here(watch, &outcome, &best));
+        points.extend(starts(graph, values, problem));
+        points.sort_by(|a, b| {
+            (a.inactive, a.cost).partial_cmp(&(b.inactive, b.cost)).unwrap_or(Ordering::Equal)
+        });
+        let looking = clock.elapsed().as_secs_f64();
+        outcome.times.other += looking;
+        outcome.times.total += looking;
+        watch.sleep();
+        // a rival of a minimum is dropped once it has cost more than that
+        let is_rival = is_minimum(&outcome.termination);
+        let bounded = self.at_most(if is_rival { outcome.iterations } else { usize::MAX });
+        for point in points {
+            tracing::debug!(cost = point.cost, inactive = point.inactive, "another start");
+            problem.put(&point.values);
+            let next = bounded.solve_from(&point, problem, watch);
+            let better = (next.inactive, next.final_cost) <= (outcome.inactive, outcome.final_cost);
+            let is_settled = is_minimum(&next.termination) && (better || is_rival);
+            if better {
+                best = problem.values();
+            }
+            outcome = outcome.then(next, better);
+            if watch.stopped || is_settled {
+                break;
+            }
+        }
+        problem.put(&best);
+        problem.linearize();
+        outcome
+    }
+
+    /// The same with a bound on its iterations.
+    fn at_most(&self, iterations: usize) -> Self {
+        let mut bounded = self.clone();
+        bounded.stop.max_iterations = iterations.min(self.stop.max_iterations);
+        bounded
+    }
+
+    /// From a good start full steps are there in a few, where damping creeps along narrow valleys.
+    fn solve_from(&self, point: &Point, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        if let Some(damping) = point.damping {
+            return self.damped(damping, problem, observer);
+        }
+        let outcome = self.full_steps(problem, observer);
+        match outcome.termination {
+            Termination::Stalled { .. } => outcome.then(self.damped(DAMPING, problem, observer), true),
+            _ => outcome,
+        }
+    }
+}
+
+/// Whether a solve has ended at a minimum, of all variables or of those that a factor touches.
+pub(super) fn is_minimum(termination: &Termination) -> bool {
+    matches!(termination, Termination::Converged { .. } | Termination::Indeterminate(_))
+}
+
+/// Where a solve has paused, to go on from.
+fn here(watch: &Watch<'_>, outcome: &Outcome, values: &Values) -> Option<Point> {
+    let damping = match watch.pause? {
+        _ if outcome.termination != Termination::Interrupted => return None,
+        Pause::Rise { .. } | Pause::Undefined => REFUSED,
+        Pause::Long { damping } => damping.max(DAMPING),
+    };
+    let (inactive, cost) = (outcome.inactive, outcome.final_cost);
+    Some(Point { inactive, cost, values: values.clone(), damping: Some(damping) })
+}

@@ -1,0 +1,161 @@
+//! Powell's dogleg: a trust region between the gradient and the Gauss-Newton step.
+use crate::linear::settings::LinearSolver;
+use crate::linear::system::{dot, norm};
+use crate::observer::Observer;
+use crate::outcome::Outcome;
+use crate::outcome::{Stall, Termination, Tolerance};
+use crate::problem::Problem;
+use crate::strategy::optimizer::{Optimizer, Session, SettingError, Step, Stopping, Tried};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::register;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Steps within a trust region, each of which lowers the cost.
+///
+/// The step is the Gauss-Newton step where that is within the radius, else the point on the path from
+/// the minimum along the gradient to it. Lengths are measured by √diag H, so that radians and metres
+/// compare. A refused step costs neither a linearization nor a factorization. A direction that nothing constrains is
+/// left alone, and named by the outcome.
+///
+/// ```toml
+/// solver = { type = "dogleg", stop = { max_iterations = 50 } }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Dogleg {
+    /// Radius of the first step, in standard deviations; the length of the first Gauss-Newton step,
+    /// where it is not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub initial_radius: Option<Positive>,
+    /// When to stop.
+    pub stop: Stopping,
+    /// How the linear system of each step is solved.
+    pub linear: LinearSolver,
+}
+
+/// Least share of the predicted decrease that makes a step good enough to take.
+const GAIN: f64 = 1e-4;
+
+#[typetag::serialize(name = "dogleg")]
+impl Optimizer for Dogleg {
+    fn linear(&self) -> LinearSolver {
+        self.linear.clone()
+    }
+
+    fn check(&self) -> Result<(), SettingError> {
+        self.stop.check()?;
+        self.linear.check()
+    }
+
+    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        let mut session = match Session::begin(problem, &self.stop, observer) {
+            Ok(session) => session,
+            Err(outcome) => return *outcome,
+        };
+        let termination = self.iterate(&mut session);
+        let open = session.open_direction();
+        session.end(termination, open)
+    }
+}
+register!(dyn Optimizer, "dogleg", Dogleg);
+
+/// Both ends of the path, and the measure of length.
+#[derive(Default)]
+struct Path {
+    scale: Vec<f64>,
+    newton: Vec<f64>,
+    cauchy: Vec<f64>,
+}
+
+impl Path {
+    fn new(problem: &Problem, newton: &[f64]) -> Self {
+        let mut path = Self { newton: newton.to_vec(), ..Self::default() };
+        problem.diagonal(&mut path.scale);
+        path.scale.iter_mut().for_each(|d| *d = d.max(1e-12));
+        // steepest descent where lengths are measured by the diagonal: -D⁻¹g
+        path.cauchy = problem.g.iter().zip(&path.scale).map(|(g, d)| -g / d).collect();
+        let curvature = dot(&path.cauchy, &problem.multiply(&path.cauchy));
+        let length = -dot(&path.cauchy, &problem.g) / curvature.max(f64::MIN_POSITIVE);
+        path.cauchy.iter_mut().for_each(|x| *x *= length);
+        path
+    }
+    fn inner(&self, a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).zip(&self.scale).map(|((a, b), d)| a * b * d).sum()
+    }
+    fn length(&self, a: &[f64]) -> f64 {
+        self.inner(a, a).sqrt()
+    }
+    /// The point of the path at this distance, or its end.
+    fn point(&self, radius: f64) -> Vec<f64> {
+        if self.length(&self.newton) <= radius {
+            return self.newton.clone();
+        }
+        let cauchy = self.length(&self.cauchy);
+        if cauchy >= radius {
+            return self.cauchy.iter().map(|x| x * radius / cauchy).collect();
+        }
+        // ‖c + t (n - c)‖ = radius
+        let leg: Vec<f64> = self.newton.iter().zip(&self.cauchy).map(|(n, c)| n - c).collect();
+        let (a, b) = (self.inner(&leg, &leg), self.inner(&self.cauchy, &leg));
+        let c = cauchy * cauchy - radius * radius;
+        let t = (-c) / (b + (b * b - a * c).max(0.0).sqrt());
+        self.cauchy.iter().zip(&leg).map(|(c, l)| c + t * l).collect()
+    }
+}
+
+impl Dogleg {
+    fn iterate(&self, session: &mut Session<'_>) -> Termination {
+        let mut radius = self.initial_radius.map(Positive::get);
+        let mut newton = vec![];
+        'linearized: loop {
+            if let Some(termination) = session.finished() {
+                return termination;
+            }
+            session.iterations += 1;
+            if !session.factorize_undamped() || !session.newton_step(&mut newton) {
+                return session.stalled(Stall::Damping);
+            }
+            let path = Path::new(session.problem, &newton);
+            let whole = path.length(&path.newton);
+            // what the whole step would gain: where that is next to nothing, so is what the radius leaves of it
+            let promises = !session.is_small(-0.5 * dot(&newton, &session.problem.g));
+            let mut within = radius.unwrap_or(whole);
+            loop {
+                // a step that the radius has made small says little of the cost around
+                let is_cut = promises && within < whole;
+                let delta = path.point(within);
+                let (g, length) = (dot(&delta, &session.problem.g), path.length(&delta));
+                let predicted = -g - 0.5 * dot(&delta, &session.problem.multiply(&delta));
+                let step = Step { predicted, norm: norm(&delta), control: within };
+                let tried = session.attempt(&delta, &step);
+                let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
+                session.record(&step, accepted);
+                if let (true, Tried::Lower { gain }) = (accepted, &tried) {
+                    radius = Some(match *gain {
+                        gain if gain > 0.75 => within.max(3.0 * length),
+                        gain if gain < 0.25 => 0.5 * within,
+                        _ => within,
+                    });
+                    match session.take(&step) {
+                        Some(termination) if !is_cut => return termination,
+                        _ => continue 'linearized,
+                    }
+                }
+                if !is_cut && !matches!(tried, Tried::Undefined) && session.settled(&step) {
+                    return Termination::Converged { reason: Tolerance::RelativeCost };
+                }
+                if step.norm <= session.stop.step {
+                    return match is_cut {
+                        true => session.stalled(Stall::TrustRegion),
+                        false => Termination::Converged { reason: Tolerance::Step },
+                    };
+                }
+                if session.interrupted() {
+                    return Termination::Interrupted;
+                }
+                within = 0.5 * within.min(length);
+            }
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! Graduated non-convexity: outliers told from inliers, without knowing beforehand which is which.
+use crate::Solution;
+use crate::linear::settings::LinearSolver;
+use crate::observer::Observer;
+use crate::outcome::Outcome;
+use crate::problem::CompileError;
+use crate::problem::Problem;
+use crate::strategy::auto::Auto;
+use crate::strategy::optimizer::{Optimizer, SettingError};
+use graduation::Graduation;
+use manifactor_graph::checked::Positive;
+use manifactor_graph::{Graph, Values, register};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+mod candidates;
+mod graduation;
+mod parameters;
+mod surrogate;
+
+pub use candidates::{Candidates, FactorType, UnknownFactor};
+pub use parameters::{BadParameter, Growth, Probability};
+pub use surrogate::Truncation;
+
+/// Rejects outliers: solves with all factors, then with ever less weight on those that do not fit.
+///
+/// Yang, Antonante, Tzoumas, Carlone, *Graduated Non-Convexity for Robust Spatial Perception*, RA-L 2020. Each
+/// candidate i costs c²ρ_μ(‖rᵢ‖²/c²), where c² is what an inlier may have; μ leads from a convex ρ_μ to one that is
+/// truncated. For each μ the weighted problem is solved from the last estimate and from the best registered start
+/// for the weighted graph, and the better of the two goes on. At the end the same is tried with fewer and with more
+/// factors than those that fit, as long as that lowers the robust cost.
+///
+/// Candidates are loop closures: what couples variables and is no odometry. A factor's own loss stays; its cost is
+/// what counts as ‖r‖². The outcome lists the factors that are rejected. Its costs are those of the weighted problem:
+/// the first with all factors, the last with what is kept.
+///
+/// ```toml
+/// solver = { type = "gnc", probability = 0.99, types = ["between_se2"], solver = { type = "dogleg" } }
+/// ```
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Gnc {
+    /// The robust cost.
+    pub cost: Truncation,
+    /// Share of the inliers that are to be kept: c² is the χ² quantile for the rows of each factor.
+    pub probability: Probability,
+    /// c itself, in standard deviations, for all factors, instead of `probability`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<Positive>,
+    /// The factors that may be outliers.
+    pub candidates: Candidates,
+    /// Of these only the ones of these types, where any are given.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub types: Vec<FactorType>,
+    /// Factors that are trusted in any case: their places in the graph, from 0.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inliers: Vec<usize>,
+    /// Factor from one μ to the next; the paper's is 1.4.
+    pub step: Growth,
+    /// Solves with the weights that are found at the end.
+    #[schemars(schema_with = "solver")]
+    pub solver: Arc<dyn Optimizer>,
+}
+
+fn solver(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "type": "object",
+        "required": ["type"],
+        "description": "Solves with the weights that are found at the end."
+    })
+}
+
+impl Default for Gnc {
+    fn default() -> Self {
+        Self {
+            cost: Truncation::default(),
+            probability: Probability::default(),
+            threshold: None,
+            candidates: Candidates::default(),
+            types: vec![],
+            inliers: vec![],
+            step: Growth::default(),
+            solver: Arc::new(Auto::default()),
+        }
+    }
+}
+
+#[typetag::serialize(name = "gnc")]
+impl Optimizer for Gnc {
+    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        Graduation::new(self, problem, None, observer).run()
+    }
+
+    fn linear(&self) -> LinearSolver {
+        self.solver.linear()
+    }
+
+    fn check(&self) -> Result<(), SettingError> {
+        self.solver.check()
+    }
+
+    fn solve_graph(
+        &self,
+        graph: &Graph,
+        values: &Values,
+        observer: &mut dyn Observer,
+    ) -> Result<Solution, CompileError> {
+        let factors = graph.factors().len();
+        if let Some(factor) = self.inliers.iter().copied().find(|i| *i >= factors) {
+            return Err(CompileError::NoFactor { factor, factors });
+        }
+        let mut problem = Problem::compile_for(graph, values, &self.linear())?;
+        let outcome = Graduation::new(self, &mut problem, Some(graph), observer).run();
+        Ok(Solution::of(problem, outcome))
+    }
+}
+register!(dyn Optimizer, "gnc", Gnc);
+
+impl Gnc {
+    /// By factor: what an inlier may cost, ½c²; `None` for those that are trusted.
+    fn bounds(&self, problem: &Problem) -> Vec<Option<f64>> {
+        let named = |name: &str| self.types.is_empty() || self.types.iter().any(|t| t.as_str() == name);
+        let mut may = self.candidates.of(problem);
+        for inlier in &self.inliers {
+            may.get_mut(*inlier).into_iter().for_each(|may| *may = false);
+        }
+        let mut quantiles: Vec<Option<f64>> = vec![];
+        let mut bound = |rows: usize| {
+            let square = self.threshold.map(|c| c.get().powi(2));
+            quantiles.resize(quantiles.len().max(rows + 1), None);
+            *quantiles[rows]
+                .get_or_insert_with(|| 0.5 * square.unwrap_or_else(|| self.probability.chi_squared(rows)))
+        };
+        let one = |(i, (name, rows)): (usize, &(&str, usize))| {
+            let candidate = may[i] && named(name) && *rows > 0;
+            candidate.then(|| bound(*rows))
+        };
+        problem.factor_types.iter().enumerate().map(one).collect()
+    }
+}

@@ -1,0 +1,184 @@
+//! Levenberg-Marquardt: steps damped along the diagonal of H.
+use crate::inspect::null_space::undetermined;
+use crate::linear::settings::LinearSolver;
+use crate::linear::system::{dot, norm};
+use crate::observer::Observer;
+use crate::outcome::Outcome;
+use crate::outcome::{Stall, Termination, Tolerance};
+use crate::problem::Problem;
+use crate::strategy::optimizer::{Optimizer, Session, SettingError, Step, Stopping, Tried, check, positive};
+use manifactor_graph::checked::{self, Positive, least_and_most, one_or_more};
+use manifactor_graph::register;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Damped steps, each of which lowers the cost: (H + λ diag H) δ = -g.
+///
+/// λ falls by up to `decrease` after a step that does what the model predicts, and rises after one that
+/// does not (Nielsen's rule). A refused step costs a factorization, not a linearization. Nothing but
+/// damping may hold a direction: the outcome then names it as undetermined.
+///
+/// ```toml
+/// solver = { type = "levenberg_marquardt", initial_lambda = 1e-5, stop = { relative_cost = 1e-6 } }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LevenbergMarquardt {
+    /// Damping of the first step, as a share of the diagonal.
+    #[serde(deserialize_with = "checked::positive")]
+    #[schemars(with = "Positive")]
+    pub initial_lambda: f64,
+    /// Least damping.
+    #[serde(deserialize_with = "checked::positive")]
+    #[schemars(with = "Positive")]
+    pub min_lambda: f64,
+    /// Damping at which a solve gives up.
+    #[serde(deserialize_with = "checked::positive")]
+    #[schemars(with = "Positive")]
+    pub max_lambda: f64,
+    /// Largest factor by which one good step lowers the damping.
+    #[serde(deserialize_with = "one_or_more")]
+    #[schemars(extend("minimum" = 1))]
+    pub decrease: f64,
+    /// Least and largest entry of the diagonal that is used for damping.
+    #[serde(deserialize_with = "least_and_most")]
+    pub diagonal: [f64; 2],
+    /// When to stop.
+    pub stop: Stopping,
+    /// How the linear system of each step is solved.
+    pub linear: LinearSolver,
+}
+
+impl Default for LevenbergMarquardt {
+    fn default() -> Self {
+        Self {
+            initial_lambda: 1e-5,
+            min_lambda: 1e-15,
+            max_lambda: 1e12,
+            decrease: 10.0,
+            diagonal: [1e-6, 1e32],
+            stop: Stopping::default(),
+            linear: LinearSolver::default(),
+        }
+    }
+}
+
+/// Least share of the predicted decrease that makes a step good enough to take.
+const GAIN: f64 = 1e-4;
+/// Damping that changes a step by next to nothing: one that is refused with less calls for more than twice as much.
+const NEGLIGIBLE: f64 = 1e-3;
+/// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal.
+const TRUSTED: f64 = 1.0;
+/// Damping up to which one small step is sign enough; above, it takes two.
+const LIGHT: f64 = 1e-2;
+
+#[typetag::serialize(name = "levenberg_marquardt")]
+impl Optimizer for LevenbergMarquardt {
+    fn linear(&self) -> LinearSolver {
+        self.linear.clone()
+    }
+
+    fn check(&self) -> Result<(), SettingError> {
+        let Self { initial_lambda, min_lambda, max_lambda, decrease, diagonal: [least, most], .. } = *self;
+        positive(&[
+            ("initial_lambda", initial_lambda),
+            ("min_lambda", min_lambda),
+            ("max_lambda", max_lambda),
+        ])?;
+        check(&[("decrease", decrease)], "1 or more", |x| x >= 1.0)?;
+        check(&[("diagonal", least)], "0 or more, and the second one no less", |x| 0.0 <= x && x <= most)?;
+        self.stop.check()?;
+        self.linear.check()
+    }
+
+    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+        self.solve_within(&|_| self.diagonal, problem, observer)
+    }
+}
+register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
+
+/// The least and the largest entry of the diagonal that is used for damping, at a linearization.
+pub(crate) type Bounds<'a> = &'a dyn Fn(&Session<'_>) -> [f64; 2];
+
+impl LevenbergMarquardt {
+    /// As `solve`, with bounds of the diagonal that may follow the cost.
+    pub(crate) fn solve_within(
+        &self,
+        bounds: Bounds<'_>,
+        problem: &mut Problem,
+        observer: &mut dyn Observer,
+    ) -> Outcome {
+        let mut session = match Session::begin(problem, &self.stop, observer) {
+            Ok(session) => session,
+            Err(outcome) => return *outcome,
+        };
+        let mut lambda = self.initial_lambda;
+        let termination = self.iterate(&mut session, &mut lambda, bounds);
+        // damping hides what nothing else holds; by now there is little left of it
+        let open = match termination {
+            Termination::Interrupted | Termination::NonFinite { .. } => None,
+            _ if session.iterations == 0 => None,
+            _ => undetermined(session.problem, false, lambda * session.problem.dim() as f64),
+        };
+        session.end(termination, open)
+    }
+
+    fn iterate(&self, session: &mut Session<'_>, lambda: &mut f64, bounds: Bounds<'_>) -> Termination {
+        let (mut rise, mut small_before) = (2.0, false);
+        let (mut delta, mut added) = (vec![], vec![]);
+        'linearized: loop {
+            if let Some(termination) = session.finished() {
+                return termination;
+            }
+            session.iterations += 1;
+            loop {
+                session.problem.diagonal(&mut added);
+                let [least, most] = bounds(session);
+                added.iter_mut().for_each(|d| *d = *lambda * d.max(least).min(most));
+                if session.factorize(Some(&added)).is_ok() && session.newton_step(&mut delta) {
+                    let damping = delta.iter().zip(&added).map(|(d, a)| a * d * d).sum::<f64>();
+                    let predicted = 0.5 * (damping - dot(&delta, &session.problem.g));
+                    let step = Step { predicted, norm: norm(&delta), control: *lambda };
+                    let tried = session.attempt(&delta, &step);
+                    let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
+                    session.record(&step, accepted);
+                    if let (true, Tried::Lower { gain }) = (accepted, &tried) {
+                        let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / self.decrease).min(1.0);
+                        (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
+                        let ended = session.take(&step);
+                        // a step that damping has made small says little of the cost around
+                        let is_trusted = step.control <= TRUSTED;
+                        let small = ended.is_some() && is_trusted;
+                        match ended {
+                            Some(termination) if small && (small_before || step.control <= LIGHT) => {
+                                return termination;
+                            }
+                            Some(termination) if !is_trusted && session.is_at_rest(&mut delta) => {
+                                return termination;
+                            }
+                            _ => small_before = small,
+                        }
+                        continue 'linearized;
+                    }
+                    if !matches!(tried, Tried::Undefined) && step.control <= TRUSTED && session.settled(&step)
+                    {
+                        return Termination::Converged { reason: Tolerance::RelativeCost };
+                    }
+                    if step.control <= TRUSTED && step.norm <= session.stop.step {
+                        return Termination::Converged { reason: Tolerance::Step };
+                    }
+                }
+                if session.interrupted() {
+                    return Termination::Interrupted;
+                }
+                (*lambda, rise) = ((*lambda * rise).max(NEGLIGIBLE), rise * 2.0);
+                if *lambda > self.max_lambda {
+                    return match session.is_at_rest(&mut delta) {
+                        true => Termination::Converged { reason: Tolerance::RelativeCost },
+                        false => session.stalled(Stall::Damping),
+                    };
+                }
+            }
+        }
+    }
+}
