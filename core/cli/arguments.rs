@@ -3,8 +3,8 @@ use crate::commands::{
     Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Run, Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
+use crate::output::watch;
 use crate::status::Status;
-use crate::watch;
 use clap::{ArgAction, Parser, Subcommand};
 use manifactor::graph::catalogue::{all, check_names};
 use manifactor::solve::{Bytes, memory_limit};

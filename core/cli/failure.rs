@@ -1,5 +1,5 @@
 //! What keeps a command from doing what it was asked to do, and how it is shown.
-use crate::{output, text};
+use crate::output::{self, text};
 use manifactor::config::{Diagnostic, Diagnostics, Problem, Source};
 use manifactor::formats::{FormatError, Malformed};
 use manifactor::slam::experiment::JournalError;

@@ -3,7 +3,7 @@ mod dot;
 mod svg;
 
 use crate::failure::Failure;
-use crate::text::Table;
+use crate::output::text::Table;
 use manifactor::graph::{Fixed, Graph, Values};
 use manifactor::solve::Problem;
 use serde::Serialize;

@@ -13,27 +13,16 @@
 // strangers' input comes in here: no place of it is taken for granted
 #![warn(clippy::indexing_slicing)]
 mod arguments;
-mod choice;
 #[allow(clippy::indexing_slicing, reason = "its own names and objects")]
 mod commands;
 mod failure;
-mod fields;
-mod graph_file;
+mod input;
 #[allow(clippy::indexing_slicing, reason = "rows that it has made")]
 mod inspection;
 mod interrupt;
 mod output;
 mod reference;
-mod report;
-mod run_file;
-mod solver;
 mod status;
-#[allow(clippy::indexing_slicing, reason = "cells that it has made")]
-mod summary_table;
-mod table;
-mod text;
-mod watch;
-mod what_if;
 
 pub use arguments::Cli;
 pub use failure::Failure;

@@ -1,8 +1,14 @@
 //! What is said: results on standard output, everything else on standard error. And pictures, which go to files.
 //!
 //! Nothing else in this crate writes to the two: `print!` and `eprintln!` panic where they cannot write.
+pub(crate) mod report;
+#[allow(clippy::indexing_slicing, reason = "cells that it has made")]
+pub(crate) mod summary_table;
+pub(crate) mod table;
+pub(crate) mod text;
+pub(crate) mod watch;
+
 use crate::failure::Failure;
-use crate::text;
 use manifactor::slam::output::write_whole;
 use manifactor::viz::Picture;
 use serde::Serialize;

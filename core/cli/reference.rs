@@ -1,7 +1,9 @@
 //! The config reference: every document and every name that is linked, as Markdown.
 //!
 //! It begins with what there is, name by name, so that a reader finds the way from a document to a type and back.
-use crate::fields::{Field, fields};
+pub(crate) mod fields;
+
+use crate::reference::fields::{Field, fields};
 use manifactor::config::{Definitions, graph_root};
 use manifactor::graph::Noise;
 use manifactor::graph::catalogue::{self, Entry};

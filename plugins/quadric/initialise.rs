@@ -6,10 +6,10 @@ mod rays;
 mod shape;
 mod svd;
 
-use crate::bounding_box::BoundingBox;
-use crate::dual_quadric::DualQuadric;
-use crate::ellipsoid::Ellipsoid;
-use crate::from_matrix::NotAnEllipsoid;
+use crate::shapes::BoundingBox;
+use crate::shapes::DualQuadric;
+use crate::shapes::Ellipsoid;
+use crate::shapes::NotAnEllipsoid;
 use manifactor_geometry::{Camera, Se3};
 use manifactor_graph::Manifold;
 use nalgebra::Vector3;

@@ -268,5 +268,4 @@ impl DynamicResidual for Mixture {
 }
 
 #[cfg(test)]
-#[path = "max_mixture_tests.rs"]
 mod tests;

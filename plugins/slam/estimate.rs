@@ -1,9 +1,12 @@
 //! A sequence mapped and solved.
+pub mod refine;
+pub mod variance;
+
+use crate::estimate::refine::Refiner;
+use crate::estimate::variance::{Components, VarianceError};
+use crate::input::sequence::{Sequence, TrueObject};
 use crate::mapping::{MappedObject, Mapping, pose_key};
-use crate::refine::Refiner;
-use crate::sequence::{Sequence, TrueObject};
 use crate::settings::Settings;
-use crate::variance::{Components, VarianceError};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};
@@ -124,7 +127,7 @@ const SETTLED: f64 = 1e-3;
 
 impl Estimate {
     /// Solves a graph that was made of a sequence, as often as it takes to know its noise; see
-    /// [`variance`](crate::variance). The graph of the estimate has the noise of its last solve.
+    /// [`variance`](crate::estimate::variance). The graph of the estimate has the noise of its last solve.
     ///
     /// # Errors
     /// Where graph and values do not fit each other, or the noise cannot be estimated.

@@ -1,7 +1,7 @@
 //! Which way is up, and in which frame the map is drawn.
 //!
 //! Orientation factors need the world's up, and odometry alone does not know it.
-use crate::sequence::{Frame, Sequence};
+use crate::input::sequence::{Frame, Sequence};
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, NoDirection};
 use std::fmt::Debug;
@@ -88,7 +88,7 @@ fn first_frame(sequence: &Sequence) -> Result<&Frame, GravityError> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::sequence::GroundTruth;
+    use crate::input::sequence::GroundTruth;
     use manifactor_formats::tum::StampedPose;
     use manifactor_geometry::So3;
     use manifactor_quadric::Camera;

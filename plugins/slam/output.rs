@@ -5,8 +5,8 @@
 //! `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
 //! into an [`OutputFolder`].
 use crate::estimate::Estimate;
-use crate::report::{RunReport, VariantReport};
-use crate::run_document::{RunDocument, Variant, absolute, slug};
+use crate::output::report::{RunReport, VariantReport};
+use crate::settings::run_document::{RunDocument, Variant, absolute, slug};
 use manifactor_config::{Format, WriteError, to_json, to_toml, write_graph};
 use manifactor_formats::table::TableError;
 use manifactor_formats::tum;
@@ -18,6 +18,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 mod folder;
+pub mod report;
+
 pub use folder::{FolderError, OutputFolder};
 
 /// Why results could not be written.

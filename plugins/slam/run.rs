@@ -1,11 +1,11 @@
 //! A run from its document to its report.
 use crate::estimate::{Estimate, EstimateError};
+use crate::input::sequence::Sequence;
+use crate::input::source::{Folders, SourceError};
 use crate::mapping::{Mapping, MappingError};
-use crate::report::{RunReport, VariantReport};
-use crate::run_document::{RunDocument, Variant};
-use crate::sequence::Sequence;
+use crate::output::report::{RunReport, VariantReport};
 use crate::settings::Settings;
-use crate::source::{Folders, SourceError};
+use crate::settings::run_document::{RunDocument, Variant};
 use manifactor_solve::{Observer, Termination};
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,15 +1,15 @@
 //! JSON Schema of a run, for editors to complete and check by.
-use crate::class::Aliases;
+use crate::estimate::variance::VarianceSettings;
 use crate::experiment::SummarySettings;
+use crate::input::class::Aliases;
 use crate::semantics::Near;
 use crate::settings::{CutSides, EvaluationSettings, ReportSettings};
-use crate::variance::VarianceSettings;
 use manifactor_config::{Definitions, graph_root};
 use manifactor_graph::Noise;
 use manifactor_quadric::BoxModel;
 use serde_json::{Value, json};
 
-/// The schema of a [`RunDocument`](crate::run_document::RunDocument), with everything registered that it can name; its
+/// The schema of a [`RunDocument`](crate::settings::run_document::RunDocument), with everything registered that it can name; its
 /// definitions are put among the others.
 pub fn run_root(definitions: &mut Definitions) -> Value {
     let mut properties = settings(definitions);

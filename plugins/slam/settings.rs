@@ -1,9 +1,9 @@
 //! The settings of a run: how a sequence becomes a graph, and how the graph is solved.
-use crate::class::Aliases;
+use crate::estimate::variance::VarianceSettings;
 use crate::gravity::{FromSource, Gravity};
+use crate::input::class::Aliases;
+use crate::input::source::Source;
 use crate::semantics::{Rule, read_semantics};
-use crate::source::Source;
-use crate::variance::VarianceSettings;
 use manifactor_config::{Diagnostics, Errors, Node, Problem, Section};
 use manifactor_graph::Noise;
 use manifactor_graph::loss::Loss;
@@ -19,6 +19,7 @@ mod number;
 mod objects;
 mod own;
 mod report;
+pub mod run_document;
 
 pub use detections::{CutSides, DetectionSettings};
 pub use evaluation::EvaluationSettings;

@@ -1,6 +1,6 @@
 //! The scene of an estimate.
-use crate::outline::Shape;
-use crate::scene::{Object, Scene, Track, TrackKind};
+use crate::drawing::outline::Shape;
+use crate::drawing::scene::{Object, Scene, Track, TrackKind};
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::Direction;
 use manifactor_quadric::DualQuadric;

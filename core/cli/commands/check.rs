@@ -1,11 +1,11 @@
 //! `manifactor check`: a document, without solving anything.
 use crate::failure::Failure;
-use crate::graph_file::{self, GraphFile, Reading};
+use crate::input::graph_file::{self, GraphFile, Reading};
+use crate::input::run_file::RunArguments;
+use crate::input::solver::SolverArguments;
 use crate::output;
-use crate::run_file::RunArguments;
-use crate::solver::SolverArguments;
+use crate::output::text::count;
 use crate::status::Status;
-use crate::text::count;
 use clap::Args;
 use manifactor::config::{Document, Format, Value};
 use manifactor::slam::mapping::Mapping;

@@ -1,6 +1,6 @@
 //! `manifactor check-factor`: whether a factor keeps the laws, before a solver meets it.
-use crate::choice::named;
 use crate::failure::Failure;
+use crate::input::choice::named;
 use crate::output;
 use crate::status::Status;
 use clap::Args;

@@ -1,8 +1,8 @@
 //! `manifactor evaluate`: a trajectory against the truth.
 use crate::failure::Failure;
 use crate::output;
+use crate::output::text::{self, Table};
 use crate::status::Status;
-use crate::text::{self, Table};
 use clap::{Args, ValueEnum};
 use manifactor::formats::tum;
 use manifactor::graph::checked::Positive;

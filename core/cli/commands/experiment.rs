@@ -1,8 +1,9 @@
 //! `manifactor experiment`: a sweep from its document to its tables.
 use crate::failure::Failure;
+use crate::interrupt;
+use crate::output::text::{count, on_one_line};
+use crate::output::{self, summary_table};
 use crate::status::Status;
-use crate::text::{count, on_one_line};
-use crate::{interrupt, output, summary_table};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use manifactor::config::Document;

@@ -1,10 +1,10 @@
 //! `manifactor explain`: what a name in a config means.
 use crate::failure::Failure;
-use crate::fields::fields;
 use crate::output;
+use crate::output::text::{self, Table};
+use crate::reference::fields::fields;
 use crate::reference::notes;
 use crate::status::Status;
-use crate::text::{self, Table};
 use clap::Args;
 use manifactor::config::nearest;
 use manifactor::graph::catalogue::{self, Entry};

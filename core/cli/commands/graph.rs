@@ -1,11 +1,11 @@
 //! `manifactor graph`: what is in a graph, and what each factor costs.
 use crate::failure::Failure;
-use crate::graph_file::Reading;
+use crate::input::graph_file::Reading;
+use crate::input::solver::SolverArguments;
+use crate::input::what_if::WhatIf;
 use crate::inspection::{Inspection, states};
 use crate::output;
-use crate::solver::SolverArguments;
 use crate::status::Status;
-use crate::what_if::WhatIf;
 use clap::{ArgGroup, Args};
 use manifactor::solve::{Silent, solve};
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! `manifactor list`: what can be named in a config.
 use crate::failure::Failure;
 use crate::output;
+use crate::output::text::Table;
 use crate::reference;
 use crate::status::Status;
-use crate::text::Table;
 use clap::Args;
 use manifactor::config::nearest;
 use manifactor::graph::catalogue;

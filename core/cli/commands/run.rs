@@ -1,9 +1,10 @@
 //! `manifactor run`: a run from its document to its files.
 use crate::failure::Failure;
-use crate::run_file::RunArguments;
+use crate::input::run_file::RunArguments;
+use crate::interrupt;
+use crate::output::watch::Watch;
+use crate::output::{self, table};
 use crate::status::Status;
-use crate::watch::Watch;
-use crate::{interrupt, output, table};
 use clap::Args;
 use manifactor::slam::output::{OutputFolder, variant_folder, write_report, write_variant, write_whole};
 use manifactor::slam::run::Run as Running;

@@ -1,9 +1,9 @@
 //! `manifactor simulate`: a sequence, as files.
 use crate::failure::Failure;
+use crate::input::run_file::RunArguments;
 use crate::output;
-use crate::run_file::RunArguments;
+use crate::output::text::count;
 use crate::status::Status;
-use crate::text::count;
 use clap::Args;
 use manifactor::config::{Diagnostic, Problem, Source};
 use manifactor::slam::output::OutputFolder;

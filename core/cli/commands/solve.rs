@@ -1,12 +1,13 @@
 //! `manifactor solve`: a graph from a file.
 use crate::failure::Failure;
-use crate::graph_file::{self, GraphFile};
-use crate::solver::SolverArguments;
+use crate::input::graph_file::{self, GraphFile};
+use crate::input::solver::SolverArguments;
+use crate::input::what_if::WhatIf;
+use crate::interrupt;
+use crate::output::text::seconds;
+use crate::output::watch::Watch;
+use crate::output::{self, report};
 use crate::status::Status;
-use crate::text::seconds;
-use crate::watch::Watch;
-use crate::what_if::WhatIf;
-use crate::{interrupt, output, report};
 use clap::Args;
 use manifactor::geometry::certify;
 use manifactor::solve::{All, Solution, solve};

@@ -1,6 +1,6 @@
 //! The language of Graphviz.
 use super::Inspection;
-use crate::text::printable;
+use crate::output::text::printable;
 use std::fmt::Write;
 
 /// Variables as ellipses, factors as boxes; the more a factor costs, the wider its lines.

@@ -1,5 +1,5 @@
 //! What linear methods need of rotations and poses, in the plane and in space alike.
-use crate::lie_group::LieGroup;
+use crate::groups::LieGroup;
 use crate::{Se2, Se3, So2, So3, atan2};
 use manifactor_graph::Variable;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};

@@ -4,7 +4,7 @@
 //! has a variable with a value grows from there; else from its first prior; else from its first
 //! fixed variable, or the first that a between factor names, at the identity.
 use super::{as_factor, seen_point};
-use crate::lie_group::LieGroup;
+use crate::groups::LieGroup;
 use crate::{Between, Prior};
 use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
 use manifactor_graph::{Factor, Graph, Key, ValueError, Values, Variable};

@@ -1,6 +1,6 @@
 //! A box and how far away its middle is: one view is enough.
 use super::{InitialiseError, Initialiser, View, check_views, check_visible, shape};
-use crate::dual_quadric::DualQuadric;
+use crate::shapes::DualQuadric;
 use manifactor_graph::checked::not_negative;
 use manifactor_graph::register;
 use nalgebra::Vector3;

@@ -1,6 +1,6 @@
 //! One way after the other.
 use super::{InitialiseError, Initialiser, View};
-use crate::dual_quadric::DualQuadric;
+use crate::shapes::DualQuadric;
 use manifactor_graph::register;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};

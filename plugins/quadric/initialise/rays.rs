@@ -1,6 +1,6 @@
 //! Where lines of sight meet, with a size from the boxes.
 use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
-use crate::dual_quadric::DualQuadric;
+use crate::shapes::DualQuadric;
 use manifactor_graph::checked::not_negative;
 use manifactor_graph::register;
 use schemars::JsonSchema;

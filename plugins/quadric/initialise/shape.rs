@@ -1,7 +1,7 @@
 //! Position and size of an object from the planes of its boxes, each by linear least squares.
 use super::{InitialiseError, View};
-use crate::dual_quadric::DualQuadric;
-use crate::semi_axes::SemiAxes;
+use crate::shapes::DualQuadric;
+use crate::shapes::SemiAxes;
 use manifactor_geometry::{Se3, So3};
 use nalgebra::{Matrix3, Vector3};
 

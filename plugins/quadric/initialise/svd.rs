@@ -1,7 +1,7 @@
 //! The dual quadric that all sides of all boxes touch, by a singular value decomposition.
 use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
-use crate::dual_quadric::DualQuadric;
-use crate::from_matrix::OnHyperboloid;
+use crate::shapes::DualQuadric;
+use crate::shapes::OnHyperboloid;
 use manifactor_graph::checked::not_negative;
 use manifactor_graph::register;
 use nalgebra::{DMatrix, Dyn, Matrix4, SVD, Vector3, Vector4};

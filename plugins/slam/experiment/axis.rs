@@ -1,5 +1,5 @@
 //! What an experiment varies.
-use crate::run_document::Declared;
+use crate::settings::run_document::Declared;
 use manifactor_config::{Errors, Field, Node, Place, Problem, Section, Table, Value};
 
 /// Columns of the table that change together, and the ways they do.

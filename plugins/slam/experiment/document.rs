@@ -2,8 +2,8 @@
 use super::axis::{Axis, Choice, Column};
 use super::names::Names;
 use super::{SummarySettings, Trial, check};
-use crate::run_document::{Declared, absolute, common, folder};
 use crate::settings::Settings;
+use crate::settings::run_document::{Declared, absolute, common, folder};
 use manifactor_config::{Diagnostics, Document, Errors, Node, Problem, Section, merge};
 use std::path::{Path, PathBuf};
 

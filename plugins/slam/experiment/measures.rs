@@ -1,8 +1,8 @@
 //! What a trial is measured by.
-use crate::class::Aliases;
 use crate::estimate::Estimate;
+use crate::input::class::Aliases;
 use crate::metrics::Alignment;
-use crate::report::{TrajectoryReport, VariantReport, alignment_name};
+use crate::output::report::{TrajectoryReport, VariantReport, alignment_name};
 use crate::semantics::{Rule, table_one};
 use indexmap::IndexMap;
 use manifactor_config::quoted_list;

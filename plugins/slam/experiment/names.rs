@@ -3,7 +3,7 @@ use super::axis::Axis;
 use super::measures::{measure_names, measure_names_in_words};
 use super::{SummarySettings, Trial};
 use crate::metrics::Alignment;
-use crate::report::alignment_name;
+use crate::output::report::alignment_name;
 use manifactor_config::{Errors, Node, Place, Problem, Value, nearest, quoted_list};
 use std::collections::HashSet;
 

@@ -1,6 +1,6 @@
 //! Trials on all cores, each on one thread.
 use super::{Experiment, Journal, JournalError, Outcome, Record, Trial};
-use crate::source::Folders;
+use crate::input::source::Folders;
 use manifactor_solve::Interrupt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,8 +1,8 @@
 //! One trial, and what it came to.
 use super::measures::measures;
+use crate::input::source::Folders;
 use crate::run::{RunError, estimate};
 use crate::settings::Settings;
-use crate::source::Folders;
 use indexmap::IndexMap;
 use manifactor_solve::{Observer, Termination};
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
 use super::{Gravity, GravityError, MapFrame, first_frame};
-use crate::sequence::{Frame, Sequence};
+use crate::input::sequence::{Frame, Sequence};
 use manifactor_geometry::{NotARotation, So3};
 use manifactor_graph::checked::not_negative;
 use manifactor_graph::{Direction, register};
@@ -89,7 +89,7 @@ fn frame_at(frames: &[Frame], timestamp: f64) -> Option<&Frame> {
 mod tests {
     use super::super::tests::sequence;
     use super::*;
-    use crate::sequence::Acceleration;
+    use crate::input::sequence::Acceleration;
 
     fn reading(timestamp: f64, acceleration: [f64; 3]) -> Acceleration {
         Acceleration { timestamp, acceleration: acceleration.into() }

@@ -1,5 +1,5 @@
 use super::{Gravity, GravityError, MapFrame, first_frame};
-use crate::sequence::Sequence;
+use crate::input::sequence::Sequence;
 use manifactor_graph::checked::not_negative;
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;

@@ -1,5 +1,5 @@
 use super::{Gravity, GravityError, MapFrame};
-use crate::sequence::Sequence;
+use crate::input::sequence::Sequence;
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

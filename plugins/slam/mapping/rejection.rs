@@ -1,6 +1,6 @@
 //! Which objects are mapped, and where they begin.
-use crate::measurements::Measured;
-use crate::sequence::Sequence;
+use crate::input::sequence::Sequence;
+use crate::mapping::measurements::Measured;
 use crate::settings::ObjectSettings;
 use manifactor_geometry::Se3;
 use manifactor_quadric::DualQuadric;
@@ -84,7 +84,7 @@ pub(super) fn start(
     started.map_err(|error| Rejection::Initialisation { message: error.to_string() })
 }
 
-fn seen(view: &crate::measurements::View, poses: &[Se3], sequence: &Sequence) -> Option<View> {
+fn seen(view: &crate::mapping::measurements::View, poses: &[Se3], sequence: &Sequence) -> Option<View> {
     let pose = *poses.get(view.frame)?;
     Some(View { observed: view.inside, ..View::new(pose, sequence.camera, view.bounding_box) })
 }

@@ -1,6 +1,6 @@
 //! Which objects a rule is for, besides their class: by score, by size, by what is near.
 use super::{ANY, Candidate};
-use crate::class::Aliases;
+use crate::input::class::Aliases;
 use manifactor_config::Section;
 use manifactor_graph::Direction;
 use manifactor_graph::checked::Positive;

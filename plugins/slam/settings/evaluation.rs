@@ -26,7 +26,7 @@ impl Default for EvaluationSettings {
 
 #[cfg(test)]
 mod tests {
-    use crate::run_document::RunDocument;
+    use crate::settings::run_document::RunDocument;
     use manifactor_config::{Document, Format};
 
     /// What is wrong with a run with this line.

@@ -1,0 +1,43 @@
+//! Which solver and which start, with which settings: `--solver`, `--start`, `--set` and the document together.
+use crate::failure::Failure;
+use crate::input::choice::choose;
+use clap::Args;
+use manifactor::config::{Document, Section, Source};
+use manifactor::solve::{Optimizer, Start};
+
+/// `--solver`, `--start` and `--set`.
+#[derive(Debug, Args)]
+pub(crate) struct SolverArguments {
+    /// The solver, one of `manifactor list solvers`, with its defaults; what `--set` says still holds.
+    #[arg(long, value_name = "NAME")]
+    solver: Option<String>,
+    /// Where to begin, one of `manifactor list starts`; the values that came with the graph, if not given.
+    #[arg(long, value_name = "NAME")]
+    start: Option<String>,
+    /// Set a value of the document, such as `solver.stop.max_iterations=50` or `factors[2].noise.sigma=0.1`.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+impl SolverArguments {
+    /// `--set` alone.
+    pub(crate) fn set_only(set: &[String]) -> Self {
+        Self { solver: None, start: None, set: set.to_vec() }
+    }
+
+    /// Puts what `--set` says into the document.
+    pub(crate) fn apply(&self, document: &mut Document) -> Result<(), Failure> {
+        Ok(document.set(&self.set)?)
+    }
+
+    /// Takes the field `solver` out of a document's table: `auto`, where nobody says anything.
+    pub(crate) fn take(&self, section: &mut Section<'_>, document: &Source) -> Option<Box<dyn Optimizer>> {
+        let argument = ("--solver", self.solver.as_deref());
+        choose(section, "solver", argument, "auto", document)
+    }
+
+    /// Takes the field `start`: the values as they are, where nobody says anything.
+    pub(crate) fn take_start(&self, section: &mut Section<'_>, document: &Source) -> Option<Box<dyn Start>> {
+        choose(section, "start", ("--start", self.start.as_deref()), "given", document)
+    }
+}

@@ -1,0 +1,80 @@
+//! What a solve has to tell, for people.
+use crate::output::text::{self, Table, count, list, seconds};
+use manifactor::solve::{Diagnosis, FactorCost, Marginal, Outcome};
+
+/// A few lines: how it ended, what it cost, where the time went.
+pub(crate) fn outcome(outcome: &Outcome) -> String {
+    let times = &outcome.times;
+    let mut out = format!("{}\n", outcome.termination);
+    out += &format!(
+        "cost {:.9} -> {:.9} in {}\n",
+        outcome.initial_cost,
+        outcome.final_cost,
+        count(outcome.iterations, "iteration")
+    );
+    if outcome.inactive > 0 {
+        let (inactive, all) = (outcome.inactive, count(outcome.factors, "factor"));
+        let named = outcome.inactive_factors.iter();
+        let named: Vec<_> =
+            named.map(|f| format!("{} {} ({})", f.factor, f.name, text::keys(&f.keys))).collect();
+        let more = if inactive > named.len() { ", …" } else { "" };
+        let named = named.join(", ");
+        out +=
+            &format!("{inactive} of {all} are not defined at these values and take no part: {named}{more}\n");
+    }
+    if let Some(moving) = &outcome.moving {
+        out += &format!("{moving}\n");
+    }
+    if let Some(undetermined) = &outcome.undetermined {
+        out += &format!("warning: {undetermined}\n");
+    }
+    if !outcome.rejected.is_empty() {
+        let (rejected, all) = (outcome.rejected.len(), count(outcome.factors, "factor"));
+        let keys = outcome.rejected.iter().map(|r| format!("{} ({})", r.factor, text::keys(&r.keys)));
+        out += &format!("{rejected} of {all} rejected as outliers: {}\n", list(keys));
+    }
+    out += &format!(
+        "{}: compile {}, linearize {}, factorize {}, solve {}, evaluate {}, other {}\n",
+        seconds(times.total),
+        seconds(times.compile),
+        seconds(times.linearize),
+        seconds(times.factorize),
+        seconds(times.solve),
+        seconds(times.evaluate),
+        seconds(times.diagnose + times.other)
+    );
+    out
+}
+
+/// The factors that cost the most, and the condition of the linear system.
+pub(crate) fn diagnosis(diagnosis: &Diagnosis) -> String {
+    let condition = match diagnosis.condition {
+        Some(condition) => format!("condition {condition:.1e}"),
+        None => "condition infinite, or not estimated: H could not be factorized, or is large".to_owned(),
+    };
+    let open = diagnosis.undetermined.as_ref();
+    let open = open.map_or_else(String::new, |open| format!("warning: at the estimate {open}\n"));
+    let condition = format!("{open}{condition} (of H with ones on its diagonal)\n");
+    if diagnosis.worst.is_empty() {
+        return condition;
+    }
+    let mut table = Table::of_numbers(&["costs the most", "cost", "weight", "residual"]);
+    for FactorCost { factor, name, keys, residual, cost, weight } in &diagnosis.worst {
+        let residual: Vec<_> = residual.iter().map(|x| format!("{x:.3}")).collect();
+        let name = format!("{factor} {name} ({})", text::keys(keys));
+        table.row([name, format!("{cost:.4}"), format!("{weight:.3}"), residual.join(" ")]);
+    }
+    format!("{condition}{}\n", table.text())
+}
+
+/// Standard deviations by direction.
+pub(crate) fn marginals(marginals: &[Marginal]) -> String {
+    let mut table = Table::of_words(&["variable", "standard deviations"]);
+    for Marginal { key, tangent, covariance } in marginals {
+        let sigmas = covariance.diagonal().map(f64::sqrt);
+        let parts: Vec<_> =
+            tangent.iter().zip(&sigmas).map(|(name, sigma)| format!("{name} {sigma:.3e}")).collect();
+        table.row([key.to_string(), parts.join("  ")]);
+    }
+    format!("{}\n", table.text())
+}

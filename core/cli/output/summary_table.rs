@@ -1,0 +1,31 @@
+//! The table that an experiment prints.
+use crate::output::text::{Table, on_one_line};
+use manifactor::slam::experiment::Summary;
+
+/// Means group by group, and under each that is compared, how far it is from the baseline.
+pub(crate) fn of(summary: &Summary) -> String {
+    let header: Vec<&str> = summary
+        .columns
+        .iter()
+        .map(String::as_str)
+        .chain(["trials", "failed"])
+        .chain(summary.metrics.iter().map(String::as_str))
+        .collect();
+    let mut table = Table::of_numbers(&header);
+    for group in &summary.groups {
+        let mean = |metric| group.means.get(metric).map_or("-".into(), |mean| format!("{:.5}", mean.mean));
+        let counts = [group.trials.to_string(), group.failed.to_string()];
+        table.row(group.labels.iter().cloned().chain(counts).chain(summary.metrics.iter().map(mean)));
+        if !group.comparisons.is_empty() {
+            let compared = |metric| group.comparisons.get(metric).map_or("-".into(), ToString::to_string);
+            let pairs = group.comparisons.values().map(|c| c.pairs).max().unwrap_or_default();
+            let mut row = vec![String::new(); group.labels.len() + 2];
+            row[0] = "  less the baseline".into();
+            row[group.labels.len()] = pairs.to_string();
+            table.row(row.into_iter().chain(summary.metrics.iter().map(compared)));
+        }
+    }
+    format!("{}\n{}\n{NOTE}", on_one_line(&summary.title), table.text())
+}
+
+const NOTE: &str = "Means over trials; differences of pairs of trials, with the bootstrap's 95 % interval.\n";

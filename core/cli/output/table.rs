@@ -1,0 +1,98 @@
+//! The table that a run prints.
+use crate::output::text::{self, Table, on_one_line, seconds};
+use manifactor::slam::report::{RunReport, VariantReport};
+
+/// What a run came to, in a table and a few lines.
+pub(crate) fn of_run(report: &RunReport) -> String {
+    let header =
+        ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
+    let mut table = Table::of_numbers(&header);
+    if let Some(first) = report.variants.first() {
+        table.row(before(first));
+    }
+    for variant in &report.variants {
+        table.row(after(variant));
+    }
+    let mut out = format!("{}\n{}\n", on_one_line(&report.title), table.text());
+    if let Some(alignment) = report.variants.iter().find_map(|v| v.row().alignment) {
+        out += &format!("ATE: RMSE of the camera's positions, aligned by {alignment}.\n");
+    }
+    if report.variants.iter().any(|v| v.landmarks.is_some()) {
+        out += "Position, shape, quality of the objects against the truth: RMSE of the centres; mean Jaccard distance \
+                of\nthe boxes around them, centred and where they stand: 0 is perfect, 1 is no overlap.\n";
+    }
+    for variant in &report.variants {
+        out += &diagnosis(variant);
+    }
+    for variant in &report.variants {
+        for warning in &variant.warnings {
+            let (name, warning) = (on_one_line(&variant.name), warning.to_string());
+            out += &format!("warning: {name}: {}\n", on_one_line(&warning));
+        }
+    }
+    out
+}
+
+/// A line: the condition, what is rejected, and the factor that costs the most. The report has the whole table.
+fn diagnosis(variant: &VariantReport) -> String {
+    let Some(diagnosis) = &variant.solve.diagnosis else { return String::new() };
+    let name = on_one_line(&variant.name);
+    let mut line = match diagnosis.condition {
+        Some(condition) => format!("{name}: condition {condition:.1e}"),
+        None => format!("{name}: condition infinite or unknown"),
+    };
+    if !variant.solve.rejected.is_empty() {
+        line += &format!(", {} rejected as outliers", text::count(variant.solve.rejected.len(), "factor"));
+    }
+    if let Some(worst) = diagnosis.worst.first() {
+        let (name, keys) = (worst.name, text::keys(&worst.keys));
+        line += &format!(", costs the most: factor {} {name} ({keys}) with {:.3}", worst.factor, worst.cost);
+    }
+    line + "\n"
+}
+
+/// What came in: odometry, and objects as they were initialised.
+fn before(variant: &VariantReport) -> Vec<String> {
+    let landmarks = variant.landmarks.as_ref().map(|l| &l.initial);
+    let cells = [
+        variant.row().odometry_ate.map(metres),
+        landmarks.map(|l| metres(l.rmse.position)),
+        landmarks.map(|l| fraction(l.mean.shape)),
+        landmarks.map(|l| fraction(l.mean.quality)),
+        Some(variant.counts.objects.to_string()),
+        Some(variant.counts.boxes.to_string()),
+        None,
+        None,
+        None,
+    ];
+    named("before the solve", cells)
+}
+
+fn after(variant: &VariantReport) -> Vec<String> {
+    let row = variant.row();
+    let cells = [
+        row.ate.map(metres),
+        row.position.map(metres),
+        row.shape.map(fraction),
+        row.quality.map(fraction),
+        Some(row.objects.to_string()),
+        Some(row.boxes.to_string()),
+        Some(format!("{:.2}", row.final_cost)),
+        Some(format!("{}{}", row.iterations, if row.converged { "" } else { "!" })),
+        Some(seconds(row.seconds)),
+    ];
+    named(&row.variant, cells)
+}
+
+fn named(name: &str, cells: [Option<String>; 9]) -> Vec<String> {
+    let cells = cells.into_iter().map(|cell| cell.unwrap_or_else(|| "-".into()));
+    std::iter::once(name.to_owned()).chain(cells).collect()
+}
+
+fn metres(x: f64) -> String {
+    format!("{x:.5}")
+}
+
+fn fraction(x: f64) -> String {
+    format!("{x:.4}")
+}

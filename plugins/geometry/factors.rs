@@ -1,0 +1,20 @@
+//! Measurements of poses and points: one file for each factor.
+mod bearing_range;
+mod bearing_range_3d;
+mod between;
+mod chordal_between;
+mod landmark;
+mod located;
+mod position;
+mod prior;
+mod range;
+
+pub use bearing_range::BearingRange2;
+pub use bearing_range_3d::BearingRange3;
+pub use between::Between;
+pub use chordal_between::ChordalBetween;
+pub use landmark::Landmark;
+pub use located::Located;
+pub use position::Position;
+pub use prior::Prior;
+pub use range::Range;

@@ -1,0 +1,135 @@
+//! In which direction and how far away a pose in space sees a point.
+//!
+//! With u = q/‖q‖, q = Rᵀ(p - t), and b₁, b₂ perpendicular to the measured direction z, the error of
+//! direction is the arc from z to u: (b₁·u, b₂·u) θ/sin θ, θ the angle between z and u.
+use crate::factors::range::NEAREST;
+use crate::groups::atan2;
+use crate::{Point3, Se3};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::{Direction, Lift, Lifted, Refs, Residual, Scalar, register_factor};
+use nalgebra::{U3, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The point is `range` away in the direction `direction`, seen from the pose.
+///
+/// Three rows: the arc from the measured direction to where the point is, in radians, along two axes
+/// perpendicular to it; the error of the distance, in metres. With one σ for both rows of the arc it
+/// does not matter which axes: the first is the one nearest to the pose's axis that is farthest from
+/// the measured direction. Not defined within a nanometre of the pose, and where the point is exactly
+/// opposite to where it was measured, within 1e-6 radians: there the arc has no direction.
+///
+/// ```toml
+/// [[factors]]
+/// keys = ["x0", "l0"]
+/// factor = { type = "bearing_range_se3", direction = [1.0, 0.0, 0.2], range = 1.5 }
+/// noise = { sigmas = [0.02, 0.02, 0.1] }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BearingRange3 {
+    /// Where the point was seen, in the frame of the pose; of any length but zero.
+    pub direction: Direction,
+    /// How far away, in metres.
+    pub range: Positive,
+}
+
+impl BearingRange3 {
+    /// Where the point was measured, in the frame of the pose.
+    pub fn measured(&self) -> Vector3<f64> {
+        *self.direction * self.range.get()
+    }
+    /// Two axes perpendicular to the measured direction and to each other.
+    fn basis(&self) -> [Vector3<f64>; 2] {
+        let z = *self.direction;
+        let first = z.cross(&Vector3::ith(z.iamin(), 1.0)).cross(&z).normalize();
+        [first, z.cross(&first)]
+    }
+}
+
+impl Residual for BearingRange3 {
+    type Variables = (Se3, Point3);
+    type Dim = U3;
+
+    fn residual<T: Scalar>(&self, (x, p): Lifted<Self::Variables, T>) -> Vector3<T> {
+        let seen = x.inverse_act(&p);
+        let distance = seen.norm_squared().sqrt();
+        let [a, b] = self.basis().map(|axis| axis.lift::<T>().dot(&seen) / distance);
+        let cos = self.direction.lift::<T>().dot(&seen) / distance;
+        let sin2 = a * a + b * b;
+        // θ/sin θ; at zero, where the sine has no derivative, by its series
+        let scale = if sin2 < T::from(1e-8) && cos > T::zero() {
+            T::one() + sin2 / 6.0 + sin2 * sin2 * 0.075
+        } else {
+            let sin = sin2.sqrt();
+            atan2(sin, cos) / sin
+        };
+        Vector3::new(a * scale, b * scale, distance - self.range.get())
+    }
+    fn is_defined(&self, (x, p): Refs<'_, Self::Variables>) -> bool {
+        let seen = x.inverse_act(p);
+        let distance = seen.norm();
+        let opposite =
+            seen.dot(&self.direction) < 0.0 && seen.cross(&self.direction).norm() < 1e-6 * distance;
+        distance >= NEAREST && !opposite
+    }
+}
+register_factor!("bearing_range_se3", BearingRange3);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{any_point3, any_se3};
+    use manifactor_testing::strategies::{direction, rotation_vector};
+    use manifactor_testing::{JacobianLaw, check, invariance_law, jacobian_laws};
+    use proptest::prelude::*;
+
+    fn any_measurement() -> impl Strategy<Value = BearingRange3> {
+        (direction(), 0.01..10.0).prop_map(|(z, range)| measured(z.into_inner(), range))
+    }
+    fn measured(z: Vector3<f64>, range: f64) -> BearingRange3 {
+        BearingRange3 { direction: Direction::new(z).unwrap(), range: Positive::literal(range) }
+    }
+
+    // the point is drawn by the arc from where it was measured: none, tiny, any, nearly opposite
+    jacobian_laws! {
+        jacobians_agree: (any_measurement(), any_se3(), rotation_vector()).prop_map(|(factor, x, arc)| {
+            let seen = crate::So3::exp(&arc).act(&factor.direction) * factor.range.get();
+            (factor, x, Point3::new(x.act(&seen)))
+        })
+    }
+
+    #[test]
+    fn jacobians_agree_next_to_distance_zero() {
+        check(
+            (any_measurement(), direction(), prop_oneof![Just(2e-9), 1e-6..1e-3]),
+            |(factor, u, distance)| {
+                let law = JacobianLaw { step: 1e-2 * distance, ..JacobianLaw::default() };
+                law.check(&factor, &[&Se3::identity(), &Point3::new(u.into_inner() * distance)])
+            },
+        );
+    }
+
+    #[test]
+    fn moving_pose_and_point_together_changes_nothing() {
+        check((any_measurement(), any_se3(), any_point3(), any_se3()), |(factor, x, p, m)| {
+            let near = (*p - x.translation).norm() < 1e-3;
+            let moved = Point3::new(m.act(&p));
+            if near { Ok(()) } else { invariance_law(&factor, &[&x, &p], &[&m.compose(&x), &moved]) }
+        });
+    }
+
+    #[test]
+    fn the_arc_is_as_long_as_the_angle() {
+        let r = measured(Vector3::z(), 1.0).residual::<f64>((Se3::identity(), Vector3::new(2.0, 0.0, 0.0)));
+        assert!((r.xy().norm() - std::f64::consts::FRAC_PI_2).abs() < 1e-15 && r.z == 1.0);
+    }
+
+    #[test]
+    fn the_opposite_direction_and_distance_zero_are_not_defined() {
+        let factor = measured(Vector3::z(), 1.0);
+        let defined = |p: [f64; 3]| factor.is_defined((&Se3::identity(), &Point3::new(p)));
+        assert!(!defined([0.0, 0.0, -3.0]) && !defined([0.0; 3]));
+        assert!(defined([0.0, 0.0, 3.0]) && defined([1e-5, 0.0, -3.0]));
+    }
+}

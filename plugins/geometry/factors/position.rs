@@ -1,0 +1,126 @@
+//! Where a pose is, as GPS or a total station measures it: r = R l + t - z.
+use crate::groups::quarter;
+use crate::{Coordinates, Se2, Se3};
+use manifactor_graph::{Jacobians, Lift, Lifted, Refs, Residual, Scalar, register_factor};
+use nalgebra::{U2, U3, Vector2, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The pose's antenna is at `position`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(description = description(N))]
+pub struct Position<const N: usize> {
+    /// Where the antenna is, in metres, in the outer frame.
+    pub position: Coordinates<N>,
+    /// Where the antenna is mounted, in metres, in the frame of the pose; its origin, if not given.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub lever_arm: Coordinates<N>,
+}
+
+fn is_zero<const N: usize>(x: &Coordinates<N>) -> bool {
+    *x == Coordinates::default()
+}
+
+fn description(n: usize) -> String {
+    let position = ["1.0", "0.5", "0.0"].get(..n).unwrap_or_default().join(", ");
+    format!(
+        "The pose, or an antenna on it, is at `position`: r = R l + t - z.\n\nOne row for each coordinate, in \
+         metres, along the axes of the outer frame. Without a lever arm l it says nothing of the rotation.\n\n\
+         ```toml\n[[factors]]\nkeys = [\"x0\"]\nfactor = {{ type = \"position_se{n}\", position = [{position}] }}\n\
+         noise = {{ sigma = 2.0 }}\n```"
+    )
+}
+
+impl Residual for Position<2> {
+    type Variables = (Se2,);
+    type Dim = U2;
+
+    fn residual<T: Scalar>(&self, (x,): Lifted<Self::Variables, T>) -> Vector2<T> {
+        x.act(&self.lever_arm.lift()) - self.position.lift::<T>()
+    }
+    fn linearize(
+        &self,
+        (x,): Refs<'_, Self::Variables>,
+        _: &[bool],
+        j: &mut Jacobians<Self>,
+    ) -> Vector2<f64> {
+        let r = x.rotation.matrix();
+        j.0.fixed_columns_mut::<2>(0).copy_from(&r);
+        j.0.set_column(2, &(r * quarter(&self.lever_arm)));
+        self.residual((*x,))
+    }
+}
+register_factor!("position_se2", Position<2>);
+
+impl Residual for Position<3> {
+    type Variables = (Se3,);
+    type Dim = U3;
+
+    fn residual<T: Scalar>(&self, (x,): Lifted<Self::Variables, T>) -> Vector3<T> {
+        x.act(&self.lever_arm.lift()) - self.position.lift::<T>()
+    }
+    fn linearize(
+        &self,
+        (x,): Refs<'_, Self::Variables>,
+        _: &[bool],
+        j: &mut Jacobians<Self>,
+    ) -> Vector3<f64> {
+        let r = x.rotation.matrix();
+        j.0.fixed_columns_mut::<3>(0).copy_from(&(-r * self.lever_arm.cross_matrix()));
+        j.0.fixed_columns_mut::<3>(3).copy_from(&r);
+        self.residual((*x,))
+    }
+}
+register_factor!("position_se3", Position<3>);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::So3;
+    use crate::testing::{any_se2, any_se3, any_so3};
+    use manifactor_testing::strategies::vector;
+    use manifactor_testing::{check, invariance_law, jacobian_laws};
+    use proptest::prelude::*;
+
+    fn any_position<const N: usize>() -> impl Strategy<Value = Position<N>> {
+        (vector(10.0), vector(1.0)).prop_map(|(position, arm)| position_at(position, arm))
+    }
+    fn position_at<const N: usize>(
+        position: nalgebra::SVector<f64, N>,
+        arm: nalgebra::SVector<f64, N>,
+    ) -> Position<N> {
+        Position { position: Coordinates::new(position).unwrap(), lever_arm: Coordinates::new(arm).unwrap() }
+    }
+
+    jacobian_laws! {
+        jacobians_agree_in_the_plane: (any_position::<2>(), any_se2());
+        jacobians_agree_in_space: (any_position::<3>(), any_se3());
+    }
+
+    #[test]
+    fn without_an_arm_the_rotation_is_free() {
+        check((any_position::<3>(), any_se3(), any_so3()), |(mut factor, x, turn)| {
+            factor.lever_arm = Coordinates::default();
+            invariance_law(&factor, &[&x], &[&Se3::new(turn, x.translation)])
+        });
+    }
+
+    #[test]
+    fn an_arm_turns_with_the_pose() {
+        let quarter_turn = So3::exp(&(Vector3::z() * std::f64::consts::FRAC_PI_2));
+        let pose = Se3::new(quarter_turn, Vector3::new(1.0, 0.0, 0.0));
+        let r = position_at(Vector3::zeros(), Vector3::x()).residual::<f64>((pose,));
+        assert!((r - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn a_document_reads_back_and_need_not_mention_the_arm() {
+        let factor = position_at(Vector2::new(0.1, 0.2), Vector2::new(0.3, 0.0));
+        let text = serde_json::to_string(&factor).unwrap();
+        assert_eq!(serde_json::from_str::<Position<2>>(&text).unwrap(), factor);
+        let bare: Position<2> = serde_json::from_str(r#"{ "position": [0.1, 0.2] }"#).unwrap();
+        assert_eq!(*bare.lever_arm, Vector2::zeros());
+        assert!(serde_json::from_str::<Position<2>>(r#"{ "position": [0.1] }"#).is_err());
+    }
+}

@@ -1,0 +1,21 @@
+//! Manifolds: vectors, rotations and poses of the plane and of space, and what Lie groups have in common.
+mod coordinates;
+mod lie_group;
+mod rn;
+mod se2;
+mod se3;
+mod small_angle;
+mod so2;
+mod so3;
+
+pub use coordinates::{Coordinates, NoCoordinates};
+pub use lie_group::LieGroup;
+pub use rn::{Point1, Point2, Point3, Rn};
+pub use se2::Se2;
+pub use se3::Se3;
+pub use so2::{NotAnAngle, So2, atan2, wrap};
+pub use so3::{NotARotation, So3};
+
+pub(crate) use se2::quarter;
+pub(crate) use so2::Angle;
+pub(crate) use so3::{Xyzw, jet};

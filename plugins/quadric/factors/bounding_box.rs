@@ -1,0 +1,154 @@
+//! An object is seen where a detector drew a box.
+use crate::shapes::BoundingBox;
+use crate::shapes::DualQuadric;
+use crate::shapes::Ellipsoid;
+use crate::shapes::tangent_line::TangentLine;
+use crate::shapes::{Ellipse, Side};
+use manifactor_geometry::{Camera, Se3};
+use manifactor_graph::{Jacobians, Lifted, Refs, Residual, Scalar, register_factor};
+use nalgebra::{Matrix4x6, SMatrix, U4, Vector4};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What of a cut object has to be left in the image, in pixels: no detector draws boxes of less.
+const VISIBLE: f64 = 1.0;
+
+/// The box around an object's outline is the one that was drawn: r = β(x, q) - b, in pixels.
+///
+/// Variables: the pose of the camera (from the camera's frame, z forward, to the world's) and the
+/// object. Rows: xmin, ymin, xmax, ymax. The sign is estimate minus measurement, as in all factors here;
+/// Jablonsky et al. write b - β, which has the same square.
+///
+/// `model` says what β is. *standard*: the bounds of the whole ellipse C* = P Q* Pᵀ. *truncated*: the
+/// bounds of what is inside of the image (Nicholson et al., QuadricSLAM), so that a box that the border
+/// cuts does not pull. With the standard model, mask such sides: `noise = { sigma = 20.0, observed =
+/// [false, true, true, true] }`.
+///
+/// Where it means something: the whole object is in front of the camera, by a millionth of its distance.
+/// Behind the camera, around it (the camera inside) and across its plane the outline is no box, and the
+/// factor is inactive; so is a truncated one of which less than a pixel is left in the image. An
+/// inactive factor has residual zero.
+///
+/// Kinks: the bounds are smooth where the object is in front. A truncated side stops at the border: from
+/// there on, the border included, its derivative is zero, so an object that fills the image is held by
+/// nothing. Where the border cuts off the end of the ellipse, the side moves to the point where they
+/// meet; its derivative has no jump there, but grows without limit as the last pixel leaves the image.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["x0", "q0"]
+/// factor = { type = "bounding_box", box = [120.0, 80.0, 260.0, 310.0], camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }, model = "truncated" }
+/// noise  = { sigma = 20.0 }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoundingBoxFactor {
+    /// The box that was measured: xmin, ymin, xmax, ymax, in pixels.
+    #[serde(rename = "box")]
+    pub bounding_box: BoundingBox,
+    /// The camera that saw it.
+    pub camera: Camera,
+    /// What of the object the box goes around.
+    #[serde(default)]
+    pub model: BoxModel,
+}
+
+/// What of an object a box goes around.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BoxModel {
+    /// All of it, even outside of the image.
+    #[default]
+    Standard,
+    /// What is inside of the image.
+    Truncated,
+}
+
+impl BoundingBoxFactor {
+    /// The sides of β; `None` where the factor is not defined.
+    #[inline(always)]
+    fn sides<T: Scalar>(&self, ellipsoid: &Ellipsoid<T>) -> Option<[Side<T>; 4]> {
+        if !ellipsoid.is_in_front() {
+            return None;
+        }
+        let outline = ellipsoid.outline(&self.camera);
+        match self.model {
+            BoxModel::Standard => Some(outline.sides()),
+            BoxModel::Truncated => self.inside(&outline),
+        }
+    }
+
+    #[inline(always)]
+    fn inside<T: Scalar>(&self, outline: &Ellipse<T>) -> Option<[Side<T>; 4]> {
+        let sides = outline.truncated_sides(self.camera.size())?;
+        let [xmin, ymin, xmax, ymax] = sides.map(|s| s.bound());
+        let [width, height] = [outline.xx, outline.yy].map(|s| s.sqrt() * 2.0);
+        let left = |extent: T, all: T| extent >= T::from(VISIBLE) || extent >= all * 0.5;
+        (left(xmax - xmin, width) && left(ymax - ymin, height)).then_some(sides)
+    }
+
+    /// The box that this object should have in that camera; `None` where it has none.
+    pub fn predict(&self, world_from_camera: &Se3, quadric: &DualQuadric) -> Option<BoundingBox> {
+        let sides = self.sides(&Ellipsoid::seen(world_from_camera, quadric))?;
+        Some(BoundingBox::from_bounds(sides.map(|s| s.bound())))
+    }
+
+    fn error<T: Scalar>(&self, sides: &[Side<T>; 4]) -> Vector4<T> {
+        let measured = self.bounding_box.bounds();
+        Vector4::from_fn(|i, _| sides[i].bound() - T::from(measured[i]))
+    }
+}
+
+impl Residual for BoundingBoxFactor {
+    type Variables = (Se3, DualQuadric);
+    type Dim = U4;
+
+    #[inline]
+    fn residual<T: Scalar>(&self, (camera, quadric): Lifted<Self::Variables, T>) -> Vector4<T> {
+        let sides = self.sides(&Ellipsoid::seen(&camera, &quadric));
+        sides.map_or_else(Vector4::zeros, |sides| self.error(&sides))
+    }
+
+    #[inline]
+    fn is_defined(&self, (camera, quadric): Refs<'_, Self::Variables>) -> bool {
+        match self.model {
+            BoxModel::Standard => quadric.is_in_front_of(camera),
+            BoxModel::Truncated => self.sides(&Ellipsoid::seen(camera, quadric)).is_some(),
+        }
+    }
+
+    fn linearize(
+        &self,
+        (camera, quadric): Refs<'_, Self::Variables>,
+        _free: &[bool],
+        jacobians: &mut Jacobians<Self>,
+    ) -> Vector4<f64> {
+        let (by_pose, by_quadric): (&mut Matrix4x6<f64>, &mut SMatrix<f64, 4, 9>) =
+            (&mut jacobians.0, &mut jacobians.1);
+        let seen = Ellipsoid::seen(camera, quadric);
+        let Some(sides) = self.sides(&seen) else {
+            by_pose.fill(0.0);
+            by_quadric.fill(0.0);
+            return Vector4::zeros();
+        };
+        for (i, side) in sides.iter().enumerate() {
+            match TangentLine::of(&self.camera, side, i % 2) {
+                None => {
+                    by_pose.row_mut(i).fill(0.0);
+                    by_quadric.row_mut(i).fill(0.0);
+                }
+                Some(line) => {
+                    let (pose, object) = line.derivatives(&seen, &quadric.semi_axes);
+                    by_pose.row_mut(i).copy_from(&pose);
+                    by_quadric.row_mut(i).copy_from(&object);
+                }
+            }
+        }
+        self.error(&sides)
+    }
+}
+
+register_factor!("bounding_box", BoundingBoxFactor);
+
+#[cfg(test)]
+mod tests;

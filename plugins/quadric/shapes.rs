@@ -1,0 +1,25 @@
+//! Ellipsoids and boxes in space, and ellipses and boxes in an image.
+mod bounding_box;
+mod box3;
+mod dual_conic;
+mod dual_quadric;
+mod ellipse;
+mod ellipsoid;
+mod from_matrix;
+mod landmark;
+mod outline;
+mod semi_axes;
+pub(crate) mod tangent_line;
+
+pub use bounding_box::{BoundingBox, NotABox, SIDES};
+pub use box3::{Box3, NotABox3};
+pub use dual_conic::DualConic;
+pub use dual_quadric::DualQuadric;
+pub use ellipse::Ellipse;
+pub use ellipsoid::Ellipsoid;
+pub use from_matrix::{NotAnEllipsoid, OnHyperboloid};
+pub use landmark::LandmarkError;
+pub use semi_axes::{LONGEST, NotSemiAxes, SHORTEST, SemiAxes};
+
+pub(crate) use dual_quadric::turned;
+pub(crate) use ellipse::Side;

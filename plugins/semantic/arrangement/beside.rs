@@ -1,0 +1,85 @@
+//! An object stands beside another.
+use crate::directions::axis::extent;
+use manifactor_graph::{
+    Direction, Lift, Lifted, Refs, Residual, Scalar, register_factor, register_invariance,
+};
+use manifactor_quadric::DualQuadric;
+use nalgebra::{U1, Vector1, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Two objects stand beside each other, so far apart: r = |h| - e₀ - e₁ - gap, in metres.
+///
+/// h is the way from the one centroid to the other, less its part along `up`; u = h/|h|, and eᵢ half the extent of object i
+/// along u. It is unchanged where one goes round the other without turning relative to h, where either moves along `up`,
+/// and where the two change places. Objects at one place, seen from above, have no direction between them: within a
+/// micrometre of that it is not defined.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["monitor", "keyboard"]
+/// factor = { type = "beside", gap = 0.05 }
+/// noise  = { sigma = 0.05 }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Beside {
+    /// How far they are apart, in metres; 0, where nothing is said: they touch.
+    #[serde(default)]
+    pub gap: f64,
+    /// The world's up, of any length but zero; z, where nothing is said.
+    #[serde(default)]
+    pub up: Direction,
+}
+
+/// Below this distance, in metres, there is no direction from the one to the other.
+const SAME_PLACE: f64 = 1e-6;
+
+impl Beside {
+    fn across<T: Scalar>(&self, a: &DualQuadric<T>, b: &DualQuadric<T>) -> Vector3<T> {
+        let (up, way): (Vector3<T>, _) = (self.up.lift(), b.centroid() - a.centroid());
+        way - up * way.dot(&up)
+    }
+}
+
+impl Residual for Beside {
+    type Variables = (DualQuadric, DualQuadric);
+    type Dim = U1;
+
+    fn residual<T: Scalar>(&self, (a, b): Lifted<Self::Variables, T>) -> Vector1<T> {
+        let h = self.across(&a, &b);
+        let length = h.norm_squared().sqrt();
+        let u = h / length;
+        Vector1::new(length - extent(&a, &u) - extent(&b, &u) - T::from(self.gap))
+    }
+    fn is_defined(&self, (a, b): Refs<'_, Self::Variables>) -> bool {
+        self.across(a, b).norm() > SAME_PLACE
+    }
+}
+register_factor!("beside", Beside);
+register_invariance!(Beside, "moving along up, and changing places", |factor, (a, b), random| {
+    let (mut a, mut b) = (*a, *b);
+    a.pose.translation += *factor.up * random(5.0);
+    b.pose.translation += *factor.up * random(5.0);
+    (b, a)
+});
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_geometry::{Se3, So3};
+    use manifactor_testing::factor_laws;
+
+    factor_laws! { beside }
+
+    #[test]
+    fn the_error_is_the_gap_less_what_was_asked_for() {
+        let at = |x: f64| DualQuadric {
+            pose: Se3::new(So3::identity(), Vector3::new(x, 0.0, x)),
+            semi_axes: Vector3::new(0.3, 0.1, 0.1),
+        };
+        let factor = Beside { gap: 0.2, ..Beside::default() };
+        assert!((factor.residual::<f64>((at(0.0), at(1.0))).x - 0.2).abs() < 1e-12);
+        assert!(!factor.is_defined((&at(1.0), &at(1.0))));
+    }
+}

@@ -1,0 +1,12 @@
+//! Directions, and what they have to do with gravity and with each other.
+mod accelerometer;
+pub(crate) mod axis;
+mod parallel;
+mod s2;
+mod upright;
+
+pub use accelerometer::Accelerometer;
+pub use axis::Axis;
+pub use parallel::Parallel;
+pub use s2::S2;
+pub use upright::{Upright, UprightAlong};

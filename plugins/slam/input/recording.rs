@@ -1,0 +1,94 @@
+//! A sequence as files: what [`Recorded`](crate::input::source::Recorded) reads.
+use crate::input::sequence::{Sequence, TrueObject};
+use manifactor_formats::FormatError;
+use manifactor_formats::detections::{self, Detection};
+use manifactor_formats::tum::{self, StampedPose};
+use manifactor_formats::whole::write_whole;
+use serde_json::json;
+use std::path::Path;
+
+/// Writes `odometry.txt` and `detections.csv`, and where the truth is known `groundtruth.txt` and
+/// `objects.json`, into a folder, which is made where it is not there.
+///
+/// # Errors
+/// Where a file cannot be written.
+pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
+    let io = |path: &Path| {
+        let path = path.to_owned();
+        move |source| FormatError::Io { path, source }
+    };
+    std::fs::create_dir_all(folder).map_err(io(folder))?;
+    let odometry = sequence.frames.iter();
+    let odometry: Vec<_> =
+        odometry.map(|f| StampedPose { timestamp: f.timestamp, pose: f.world_from_camera }).collect();
+    tum::write(folder.join("odometry.txt"), &odometry)?;
+    detections::write(folder.join("detections.csv"), &rows(sequence))?;
+    if let Some(truth) = &sequence.ground_truth {
+        tum::write(folder.join("groundtruth.txt"), &truth.trajectory)?;
+        let objects: Vec<_> = truth.objects.iter().map(document).collect();
+        let path = folder.join("objects.json");
+        write_whole(&path, format!("{:#}\n", json!(objects)).as_bytes()).map_err(io(&path))?;
+    }
+    Ok(())
+}
+
+fn rows(sequence: &Sequence) -> Vec<Detection> {
+    let row = |d: &crate::input::sequence::Detection| {
+        let (class, score) = d.scores.best()?;
+        let all: Vec<_> = d.scores.iter().map(|(class, score)| format!("{class}:{score}")).collect();
+        let [xmin, ymin, xmax, ymax] = d.bounding_box.bounds();
+        Some(Detection {
+            frame_idx: Some(d.frame as u64),
+            timestamp: sequence.frames.get(d.frame)?.timestamp,
+            frame_idx_as_published: None,
+            object_key: d.object.map(|id| id.0),
+            class_id: None,
+            class_name: class.to_owned(),
+            score,
+            xmin,
+            ymin,
+            xmax,
+            ymax,
+            scores: (all.len() > 1).then(|| all.join(";")),
+        })
+    };
+    sequence.detections.iter().filter_map(row).collect()
+}
+
+fn document(object: &TrueObject) -> serde_json::Value {
+    let half: [f64; 3] = object.half_extents.into();
+    json!({
+        "id": object.id,
+        "class": object.class,
+        "world_from_object": object.world_from_object,
+        "half_extents": half,
+        "bounding_box": object.bounding_box,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::simulator::Simulated;
+    use crate::input::source::{CameraChoice, Folders, Recorded, Source};
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let mut settings = Simulated::default();
+        settings.trajectory.frames = 30;
+        let sequence = settings.simulate().unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        write(&sequence, folder).unwrap();
+        let camera = serde_json::to_value(sequence.camera).unwrap();
+        let recorded: Recorded =
+            serde_json::from_value(json!({ "folder": folder, "camera": camera })).unwrap();
+        assert_eq!(recorded.camera, CameraChoice::Camera(sequence.camera));
+        let read = recorded.load(&Folders::default()).unwrap();
+        assert_eq!((read.frames.len(), read.detections.len()), (30, sequence.detections.len()));
+        for (a, b) in read.detections.iter().zip(&sequence.detections) {
+            assert_eq!((a.frame, a.object, &a.scores), (b.frame, b.object, &b.scores));
+            assert_eq!(a.bounding_box, b.bounding_box);
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! What is wrong with measurements.
+use super::solid::Boxes;
+use crate::input::sequence::ClassScores;
+use manifactor_geometry::Se3;
+use manifactor_graph::Manifold;
+use manifactor_quadric::{BoundingBox, Camera};
+use nalgebra::{Vector3, Vector6};
+use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Noise of odometry: zero-mean and Gaussian, a share of each motion, applied through retract.
+///
+/// The paper says 5 % of translation and 15 % of rotation, and not of what: see `spread`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionNoise {
+    /// Standard deviation as a share of the translation.
+    pub translation: f64,
+    /// Standard deviation as a share of the rotation.
+    pub rotation: f64,
+    /// What the share is of.
+    pub spread: Spread,
+}
+
+impl Default for MotionNoise {
+    fn default() -> Self {
+        Self { translation: 0.05, rotation: 0.15, spread: Spread::default() }
+    }
+}
+
+/// Of what a motion's noise is a share.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Spread {
+    /// The length of the motion, for the whole error: each axis has the share / √3.
+    #[default]
+    Total,
+    /// The length of the motion, for the error along each axis.
+    PerAxis,
+    /// The motion along each axis, for the error along it.
+    Component,
+}
+
+fn normal(rng: &mut Pcg64) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+impl MotionNoise {
+    /// A relative pose as it is measured.
+    pub(super) fn corrupt(&self, motion: &Se3, rng: &mut Pcg64) -> Se3 {
+        let turn = self.sigmas(&motion.rotation.log(), self.rotation);
+        let shift = self.sigmas(&motion.translation, self.translation);
+        let sigmas = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+        motion.retract(&Vector6::from_iterator(sigmas.into_iter().map(|s| s * normal(rng))))
+    }
+    fn sigmas(&self, motion: &Vector3<f64>, share: f64) -> Vector3<f64> {
+        match self.spread {
+            Spread::Total => Vector3::repeat(share * motion.norm() / 3.0_f64.sqrt()),
+            Spread::PerAxis => Vector3::repeat(share * motion.norm()),
+            Spread::Component => motion.abs() * share,
+        }
+    }
+}
+
+/// A detector and what it does wrong. Shares and rates are from 0 to 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Detector {
+    /// Standard deviation of each side of a box, in pixels. The paper says a variance of 4 px², its
+    /// authors' code draws with 2 px: the same.
+    pub sigma_px: f64,
+    /// Boxes with a side shorter than this are not seen, in pixels.
+    pub min_size_px: f64,
+    /// Objects of which less than this share is in the image are not seen.
+    pub min_visible: f64,
+    /// Rate at which a box is not there.
+    pub missed: f64,
+    /// Rate at which something hides a part of an object: its box loses part of one side.
+    pub occluded: f64,
+    /// By how much of its width or height such a box shrinks, at most.
+    pub occlusion: f64,
+    /// Share of the objects that are taken for another class in most of their images.
+    pub misclassified: f64,
+    /// Rate at which a box has another class than the object's usual.
+    pub confused: f64,
+}
+
+impl Default for Detector {
+    fn default() -> Self {
+        Self {
+            sigma_px: 2.0,
+            min_size_px: 8.0,
+            min_visible: 0.3,
+            missed: 0.0,
+            occluded: 0.0,
+            occlusion: 0.4,
+            misclassified: 0.0,
+            confused: 0.0,
+        }
+    }
+}
+
+impl Detector {
+    /// The box that it draws; `None` where it draws none.
+    pub(super) fn draw(&self, boxes: &Boxes, camera: &Camera, rng: &mut Pcg64) -> Option<BoundingBox> {
+        // the same draws for each box, seen or not: one setting changes nothing but its own effect
+        let (missed, hidden) = (rng.random_bool(self.missed), rng.random_bool(self.occluded));
+        let (side, share) = (rng.random_range(0..4), rng.random::<f64>() * self.occlusion);
+        let noise = [(); 4].map(|()| self.sigma_px * normal(rng));
+        let mut b = boxes.inside.bounds();
+        if hidden {
+            let extent = b[side % 2 + 2] - b[side % 2];
+            b[side] += if side < 2 { share * extent } else { -share * extent };
+        }
+        (0..4).for_each(|i| b[i] += noise[i]);
+        let size = camera.size();
+        for axis in 0..2 {
+            let (low, high) = (b[axis].min(b[axis + 2]), b[axis].max(b[axis + 2]));
+            (b[axis], b[axis + 2]) = (low.clamp(0.0, size[axis]), high.clamp(0.0, size[axis]));
+        }
+        let large = b[2] - b[0] >= self.min_size_px && b[3] - b[1] >= self.min_size_px;
+        let visible = boxes.inside.area() >= self.min_visible * boxes.whole.area();
+        (!missed && large && visible).then(|| BoundingBox::new(b).ok()).flatten()
+    }
+
+    /// What it takes an object for whose usual class is this.
+    pub(super) fn classify(&self, usual: &str, classes: &[&str], rng: &mut Pcg64) -> ClassScores {
+        let (confused, score) = (rng.random_bool(self.confused), rng.random_range(0.5..1.0));
+        let other = another(usual, classes, rng);
+        ClassScores::single(if confused { other } else { usual }, score)
+    }
+}
+
+/// A class that is not this one, if there is any.
+pub(super) fn another<'a>(class: &'a str, classes: &[&'a str], rng: &mut Pcg64) -> &'a str {
+    let others: Vec<&str> = classes.iter().copied().filter(|c| *c != class).collect();
+    let i = rng.random_range(0..others.len().max(1));
+    others.get(i).copied().unwrap_or(class)
+}

@@ -1,0 +1,145 @@
+//! Where sequences come from, chosen by name in a run's `[source]`.
+use crate::input::sequence::Sequence;
+use manifactor_formats::FormatError;
+use std::fmt::Debug;
+use std::path::{Path, PathBuf};
+
+mod assemble;
+mod camera;
+mod recorded;
+mod tum;
+
+pub use camera::CameraChoice;
+pub use recorded::Recorded;
+pub use tum::TumRgbd;
+
+/// A source of a sequence.
+#[typetag::serialize(tag = "type")]
+pub trait Source: Debug + Send + Sync {
+    /// Reads or makes the sequence.
+    ///
+    /// # Errors
+    /// Files that are not there or not what they should be; sequences of nothing.
+    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError>;
+}
+
+manifactor_graph::kind!(dyn Source, "source");
+
+/// Where files are looked for.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Folders {
+    /// Where public data sets lie, each in a folder of its own: `--data`, or `MANIFACTOR_DATA`.
+    pub data: Option<PathBuf>,
+    /// The folder of the run's document, from which its own files are named.
+    pub document: PathBuf,
+}
+
+impl Folders {
+    /// A file that belongs to the document.
+    pub fn beside_document(&self, path: &Path) -> PathBuf {
+        self.document.join(path)
+    }
+
+    /// A data set's folder: as it stands if it is absolute or lies beside the document; else in the data folder, or in
+    /// one of the folders there.
+    ///
+    /// # Errors
+    /// Where there is none, with the places that were tried.
+    pub fn data_set(&self, name: &Path) -> Result<PathBuf, SourceError> {
+        let mut tried = vec![self.beside_document(name)];
+        if let Some(data) = self.data.as_ref().filter(|_| name.is_relative()) {
+            tried.push(data.join(name));
+            let inner = std::fs::read_dir(data).into_iter().flatten().flatten().map(|entry| entry.path());
+            let mut inner: Vec<PathBuf> = inner.filter(|path| path.is_dir()).collect();
+            // the order of a folder differs between file systems
+            inner.sort();
+            tried.extend(inner.into_iter().map(|folder| folder.join(name)));
+        }
+        let found = tried.iter().find(|path| path.is_dir()).cloned();
+        let no_data_folder = self.data.is_none();
+        found.ok_or_else(|| SourceError::NoFolder { name: name.to_owned(), tried, no_data_folder })
+    }
+}
+
+/// Why there is no sequence.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SourceError {
+    /// A folder that is nowhere.
+    #[error("{}", no_folder(name, tried, *no_data_folder))]
+    NoFolder {
+        /// What was asked for.
+        name: PathBuf,
+        /// Where it was looked for.
+        tried: Vec<PathBuf>,
+        /// Whether nobody said where data sets lie.
+        no_data_folder: bool,
+    },
+    /// A file that cannot be read, or that is not what it should be.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// A sequence whose camera nobody knows.
+    #[error(
+        "the camera of `{}` is not known by the name of its folder: set `camera` to \
+         {{ fx = …, fy = …, cx = …, cy = …, width = …, height = … }}, or to one of {}", folder.display(), known.join(", ")
+    )]
+    UnknownCamera {
+        /// The sequence's folder.
+        folder: PathBuf,
+        /// Cameras that have a name.
+        known: Vec<&'static str>,
+    },
+    /// Detections of which none belongs to a frame.
+    #[error(
+        "{}: none of {detections} detections was made within {within} s of a pose in {}: \
+         do the two belong to the same sequence?", file.display(), odometry.display()
+    )]
+    NothingMatches {
+        /// The file of detections.
+        file: PathBuf,
+        /// The file of poses.
+        odometry: PathBuf,
+        /// How many detections there are.
+        detections: usize,
+        /// Seconds.
+        within: f64,
+    },
+    /// A simulation that cannot be run.
+    #[error("the simulation cannot be run: {0}")]
+    Simulation(String),
+}
+
+fn no_folder(name: &Path, tried: &[PathBuf], no_data_folder: bool) -> String {
+    let name = name.display();
+    let tried: Vec<String> = tried.iter().map(|path| format!("\n  {}", path.display())).collect();
+    let data = if no_data_folder {
+        "say where data sets lie with --data FOLDER, or the environment variable MANIFACTOR_DATA"
+    } else {
+        "check the name, and the folder given by --data or MANIFACTOR_DATA"
+    };
+    format!("there is no folder `{name}`: {data}; it was looked for at{}", tried.concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_that_is_nowhere_is_told_with_the_places_tried() {
+        let folders = Folders { data: None, document: "runs".into() };
+        let text = folders.data_set(Path::new("fr1")).unwrap_err().to_string();
+        assert!(text.contains("MANIFACTOR_DATA") && text.ends_with("runs/fr1"), "{text}");
+    }
+
+    #[test]
+    fn data_sets_are_found_one_folder_deep() {
+        let data = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let folders = Folders { data: Some(data.parent().unwrap().to_owned()), document: data.into() };
+        assert_eq!(folders.data_set(Path::new("source")).unwrap(), data.join("source"));
+        let found = folders.data_set(Path::new("gravity")).unwrap();
+        assert_eq!(found, data.join("gravity"));
+        let deep = Folders { document: "elsewhere".into(), ..folders };
+        assert!(deep.data_set(Path::new("slam")).unwrap().ends_with("slam"));
+        assert!(deep.data_set(Path::new("semantics")).unwrap().ends_with("slam/semantics"));
+    }
+}

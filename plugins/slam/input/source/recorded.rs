@@ -1,0 +1,71 @@
+use super::assemble::{read_ground_truth, read_matched};
+use super::camera::CameraChoice;
+use super::{Folders, Source, SourceError};
+use crate::input::sequence::Sequence;
+use manifactor_graph::checked::not_negative;
+use manifactor_graph::{Direction, register};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Odometry and detections from files of one's own.
+///
+/// `folder` is found as that of `tum` is. In it lie `odometry.txt` and `detections.csv`, and where there is one, a
+/// `groundtruth.txt`: poses `timestamp tx ty tz qx qy qz qw`, and boxes by column names.
+///
+/// ```toml
+/// source = { type = "recorded", folder = "my_recording", camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Recorded {
+    /// Where the files are.
+    pub folder: PathBuf,
+    /// The camera.
+    pub camera: CameraChoice,
+    /// The odometry in the folder.
+    #[serde(default = "odometry")]
+    pub odometry: PathBuf,
+    /// The detections in the folder.
+    #[serde(default = "detections")]
+    pub detections: PathBuf,
+    /// The ground truth in the folder; `groundtruth.txt`, where nothing is said and there is such a file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+    /// Up in the odometry's frame, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+    /// How far apart in time a detection and its pose may be, in seconds.
+    #[serde(default = "exact", deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
+    pub max_time_difference: f64,
+}
+
+fn odometry() -> PathBuf {
+    "odometry.txt".into()
+}
+fn detections() -> PathBuf {
+    "detections.csv".into()
+}
+fn exact() -> f64 {
+    1e-6
+}
+
+#[typetag::serialize(name = "recorded")]
+impl Source for Recorded {
+    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
+        let folder = folders.data_set(&self.folder)?;
+        let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
+        let (frames, detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
+        let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
+        Ok(Sequence {
+            camera: self.camera.camera(),
+            frames,
+            detections,
+            up: self.up,
+            accelerometer: vec![],
+            ground_truth: truth,
+        })
+    }
+}
+register!(dyn Source, "recorded", Recorded);

@@ -1,0 +1,79 @@
+use super::assemble::{read_ground_truth, read_matched};
+use super::camera::{CameraChoice, by_folder};
+use super::{Folders, Source, SourceError};
+use crate::input::sequence::{Acceleration, Sequence};
+use manifactor_formats::accelerometer;
+use manifactor_graph::checked::not_negative;
+use manifactor_graph::register;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// A sequence of the TUM RGB-D benchmark, with detections beside it.
+///
+/// `sequence` is a folder: an absolute path, one beside the document, or one in the folder that `--data` or the
+/// environment variable `MANIFACTOR_DATA` names. In it lie `odometry`, a trajectory whose consecutive relative poses
+/// are the motion that was measured; `detections`, a CSV of boxes with the objects that they show; and, where there
+/// are any, `groundtruth.txt` and `accelerometer.txt`. Each pose of the odometry is a frame.
+///
+/// ```toml
+/// source = { type = "tum", sequence = "rgbd_dataset_freiburg1_desk", odometry = "trajectories/dvo_vo.txt" }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TumRgbd {
+    /// The folder of the sequence.
+    pub sequence: PathBuf,
+    /// The odometry in it, in TUM's format.
+    pub odometry: PathBuf,
+    /// The detections in it.
+    #[serde(default = "detections")]
+    pub detections: PathBuf,
+    /// The ground truth in it; `groundtruth.txt`, where nothing is said and there is such a file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+    /// The camera: by name, or by its numbers. The folder's name tells, where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<CameraChoice>,
+    /// How far apart in time a detection and its pose may be, in seconds. Time stamps are written to the
+    /// microsecond: as it stands, only equal ones match.
+    #[serde(default = "exact", deserialize_with = "not_negative")]
+    #[schemars(extend("minimum" = 0))]
+    pub max_time_difference: f64,
+}
+
+fn detections() -> PathBuf {
+    "detections_yolov3_associated.csv".into()
+}
+fn exact() -> f64 {
+    1e-6
+}
+
+#[typetag::serialize(name = "tum")]
+impl Source for TumRgbd {
+    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
+        let folder = folders.data_set(&self.sequence)?;
+        let camera = match &self.camera {
+            Some(choice) => choice.camera(),
+            None => by_folder(&folder)?,
+        };
+        let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
+        let (frames, detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
+        let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
+        let file = folder.join("accelerometer.txt");
+        let readings = if file.is_file() { accelerometer::read(&file)? } else { vec![] };
+        let reading = |r: accelerometer::Acceleration| Acceleration {
+            timestamp: r.timestamp,
+            acceleration: r.acceleration,
+        };
+        Ok(Sequence {
+            camera,
+            frames,
+            detections,
+            up: None,
+            accelerometer: readings.into_iter().map(reading).collect(),
+            ground_truth: truth,
+        })
+    }
+}
+register!(dyn Source, "tum", TumRgbd);

@@ -1,0 +1,106 @@
+//! One class for an object, out of all of its detections.
+use crate::input::class::Aliases;
+use crate::input::sequence::ClassScores;
+use indexmap::IndexMap;
+use serde::Serialize;
+
+/// Scores of an object's detections, averaged.
+///
+/// The class is the arg max of the average of the score vectors (Jablonsky et al., section V). Where a detector
+/// reports its best class only, the average is a vote in which each detection counts with its score.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Fusion {
+    sums: IndexMap<String, f64>,
+    detections: usize,
+}
+
+/// The class of an object, and how sure it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FusedClass {
+    /// Its name, after aliases.
+    pub name: String,
+    /// Its score, averaged over the detections.
+    pub score: f64,
+    /// Its part of all scores, from 0 to 1.
+    pub share: f64,
+    /// What else it may be: the other classes by their part of all scores, the largest first.
+    #[serde(skip_serializing_if = "IndexMap::is_empty")]
+    pub others: IndexMap<String, f64>,
+}
+
+/// Classes with a smaller part of all scores are not worth a word.
+const LEAST_SHARE: f64 = 0.01;
+
+impl FusedClass {
+    /// All classes that it may be, with their parts of all scores.
+    pub fn shares(&self) -> impl Iterator<Item = (&str, f64)> {
+        let others = self.others.iter().map(|(name, share)| (name.as_str(), *share));
+        std::iter::once((self.name.as_str(), self.share)).chain(others)
+    }
+}
+
+impl Fusion {
+    /// Counts a detection in.
+    pub fn add(&mut self, scores: &ClassScores, aliases: &Aliases) {
+        self.detections += 1;
+        for (class, score) in scores.iter() {
+            *self.sums.entry(aliases.canonical(class)).or_default() += score;
+        }
+    }
+
+    /// The best class, the first seen of equals; `None` where no detection named any.
+    pub fn best(&self) -> Option<FusedClass> {
+        let best = self.sums.iter().reduce(|best, next| if next.1 > best.1 { next } else { best });
+        let total: f64 = self.sums.values().sum();
+        let share = |sum: f64| if total > 0.0 { sum / total } else { 0.0 };
+        best.map(|(name, sum)| {
+            let others =
+                self.sums.iter().filter(|(other, sum)| *other != name && share(**sum) >= LEAST_SHARE);
+            let mut others: IndexMap<_, _> =
+                others.map(|(other, sum)| (other.clone(), share(*sum))).collect();
+            others.sort_by(|_, a, _, b| b.total_cmp(a));
+            let score = sum / self.detections.max(1) as f64;
+            FusedClass { name: name.clone(), score, share: share(*sum), others }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fuse(detections: &[&[(&str, f64)]]) -> FusedClass {
+        let mut fusion = Fusion::default();
+        for scores in detections {
+            let scores = scores.iter().map(|(class, score)| ((*class).to_owned(), *score)).collect();
+            fusion.add(&scores, &Aliases::default());
+        }
+        fusion.best().unwrap()
+    }
+
+    #[test]
+    fn the_average_decides_and_not_the_majority() {
+        let class = fuse(&[&[("cup", 0.4)], &[("cup", 0.3)], &[("bottle", 0.9)]]);
+        assert_eq!(class.name, "bottle");
+        assert!((class.score - 0.3).abs() < 1e-15);
+        assert!((class.share - 0.9 / 1.6).abs() < 1e-15);
+        assert!((class.others["cup"] - 0.7 / 1.6).abs() < 1e-15 && class.others.len() == 1);
+    }
+
+    #[test]
+    fn second_best_classes_count() {
+        let class = fuse(&[&[("cup", 0.5), ("vase", 0.45)], &[("bowl", 0.5), ("vase", 0.45)]]);
+        assert_eq!(class.name, "vase");
+    }
+
+    #[test]
+    fn spellings_are_counted_together() {
+        let class = fuse(&[&[("tvmonitor", 0.4)], &[("laptop", 0.7)], &[("tv", 0.5)]]);
+        assert_eq!(class.name, "tv monitor");
+    }
+
+    #[test]
+    fn no_detection_has_no_class() {
+        assert_eq!(Fusion::default().best(), None);
+    }
+}

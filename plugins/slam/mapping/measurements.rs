@@ -1,0 +1,189 @@
+//! What is measured of each object: its class, and its boxes after the filters.
+//!
+//! In this order: detections of no object and of low score are left out; the class is fused from all others; boxes cut
+//! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
+use crate::input::class::Aliases;
+use crate::input::sequence::{ObjectId, Sequence};
+use crate::mapping::fusion::{FusedClass, Fusion};
+use crate::settings::DetectionSettings;
+use manifactor_quadric::BoundingBox;
+use std::collections::BTreeMap;
+
+/// One box of an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Place in the sequence's frames.
+    pub frame: usize,
+    /// The box, in pixels.
+    pub bounding_box: BoundingBox,
+    /// Which of its sides are the object's own, and not the border's: xmin, ymin, xmax, ymax.
+    pub inside: [bool; 4],
+}
+
+/// One object.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Its number.
+    pub id: ObjectId,
+    /// Its class; `None` where no detection named one.
+    pub class: Option<FusedClass>,
+    /// Detections that are associated with it.
+    pub detections: usize,
+    /// Its boxes that are left, one a frame at most, in order of frames.
+    pub views: Vec<View>,
+}
+
+/// Which boxes a sequence has of which objects.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Measurements {
+    /// By number.
+    pub objects: Vec<Measured>,
+    /// Detections of no object.
+    pub unassociated: usize,
+    /// Detections that score too low.
+    pub low_score: usize,
+    /// Boxes that the border cuts, and that were dropped for it.
+    pub cut: usize,
+    /// Boxes that a later one of the same object in the same frame replaces.
+    pub duplicates: usize,
+}
+
+#[derive(Default)]
+struct Gathered {
+    fusion: Fusion,
+    detections: usize,
+    views: BTreeMap<usize, View>,
+}
+
+impl Measurements {
+    /// Sorts the detections of a sequence by object.
+    pub fn gather(sequence: &Sequence, settings: &DetectionSettings, aliases: &Aliases) -> Self {
+        let mut all = Self::default();
+        let mut objects: BTreeMap<ObjectId, Gathered> = BTreeMap::new();
+        for detection in &sequence.detections {
+            let Some(id) = detection.object else {
+                all.unassociated += 1;
+                continue;
+            };
+            if detection.scores.best().is_some_and(|(_, score)| score < settings.min_score) {
+                all.low_score += 1;
+                continue;
+            }
+            let object = objects.entry(id).or_default();
+            object.detections += 1;
+            object.fusion.add(&detection.scores, aliases);
+            let (bounding_box, camera) = (detection.bounding_box, &sequence.camera);
+            let inside = bounding_box.sides_inside(camera.width, camera.height, settings.border_px);
+            if !settings.cut_sides.accepts(inside) {
+                all.cut += 1;
+                continue;
+            }
+            let view = View { frame: detection.frame, bounding_box, inside };
+            all.duplicates += usize::from(object.views.insert(view.frame, view).is_some());
+        }
+        all.objects = objects.into_iter().map(|(id, object)| object.measured(id)).collect();
+        all
+    }
+
+    /// All boxes that are left.
+    pub fn boxes(&self) -> usize {
+        self.objects.iter().map(|object| object.views.len()).sum()
+    }
+}
+
+impl Gathered {
+    fn measured(self, id: ObjectId) -> Measured {
+        let views = self.views.into_values().collect();
+        Measured { id, class: self.fusion.best(), detections: self.detections, views }
+    }
+}
+
+impl Measured {
+    /// The larger of the standard deviations of the boxes' widths and heights, in pixels; 0 for no box.
+    pub fn box_deviation(&self) -> f64 {
+        let of = |size: fn(&BoundingBox) -> f64| {
+            let sizes = self.views.iter().map(|view| size(&view.bounding_box));
+            let n = self.views.len().max(1) as f64;
+            let mean = sizes.clone().sum::<f64>() / n;
+            (sizes.map(|s| (s - mean) * (s - mean)).sum::<f64>() / n).sqrt()
+        };
+        of(BoundingBox::width).max(of(BoundingBox::height))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gravity::tests::sequence;
+    use crate::input::sequence::{ClassScores, Detection};
+    use crate::settings::CutSides;
+
+    fn detection(frame: usize, object: u32, class: &str, score: f64, bounds: [f64; 4]) -> Detection {
+        Detection {
+            frame,
+            object: Some(ObjectId(object)).filter(|_| object > 0),
+            scores: ClassScores::single(class, score),
+            bounding_box: BoundingBox::new(bounds).unwrap(),
+        }
+    }
+
+    const INSIDE: [f64; 4] = [100.0, 100.0, 200.0, 150.0];
+    const CUT: [f64; 4] = [10.0, 100.0, 200.0, 150.0];
+
+    fn gather(detections: Vec<Detection>, settings: &DetectionSettings) -> Measurements {
+        let sequence = Sequence { detections, ..sequence() };
+        Measurements::gather(&sequence, settings, &Aliases::default())
+    }
+
+    fn with(cut_sides: CutSides) -> DetectionSettings {
+        DetectionSettings { border_px: 20.0, cut_sides, ..DetectionSettings::default() }
+    }
+
+    #[test]
+    fn a_later_box_replaces_an_earlier_one_of_its_frame() {
+        let later = [101.0, 100.0, 200.0, 150.0];
+        let all = gather(
+            vec![detection(0, 1, "cup", 0.5, INSIDE), detection(0, 1, "cup", 0.5, later)],
+            &with(CutSides::Drop),
+        );
+        assert_eq!(all.duplicates, 1);
+        assert_eq!(all.objects[0].views.len(), 1);
+        assert_eq!(all.objects[0].views[0].bounding_box.xmin, 101.0);
+    }
+
+    #[test]
+    fn a_cut_box_votes_and_replaces_nothing() {
+        let boxes = vec![detection(0, 1, "cup", 0.5, INSIDE), detection(0, 1, "bowl", 0.9, CUT)];
+        let all = gather(boxes, &with(CutSides::Drop));
+        assert_eq!((all.cut, all.duplicates, all.boxes()), (1, 0, 1));
+        assert_eq!(all.objects[0].class.as_ref().unwrap().name, "bowl");
+        assert_eq!(all.objects[0].detections, 2);
+    }
+
+    #[test]
+    fn cut_sides_are_masked_or_kept_if_asked_for() {
+        let mask = gather(vec![detection(0, 1, "cup", 0.5, CUT)], &with(CutSides::Mask));
+        assert_eq!(mask.objects[0].views[0].inside, [false, true, true, true]);
+        let keep = gather(vec![detection(0, 1, "cup", 0.5, CUT)], &with(CutSides::Keep));
+        assert_eq!(keep.boxes(), 1);
+        let whole = [0.0, 0.0, 640.0, 480.0];
+        let nothing = gather(vec![detection(0, 1, "cup", 0.5, whole)], &with(CutSides::Mask));
+        assert_eq!((nothing.cut, nothing.boxes()), (1, 0));
+    }
+
+    #[test]
+    fn strangers_and_doubtful_boxes_are_counted() {
+        let settings = DetectionSettings { min_score: 0.3, ..with(CutSides::Drop) };
+        let all =
+            gather(vec![detection(0, 0, "cup", 0.9, INSIDE), detection(0, 2, "cup", 0.2, INSIDE)], &settings);
+        assert_eq!((all.unassociated, all.low_score, all.objects.len()), (1, 1, 0));
+    }
+
+    #[test]
+    fn deviation_is_that_of_the_worse_dimension() {
+        let boxes = [[0.0, 0.0, 100.0, 50.0], [0.0, 0.0, 160.0, 50.0]];
+        let boxes = boxes.iter().enumerate().map(|(i, b)| detection(i, 1, "cup", 0.5, *b)).collect();
+        let all = gather(boxes, &with(CutSides::Keep));
+        assert_eq!(all.objects[0].box_deviation(), 30.0);
+    }
+}

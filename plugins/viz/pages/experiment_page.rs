@@ -1,0 +1,104 @@
+//! The page of an experiment: means, comparisons, distributions, curves, and every trial.
+use crate::drawing::picture::Picture;
+use crate::drawing::{Chart, Distribution};
+use crate::pages::page::Page;
+use crate::pages::run_page::version;
+use manifactor_formats::table::{Column, Table};
+use manifactor_slam::experiment::{Experiment, Summary};
+
+/// The pictures of an experiment, one a metric: a curve over the column that the summary names, or distributions.
+pub fn experiment_pictures(experiment: &Experiment, summary: &Summary, trials: &Table) -> Vec<Picture> {
+    let picture = |metric: &String| match &experiment.summary.curve {
+        Some(x) => curve(summary, x, metric).picture(&format!("{metric}_over_{x}")),
+        None => distribution(summary, trials, metric).picture(metric),
+    };
+    summary.metrics.iter().filter_map(picture).collect()
+}
+
+/// The page of an experiment. `trials` is the table of trials, `config` what was read.
+pub fn experiment_page(
+    experiment: &Experiment,
+    summary: &Summary,
+    trials: &Table,
+    pictures: &[Picture],
+    config: &str,
+) -> String {
+    let mut page = Page::new(&experiment.title);
+    let done = experiment.trials.len() - summary.open;
+    page.paragraph(&format!("{done} of {} trials. {}", experiment.trials.len(), version()));
+    page.heading("Summary");
+    page.table(&summary.header(), &summary.rows().collect::<Vec<_>>());
+    page.paragraph(
+        "Means over trials; in brackets the difference from the baseline over pairs of trials, with the bootstrap's 95 % \
+         interval, as a share of the baseline's mean.",
+    );
+    match &experiment.summary.curve {
+        Some(x) => page.heading(&format!("Over {x}")),
+        None => page.heading("Distributions"),
+    };
+    pictures.iter().for_each(|picture| _ = page.picture(picture));
+    page.heading("Trials");
+    let header: Vec<String> = trials.columns.iter().map(|(name, _)| name.clone()).collect();
+    let rows = trials.rows().unwrap_or_default();
+    let cell = |column: &Column, row| match column {
+        Column::Text(cells) => cells.get(row).cloned().unwrap_or_default(),
+        Column::Number(cells) => cells.get(row).copied().flatten().map_or(String::new(), short),
+    };
+    let row = |row| trials.columns.iter().map(|(_, column)| cell(column, row)).collect();
+    page.table(&header, &(0..rows).map(row).collect::<Vec<Vec<String>>>());
+    page.heading("Config");
+    page.folded("The experiment", config);
+    page.html()
+}
+
+fn short(x: f64) -> String {
+    if x.fract() == 0.0 && x.abs() < 1e9 { x.to_string() } else { format!("{x:.5}") }
+}
+
+/// Values of a metric, group by group of the summary.
+fn distribution(summary: &Summary, trials: &Table, metric: &str) -> Distribution {
+    let column = |name: &str| trials.columns.iter().find(|(own, _)| own == name).map(|(_, column)| column);
+    let texts = |name: &String| match column(name) {
+        Some(Column::Text(cells)) => cells.as_slice(),
+        _ => &[],
+    };
+    let values = match column(metric) {
+        Some(Column::Number(cells)) => cells.as_slice(),
+        _ => &[],
+    };
+    let labels: Vec<&[String]> = summary.columns.iter().map(texts).collect();
+    let group = |group: &manifactor_slam::experiment::Group| {
+        let belongs =
+            |row: usize| labels.iter().zip(&group.labels).all(|(cells, label)| cells.get(row) == Some(label));
+        let own = values.iter().enumerate().filter(|(row, _)| belongs(*row)).filter_map(|(_, value)| *value);
+        (group.labels.join(", "), own.collect())
+    };
+    Distribution {
+        title: metric.to_owned(),
+        y: metric.to_owned(),
+        groups: summary.groups.iter().map(group).collect(),
+    }
+}
+
+/// Means of a metric over a column of numbers: a curve for each combination of the others.
+fn curve(summary: &Summary, x: &str, metric: &str) -> Chart {
+    let place = summary.columns.iter().position(|column| column == x);
+    let mut curves: Vec<(String, Vec<(f64, f64)>)> = vec![];
+    for group in &summary.groups {
+        let number = place.and_then(|place| group.labels.get(place)?.parse().ok());
+        let (Some(number), Some(mean)) = (number, group.means.get(metric)) else { continue };
+        let others = group.labels.iter().enumerate().filter(|(i, _)| Some(*i) != place);
+        let name = others.map(|(_, label)| label.as_str()).collect::<Vec<_>>().join(", ");
+        match curves.iter_mut().find(|(own, _)| *own == name) {
+            Some((_, points)) => points.push((number, mean.mean)),
+            None => curves.push((name, vec![(number, mean.mean)])),
+        }
+    }
+    Chart {
+        title: format!("{metric} over {x}"),
+        x: x.to_owned(),
+        y: metric.to_owned(),
+        log_x: curves.iter().flat_map(|(_, points)| points).all(|(x, _)| *x > 0.0),
+        curves,
+    }
+}
