@@ -1,5 +1,8 @@
 //! The formats that a document may have, told by the file's extension.
-use crate::{json, toml, yaml};
+mod json;
+pub(crate) mod toml;
+mod yaml;
+
 use manifactor_tree::Problem;
 use manifactor_tree::{Diagnostic, Diagnostics};
 use manifactor_tree::{MAX_DEPTH, Node};

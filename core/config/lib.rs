@@ -9,12 +9,9 @@
 mod document;
 mod format;
 mod graph_document;
-mod json;
 mod overrides;
 mod schema;
-mod toml;
 mod write;
-mod yaml;
 
 pub use document::Document;
 pub use format::{Format, MAX_BYTES};

@@ -1,6 +1,6 @@
 //! Single values set from outside, as `--set solver.max_iterations=50` does.
+use crate::format::toml::parse_value;
 use crate::format::too_deep;
-use crate::toml::parse_value;
 use manifactor_tree::Errors;
 use manifactor_tree::Problem;
 use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};

@@ -3,9 +3,9 @@ mod version;
 
 use crate::factor::{Factor, FactorEntry};
 use crate::noise::{Noise, NoiseError, Whitener};
-use crate::registry::catalogue::manifold_name;
 use crate::variable::Key;
 use crate::variable::Values;
+use crate::variable::manifold_name;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;

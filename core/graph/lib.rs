@@ -24,7 +24,7 @@ pub use manifactor_tree::TextError;
 pub use noise::Noise;
 pub use registry::{catalogue, checked};
 pub use residual::{Jacobians, Lifted, List, Many, Refs, Residual, Variables, normal_equations};
-pub use variable::{AsVariable, ErasedManifold, Variable, as_variable, column};
+pub use variable::{AsVariable, ErasedManifold, Variable, as_variable, column, manifold_name};
 pub use variable::{Key, Manifold, Tangent, ValueError, Values};
 
 #[doc(hidden)]

@@ -5,6 +5,7 @@ mod manifold;
 mod values;
 
 use crate::algebra::Dimension;
+use crate::registry::catalogue::{self, Kind};
 use crate::variable::column::{Column, Plain};
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
@@ -26,6 +27,13 @@ pub trait Variable: Debug + Send + Sync {
 }
 
 crate::kind!(dyn Variable, "variable");
+
+/// The name of a registered manifold; its Rust type's name, where it is not registered.
+pub fn manifold_name(id: TypeId) -> &'static str {
+    let kind = <dyn Variable as Kind>::NAME;
+    let entry = catalogue::entries(kind).into_iter().find(|e| (e.type_id)() == id);
+    entry.map_or("an unregistered manifold", |e| e.name)
+}
 
 /// The way from `dyn Any` back to a registered type of variables. Made by
 /// [`register_manifold!`](crate::register_manifold).

@@ -3,17 +3,18 @@
 //! A registered type brings an example in its docs. That is a factor to check, or a point around
 //! which others can be drawn, so that no type goes without the laws.
 use crate::error::LawError;
+use crate::example::{example_fields, problem};
 use crate::factor_check::{FactorCheck, FactorReport, Subject};
 use crate::manifold::manifold_laws;
 use manifactor_graph::catalogue::{self, Entry, Kind};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, Variable};
-use manifactor_tree::{Node, Reader};
+use manifactor_tree::Reader;
+
+pub use crate::example::example;
 use proptest::prelude::RngExt;
 use proptest::test_runner::{RngAlgorithm, TestRng};
-use serde_json::Value;
-use std::any::TypeId;
 
 /// Checks that an entry has a name in snake case, a summary, an object for a schema, and an example
 /// in TOML that mentions it and can be read.
@@ -29,14 +30,6 @@ pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
     require(schema.as_object().is_some(), "its schema is no object")?;
     let read = (entry.read_boxed)(Reader::new(&example_fields(entry)?));
     read.map(drop).map_err(|e| problem(entry, format!("its example: {e}")))
-}
-
-/// The example in the docs of a registered type.
-///
-/// # Errors
-/// Where there is none, or it cannot be read.
-pub fn example<K: Kind + ?Sized>(entry: &'static Entry) -> Result<Box<K>, LawError> {
-    entry.read::<K>(&example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))
 }
 
 /// Checks a factor's example, see [`FactorCheck`], at so many points. Returns what was found.
@@ -134,55 +127,8 @@ pub fn loss_law(entry: &'static Entry) -> Result<(), LawError> {
     Ok(())
 }
 
-fn problem(entry: &'static Entry, problem: String) -> LawError {
-    LawError::Entry { kind: entry.kind, name: entry.name, problem }
-}
-
 /// A point at most 1 away in each direction.
 fn around(x: &dyn Variable, rng: &mut TestRng) -> Option<Box<dyn Variable>> {
     let delta: Vec<f64> = (0..x.erased().dim()).map(|_| rng.random_range(-1.0..1.0)).collect();
     x.erased().retract(&delta)
-}
-
-/// The example of a manifold, for a factor of this entry.
-pub(crate) fn example_point(of: &'static Entry, id: TypeId) -> Result<Box<dyn Variable>, LawError> {
-    let kind = <dyn Variable as Kind>::NAME;
-    let entry = catalogue::entries(kind).into_iter().find(|e| (e.type_id)() == id);
-    example(entry.ok_or_else(|| problem(of, "one of its variables is of no registered type".into()))?)
-}
-
-/// The fields of the example: the table in it whose `type` is the entry's name.
-fn example_fields(entry: &'static Entry) -> Result<Node, LawError> {
-    let missing = || problem(entry, format!("its example has no table with type = \"{}\"", entry.name));
-    let table = table_of_type(&example_document(entry)?, entry.name).ok_or_else(missing)?;
-    serde_json::from_value(table).map_err(|e| problem(entry, e.to_string()))
-}
-
-fn example_document(entry: &'static Entry) -> Result<Value, LawError> {
-    let text = entry.example().ok_or_else(|| problem(entry, "its docs have no ```toml example".into()))?;
-    let document: toml::Value =
-        toml::from_str(&text).map_err(|e| problem(entry, format!("its example is no TOML: {e}")))?;
-    serde_json::to_value(document).map_err(|e| problem(entry, e.to_string()))
-}
-
-/// The keys beside a factor in its example; none, where it shows the factor alone.
-pub(crate) fn example_keys(entry: &'static Entry) -> Vec<String> {
-    let document = example_document(entry).unwrap_or_default();
-    let factors = document.get("factors").and_then(Value::as_array).cloned().unwrap_or_default();
-    let this = |f: &&Value| f.pointer("/factor/type").and_then(Value::as_str) == Some(entry.name);
-    let keys = factors.iter().find(this).and_then(|f| f.get("keys")).and_then(Value::as_array).cloned();
-    keys.unwrap_or_default().iter().filter_map(Value::as_str).map(str::to_owned).collect()
-}
-
-fn table_of_type(value: &Value, name: &str) -> Option<Value> {
-    match value {
-        Value::Object(table) if table.get("type").and_then(Value::as_str) == Some(name) => {
-            let mut fields = table.clone();
-            fields.shift_remove("type");
-            Some(Value::Object(fields))
-        }
-        Value::Object(table) => table.values().find_map(|v| table_of_type(v, name)),
-        Value::Array(all) => all.iter().find_map(|v| table_of_type(v, name)),
-        _ => None,
-    }
 }

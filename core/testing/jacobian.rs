@@ -1,8 +1,12 @@
 //! The Jacobian law: analytic = automatic = numeric.
+mod kink;
+
 use crate::differences::differentiate;
 use crate::error::{LawError, json_of_all, json_of_factor};
-use crate::kink::{Kink, hull, sides};
 use manifactor_graph::{Factor, Linearization, Variable};
+
+pub use kink::Kink;
+use kink::{hull, sides};
 
 /// How far points are away, in units of the tangent, that tell what a residual is like around one.
 const NEARBY: f64 = 1e-4;

@@ -16,11 +16,11 @@ pub mod catalogue;
 mod check;
 mod differences;
 mod error;
+mod example;
 mod factor_check;
 mod freedom;
 mod invariance;
 mod jacobian;
-mod kink;
 mod manifold;
 pub mod points;
 pub mod strategies;
@@ -33,8 +33,8 @@ pub use factor_check::{
 };
 pub use freedom::{Free, Freedom, freedom};
 pub use invariance::invariance_law;
+pub use jacobian::Kink;
 pub use jacobian::{Entry, Examined, JacobianLaw, jacobian_law};
-pub use kink::Kink;
 pub use manifold::manifold_laws;
 
 #[doc(hidden)]

@@ -9,15 +9,14 @@ pub mod accelerometer;
 pub mod bal;
 pub mod detections;
 mod error;
-pub mod g2o;
 mod lines;
 pub mod pose_graph;
 pub mod table;
 mod text;
 pub mod timestamps;
-mod toro;
 pub mod tum;
 pub mod whole;
 
 pub use error::{FormatError, Malformed, Mistake, Problem};
+pub use pose_graph::g2o;
 pub use text::read_text;

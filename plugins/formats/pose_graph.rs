@@ -11,7 +11,6 @@
 use crate::error::{FormatError, Mistake, Problems};
 use crate::lines::lines;
 use crate::text::read_text;
-use crate::{g2o, toro};
 use manifactor_geometry::Tree;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Key, Values};
@@ -20,11 +19,13 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-#[allow(clippy::indexing_slicing, reason = "by places that it has made itself")]
 pub(crate) mod anchor;
 mod build;
+#[allow(clippy::indexing_slicing, reason = "by places that it has made itself")]
+pub mod g2o;
 mod information;
 pub(crate) mod record;
+mod toro;
 
 use record::Record;
 

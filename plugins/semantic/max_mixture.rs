@@ -162,7 +162,7 @@ impl Mixture {
         let signatures = || components.iter().map(|c| c.factor.as_ref().map(|f| f.erased().signature()));
         let first = signatures().flatten().next().ok_or(MixtureError::NoFactor)?;
         let names = |types: &[TypeId]| {
-            types.iter().map(|id| catalogue::manifold_name(*id)).collect::<Vec<_>>().join(", ")
+            types.iter().map(|id| manifactor_graph::manifold_name(*id)).collect::<Vec<_>>().join(", ")
         };
         let mut parts = vec![];
         let largest = components.iter().map(|c| c.weight.get()).fold(0.0, f64::max);

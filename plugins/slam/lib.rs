@@ -5,10 +5,12 @@
 //! [`Estimate`](estimate::Estimate), which is compared with the truth in a [`report`].
 pub mod estimate;
 pub mod experiment;
+pub mod fusion;
 pub mod gravity;
 mod input;
 pub mod mapping;
 pub mod metrics;
+mod number;
 pub mod output;
 pub mod run;
 pub mod schema;
@@ -17,6 +19,6 @@ pub mod settings;
 
 pub use estimate::{refine, variance};
 pub use input::{class, recording, sequence, simulator, source};
-pub use mapping::{fusion, measurements};
+pub use mapping::measurements;
 pub use output::report;
 pub use settings::run_document;

@@ -3,9 +3,9 @@
 //! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
 //! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
 //! semantic rules say of it; last, variables and factors of the document's own.
+use crate::fusion::FusedClass;
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::sequence::{ObjectId, Sequence};
-use crate::mapping::fusion::FusedClass;
 use crate::mapping::measurements::{Measured, Measurements, View};
 use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, unmatched};
 use crate::settings::{DetectionSettings, Settings};
@@ -15,7 +15,6 @@ use manifactor_quadric::{BoundingBoxFactor, DualQuadric};
 use serde::Serialize;
 use std::sync::Arc;
 
-pub mod fusion;
 pub mod measurements;
 mod rejection;
 mod warning;

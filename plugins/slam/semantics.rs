@@ -17,8 +17,8 @@
 //! ```
 //! The class `"*"` stands for all. `semantics = "table_one"` stands for the rules of the paper's Table I. All rules that are
 //! for an object apply to it.
+use crate::fusion::FusedClass;
 use crate::input::class::Aliases;
-use crate::mapping::fusion::FusedClass;
 use manifactor_config::{Errors, Place, Problem, Section};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Loss;

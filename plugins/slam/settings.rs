@@ -1,8 +1,8 @@
 //! The settings of a run: how a sequence becomes a graph, and how the graph is solved.
-use crate::estimate::variance::VarianceSettings;
 use crate::gravity::{FromSource, Gravity};
 use crate::input::class::Aliases;
 use crate::input::source::Source;
+use crate::number;
 use crate::semantics::{Rule, read_semantics};
 use manifactor_config::{Diagnostics, Errors, Node, Problem, Section};
 use manifactor_graph::Noise;
@@ -15,18 +15,18 @@ use std::sync::Arc;
 
 mod detections;
 mod evaluation;
-mod number;
 mod objects;
 mod own;
 mod report;
 pub mod run_document;
+mod variance;
 
 pub use detections::{CutSides, DetectionSettings};
 pub use evaluation::EvaluationSettings;
-pub(crate) use number::share;
 pub use objects::ObjectSettings;
 pub use own::OwnGraph;
 pub use report::ReportSettings;
+pub use variance::{BoxGroups, VarianceSettings};
 
 /// Everything that is to be known to make an estimate.
 #[derive(Debug, Clone, Serialize)]

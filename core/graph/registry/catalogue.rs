@@ -141,13 +141,6 @@ pub fn find(kind: &str, name: &str) -> Option<&'static Entry> {
     index.get(&(kind, name)).copied()
 }
 
-/// The name of a registered manifold; its Rust type's name, where it is not registered.
-pub fn manifold_name(id: TypeId) -> &'static str {
-    let kind = <dyn crate::Variable as Kind>::NAME;
-    let entry = inventory::iter::<Entry>.into_iter().find(|e| e.kind == kind && (e.type_id)() == id);
-    entry.map_or("an unregistered manifold", |e| e.name)
-}
-
 /// Makes a trait a [`Kind`](crate::registry::catalogue::Kind) of this name: `kind!(dyn Optimizer, "solver");`. Boxes of it are read
 /// from documents by their `type`; `#[typetag::serialize(tag = "type")]` on the trait writes them.
 #[macro_export]

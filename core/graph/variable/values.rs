@@ -1,7 +1,7 @@
 //! The estimate: a point for each key.
-use crate::registry::catalogue::manifold_name;
 use crate::variable::Key;
 use crate::variable::Variable;
+use crate::variable::manifold_name;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use std::any::TypeId;

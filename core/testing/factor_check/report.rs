@@ -3,7 +3,7 @@ use super::Subject;
 use crate::error::LawError;
 use crate::freedom::Freedom;
 use crate::jacobian::Entry;
-use crate::kink::Kink;
+use crate::jacobian::Kink;
 use crate::points::Drawn;
 use manifactor_graph::Linearization;
 use manifactor_graph::invariance::invariances;

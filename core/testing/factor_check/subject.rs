@@ -1,7 +1,8 @@
 //! A factor to check, with a point where it means something.
-use crate::catalogue::{example, example_keys, example_point};
 use crate::error::LawError;
-use manifactor_graph::catalogue::{Entry, manifold_name};
+use crate::example::{example, example_keys, example_point};
+use manifactor_graph::catalogue::Entry;
+use manifactor_graph::manifold_name;
 use manifactor_graph::{Factor, Variable};
 use serde_json::{Value, json};
 use std::sync::Arc;

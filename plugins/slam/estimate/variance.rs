@@ -6,7 +6,6 @@
 //! No ground truth takes part.
 mod components;
 mod correlation;
-mod settings;
 
+pub use crate::settings::{BoxGroups, VarianceSettings};
 pub use components::{Components, VarianceError};
-pub use settings::{BoxGroups, VarianceSettings};

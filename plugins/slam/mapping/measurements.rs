@@ -2,9 +2,9 @@
 //!
 //! In this order: detections of no object and of low score are left out; the class is fused from all others; boxes cut
 //! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
+use crate::fusion::{FusedClass, Fusion};
 use crate::input::class::Aliases;
 use crate::input::sequence::{ObjectId, Sequence};
-use crate::mapping::fusion::{FusedClass, Fusion};
 use crate::settings::DetectionSettings;
 use manifactor_quadric::BoundingBox;
 use std::collections::BTreeMap;

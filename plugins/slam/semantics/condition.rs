@@ -52,7 +52,7 @@ pub(super) struct Met<'a> {
 
 impl Conditions {
     pub(super) fn take(section: &mut Section<'_>) -> Self {
-        let min_score = section.has("min_score").then(|| crate::settings::share(section, "min_score"));
+        let min_score = section.has("min_score").then(|| crate::number::share(section, "min_score"));
         Self {
             min_score,
             min_size_m: section.optional("min_size_m"),

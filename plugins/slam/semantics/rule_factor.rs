@@ -1,5 +1,6 @@
 use manifactor_config::{Errors, Node, Place, Problem, ReadError, Value as NodeValue};
-use manifactor_graph::catalogue::{Kind, find, manifold_name};
+use manifactor_graph::catalogue::{Kind, find};
+use manifactor_graph::manifold_name;
 use manifactor_graph::{Direction, Factor, Key, Values};
 use manifactor_quadric::DualQuadric;
 use manifactor_semantic::MixtureError;

@@ -1,5 +1,5 @@
-use super::number::{table, within};
 use super::{loss, noise};
+use crate::number::{table, within};
 use manifactor_config::Section;
 use manifactor_graph::Noise;
 use manifactor_graph::loss::Loss;

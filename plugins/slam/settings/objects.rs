@@ -1,4 +1,4 @@
-use super::number::{table, within};
+use crate::number::{table, within};
 use manifactor_config::Section;
 use manifactor_quadric::initialise::{Initialiser, Svd};
 use serde::Serialize;

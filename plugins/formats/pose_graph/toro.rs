@@ -5,8 +5,8 @@
 //! first · `EQUIV` a b. The rotation is Rz(yaw)·Ry(pitch)·Rx(roll). Edges may come without information.
 //! `VERTEX` and `EDGE` are TORO's older names for `VERTEX2` and `EDGE2`.
 use crate::error::Mistake;
-use crate::g2o::{se2, vertex_se2};
 use crate::lines::Fields;
+use crate::pose_graph::g2o::{se2, vertex_se2};
 use crate::pose_graph::record::{Edge, Measurement, Parse, Record, Vertex, exchange_halves, upper_triangle};
 use manifactor_geometry::{Se3, So3};
 use nalgebra::Vector3;

@@ -81,10 +81,10 @@ impl Plugin {
             return Ok((git.clone(), git));
         };
         let root = path.canonicalize().map_err(Failure::at(path))?;
-        let cli = root.join("core").join("cli");
+        let cli = root.join("plugins").join("cli");
         if !cli.join("Cargo.toml").is_file() {
             let what =
-                format!("{} is no checkout of Manifactor: it has no core/cli/Cargo.toml", root.display());
+                format!("{} is no checkout of Manifactor: it has no plugins/cli/Cargo.toml", root.display());
             return Err(Failure::with_help(what, "give the folder that has Manifactor's README in it"));
         }
         // a literal string of TOML takes backslashes as they are

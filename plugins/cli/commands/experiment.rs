@@ -68,7 +68,7 @@ impl Experiment {
         let summary = experiment::write(&sweep, &journal)?;
         let trials = experiment::trials_table(&sweep, &journal);
         let pictures = experiment_pictures(&sweep, &summary, &trials);
-        output::pictures(&sweep.output, &pictures)?;
+        super::pictures::write(&sweep.output, &pictures)?;
         let page = experiment_page(&sweep, &summary, &trials, &pictures, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);

@@ -93,7 +93,8 @@ pub(crate) fn notes(entry: &Entry) -> Vec<String> {
     let signature = (entry.signature)();
     let mut notes = vec![];
     if let Some(rows) = signature.rows {
-        let names: Vec<_> = signature.variables.iter().map(|id| catalogue::manifold_name(*id)).collect();
+        let names: Vec<_> =
+            signature.variables.iter().map(|id| manifactor::graph::manifold_name(*id)).collect();
         let many = if signature.many { "any number of " } else { "" };
         notes.push(format!("Variables: {many}{}. Rows of its residual: {rows}.", names.join(", ")));
     }

@@ -1,4 +1,4 @@
-//! What is said: results on standard output, everything else on standard error. And pictures, which go to files.
+//! What is said: results on standard output, everything else on standard error.
 //!
 //! Nothing else in this crate writes to the two: `print!` and `eprintln!` panic where they cannot write.
 pub(crate) mod report;
@@ -8,12 +8,8 @@ pub(crate) mod table;
 pub(crate) mod text;
 pub(crate) mod watch;
 
-use crate::failure::Failure;
-use manifactor::slam::output::write_whole;
-use manifactor::viz::Picture;
 use serde::Serialize;
 use std::io::{self, ErrorKind, Write};
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether results were lost on their way out.
@@ -62,13 +58,4 @@ pub(crate) fn say_styled(text: &str) {
 /// Says something that is worth knowing.
 pub(crate) fn note(note: &str) {
     say(&format!("note: {}", text::shortened(note)));
-}
-
-/// Writes pictures into a folder, each as SVG and as PNG.
-pub(crate) fn pictures(folder: &Path, pictures: &[Picture]) -> Result<(), Failure> {
-    for picture in pictures {
-        write_whole(&folder.join(format!("{}.svg", picture.name)), picture.svg())?;
-        write_whole(&folder.join(format!("{}.png", picture.name)), picture.png().map_err(Failure::input)?)?;
-    }
-    Ok(())
 }

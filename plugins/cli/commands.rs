@@ -7,6 +7,7 @@ mod explain;
 mod graph;
 mod list;
 mod new;
+mod pictures;
 mod run;
 mod schema;
 mod simulate;

@@ -52,7 +52,7 @@ impl Run {
             let folder = write_variant(&document, variant, &estimate, &report)?;
             let title = format!("{}: {}", document.title, variant.name);
             let pictures = run_pictures(&title, &estimate, &variant.settings);
-            output::pictures(&folder, &pictures)?;
+            super::pictures::write(&folder, &pictures)?;
             let config = std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?;
             page.variant(&estimate, &report, &pictures, &config);
             if interrupt.0.load(Ordering::Relaxed) {
