@@ -68,8 +68,8 @@ pub mod prelude {
         register_quantity,
     };
     pub use manifactor_solve::{
-        Dogleg, GaussNewton, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome, Problem, Silent,
-        Solution, Start, StartError, Stopping, Termination, solve,
+        Auto, Descent, Dogleg, GaussNewton, Gnc, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome,
+        Problem, Silent, Solution, Start, StartError, Step, Stopping, Termination, Tried, solve,
     };
     pub use nalgebra::{
         Matrix2, Matrix3, Matrix4, U1, U2, U3, U4, U5, U6, U7, U8, U9, Vector1, Vector2, Vector3, Vector4,

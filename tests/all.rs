@@ -13,3 +13,4 @@ mod expression;
 #[path = "fuzz/replay.rs"]
 mod fuzz;
 mod numbers;
+mod rooms;

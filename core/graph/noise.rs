@@ -443,6 +443,19 @@ impl<D: Dimension> Whiteners<D> {
             _ => {}
         }
     }
+    /// Puts another in place of the `i`-th; whether it is of this kind.
+    pub(crate) fn set(&mut self, i: usize, one: &Whitener) -> bool {
+        let mut single = Self::like(one);
+        single.push(one);
+        match (self, single) {
+            (Self::Unit, Self::Unit) => {}
+            (Self::Isotropic(all), Self::Isotropic(one)) => all[i] = one[0],
+            (Self::Diagonal(all), Self::Diagonal(mut one)) => all[i] = one.remove(0),
+            (Self::Full(all), Self::Full(one)) => all[i] = one[0],
+            _ => return false,
+        }
+        true
+    }
     /// x ← W x for each column of `x`, in place; whatever stands in rows not observed, zero comes out.
     #[inline(always)]
     pub(crate) fn whiten(&self, i: usize, x: &mut [f64]) {

@@ -2,8 +2,12 @@
 mod condition;
 mod covariance;
 mod diagnosis;
+mod factorized;
 mod leverage;
+mod moving;
 pub(crate) mod null_space;
+mod untouched;
 
 pub use covariance::{CovarianceError, Marginal};
 pub use diagnosis::{Diagnosis, FactorCost};
+pub use factorized::Factorized;

@@ -8,19 +8,22 @@ mod linear;
 mod observer;
 mod outcome;
 mod problem;
+mod setting;
 mod strategy;
 
-pub use inspect::{CovarianceError, Diagnosis, FactorCost, Marginal};
+pub use inspect::{CovarianceError, Diagnosis, FactorCost, Factorized, Marginal};
 pub use linear::memory::{Bytes, available_memory, memory_limit};
 pub use linear::settings::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
 pub use linear::{BlockSystem, BlockSystemError};
 pub use observer::{All, Interrupt, Observer, Silent};
 pub use outcome::{InactiveFactor, IterationRecord, Moving, Outcome, Rejected, Times, Untouched};
 pub use outcome::{Stall, Termination, Tolerance, Undetermined};
-pub use problem::{CompileError, Problem, WeightError};
+pub use problem::{ChangeError, CompileError, Problem, WeightError};
+pub use setting::SettingError;
 pub use strategy::{
-    Auto, BadParameter, Candidates, Dogleg, FactorType, GaussNewton, Given, Gnc, Growth, LevenbergMarquardt,
-    Optimizer, Probability, SettingError, Start, StartError, Stopping, Truncation, UnknownFactor,
+    Auto, BadParameter, Candidates, Descent, Dogleg, FactorType, GaussNewton, Given, Gnc, Growth,
+    LevenbergMarquardt, Optimizer, Probability, Start, StartError, Step, Stopping, Tried, Truncation,
+    UnknownFactor,
 };
 
 use manifactor_graph::batch::FactorState;

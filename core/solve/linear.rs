@@ -1,6 +1,5 @@
 //! The linear systems of steps: their structure, their settings and the methods that solve them.
 mod block_system;
-pub(crate) mod choice;
 mod cholesky;
 mod conjugate_gradients;
 mod elimination;

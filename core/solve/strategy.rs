@@ -1,5 +1,6 @@
 //! How an estimate is moved to a minimum: one file for each solver, and what they share.
 mod auto;
+mod descent;
 mod dogleg;
 mod gauss_newton;
 mod gnc;
@@ -8,9 +9,10 @@ mod optimizer;
 mod start;
 
 pub use auto::Auto;
+pub use descent::{Descent, Step, Tried};
 pub use dogleg::Dogleg;
 pub use gauss_newton::GaussNewton;
 pub use gnc::{BadParameter, Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor};
 pub use levenberg_marquardt::LevenbergMarquardt;
-pub use optimizer::{Optimizer, SettingError, Stopping};
+pub use optimizer::{Optimizer, Stopping};
 pub use start::{Given, Start, StartError};

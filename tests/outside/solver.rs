@@ -1,37 +1,76 @@
-//! A solver: one that is made of two others.
+//! A solver of one's own: Levenberg-Marquardt, on the seam that the built-in ones use.
 use crate::solve_document;
 use manifactor::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Levenberg-Marquardt as long as it takes to get near, then Gauss-Newton.
+/// Steps damped along the diagonal of H: ten times less after a good one, ten times more after a bad one.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Relay {
-    /// Steps of the first.
-    first: usize,
+struct Marquardt {
+    /// Damping of the first step, as a share of the diagonal.
+    lambda: f64,
 }
 
-#[typetag::serialize(name = "test_relay")]
-impl Optimizer for Relay {
+#[typetag::serialize(name = "test_marquardt")]
+impl Optimizer for Marquardt {
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        let stop = Stopping { max_iterations: self.first, ..Stopping::default() };
-        let begun = LevenbergMarquardt { stop, ..LevenbergMarquardt::default() }.solve(problem, observer);
-        let ended = GaussNewton::default().solve(problem, observer);
-        Outcome { initial_cost: begun.initial_cost, iterations: begun.iterations + ended.iterations, ..ended }
+        let stop = Stopping::default();
+        let mut descent = match Descent::begin(problem, &stop, observer) {
+            Ok(descent) => descent,
+            Err(outcome) => return *outcome,
+        };
+        let (mut lambda, mut step) = (self.lambda, Step::default());
+        while lambda < 1e12 {
+            if let Some(termination) = descent.next() {
+                return descent.end(termination);
+            }
+            let damping: Vec<f64> = descent.diagonal().iter().map(|d| lambda * d.max(1e-6)).collect();
+            step.control = lambda;
+            let lower = descent.damped(&damping, &mut step)
+                && matches!(descent.attempt(&step), Tried::Lower { gain } if gain > 1e-3);
+            descent.record(&step, lower);
+            lambda *= if lower { 0.1 } else { 10.0 };
+            if let Some(termination) = if lower { descent.take(&step) } else { None } {
+                return descent.end(termination);
+            }
+        }
+        let stalled = descent.stalled();
+        descent.end(stalled)
     }
 }
-register!(dyn Optimizer, "test_relay", Relay);
+register!(dyn Optimizer, "test_marquardt", Marquardt);
+
+/// A range to each of two beacons, and where it begins: nonlinear, so that full steps overshoot.
+const GRAPH: &str = r#"
+variables = [
+    { key = "x", value = { type = "point2", position = [0.2, 0.1] } },
+    { key = "a", value = { type = "point2", position = [0.0, 0.0] }, fixed = true },
+    { key = "b", value = { type = "point2", position = [4.0, 0.0] }, fixed = true },
+]
+factors = [
+    { keys = ["a", "x"], factor = { type = "expression", variables = { a = "point2", x = "point2" }, residual = ["sqrt(dot(x - a, x - a)) - 5"] } },
+    { keys = ["b", "x"], factor = { type = "expression", variables = { b = "point2", x = "point2" }, residual = ["sqrt(dot(x - b, x - b)) - 3"] } },
+]
+"#;
 
 #[test]
 fn a_graph_names_it() {
-    let solution = solve_document(
-        r#"
-solver = { type = "test_relay", first = 2 }
-variables = [{ key = "x", value = { type = "se2", translation = [1.0, 2.0], angle = 0.5 } }]
-factors = [{ keys = ["x"], factor = { type = "prior_se2", value = { translation = [0.0, 0.0], angle = 0.0 } } }]
-"#,
-    );
-    assert!(solution.outcome.termination.is_converged());
-    assert!(solution.outcome.final_cost < 1e-20 && solution.outcome.initial_cost > 1.0);
+    let ours = solve_document(&format!("solver = {{ type = \"test_marquardt\", lambda = 1e-4 }}\n{GRAPH}"));
+    assert!(ours.outcome.termination.is_converged(), "{}", ours.outcome.termination);
+    assert!(ours.outcome.final_cost < 1e-15 && ours.outcome.undetermined.is_none());
+    let theirs = solve_document(&format!("solver = {{ type = \"levenberg_marquardt\" }}\n{GRAPH}"));
+    let distance = |solution: &Solution| {
+        let x: &manifactor::geometry::Point2 = solution.values.get("x").unwrap();
+        (x.0 - Vector2::new(4.0, 3.0)).norm()
+    };
+    assert!(distance(&ours) < 1e-6 && distance(&theirs) < 1e-6);
+}
+
+#[test]
+fn what_nothing_constrains_is_named() {
+    let open = GRAPH.lines().filter(|line| !line.contains("\"b\", \"x\"")).collect::<Vec<_>>().join("\n");
+    let ours = solve_document(&format!("solver = {{ type = \"test_marquardt\", lambda = 1e-4 }}\n{open}"));
+    assert!(ours.outcome.termination.is_converged());
+    assert_eq!(ours.outcome.undetermined.unwrap().keys, [Key::from("x")]);
 }

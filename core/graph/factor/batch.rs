@@ -95,6 +95,10 @@ pub trait Batch: Send + Sync {
     fn reserve(&mut self, factors: usize, variables: usize);
     /// Adds a factor of this batch's type; others are left out.
     fn push(&mut self, member: &Member<'_>);
+    /// The residual of a factor, by its place in the batch; `None` where its type leaves the number of rows open.
+    fn residual_mut(&mut self, index: usize) -> Option<&mut dyn Any>;
+    /// Sets the noise of a factor, by its place in the batch; whether it is of the batch's kind.
+    fn set_noise(&mut self, index: usize, noise: &Whitener) -> bool;
     /// Decides which factors are active, and adds their parts of H and g.
     fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation;
     /// The cost of the factors that were active at the last linearization.
@@ -209,6 +213,14 @@ impl<F: Kernel> Batch for BatchOf<F> {
             losses.push(loss);
         }
         self.active.push(true);
+    }
+
+    fn residual_mut(&mut self, index: usize) -> Option<&mut dyn Any> {
+        self.factors.get_mut(index).and_then(Kernel::residual_mut)
+    }
+
+    fn set_noise(&mut self, index: usize, noise: &Whitener) -> bool {
+        self.whiteners.set(index, noise)
     }
 
     fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation {

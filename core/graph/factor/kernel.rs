@@ -19,6 +19,10 @@ pub(crate) trait Kernel: Clone + Send + Sync + 'static {
 
     /// A copy of a factor of this type; `None` for another.
     fn of(factor: &dyn Any) -> Option<Self>;
+    /// The residual itself; `None` where its value may change the number of rows.
+    fn residual_mut(&mut self) -> Option<&mut dyn Any> {
+        None
+    }
     fn columns(columns: &Columns) -> Self::Columns<'_>;
     /// The variables, by their places in their columns.
     fn load<'a>(&self, columns: Self::Columns<'a>, index: &[u32]) -> Self::Refs<'a>;
@@ -41,6 +45,9 @@ impl<F: Residual> Kernel for F {
 
     fn of(factor: &dyn Any) -> Option<Self> {
         factor.downcast_ref::<F>().cloned()
+    }
+    fn residual_mut(&mut self) -> Option<&mut dyn Any> {
+        Some(self)
     }
     fn columns(columns: &Columns) -> Self::Columns<'_> {
         F::Variables::columns(columns)

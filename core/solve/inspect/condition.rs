@@ -1,4 +1,5 @@
 //! How well the linear system is conditioned.
+use crate::inspect::Factorized;
 use crate::linear::system::{dot, norm};
 use crate::problem::Problem;
 
@@ -16,14 +17,16 @@ impl Problem {
     /// spectrum, so the condition is underestimated, as a rule by a few percent. With 16 digits in all, about as many
     /// of a solution are lost as the estimate has.
     pub fn condition(&mut self) -> Option<f64> {
-        self.linearize();
-        self.directly(Self::condition_directly).flatten()
+        self.factorized().ok()?.condition()
     }
+}
 
-    fn condition_directly(&mut self) -> Option<f64> {
-        let mut scale = vec![];
-        self.diagonal(&mut scale);
-        if !scale.iter().all(|d| *d > 0.0) || self.factorize(None).is_err() {
+impl Factorized<'_> {
+    /// See [`Problem::condition`].
+    pub fn condition(&mut self) -> Option<f64> {
+        let Problem { system, .. } = &mut *self.problem;
+        let mut scale: Vec<f64> = system.diagonal().copied().collect();
+        if !scale.iter().all(|d| *d > 0.0) {
             return None;
         }
         scale.iter_mut().for_each(|d| *d = d.sqrt());
@@ -31,11 +34,11 @@ impl Problem {
             |x: &mut [f64], by: fn(f64) -> f64| x.iter_mut().zip(&scale).for_each(|(x, d)| *x *= by(*d));
         let largest = dominant(scale.len(), |x| {
             scaled(x, f64::recip);
-            let product = self.multiply(x);
+            let product = system.multiply(x);
             x.copy_from_slice(&product);
             scaled(x, f64::recip);
         });
-        let cholesky = self.cholesky()?;
+        let cholesky = system.cholesky()?;
         let smallest = dominant(scale.len(), |x| {
             scaled(x, |d| d);
             cholesky.solve(x);

@@ -1,6 +1,6 @@
 //! What is worth a look after a solve: the worst factors, and the condition of the linear system.
 use crate::Solution;
-use crate::inspect::null_space::undetermined;
+use crate::inspect::CovarianceError;
 use crate::outcome::Undetermined;
 use crate::problem::CompileError;
 use crate::problem::Problem;
@@ -46,9 +46,10 @@ impl Problem {
     /// A direction that nothing constrains at the estimate, as far as f64 can tell: neither damping nor what a solver
     /// found on its way has a part in it.
     pub fn undetermined(&mut self) -> Option<Undetermined> {
-        self.linearize();
-        let failed = self.factorize(None).is_err();
-        undetermined(self, failed, 0.0)
+        match self.factorized() {
+            Err(CovarianceError::Indeterminate(open)) => Some(open),
+            _ => None,
+        }
     }
 }
 
@@ -58,10 +59,10 @@ impl Solution {
     /// # Errors
     /// Where `graph` is not the one that was solved.
     pub fn diagnose(&self, graph: &Graph) -> Result<Diagnosis, CompileError> {
-        let look = |problem: &mut Problem| {
-            let undetermined = problem.undetermined();
-            let condition = if undetermined.is_none() { problem.condition() } else { None };
-            (undetermined, condition)
+        let look = |problem: &mut Problem| match problem.factorized() {
+            Ok(mut system) => (None, system.condition()),
+            Err(CovarianceError::Indeterminate(open)) => (Some(open), None),
+            Err(_) => (None, None),
         };
         let is_small = self.values.len() <= LARGE;
         let (undetermined, condition) = if is_small { self.ask(graph, look)? } else { (None, None) };

@@ -1,6 +1,6 @@
 //! How much of each measurement the estimate takes up: its leverage.
 use crate::inspect::CovarianceError;
-use crate::linear::Method;
+use crate::linear::system::NoFactor;
 use crate::problem::Problem;
 
 /// Damping, as a share of the diagonal of H.
@@ -17,22 +17,21 @@ impl Problem {
     /// # Errors
     /// Where there is no memory, or something is not finite.
     pub fn leverages(&mut self) -> Result<Vec<Vec<f64>>, CovarianceError> {
-        self.directly(Self::leverages_directly).unwrap_or(Err(self.out_of_memory()))
-    }
-
-    fn leverages_directly(&mut self) -> Result<Vec<Vec<f64>>, CovarianceError> {
+        self.linearize_once();
         let out_of_memory = self.out_of_memory();
-        self.linearize();
-        let largest = self.layout.diagonal().iter().fold(0.0, |most, i| f64::max(most, self.h[*i]));
-        let mut damping = vec![];
-        self.diagonal(&mut damping);
+        let floor = FLOOR * self.system.largest();
         // a direction that nothing constrains has rows of zeros in J: it takes nothing up, however it is held
-        damping.iter_mut().for_each(|d| *d = SHIFT * d.max(FLOOR * largest));
-        self.factorize(Some(&damping)).map_err(|_| CovarianceError::NotPositiveDefinite)?;
-        let Method::Cholesky(cholesky) = &self.method else { return Err(out_of_memory) };
-        let inverse = cholesky.selected_inverse().ok_or(out_of_memory)?;
-        let mut all = vec![vec![]; self.factors()];
-        self.rows(&mut |factor| {
+        let damping: Vec<f64> = self.system.diagonal().map(|d| SHIFT * d.max(floor)).collect();
+        match self.system.factorize_directly(Some(&damping)) {
+            Ok(()) => {}
+            Err(NoFactor::OutOfMemory) => return Err(out_of_memory),
+            Err(NoFactor::NotPositiveDefinite) => return Err(CovarianceError::NotPositiveDefinite),
+        }
+        let Self { model, system, .. } = self;
+        let inverse =
+            system.cholesky().and_then(|cholesky| cholesky.selected_inverse()).ok_or(out_of_memory)?;
+        let mut all = vec![vec![]; model.factors.len()];
+        model.rows(&mut |factor| {
             let rows = factor.residual.len();
             // the columns of J, with the unknown that each belongs to
             let columns: Vec<(usize, &[f64])> = factor

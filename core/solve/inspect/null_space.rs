@@ -1,7 +1,8 @@
 //! Which variables, in which direction, nothing constrains.
 use crate::linear::Method;
+use crate::linear::system::NoFactor;
 use crate::outcome::Undetermined;
-use crate::problem::Problem;
+use crate::problem::{Model, Problem};
 use std::time::Instant;
 
 /// A pivot below this share of its diagonal entry calls for a closer look.
@@ -23,32 +24,33 @@ const NAMED: usize = 3;
 ///
 /// Overwrites the factorization if it looks closer.
 pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
-    let (clock, before) = (Instant::now(), problem.times.stages());
-    let found = match problem.method {
+    let clock = Instant::now();
+    let has_factor = problem.system.cholesky().is_some();
+    let found = match problem.system.method {
         Method::Cholesky(_) => search(problem, failed, damping),
         // others have no pivots to look at
-        Method::Qr(_) => problem.directly(|problem| {
-            let failed = problem.factorize(None).is_err();
-            search(problem, failed, 0.0)
-        })?,
-        Method::ConjugateGradients(_) if failed => {
-            problem.directly(|problem| search(problem, true, damping))?
-        }
+        Method::Qr(_) => match problem.system.factorize_directly(None) {
+            Err(NoFactor::OutOfMemory) => None,
+            done => search(problem, done.is_err(), 0.0),
+        },
+        Method::ConjugateGradients(_) if failed => search(problem, true, damping),
+        // or where they have been factorized for a question
+        Method::ConjugateGradients(_) if has_factor => search(problem, failed, damping),
         Method::ConjugateGradients(_) => None,
     };
-    problem.times.diagnose += clock.elapsed().as_secs_f64() - (problem.times.stages() - before);
+    problem.times.diagnose += clock.elapsed().as_secs_f64();
     found
 }
 
 fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
-    let largest = problem.layout.diagonal().iter().fold(0.0, |most, i| f64::max(most, problem.h[*i]));
+    let Problem { model, system, .. } = problem;
+    let largest = system.largest();
     if !failed {
         let mut suspicious = false;
         let share = PIVOT.max(10.0 * damping);
-        let (h, diagonal) = (&problem.h, problem.layout.diagonal());
-        let Method::Cholesky(cholesky) = &problem.method else { return None };
-        cholesky.pivots(&mut |i, pivot| {
-            let entry = h[diagonal[i]];
+        let diagonal: Vec<f64> = system.diagonal().copied().collect();
+        system.cholesky()?.pivots(&mut |i, pivot| {
+            let entry = diagonal[i];
             // a pivot that is not a number is suspicious too
             suspicious |= pivot.is_nan() || pivot < share * entry || entry <= ROUNDING * largest;
         });
@@ -56,23 +58,21 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
             return None;
         }
     }
-    let mut scale = vec![];
-    problem.diagonal(&mut scale);
     let floor = if largest > 0.0 { FLOOR * largest } else { 1.0 };
-    scale.iter_mut().for_each(|d| *d = d.max(floor));
+    let scale: Vec<f64> = system.diagonal().map(|d| d.max(floor)).collect();
     let shift: Vec<f64> = scale.iter().map(|d| SHIFT * d).collect();
-    problem.factorize(Some(&shift)).ok()?;
+    system.factorize_directly(Some(&shift)).ok()?;
     // inverse iteration from a start with a part in every direction
     let mut v: Vec<f64> = (0..scale.len()).map(|i| ((i * 7919 % 104_729) as f64 + 1.0).sin()).collect();
     for _ in 0..6 {
         v.iter_mut().zip(&scale).for_each(|(v, d)| *v *= d);
-        problem.cholesky()?.solve(&mut v);
+        system.cholesky()?.solve(&mut v);
         let length = v.iter().zip(&scale).map(|(v, d)| v * v * d).sum::<f64>().sqrt();
         v.iter_mut().for_each(|v| *v /= length);
     }
     // through the rows of J: the quadratic form of H would drown in rounding
-    let mut bent: f64 = problem.held.iter().map(|i| v[*i] * v[*i]).sum();
-    problem.rows(&mut |factor| {
+    let mut bent: f64 = system.held.iter().map(|i| v[*i] * v[*i]).sum();
+    model.rows(&mut |factor| {
         let rows = factor.residual.len();
         for row in 0..rows {
             let along = |(start, block): &(usize, Vec<f64>)| -> f64 {
@@ -81,13 +81,13 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
             bent += factor.blocks.iter().map(along).sum::<f64>().powi(2);
         }
     });
-    (bent < OPEN).then(|| name(problem, &v, &scale))
+    (bent < OPEN).then(|| name(model, &v, &scale))
 }
 
 /// The direction in terms of variables and the names of their tangent directions.
-pub(crate) fn name(problem: &Problem, v: &[f64], scale: &[f64]) -> Undetermined {
+pub(crate) fn name(model: &Model, v: &[f64], scale: &[f64]) -> Undetermined {
     let mut moves: Vec<(usize, f64)> = vec![];
-    for (i, place) in problem.variables.iter().enumerate() {
+    for (i, place) in model.variables.iter().enumerate() {
         if let Some(start) = place.start {
             let range = start..start + place.tangent.len();
             let square = v[range.clone()].iter().zip(&scale[range]).map(|(v, d)| v * v * d).sum::<f64>();
@@ -100,7 +100,7 @@ pub(crate) fn name(problem: &Problem, v: &[f64], scale: &[f64]) -> Undetermined 
     moves.truncate(NAMED.min(moving));
     let mut direction = vec![];
     for (i, _) in &moves {
-        let place = &problem.variables[*i];
+        let place = &model.variables[*i];
         let Some(start) = place.start else { continue };
         let part = &v[start..start + place.tangent.len()];
         let largest = part.iter().fold(0.0, |m, x| f64::max(m, x.abs()));
@@ -109,6 +109,6 @@ pub(crate) fn name(problem: &Problem, v: &[f64], scale: &[f64]) -> Undetermined 
         let entries = part.iter().zip(place.tangent).filter(|(x, _)| x.abs() > 0.1 * largest);
         direction.extend(entries.map(|(x, name)| (place.key.clone(), *name, sign * x / largest)));
     }
-    let keys = moves.iter().map(|(i, _)| problem.variables[*i].key.clone()).collect();
+    let keys = moves.iter().map(|(i, _)| model.variables[*i].key.clone()).collect();
     Undetermined { keys, direction, moving }
 }

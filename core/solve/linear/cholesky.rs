@@ -141,6 +141,22 @@ impl Cholesky {
         self.arch.dispatch(Solve { cholesky: self, x, lower: false, upper: true });
     }
 
+    /// x ← x + L⁻¹ eᵢ, for x zero along the way: only the supernodes from that of the unknown i to its root have a part in
+    /// it. Returns their columns.
+    pub(crate) fn solve_unit(&mut self, i: usize, x: &mut [f64]) -> Vec<Range<usize>> {
+        let mut columns = vec![];
+        x[i] = 1.0;
+        let nodes = &self.structure.nodes;
+        let mut at = nodes.partition_point(|node| node.first + node.width <= i);
+        while let Some(node) = nodes.get(at) {
+            columns.push(node.first..node.first + node.width);
+            let panel = &self.values[node.panel..node.panel + node.height() * node.width];
+            solve_lower(node, &self.structure, panel, x, &mut self.below);
+            at = node.parent as usize;
+        }
+        columns
+    }
+
     /// The pivots: squares of the factor's diagonal.
     pub(crate) fn pivots(&self, visit: &mut impl FnMut(usize, f64)) {
         for node in &self.structure.nodes {

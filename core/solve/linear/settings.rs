@@ -1,4 +1,5 @@
 //! How the linear system of each step is solved, as a config says it.
+use crate::setting::{SettingError, not_negative as all_not_negative};
 use manifactor_graph::Key;
 use manifactor_graph::checked::not_negative;
 use schemars::JsonSchema;
@@ -99,4 +100,17 @@ pub enum Ordering {
     First(Vec<String>),
     /// These variables first, as listed; then the others, by minimum degree.
     Given(Vec<Key>),
+}
+
+impl LinearSolver {
+    /// Whether each number is within its domain.
+    ///
+    /// # Errors
+    /// Names the one that is not.
+    pub fn check(&self) -> Result<(), SettingError> {
+        all_not_negative(&[
+            ("linear.conjugate_gradients.tolerance", self.conjugate_gradients.tolerance),
+            ("linear.memory_gib", self.memory_gib.unwrap_or(0.0)),
+        ])
+    }
 }

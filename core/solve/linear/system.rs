@@ -1,111 +1,91 @@
-//! Linear steps of a linearized problem: damped, undamped, and along the gradient.
+//! The linear system of a step: H, g, and whatever factorizes them.
+use crate::linear::layout::Layout;
 use crate::linear::memory;
 use crate::linear::{Cholesky, Damped, Method, NotPositiveDefinite, Qr};
-use crate::problem::Problem;
 use manifactor_graph::batch::FactorRows;
-use std::time::Instant;
+use manifactor_graph::normal_equations::NormalEquations;
 
-impl Problem {
-    /// Factorizes H + diag(added), and takes -g half the way to the step.
-    pub(crate) fn factorize(&mut self, added: Option<&[f64]>) -> Result<(), NotPositiveDefinite> {
-        self.factorize_while(added, &mut || true)
-    }
+/// Visits the rows of the whitened and weighted Jacobian, for methods that take J in place of H.
+pub(crate) type Rows<'a> = &'a dyn Fn(&mut dyn FnMut(FactorRows<'_>));
 
-    /// The same; iterations end where `go_on` is false, with the step as far as it is.
-    pub(crate) fn factorize_while(
-        &mut self,
-        added: Option<&[f64]>,
-        go_on: &mut dyn FnMut() -> bool,
-    ) -> Result<(), NotPositiveDefinite> {
-        let clock = Instant::now();
-        self.forward.clear();
-        self.forward.extend(self.g.iter().map(|g| -g));
-        let system = Damped { layout: &self.layout, h: &self.h, added };
-        let done = match &mut self.method {
-            Method::Cholesky(cholesky) => cholesky.factorize(&self.h, added, &mut self.forward),
-            Method::ConjugateGradients(iterative) => iterative.solve(system, &mut self.forward, go_on),
-            Method::Qr(qr) => {
-                qr.clear();
-                let (batches, columns) = (&self.batches, &self.columns);
-                batches.iter().for_each(|b| b.rows(columns, &mut |factor| push_rows(qr, &factor)));
-                let held = self.held.iter().map(|i| (*i, 1.0));
-                let damped = added.into_iter().flatten().enumerate().map(|(i, a)| (i, a.sqrt()));
-                held.chain(damped).for_each(|entry| qr.push([entry].into_iter(), 0.0));
-                qr.solve(&mut self.forward)
-            }
-        };
-        if self.refinements > 0 {
-            let kept = self.added.get_or_insert_default();
-            kept.clear();
-            kept.extend(added.into_iter().flatten());
-        }
-        self.times.factorize += clock.elapsed().as_secs_f64();
-        done
-    }
+/// Why there is no factor by Cholesky.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum NoFactor {
+    NotPositiveDefinite,
+    OutOfMemory,
+}
 
-    /// -(H + diag(added))⁻¹ g of the last factorization, into `step`, refined as often as is asked for, as long as each
-    /// correction is less than half of the one before (Higham, *Accuracy and Stability of Numerical Algorithms*,
-    /// chapter 12): what follows is rounding.
-    pub(crate) fn newton_step(&mut self, step: &mut Vec<f64>, go_on: &mut dyn FnMut() -> bool) {
-        let clock = Instant::now();
-        step.clear();
-        step.extend_from_slice(&self.forward);
-        if let Method::Cholesky(cholesky) = &mut self.method {
-            cholesky.solve_upper(step);
-            let mut before = f64::INFINITY;
-            for _ in 0..self.refinements {
-                if !go_on() {
-                    break;
-                }
-                // what is left of -g - (H + diag(added)) δ
-                let added = self.added.as_deref().filter(|added| !added.is_empty());
-                Damped { layout: &self.layout, h: &self.h, added }.multiply(step, &mut self.forward);
-                self.forward.iter_mut().zip(&self.g).for_each(|(r, g)| *r = -g - *r);
-                cholesky.solve(&mut self.forward);
-                let correction = norm(&self.forward);
-                if correction.is_nan() || 2.0 * correction > before {
-                    break;
-                }
-                step.iter_mut().zip(&self.forward).for_each(|(s, r)| *s += r);
-                if correction == 0.0 {
-                    break;
-                }
-                before = correction;
-            }
-        }
-        self.times.solve += clock.elapsed().as_secs_f64();
-    }
+/// (H + damping) δ = -g. The structure is analysed once; numbers come and go.
+pub(crate) struct LinearSystem {
+    pub layout: Layout,
+    /// The lower triangle of H, by compressed columns in the order of elimination.
+    pub h: Vec<f64>,
+    pub g: Vec<f64>,
+    /// Scalar unknowns that are held: one on the diagonal of H, zero in the rest of their rows.
+    pub held: Vec<usize>,
+    pub method: Method,
+    /// Most steps of iterative refinement after each solve.
+    refinements: usize,
+    /// Damping of the last factorization, kept for its refinement.
+    damping: Vec<f64>,
+    /// -L⁻¹g of the last factorization, or the step itself, by what the method is.
+    half_step: Vec<f64>,
+    /// A factor by Cholesky where the method has none.
+    direct: Option<Cholesky>,
+    /// Whether the factor by Cholesky is that of H as it is, without damping.
+    is_factorized: bool,
+}
 
-    /// Runs what needs a factorization by Cholesky, with one in the method's place meanwhile; `None` where there is no
-    /// memory for it.
-    pub(crate) fn directly<R>(&mut self, run: impl FnOnce(&mut Self) -> R) -> Option<R> {
-        if self.cholesky().is_some() {
-            return Some(run(self));
-        }
-        let structure = self.layout.structure(false);
-        if structure.bytes() > memory::for_factor(self.layout.row_idx.len()) {
-            return None;
-        }
-        let direct = Method::Cholesky(Cholesky::new(structure)?);
-        let method = std::mem::replace(&mut self.method, direct);
-        let step = std::mem::take(&mut self.forward);
-        let result = run(self);
-        (self.method, self.forward) = (method, step);
-        Some(result)
-    }
-
-    /// The last factorization, where it is one by Cholesky.
-    pub(crate) fn cholesky(&mut self) -> Option<&mut Cholesky> {
-        match &mut self.method {
-            Method::Cholesky(cholesky) => Some(cholesky),
-            _ => None,
+impl LinearSystem {
+    pub(crate) fn new(layout: Layout, held: Vec<usize>, method: Method, refinements: usize) -> Self {
+        Self {
+            h: vec![0.0; layout.row_idx.len()],
+            g: vec![0.0; layout.dim()],
+            layout,
+            held,
+            method,
+            refinements,
+            damping: vec![],
+            half_step: vec![],
+            direct: None,
+            is_factorized: false,
         }
     }
 
-    /// The diagonal of H, into `out`.
-    pub(crate) fn diagonal(&self, out: &mut Vec<f64>) {
-        out.clear();
-        out.extend(self.layout.diagonal().iter().map(|i| self.h[*i]));
+    /// Number of scalar unknowns.
+    pub(crate) fn dim(&self) -> usize {
+        self.g.len()
+    }
+
+    /// Zeros, for factors to add to.
+    pub(crate) fn begin(&mut self) -> NormalEquations<'_> {
+        self.is_factorized = false;
+        self.direct = None;
+        self.h.fill(0.0);
+        self.g.fill(0.0);
+        NormalEquations { h: &mut self.h, g: &mut self.g }
+    }
+
+    /// Once all factors are added: the diagonal of what is held.
+    pub(crate) fn finish(&mut self) {
+        for &i in &self.held {
+            self.h[self.layout.diagonal()[i]] = 1.0;
+        }
+    }
+
+    /// Whether g and H are finite. No entry of a sum of JᵀJ is larger than those on its diagonal, so these will do.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.g.iter().chain(self.diagonal()).all(|x| x.is_finite())
+    }
+
+    /// The diagonal of H.
+    pub(crate) fn diagonal(&self) -> impl Iterator<Item = &f64> {
+        self.layout.diagonal().iter().map(|i| &self.h[*i])
+    }
+
+    /// The largest entry on the diagonal of H.
+    pub(crate) fn largest(&self) -> f64 {
+        self.diagonal().fold(0.0, |most, d| f64::max(most, *d))
     }
 
     /// H x.
@@ -113,6 +93,112 @@ impl Problem {
         let mut y = vec![0.0; x.len()];
         self.layout.multiply_add(&self.h, x, &mut y);
         y
+    }
+
+    /// Factorizes H + diag(damping) by the method that was chosen, and takes -g half the way to the step. Iterations end
+    /// where `go_on` is false, with the step as far as it is.
+    pub(crate) fn factorize(
+        &mut self,
+        damping: Option<&[f64]>,
+        rows: Rows<'_>,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), NotPositiveDefinite> {
+        self.is_factorized = false;
+        self.begin_step(damping);
+        let system = Damped { layout: &self.layout, h: &self.h, added: damping };
+        let step = &mut self.half_step;
+        match &mut self.method {
+            Method::Cholesky(cholesky) => {
+                cholesky.factorize(&self.h, damping, step)?;
+                self.is_factorized = damping.is_none();
+                Ok(())
+            }
+            Method::ConjugateGradients(iterative) => iterative.solve(system, step, go_on),
+            Method::Qr(qr) => {
+                qr.clear();
+                rows(&mut |factor| push_rows(qr, &factor));
+                let held = self.held.iter().map(|i| (*i, 1.0));
+                let damped = damping.into_iter().flatten().enumerate().map(|(i, d)| (i, d.sqrt()));
+                held.chain(damped).for_each(|entry| qr.push([entry].into_iter(), 0.0));
+                qr.solve(step)
+            }
+        }
+    }
+
+    fn begin_step(&mut self, damping: Option<&[f64]>) {
+        self.half_step.clear();
+        self.half_step.extend(self.g.iter().map(|g| -g));
+        self.damping.clear();
+        if self.refinements > 0 {
+            self.damping.extend(damping.into_iter().flatten());
+        }
+    }
+
+    /// -(H + diag(damping))⁻¹ g of the last factorization, into `step`, refined as often as is asked for, as long as each
+    /// correction is less than half of the one before (Higham, *Accuracy and Stability of Numerical Algorithms*,
+    /// chapter 12): what follows is rounding.
+    pub(crate) fn newton_step(&mut self, step: &mut Vec<f64>, go_on: &mut dyn FnMut() -> bool) {
+        step.clear();
+        step.extend_from_slice(&self.half_step);
+        let Method::Cholesky(cholesky) = &mut self.method else { return };
+        cholesky.solve_upper(step);
+        let mut before = f64::INFINITY;
+        for _ in 0..self.refinements {
+            if !go_on() {
+                break;
+            }
+            // what is left of -g - (H + diag(damping)) δ
+            let added = Some(&self.damping[..]).filter(|damping| !damping.is_empty());
+            let rest = &mut self.half_step;
+            Damped { layout: &self.layout, h: &self.h, added }.multiply(step, rest);
+            rest.iter_mut().zip(&self.g).for_each(|(r, g)| *r = -g - *r);
+            cholesky.solve(rest);
+            let correction = norm(rest);
+            if correction.is_nan() || 2.0 * correction > before {
+                break;
+            }
+            step.iter_mut().zip(rest).for_each(|(s, r)| *s += *r);
+            if correction == 0.0 {
+                break;
+            }
+            before = correction;
+        }
+    }
+
+    /// Factorizes H + diag(damping) by Cholesky, whatever the method is. It is there until the next linearization.
+    pub(crate) fn factorize_directly(&mut self, damping: Option<&[f64]>) -> Result<(), NoFactor> {
+        self.is_factorized = false;
+        if !matches!(self.method, Method::Cholesky(_)) && self.direct.is_none() {
+            let structure = self.layout.structure(false);
+            if structure.bytes() > memory::for_factor(self.layout.row_idx.len()) {
+                return Err(NoFactor::OutOfMemory);
+            }
+            self.direct = Some(Cholesky::new(structure).ok_or(NoFactor::OutOfMemory)?);
+        }
+        if matches!(self.method, Method::Cholesky(_)) {
+            self.begin_step(damping);
+        }
+        let done = match (&mut self.method, &mut self.direct) {
+            (Method::Cholesky(cholesky), _) => cholesky.factorize(&self.h, damping, &mut self.half_step),
+            // the method's own step stays as it is
+            (_, Some(cholesky)) => cholesky.factorize(&self.h, damping, &mut vec![0.0; self.g.len()]),
+            (_, None) => return Err(NoFactor::OutOfMemory),
+        };
+        self.is_factorized = done.is_ok() && damping.is_none();
+        done.map_err(|_| NoFactor::NotPositiveDefinite)
+    }
+
+    /// Whether the factor by Cholesky is that of H as it is, without damping.
+    pub(crate) fn is_factorized(&self) -> bool {
+        self.is_factorized
+    }
+
+    /// The last factor by Cholesky: the method's own, or that of [`factorize_directly`](Self::factorize_directly).
+    pub(crate) fn cholesky(&mut self) -> Option<&mut Cholesky> {
+        match &mut self.method {
+            Method::Cholesky(cholesky) => Some(cholesky),
+            _ => self.direct.as_mut(),
+        }
     }
 }
 

@@ -1,11 +1,7 @@
 //! What takes no part in a solve: factors that are not defined, and variables that no other factor touches.
-use crate::problem::Problem;
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::fmt;
-
-/// Inactive factors that an outcome names.
-const NAMED: usize = 10;
 
 /// A factor that is not defined at the final values.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -48,38 +44,5 @@ impl fmt::Display for Untouched {
             }
         };
         write!(f, "{advice}, or fix or remove what nothing touches")
-    }
-}
-
-impl Problem {
-    /// The first of the factors that were not defined at the last linearization.
-    pub(crate) fn inactive_factors(&self) -> Vec<InactiveFactor> {
-        let mut factors = vec![];
-        self.batches.iter().for_each(|batch| batch.inactive(&mut |factor| factors.push(factor)));
-        factors.sort_unstable();
-        let named = factors.into_iter().take(NAMED);
-        let describe = |factor| InactiveFactor {
-            factor,
-            name: self.factor_types[factor].0,
-            keys: self.factor_keys(factor),
-        };
-        named.map(describe).collect()
-    }
-
-    /// The free variables that no factor touches which took part in the last linearization; `None` where there are
-    /// none.
-    pub(crate) fn untouched(&self) -> Option<Untouched> {
-        let mut takes_part = vec![true; self.factors()];
-        self.batches.iter().for_each(|batch| batch.inactive(&mut |factor| takes_part[factor] = false));
-        takes_part.iter_mut().zip(&self.weights).for_each(|(part, weight)| *part &= *weight != 0.0);
-        let mut touched = vec![false; self.variables.len()];
-        for (variables, _) in self.factor_variables.iter().zip(&takes_part).filter(|(_, part)| **part) {
-            variables.iter().for_each(|variable| touched[*variable as usize] = true);
-        }
-        let free = self.variables.iter().zip(&touched).filter(|(place, _)| place.start.is_some());
-        let keys: Vec<Key> =
-            free.filter(|(_, touched)| !**touched).map(|(place, _)| place.key.clone()).collect();
-        let active = takes_part.iter().filter(|part| **part).count();
-        (!keys.is_empty()).then(|| Untouched { keys, active, factors: self.factors() })
     }
 }

@@ -1,13 +1,15 @@
 //! From the dynamic view of a graph to the columnar one.
-use crate::linear::choice::{self, Blocks};
 use crate::linear::layout::Layout;
 use crate::linear::memory::{self, Bytes};
 use crate::linear::settings::LinearSolver;
+use crate::linear::system::LinearSystem;
 use crate::outcome::Times;
-use crate::problem::{Place, Problem};
+use crate::problem::Problem;
+use crate::problem::method::{self, Blocks};
+use crate::problem::model::{FactorPlace, Model, Place};
 use manifactor_graph::batch::{Batch, Member};
 use manifactor_graph::column::{Columns, FIXED};
-use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values};
+use manifactor_graph::{Fixed, Graph, GraphError, Key, Resolved, Values};
 use std::any::TypeId;
 use std::collections::HashMap;
 use std::time::Instant;
@@ -110,10 +112,10 @@ pub(crate) fn compile(
     }
     let of_block: Vec<&Place> = free.iter().map(|v| &variables[*v]).collect();
     let blocks = Blocks::new(&of_block, values);
-    let order = choice::order(linear, &blocks)?;
+    let order = method::order(linear, &blocks)?;
     let out_of_memory = CompileError::OutOfMemory { unknowns, needed: None, available: 0 };
     let layout = Layout::new(&dims, pairs, &order).ok_or(out_of_memory)?;
-    let method = choice::method(linear, &blocks, &layout)?;
+    let method = method::method(linear, &blocks, &layout)?;
     for (variable, block) in variables.iter_mut().zip(&block) {
         variable.start = block.map(|b| layout.start[b] as usize);
     }
@@ -125,41 +127,20 @@ pub(crate) fn compile(
             held.extend((0..place.tangent.len()).filter(|d| place.held >> d & 1 == 1).map(|d| start + d));
         }
     }
-    let batches = batches(graph, &resolved, &variables, &block, &layout);
-    let (h, g) = (vec![0.0; layout.row_idx.len()], vec![0.0; unknowns]);
-    let factor_variables = resolved.into_iter().map(|factor| factor.variables).collect();
-    let factor_types = graph.factors().iter().map(|f| (f.factor.typetag_name(), observed_rows(f))).collect();
+    let (batches, factors) = batches(graph, resolved, &variables, &block, &layout);
     let times = Times { compile: clock.elapsed().as_secs_f64(), ..Times::default() };
-    let trial = columns.clone();
-    let (factors, entries) = (graph.factors().len(), layout.row_idx.len());
+    let (count, entries) = (factors.len(), layout.row_idx.len());
     tracing::debug!(
         variables = variables.len(),
-        factors,
+        factors = count,
         unknowns,
         entries,
         seconds = times.compile,
         "compiled"
     );
-    Ok(Problem {
-        variables,
-        version: graph.version(),
-        factor_variables,
-        factor_types,
-        weights: vec![],
-        columns,
-        trial,
-        starts,
-        batches,
-        layout,
-        h,
-        g,
-        held,
-        method,
-        refinements: linear.refinements,
-        added: None,
-        forward: vec![],
-        times,
-    })
+    let model = Model::new(variables, factors, columns, starts, batches);
+    let system = LinearSystem::new(layout, held, method, linear.refinements);
+    Ok(Problem::new(model, system, graph.version(), times))
 }
 
 /// Refuses a graph for which there is no memory, before any of it is taken.
@@ -175,11 +156,6 @@ fn check_memory(graph: &Graph, values: &Values) -> Result<(), CompileError> {
         true => Err(CompileError::TooLarge { factors, needed, available }),
         false => Ok(()),
     }
-}
-
-fn observed_rows(entry: &FactorEntry) -> usize {
-    let all = entry.factor.erased().signature().rows.unwrap_or(0);
-    entry.noise.observed().map_or(all, |observed| observed.iter().filter(|o| **o).count())
 }
 
 /// Values into columns, by type.
@@ -212,20 +188,20 @@ fn held_bits(fixed: &Fixed, tangent: &[&str]) -> u32 {
     }
 }
 
-/// Factors into batches, by residual type, kind of noise and type of loss.
+/// Factors into batches, by residual type, kind of noise and type of loss; and by factor, where it went.
 fn batches(
     graph: &Graph,
-    resolved: &[Resolved],
+    resolved: Vec<Resolved>,
     variables: &[Place],
     block: &[Option<usize>],
     layout: &Layout,
-) -> Vec<Box<dyn Batch>> {
+) -> (Vec<Box<dyn Batch>>, Vec<FactorPlace>) {
     let mut batches: Vec<Box<dyn Batch>> = vec![];
     let mut of_type: HashMap<TypeId, Vec<usize>> = HashMap::new();
     // by factor its batch, and by batch the numbers of factors and of their variables: room is made once
-    let mut batch_of = Vec::with_capacity(resolved.len());
+    let mut places = Vec::with_capacity(resolved.len());
     let mut sizes: Vec<(usize, usize)> = vec![];
-    for (factor, Resolved { variables, whitener }) in graph.factors().iter().zip(resolved) {
+    for (factor, Resolved { variables, whitener }) in graph.factors().iter().zip(&resolved) {
         let (erased, loss) = (factor.factor.erased(), factor.loss.as_deref());
         let candidates = of_type.entry(erased.type_id()).or_default();
         let found = candidates.iter().copied().find(|b| batches[*b].fits(whitener, loss));
@@ -235,13 +211,14 @@ fn batches(
             sizes.push((0, 0));
             batches.len() - 1
         });
+        places.push((batch as u32, sizes[batch].0 as u32));
         sizes[batch].0 += 1;
         sizes[batch].1 += variables.len();
-        batch_of.push(batch);
     }
     for (batch, (factors, variables)) in batches.iter_mut().zip(sizes) {
         batch.reserve(factors, variables);
     }
+    let mut factors = Vec::with_capacity(resolved.len());
     let (mut index, mut starts, mut held, mut slots) = (vec![], vec![], vec![], vec![]);
     for (entry, (factor, Resolved { variables: ids, whitener })) in
         graph.factors().iter().zip(resolved).enumerate()
@@ -259,16 +236,22 @@ fn batches(
                 slots.push(both.and_then(|(a, b)| layout.slot(a, b)).unwrap_or_default());
             }
         }
-        batches[batch_of[entry]].push(&Member {
+        let (batch, at) = places[entry];
+        batches[batch as usize].push(&Member {
             entry,
             factor: factor.factor.erased().as_any(),
             index: &index,
             starts: &starts,
             held: &held,
             slots: &slots,
-            whitener,
+            whitener: &whitener,
             loss: factor.loss.as_deref(),
         });
+        let (name, all_rows) =
+            (factor.factor.typetag_name(), factor.factor.erased().signature().rows.unwrap_or(0) as u32);
+        let mut place = FactorPlace { variables: ids, name, all_rows, rows: all_rows, batch, index: at };
+        place.observe(&factor.noise);
+        factors.push(place);
     }
-    batches
+    (batches, factors)
 }

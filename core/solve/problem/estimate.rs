@@ -32,12 +32,12 @@ impl Problem {
     /// estimate is then as it was.
     pub fn set_values(&mut self, values: &Values) -> Result<(), ValueError> {
         let mut known = 0;
-        for place in &self.variables {
+        for place in &self.model.variables {
             let Some(value) = values.variable(place.key.as_str()) else { continue };
             known += 1;
             let (erased, key) = (value.erased(), place.key.clone());
-            if self.columns.position(erased.type_id()) != Some(place.column) {
-                let before = self.columns.column(place.column).get(place.index);
+            if self.model.columns().position(erased.type_id()) != Some(place.column) {
+                let before = self.model.columns().column(place.column).get(place.index);
                 let expected = before.map_or("another type", |value| value.typetag_name());
                 return Err(ValueError::WrongType { key, expected, found: value.typetag_name() });
             }
@@ -46,22 +46,13 @@ impl Problem {
             }
         }
         if known < values.len() {
-            let is_unknown = |key: &str| self.variables.iter().all(|place| place.key.as_str() != key);
+            let is_unknown = |key: &str| self.model.variables.iter().all(|place| place.key.as_str() != key);
             if let Some((key, _)) = values.iter().find(|(key, _)| is_unknown(key.as_str())) {
                 return Err(ValueError::Missing { key: key.clone() });
             }
         }
-        self.put(values);
+        self.model.put(values);
         Ok(())
-    }
-
-    /// Sets the estimate to values that are known to fit.
-    pub(crate) fn put(&mut self, values: &Values) {
-        for place in &self.variables {
-            if let Some(value) = values.variable(place.key.as_str()) {
-                self.columns.column_mut(place.column).set(place.index, value);
-            }
-        }
     }
 
     /// Makes each factor count as often as its weight says, on top of its loss.
@@ -77,15 +68,7 @@ impl Problem {
         if let Some(factor) = weights.iter().position(bad) {
             return Err(WeightError::Domain { factor, weight: weights[factor] });
         }
-        self.weigh(weights);
+        self.model.weigh(weights);
         Ok(())
-    }
-
-    /// Sets weights that are known to fit; a factor without one counts once.
-    pub(crate) fn weigh(&mut self, weights: &[f64]) {
-        self.weights.clear();
-        self.weights.extend_from_slice(weights);
-        self.weights.resize(self.factors(), 1.0);
-        self.batches.iter_mut().for_each(|b| b.set_weights(&self.weights));
     }
 }

@@ -28,10 +28,10 @@ impl Solution {
         question: impl FnOnce(&mut Problem) -> R,
     ) -> Result<R, CompileError> {
         if let Ok(mut problem) = self.problem.0.try_lock()
-            && !matches!(problem.method, Method::ConjugateGradients(_))
+            && !matches!(problem.system.method, Method::ConjugateGradients(_))
             && problem.version == graph.version()
         {
-            problem.put(&self.values);
+            problem.model.put(&self.values);
             return Ok(question(&mut problem));
         }
         Ok(question(&mut self.problem(graph)?))
@@ -44,7 +44,7 @@ impl Solution {
     pub fn problem(&self, graph: &Graph) -> Result<Problem, CompileError> {
         let mut problem = Problem::compile(graph, &self.values)?;
         if !self.weights.is_empty() {
-            problem.weigh(&self.weights);
+            problem.model.weigh(&self.weights);
         }
         Ok(problem)
     }

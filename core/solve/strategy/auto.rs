@@ -9,9 +9,11 @@ use crate::outcome::Outcome;
 use crate::outcome::Termination;
 use crate::problem::CompileError;
 use crate::problem::Problem;
+use crate::setting::SettingError;
+use crate::strategy::descent::Descent;
 use crate::strategy::gauss_newton::GaussNewton;
 use crate::strategy::levenberg_marquardt::LevenbergMarquardt;
-use crate::strategy::optimizer::{Optimizer, Session, SettingError, Stopping};
+use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::{Graph, Values, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -99,12 +101,10 @@ register!(dyn Optimizer, "auto", Auto);
 impl Auto {
     /// Damped steps, the first by so much. The damping follows the noise: (H + λ D) δ = -g is the same for any unit of it.
     fn damped(&self, initial_lambda: f64, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        let rows: usize = problem.factor_types.iter().map(|(_, rows)| rows).sum();
-        let bounds = |session: &Session<'_>| {
-            let variance = 2.0 * session.at.cost / rows.max(1) as f64;
-            let diagonal = session.problem.layout.diagonal().iter();
-            let largest = diagonal.fold(0.0, |most, i| f64::max(most, session.problem.h[*i]));
-            let most = (variance / WEAK.powi(2)).max(FLOOR * largest);
+        let rows: u32 = problem.model.factors.iter().map(|factor| factor.rows).sum();
+        let bounds = |descent: &Descent<'_>| {
+            let variance = 2.0 * descent.at.cost / f64::from(rows.max(1));
+            let most = (variance / WEAK.powi(2)).max(FLOOR * descent.problem.system.largest());
             [LEAST * most, most]
         };
         let damped =
@@ -119,14 +119,14 @@ impl Auto {
     /// Takes a step of this length that has raised the cost, and goes on by full ones, if the next is much shorter: weights
     /// that span many digits make the cost of a good step rise. Back to before it, where that leads to no minimum.
     fn go_on(&self, step: f64, problem: &mut Problem, watch: &mut Watch<'_>, outcome: Outcome) -> Outcome {
-        let (before, pause) = (problem.columns.clone(), watch.pause);
-        problem.accept();
+        let (before, pause) = (problem.model.columns().clone(), watch.pause);
+        problem.model.accept();
         watch.expect_shorter_than(step);
         let next = self.full_steps(problem, watch);
         let better = search::is_minimum(&next.termination);
         if !better {
             watch.pause = pause;
-            problem.columns = before;
+            problem.model.restore(before);
             problem.linearize();
         }
         outcome.then(next, better)

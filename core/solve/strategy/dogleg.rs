@@ -5,7 +5,9 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::{Stall, Termination, Tolerance};
 use crate::problem::Problem;
-use crate::strategy::optimizer::{Optimizer, Session, SettingError, Step, Stopping, Tried};
+use crate::setting::SettingError;
+use crate::strategy::descent::{Descent, Step, Tried};
+use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::register;
 use schemars::JsonSchema;
@@ -49,13 +51,13 @@ impl Optimizer for Dogleg {
     }
 
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        let mut session = match Session::begin(problem, &self.stop, observer) {
-            Ok(session) => session,
+        let mut descent = match Descent::begin(problem, &self.stop, observer) {
+            Ok(descent) => descent,
             Err(outcome) => return *outcome,
         };
-        let termination = self.iterate(&mut session);
-        let open = session.open_direction();
-        session.end(termination, open)
+        let termination = self.iterate(&mut descent);
+        let open = descent.open_direction();
+        descent.account(termination, open)
     }
 }
 register!(dyn Optimizer, "dogleg", Dogleg);
@@ -71,12 +73,12 @@ struct Path {
 impl Path {
     fn new(problem: &Problem, newton: &[f64]) -> Self {
         let mut path = Self { newton: newton.to_vec(), ..Self::default() };
-        problem.diagonal(&mut path.scale);
+        path.scale.extend(problem.system.diagonal());
         path.scale.iter_mut().for_each(|d| *d = d.max(1e-12));
         // steepest descent where lengths are measured by the diagonal: -D⁻¹g
-        path.cauchy = problem.g.iter().zip(&path.scale).map(|(g, d)| -g / d).collect();
-        let curvature = dot(&path.cauchy, &problem.multiply(&path.cauchy));
-        let length = -dot(&path.cauchy, &problem.g) / curvature.max(f64::MIN_POSITIVE);
+        path.cauchy = problem.system.g.iter().zip(&path.scale).map(|(g, d)| -g / d).collect();
+        let curvature = dot(&path.cauchy, &problem.system.multiply(&path.cauchy));
+        let length = -dot(&path.cauchy, &problem.system.g) / curvature.max(f64::MIN_POSITIVE);
         path.cauchy.iter_mut().for_each(|x| *x *= length);
         path
     }
@@ -105,53 +107,52 @@ impl Path {
 }
 
 impl Dogleg {
-    fn iterate(&self, session: &mut Session<'_>) -> Termination {
+    fn iterate(&self, descent: &mut Descent<'_>) -> Termination {
         let mut radius = self.initial_radius.map(Positive::get);
-        let mut newton = vec![];
+        let mut newton = Step::default();
         'linearized: loop {
-            if let Some(termination) = session.finished() {
+            if let Some(termination) = descent.next() {
                 return termination;
             }
-            session.iterations += 1;
-            if !session.factorize_undamped() || !session.newton_step(&mut newton) {
-                return session.stalled(Stall::Damping);
+            if !descent.undamped(&mut newton) {
+                return descent.stalled();
             }
-            let path = Path::new(session.problem, &newton);
+            let path = Path::new(descent.problem, &newton.delta);
             let whole = path.length(&path.newton);
             // what the whole step would gain: where that is next to nothing, so is what the radius leaves of it
-            let promises = !session.is_small(-0.5 * dot(&newton, &session.problem.g));
+            let promises = !descent.is_small(newton.predicted);
             let mut within = radius.unwrap_or(whole);
             loop {
                 // a step that the radius has made small says little of the cost around
                 let is_cut = promises && within < whole;
                 let delta = path.point(within);
-                let (g, length) = (dot(&delta, &session.problem.g), path.length(&delta));
-                let predicted = -g - 0.5 * dot(&delta, &session.problem.multiply(&delta));
-                let step = Step { predicted, norm: norm(&delta), control: within };
-                let tried = session.attempt(&delta, &step);
+                let (g, length) = (dot(&delta, descent.gradient()), path.length(&delta));
+                let predicted = -g - 0.5 * dot(&delta, &descent.problem.system.multiply(&delta));
+                let step = Step { predicted, norm: norm(&delta), control: within, delta };
+                let tried = descent.attempt(&step);
                 let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
-                session.record(&step, accepted);
+                descent.record(&step, accepted);
                 if let (true, Tried::Lower { gain }) = (accepted, &tried) {
                     radius = Some(match *gain {
                         gain if gain > 0.75 => within.max(3.0 * length),
                         gain if gain < 0.25 => 0.5 * within,
                         _ => within,
                     });
-                    match session.take(&step) {
+                    match descent.take(&step) {
                         Some(termination) if !is_cut => return termination,
                         _ => continue 'linearized,
                     }
                 }
-                if !is_cut && !matches!(tried, Tried::Undefined) && session.settled(&step) {
+                if !is_cut && !matches!(tried, Tried::Undefined) && descent.settled(&step) {
                     return Termination::Converged { reason: Tolerance::RelativeCost };
                 }
-                if step.norm <= session.stop.step {
+                if step.norm <= descent.stop.step {
                     return match is_cut {
-                        true => session.stalled(Stall::TrustRegion),
+                        true => descent.stalled_by(Stall::TrustRegion),
                         false => Termination::Converged { reason: Tolerance::Step },
                     };
                 }
-                if session.interrupted() {
+                if descent.interrupted() {
                     return Termination::Interrupted;
                 }
                 within = 0.5 * within.min(length);

@@ -1,11 +1,12 @@
 //! Gauss-Newton: full steps.
 use crate::linear::settings::LinearSolver;
-use crate::linear::system::{dot, norm};
 use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::{Stall, Termination};
 use crate::problem::Problem;
-use crate::strategy::optimizer::{Best, Optimizer, Session, SettingError, Step, Stopping, Tried};
+use crate::setting::SettingError;
+use crate::strategy::descent::{Best, Descent, Step, Tried};
+use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -45,54 +46,51 @@ impl Optimizer for GaussNewton {
     }
 
     fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        let mut session = match Session::begin(problem, &self.stop, observer) {
-            Ok(session) => session,
+        let mut descent = match Descent::begin(problem, &self.stop, observer) {
+            Ok(descent) => descent,
             Err(outcome) => return *outcome,
         };
-        let mut best = Best::new(&session);
-        let termination = iterate(&mut session, &mut best);
-        best.restore(&mut session);
-        let open = session.open_direction();
-        session.end(termination, open)
+        let mut best = Best::new(&descent);
+        let termination = iterate(&mut descent, &mut best);
+        best.restore(&mut descent);
+        let open = descent.open_direction();
+        descent.account(termination, open)
     }
 }
 register!(dyn Optimizer, "gauss_newton", GaussNewton);
 
-fn iterate(session: &mut Session<'_>, best: &mut Best) -> Termination {
-    let mut delta = vec![];
+fn iterate(descent: &mut Descent<'_>, best: &mut Best) -> Termination {
+    let mut step = Step::default();
     let mut rises = 0;
     loop {
-        if let Some(termination) = session.finished() {
+        if let Some(termination) = descent.next() {
             return termination;
         }
-        session.iterations += 1;
-        if !session.factorize_undamped() || !session.newton_step(&mut delta) {
-            return session.stalled(Stall::Damping);
+        if !descent.undamped(&mut step) {
+            return descent.stalled();
         }
-        let mut step =
-            Step { predicted: -0.5 * dot(&delta, &session.problem.g), norm: norm(&delta), control: 1.0 };
+        step.control = 1.0;
         let mut halvings = 0;
-        while let Tried::Undefined = session.attempt(&delta, &step) {
-            session.record(&step, false);
+        while let Tried::Undefined = descent.attempt(&step) {
+            descent.record(&step, false);
             halvings += 1;
-            if session.interrupted() {
+            if descent.interrupted() {
                 return Termination::Interrupted;
             }
             if halvings > HALVINGS {
-                return session.stalled(Stall::Domain);
+                return descent.stalled_by(Stall::Domain);
             }
-            delta.iter_mut().for_each(|d| *d *= 0.5);
-            step = Step { norm: 0.5 * step.norm, control: 0.5 * step.control, ..step };
+            step.halve();
         }
-        rises = if session.trial.cost > session.at.cost && !session.settled(&step) { rises + 1 } else { 0 };
-        session.record(&step, true);
+        rises = if descent.trial.cost > descent.at.cost && !descent.settled(&step) { rises + 1 } else { 0 };
+        descent.record(&step, true);
         // a step that was halved is small for another reason
-        let is_cut = halvings > 0 && !session.is_small(step.predicted);
-        match session.take(&step) {
+        let is_cut = halvings > 0 && !descent.is_small(step.predicted);
+        match descent.take(&step) {
             Some(termination) if !is_cut => return termination,
             _ => {}
         }
-        best.update(session);
+        best.update(descent);
         if rises >= RISES {
             return Termination::Stalled { reason: Stall::Diverging };
         }

@@ -4,9 +4,10 @@ use crate::linear::settings::LinearSolver;
 use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::problem::CompileError;
-use crate::problem::Problem;
+use crate::problem::{FactorPlace, Problem};
+use crate::setting::SettingError;
 use crate::strategy::auto::Auto;
-use crate::strategy::optimizer::{Optimizer, SettingError};
+use crate::strategy::optimizer::Optimizer;
 use graduation::Graduation;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Values, register};
@@ -132,10 +133,10 @@ impl Gnc {
             *quantiles[rows]
                 .get_or_insert_with(|| 0.5 * square.unwrap_or_else(|| self.probability.chi_squared(rows)))
         };
-        let one = |(i, (name, rows)): (usize, &(&str, usize))| {
-            let candidate = may[i] && named(name) && *rows > 0;
-            candidate.then(|| bound(*rows))
+        let one = |(may, factor): (bool, &FactorPlace)| {
+            let candidate = may && named(factor.name) && factor.rows > 0;
+            candidate.then(|| bound(factor.rows as usize))
         };
-        problem.factor_types.iter().enumerate().map(one).collect()
+        may.into_iter().zip(&problem.model.factors).map(one).collect()
     }
 }

@@ -1,12 +1,13 @@
 //! Levenberg-Marquardt: steps damped along the diagonal of H.
 use crate::inspect::null_space::undetermined;
 use crate::linear::settings::LinearSolver;
-use crate::linear::system::{dot, norm};
 use crate::observer::Observer;
 use crate::outcome::Outcome;
-use crate::outcome::{Stall, Termination, Tolerance};
+use crate::outcome::{Termination, Tolerance};
 use crate::problem::Problem;
-use crate::strategy::optimizer::{Optimizer, Session, SettingError, Step, Stopping, Tried, check, positive};
+use crate::setting::{SettingError, check, positive};
+use crate::strategy::descent::{Descent, Step, Tried};
+use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::checked::{self, Positive, least_and_most, one_or_more};
 use manifactor_graph::register;
 use schemars::JsonSchema;
@@ -98,7 +99,7 @@ impl Optimizer for LevenbergMarquardt {
 register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
 
 /// The least and the largest entry of the diagonal that is used for damping, at a linearization.
-pub(crate) type Bounds<'a> = &'a dyn Fn(&Session<'_>) -> [f64; 2];
+pub(crate) type Bounds<'a> = &'a dyn Fn(&Descent<'_>) -> [f64; 2];
 
 impl LevenbergMarquardt {
     /// As `solve`, with bounds of the diagonal that may follow the cost.
@@ -108,44 +109,41 @@ impl LevenbergMarquardt {
         problem: &mut Problem,
         observer: &mut dyn Observer,
     ) -> Outcome {
-        let mut session = match Session::begin(problem, &self.stop, observer) {
-            Ok(session) => session,
+        let mut descent = match Descent::begin(problem, &self.stop, observer) {
+            Ok(descent) => descent,
             Err(outcome) => return *outcome,
         };
         let mut lambda = self.initial_lambda;
-        let termination = self.iterate(&mut session, &mut lambda, bounds);
+        let termination = self.iterate(&mut descent, &mut lambda, bounds);
         // damping hides what nothing else holds; by now there is little left of it
         let open = match termination {
             Termination::Interrupted | Termination::NonFinite { .. } => None,
-            _ if session.iterations == 0 => None,
-            _ => undetermined(session.problem, false, lambda * session.problem.dim() as f64),
+            _ if descent.iterations == 0 => None,
+            _ => undetermined(descent.problem, false, lambda * descent.problem.dim() as f64),
         };
-        session.end(termination, open)
+        descent.account(termination, open)
     }
 
-    fn iterate(&self, session: &mut Session<'_>, lambda: &mut f64, bounds: Bounds<'_>) -> Termination {
+    fn iterate(&self, descent: &mut Descent<'_>, lambda: &mut f64, bounds: Bounds<'_>) -> Termination {
         let (mut rise, mut small_before) = (2.0, false);
-        let (mut delta, mut added) = (vec![], vec![]);
+        let mut step = Step::default();
         'linearized: loop {
-            if let Some(termination) = session.finished() {
+            if let Some(termination) = descent.next() {
                 return termination;
             }
-            session.iterations += 1;
             loop {
-                session.problem.diagonal(&mut added);
-                let [least, most] = bounds(session);
-                added.iter_mut().for_each(|d| *d = *lambda * d.max(least).min(most));
-                if session.factorize(Some(&added)).is_ok() && session.newton_step(&mut delta) {
-                    let damping = delta.iter().zip(&added).map(|(d, a)| a * d * d).sum::<f64>();
-                    let predicted = 0.5 * (damping - dot(&delta, &session.problem.g));
-                    let step = Step { predicted, norm: norm(&delta), control: *lambda };
-                    let tried = session.attempt(&delta, &step);
+                let [least, most] = bounds(descent);
+                let mut damping = descent.diagonal();
+                damping.iter_mut().for_each(|d| *d = *lambda * d.max(least).min(most));
+                step.control = *lambda;
+                if descent.damped(&damping, &mut step) {
+                    let tried = descent.attempt(&step);
                     let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
-                    session.record(&step, accepted);
+                    descent.record(&step, accepted);
                     if let (true, Tried::Lower { gain }) = (accepted, &tried) {
                         let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / self.decrease).min(1.0);
                         (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
-                        let ended = session.take(&step);
+                        let ended = descent.take(&step);
                         // a step that damping has made small says little of the cost around
                         let is_trusted = step.control <= TRUSTED;
                         let small = ended.is_some() && is_trusted;
@@ -153,29 +151,29 @@ impl LevenbergMarquardt {
                             Some(termination) if small && (small_before || step.control <= LIGHT) => {
                                 return termination;
                             }
-                            Some(termination) if !is_trusted && session.is_at_rest(&mut delta) => {
+                            Some(termination) if !is_trusted && descent.is_at_rest(&mut step) => {
                                 return termination;
                             }
                             _ => small_before = small,
                         }
                         continue 'linearized;
                     }
-                    if !matches!(tried, Tried::Undefined) && step.control <= TRUSTED && session.settled(&step)
+                    if !matches!(tried, Tried::Undefined) && step.control <= TRUSTED && descent.settled(&step)
                     {
                         return Termination::Converged { reason: Tolerance::RelativeCost };
                     }
-                    if step.control <= TRUSTED && step.norm <= session.stop.step {
+                    if step.control <= TRUSTED && step.norm <= descent.stop.step {
                         return Termination::Converged { reason: Tolerance::Step };
                     }
                 }
-                if session.interrupted() {
+                if descent.interrupted() {
                     return Termination::Interrupted;
                 }
                 (*lambda, rise) = ((*lambda * rise).max(NEGLIGIBLE), rise * 2.0);
                 if *lambda > self.max_lambda {
-                    return match session.is_at_rest(&mut delta) {
+                    return match descent.is_at_rest(&mut step) {
                         true => Termination::Converged { reason: Tolerance::RelativeCost },
-                        false => session.stalled(Stall::Damping),
+                        false => descent.stalled(),
                     };
                 }
             }

@@ -7,6 +7,7 @@
     clippy::print_stdout,
     clippy::print_stderr
 )]
+mod change;
 mod checked;
 mod covariance;
 mod endings;

@@ -111,3 +111,32 @@ fn what_nothing_constrains_takes_nothing_up() {
     let total: f64 = leverages.iter().flatten().sum();
     assert!((total - 6.0).abs() < 1e-8, "{leverages:?}");
 }
+
+#[test]
+fn a_question_takes_the_factorization_at_hand() {
+    let (graph, values) = chain(200);
+    let mut problem = Problem::compile(&graph, &values).unwrap();
+    let all = problem.marginals().unwrap();
+    let factorized = problem.times().factorize;
+    for key in ["p0", "p77", "p199"] {
+        let one = problem.factorized().unwrap().marginal(key).unwrap();
+        let of_all = &all.iter().find(|(k, _)| k.as_str() == key).unwrap().1;
+        assert!((&one - of_all).amax() < 1e-12, "{key}");
+    }
+    assert_eq!(problem.times().factorize, factorized);
+    // of a changed estimate, the covariance is another: here a weight has changed
+    problem.set_weights(&vec![0.25; problem.factors()]).unwrap();
+    let one = problem.factorized().unwrap().marginal("p77").unwrap();
+    assert!((one - &all[77].1 * 4.0).amax() < 1e-9);
+}
+
+#[test]
+fn few_marginals_are_those_of_all() {
+    let (graph, values) = chain(100);
+    let solution = solve(&graph, &values, &GaussNewton::default(), &mut Silent).unwrap();
+    let all = solution.marginals(&graph, &[]).unwrap();
+    for one in solution.marginals(&graph, &["p3", "p99"]).unwrap() {
+        let of_all = all.iter().find(|marginal| marginal.key == one.key).unwrap();
+        assert!((one.covariance - &of_all.covariance).amax() < 1e-12);
+    }
+}

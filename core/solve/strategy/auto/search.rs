@@ -80,7 +80,7 @@ impl Auto {
         let bounded = self.at_most(if is_rival { outcome.iterations } else { usize::MAX });
         for point in points {
             tracing::debug!(cost = point.cost, inactive = point.inactive, "another start");
-            problem.put(&point.values);
+            problem.model.put(&point.values);
             let next = bounded.solve_from(&point, problem, watch);
             let better = (next.inactive, next.final_cost) <= (outcome.inactive, outcome.final_cost);
             let is_settled = is_minimum(&next.termination) && (better || is_rival);
@@ -92,7 +92,7 @@ impl Auto {
                 break;
             }
         }
-        problem.put(&best);
+        problem.model.put(&best);
         problem.linearize();
         outcome
     }

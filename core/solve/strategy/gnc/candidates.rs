@@ -1,6 +1,5 @@
 //! Which factors may be outliers.
-use crate::problem::Problem;
-use manifactor_graph::VariableIndices;
+use crate::problem::{FactorPlace, Problem};
 use manifactor_graph::catalogue;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,13 +53,14 @@ impl Candidates {
     /// By factor: whether it is a candidate.
     pub(crate) fn of(self, problem: &Problem) -> Vec<bool> {
         let follows = |pair: &[u32]| {
-            let (a, b) = (&problem.variables[pair[0] as usize], &problem.variables[pair[1] as usize]);
+            let (a, b) =
+                (&problem.model.variables[pair[0] as usize], &problem.model.variables[pair[1] as usize]);
             a.column == b.column && a.index.abs_diff(b.index) == 1
         };
-        let may = |variables: &VariableIndices| match self {
+        let may = |factor: &FactorPlace| match self {
             Self::All => true,
-            Self::LoopClosures => variables.len() > 1 && !variables.windows(2).all(follows),
+            Self::LoopClosures => factor.variables.len() > 1 && !factor.variables.windows(2).all(follows),
         };
-        problem.factor_variables.iter().map(may).collect()
+        problem.model.factors.iter().map(may).collect()
     }
 }

@@ -52,7 +52,7 @@ impl<'a> Graduation<'a> {
 
     pub(super) fn run(mut self) -> Outcome {
         let (clock, compile) = (Instant::now(), self.problem.times.compile);
-        self.problem.weigh(&self.weights);
+        self.problem.model.weigh(&self.weights);
         let mut outcome = match self.graduate() {
             ControlFlow::Continue(()) => {
                 self.weigh(self.gnc.cost.last());
@@ -103,14 +103,14 @@ impl<'a> Graduation<'a> {
         for i in 0..self.weights.len() {
             self.weights[i] = if self.excess(i) <= Some(share) { 1.0 } else { 0.0 };
         }
-        self.problem.weigh(&self.weights);
+        self.problem.model.weigh(&self.weights);
         if !self.begin_elsewhere(f64::INFINITY) {
             self.solve()?;
         }
         self.settle()?;
         let improved = self.robust_cost() < before * (1.0 - LESS);
         if !improved {
-            self.problem.put(&values);
+            self.problem.model.put(&values);
             self.problem.factor_costs(&mut self.costs);
         }
         ControlFlow::Continue(improved)
@@ -178,13 +178,13 @@ impl<'a> Graduation<'a> {
         let points = starts(&weighed, &here, self.problem);
         let best = points.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         if let Some(point) = &best {
-            self.problem.put(&point.values);
+            self.problem.model.put(&point.values);
             let there = self.inner.solve(self.problem, &mut Quiet(self.observer));
             if there.final_cost < cost && !matches!(there.termination, Termination::NonFinite { .. }) {
                 return true;
             }
         }
-        self.problem.put(&here);
+        self.problem.model.put(&here);
         false
     }
 
@@ -197,7 +197,7 @@ impl<'a> Graduation<'a> {
         for i in 0..self.weights.len() {
             self.weights[i] = self.excess(i).map_or(1.0, |u| self.gnc.cost.weight(mu, u));
         }
-        self.problem.weigh(&self.weights);
+        self.problem.model.weigh(&self.weights);
     }
 
     fn robust_cost(&self) -> f64 {
@@ -213,8 +213,8 @@ impl<'a> Graduation<'a> {
         let beyond = |i: &usize| self.excess(*i).is_some_and(|u| u > 1.0);
         let one = |factor: usize| Rejected {
             factor,
-            name: self.problem.factor_types[factor].0,
-            keys: self.problem.factor_keys(factor),
+            name: self.problem.model.factors[factor].name,
+            keys: self.problem.model.keys(factor),
             weight: self.weights[factor],
             cost: self.costs[factor],
         };

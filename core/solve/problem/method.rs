@@ -4,7 +4,7 @@ use crate::linear::ordering::Order;
 use crate::linear::settings::{self as chosen, LinearSolver, Ordering, Preconditioner};
 use crate::linear::{Cholesky, ConjugateGradients, Method, Qr, memory};
 use crate::problem::CompileError;
-use crate::problem::Place;
+use crate::problem::model::Place;
 use manifactor_graph::{Key, Values};
 use std::collections::HashMap;
 

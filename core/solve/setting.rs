@@ -1,7 +1,4 @@
 //! Settings of solvers that are made in code: what a config is checked for when it is read.
-use crate::linear::settings::LinearSolver;
-use crate::strategy::optimizer::Stopping;
-
 /// A number outside its domain among the settings of a solver.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the solver's setting `{setting}`: expected a finite number, {expected}, got {got}")]
@@ -36,33 +33,5 @@ pub(crate) fn check(
     match settings.iter().find(|(_, x)| !(domain(*x) && x.is_finite())) {
         Some((setting, got)) => Err(SettingError { setting, expected, got: *got }),
         None => Ok(()),
-    }
-}
-
-impl Stopping {
-    /// Whether each tolerance is a finite number, 0 or more: one that is not would never be met.
-    ///
-    /// # Errors
-    /// Names the one that is not.
-    pub fn check(&self) -> Result<(), SettingError> {
-        not_negative(&[
-            ("stop.relative_cost", self.relative_cost),
-            ("stop.absolute_cost", self.absolute_cost),
-            ("stop.gradient", self.gradient),
-            ("stop.step", self.step),
-        ])
-    }
-}
-
-impl LinearSolver {
-    /// Whether each number is within its domain.
-    ///
-    /// # Errors
-    /// Names the one that is not.
-    pub fn check(&self) -> Result<(), SettingError> {
-        not_negative(&[
-            ("linear.conjugate_gradients.tolerance", self.conjugate_gradients.tolerance),
-            ("linear.memory_gib", self.memory_gib.unwrap_or(0.0)),
-        ])
     }
 }

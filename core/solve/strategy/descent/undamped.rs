@@ -1,7 +1,6 @@
 //! Steps without damping, for solvers that take none: with next to none where something is open.
-use super::Session;
+use super::{Descent, Step};
 use crate::inspect::null_space::undetermined;
-use crate::linear::system::dot;
 use crate::outcome::Undetermined;
 
 /// What is added to the diagonal of H where it cannot be factorized, as shares of it: the least that will do.
@@ -9,35 +8,31 @@ const SHARES: [f64; 4] = [1e-10, 1e-8, 1e-6, 1e-3];
 /// Entries of the diagonal below this share of the largest count as this share.
 const FLOOR: f64 = 1e-9;
 
-impl Session<'_> {
+impl Descent<'_> {
     /// Factorizes H; whether that was possible. Where nothing constrains a direction, as in a graph without a prior,
     /// just enough is added to its diagonal: the step then leaves that direction alone, and the outcome names it. See
     /// `docs/decisions/undetermined.md`.
-    pub(crate) fn factorize_undamped(&mut self) -> bool {
+    pub(super) fn factorize_undamped(&mut self) -> bool {
         if !self.is_open {
-            let failed = self.factorize(None).is_err();
-            self.is_open = undetermined(self.problem, failed, 0.0).is_some();
-            if !failed && !self.is_open {
+            let done = self.factorize(None);
+            self.is_open = undetermined(self.problem, !done, 0.0).is_some();
+            if done && !self.is_open {
                 return true;
             }
         }
-        let mut diagonal = vec![];
-        self.problem.diagonal(&mut diagonal);
+        let diagonal = self.diagonal();
         let largest = diagonal.iter().fold(0.0, |most, d| f64::max(most, *d));
         let floor = if largest > 0.0 { FLOOR * largest } else { 1.0 };
         SHARES.into_iter().any(|share| {
             let added: Vec<f64> = diagonal.iter().map(|d| share * d.max(floor)).collect();
-            self.factorize(Some(&added)).is_ok()
+            self.factorize(Some(&added))
         })
     }
 
     /// Whether a step without damping promises next to nothing: then it is not the damping that makes steps small.
     /// Leaves that step in `step`.
-    pub(crate) fn is_at_rest(&mut self, step: &mut Vec<f64>) -> bool {
-        self.at.not_finite.is_none()
-            && self.factorize_undamped()
-            && self.newton_step(step)
-            && self.is_small(0.5 * dot(step, &self.problem.g))
+    pub(crate) fn is_at_rest(&mut self, step: &mut Step) -> bool {
+        self.at.not_finite.is_none() && self.undamped(step) && self.is_small(step.predicted)
     }
 
     /// At the end of a solve by such steps: what is open at the estimate, where something was on the way.

@@ -1,0 +1,40 @@
+//! What takes no part in a solve: factors that are not defined, and variables that no other factor touches.
+use crate::outcome::{InactiveFactor, Untouched};
+use crate::problem::Problem;
+use manifactor_graph::Key;
+
+/// Inactive factors that an outcome names.
+const NAMED: usize = 10;
+
+impl Problem {
+    /// The first of the factors that were not defined at the last linearization.
+    pub(crate) fn inactive_factors(&self) -> Vec<InactiveFactor> {
+        let mut factors = vec![];
+        self.model.batches.iter().for_each(|batch| batch.inactive(&mut |factor| factors.push(factor)));
+        factors.sort_unstable();
+        let named = factors.into_iter().take(NAMED);
+        let describe = |factor| InactiveFactor {
+            factor,
+            name: self.model.factors[factor].name,
+            keys: self.model.keys(factor),
+        };
+        named.map(describe).collect()
+    }
+
+    /// The free variables that no factor touches which took part in the last linearization; `None` where there are
+    /// none.
+    pub(crate) fn untouched(&self) -> Option<Untouched> {
+        let mut takes_part = vec![true; self.factors()];
+        self.model.batches.iter().for_each(|batch| batch.inactive(&mut |factor| takes_part[factor] = false));
+        takes_part.iter_mut().zip(self.weights()).for_each(|(part, weight)| *part &= *weight != 0.0);
+        let mut touched = vec![false; self.model.variables.len()];
+        for (factor, _) in self.model.factors.iter().zip(&takes_part).filter(|(_, part)| **part) {
+            factor.variables.iter().for_each(|variable| touched[*variable as usize] = true);
+        }
+        let free = self.model.variables.iter().zip(&touched).filter(|(place, _)| place.start.is_some());
+        let keys: Vec<Key> =
+            free.filter(|(_, touched)| !**touched).map(|(place, _)| place.key.clone()).collect();
+        let active = takes_part.iter().filter(|part| **part).count();
+        (!keys.is_empty()).then(|| Untouched { keys, active, factors: self.factors() })
+    }
+}

@@ -1,0 +1,211 @@
+//! The columnar side of a problem: variables, factors and weights, and the estimate.
+use manifactor_graph::batch::{Batch, Evaluation, FactorRows, FactorState};
+use manifactor_graph::column::Columns;
+use manifactor_graph::normal_equations::NormalEquations;
+use manifactor_graph::{Key, Noise, Values, VariableIndices};
+
+/// A variable in a problem.
+#[derive(Debug, Clone)]
+pub(crate) struct Place {
+    pub key: Key,
+    /// Which column, and where in it.
+    pub column: usize,
+    pub index: usize,
+    pub tangent: &'static [&'static str],
+    /// Where it begins in the linear system; `None` for one that is held.
+    pub start: Option<usize>,
+    /// A bit for each direction that is held.
+    pub held: u32,
+}
+
+impl Place {
+    /// By direction of its tangent space: its scalar unknown, `None` for one that is held.
+    pub(crate) fn unknowns(&self) -> impl Iterator<Item = Option<usize>> {
+        let free = |d: usize| self.start.filter(|_| self.held >> d & 1 == 0).map(|start| start + d);
+        (0..self.tangent.len()).map(free)
+    }
+}
+
+/// A factor in a problem.
+#[derive(Debug, Clone)]
+pub(crate) struct FactorPlace {
+    pub variables: VariableIndices,
+    /// Its type's name.
+    pub name: &'static str,
+    /// Rows of its residual, and those that were observed.
+    pub all_rows: u32,
+    pub rows: u32,
+    /// Which batch, and where in it.
+    pub batch: u32,
+    pub index: u32,
+}
+
+impl FactorPlace {
+    /// Counts the rows that such noise says were observed.
+    pub(crate) fn observe(&mut self, noise: &Noise) {
+        self.rows = noise.observed().map_or(self.all_rows, |all| all.iter().filter(|o| **o).count() as u32);
+    }
+}
+
+/// Variables in columns and factors in batches, by type.
+pub(crate) struct Model {
+    pub variables: Vec<Place>,
+    pub factors: Vec<FactorPlace>,
+    /// By factor: how often it counts; empty, where nobody weighs them.
+    weights: Vec<f64>,
+    /// The estimate, and room for a trial step.
+    columns: Columns,
+    trial: Columns,
+    /// By column: where each variable begins in the linear system.
+    starts: Vec<Vec<u32>>,
+    pub batches: Vec<Box<dyn Batch>>,
+    /// Counts changes of the estimate, of weights and of measurements: what is known of the problem may be out of date.
+    revision: u64,
+}
+
+impl Model {
+    pub(crate) fn new(
+        variables: Vec<Place>,
+        factors: Vec<FactorPlace>,
+        columns: Columns,
+        starts: Vec<Vec<u32>>,
+        batches: Vec<Box<dyn Batch>>,
+    ) -> Self {
+        let trial = columns.clone();
+        Self { variables, factors, weights: vec![], columns, trial, starts, batches, revision: 0 }
+    }
+
+    pub(crate) fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// Batches, to be changed.
+    pub(crate) fn batches_mut(&mut self) -> &mut [Box<dyn Batch>] {
+        self.revision += 1;
+        &mut self.batches
+    }
+
+    pub(crate) fn columns(&self) -> &Columns {
+        &self.columns
+    }
+
+    pub(crate) fn trial(&self) -> &Columns {
+        &self.trial
+    }
+
+    pub(crate) fn place(&self, key: &str) -> Option<&Place> {
+        self.variables.iter().find(|place| place.key.as_str() == key)
+    }
+
+    /// The variables of a factor.
+    pub(crate) fn keys(&self, factor: usize) -> Vec<Key> {
+        let variables = self.factors.get(factor).into_iter().flat_map(|place| &place.variables);
+        variables.map(|v| self.variables[*v as usize].key.clone()).collect()
+    }
+
+    /// The estimate, in the order of the values that the problem was compiled with.
+    pub(crate) fn values(&self) -> Values {
+        let mut values = Values::new();
+        for place in &self.variables {
+            if let Some(value) = self.columns.column(place.column).get(place.index) {
+                values.insert_boxed(place.key.clone(), value);
+            }
+        }
+        values
+    }
+
+    /// Sets the estimate to values that are known to fit; variables that it does not have keep theirs.
+    pub(crate) fn put(&mut self, values: &Values) {
+        self.revision += 1;
+        for place in &self.variables {
+            if let Some(value) = values.variable(place.key.as_str()) {
+                self.columns.column_mut(place.column).set(place.index, value);
+            }
+        }
+    }
+
+    /// Goes back to an estimate of before.
+    pub(crate) fn restore(&mut self, columns: Columns) {
+        self.revision += 1;
+        self.columns = columns;
+    }
+
+    pub(crate) fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Sets weights that are known to fit; a factor without one counts once.
+    pub(crate) fn weigh(&mut self, weights: &[f64]) {
+        self.revision += 1;
+        self.weights.clear();
+        self.weights.extend_from_slice(weights);
+        self.weights.resize(self.factors.len(), 1.0);
+        self.batches.iter_mut().for_each(|b| b.set_weights(&self.weights));
+    }
+
+    /// Adds all factors to H and g, and decides which of them take part.
+    pub(crate) fn linearize(&mut self, to: &mut NormalEquations<'_>) -> Evaluation {
+        let columns = &self.columns;
+        self.batches.iter_mut().fold(Evaluation::default(), |total, b| total.and(b.linearize(columns, to)))
+    }
+
+    /// Cost at the estimate, over the factors that took part in the last linearization.
+    pub(crate) fn cost(&self) -> Evaluation {
+        self.cost_at(&self.columns)
+    }
+
+    fn cost_at(&self, columns: &Columns) -> Evaluation {
+        self.batches.iter().map(|b| b.cost(columns)).fold(Evaluation::default(), Evaluation::and)
+    }
+
+    /// Makes `estimate ⊞ step` the trial, and returns its cost.
+    pub(crate) fn try_step(&mut self, step: &[f64]) -> Evaluation {
+        for (i, starts) in self.starts.iter().enumerate() {
+            self.trial.column_mut(i).retract_from(self.columns.column(i), starts, step);
+        }
+        self.cost_at(&self.trial)
+    }
+
+    /// Makes the trial the estimate.
+    pub(crate) fn accept(&mut self) {
+        self.revision += 1;
+        std::mem::swap(&mut self.columns, &mut self.trial);
+    }
+
+    /// ½ρ of each factor at the estimate, whatever its weight; zero where it is not defined.
+    pub(crate) fn factor_costs(&self, costs: &mut Vec<f64>) {
+        costs.resize(self.factors.len(), 0.0);
+        self.batches.iter().for_each(|b| b.costs(&self.columns, costs));
+    }
+
+    /// Each factor as it stands at the estimate, in the order of the graph.
+    pub(crate) fn inspect(&self) -> Vec<FactorState> {
+        let mut all: Vec<_> = self.batches.iter().flat_map(|b| b.inspect(&self.columns)).collect();
+        all.sort_by_key(|f| f.entry);
+        all
+    }
+
+    /// Visits the rows of the whitened and weighted Jacobian at the estimate, batch by batch.
+    pub(crate) fn rows(&self, visit: &mut dyn FnMut(FactorRows<'_>)) {
+        self.batches.iter().for_each(|b| b.rows(&self.columns, visit));
+    }
+
+    /// The factor with a residual or a derivative that is not finite; where all are, the one with the largest. Walks
+    /// through the rows of all factors: for solves that have failed.
+    pub(crate) fn not_finite_factor(&self) -> usize {
+        let (mut factor, mut largest) = (0, f64::NEG_INFINITY);
+        self.rows(&mut |rows| {
+            let size = size(&rows);
+            if size > largest {
+                (factor, largest) = (rows.entry, size);
+            }
+        });
+        factor
+    }
+}
+
+/// Largest entry of a factor's rows; infinite where one is not a number.
+fn size(rows: &FactorRows<'_>) -> f64 {
+    let entries = rows.residual.iter().chain(rows.blocks.iter().flat_map(|(_, block)| block));
+    entries.fold(0.0, |most, x| if x.is_nan() { f64::INFINITY } else { f64::max(most, x.abs()) })
+}

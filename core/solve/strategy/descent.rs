@@ -1,0 +1,394 @@
+//! A solve under way: what strategies share.
+mod undamped;
+
+use crate::linear::system::{dot, norm};
+use crate::observer::Observer;
+use crate::outcome::{IterationRecord, Outcome, Stall, Termination, Times, Tolerance, Undetermined};
+use crate::problem::Problem;
+use crate::strategy::optimizer::Stopping;
+use manifactor_graph::batch::Evaluation;
+use manifactor_graph::column::Columns;
+use std::time::Instant;
+
+/// Records that there is room for from the beginning.
+const HISTORY: usize = 1000;
+
+/// A step to be tried, and what is expected of it.
+#[derive(Debug, Clone, Default)]
+pub struct Step {
+    /// δ, in the order of the linear system.
+    pub delta: Vec<f64>,
+    /// By how much it lowers ½ρ, by the quadratic model.
+    pub predicted: f64,
+    /// ‖δ‖.
+    pub norm: f64,
+    /// What the solver controls it by, for the record: its damping, say, or the radius of its trust region.
+    pub control: f64,
+}
+
+impl Step {
+    /// Half of it. The prediction stays.
+    pub(crate) fn halve(&mut self) {
+        self.delta.iter_mut().for_each(|d| *d *= 0.5);
+        self.norm *= 0.5;
+        self.control *= 0.5;
+    }
+}
+
+/// What became of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Tried {
+    /// It lowered the cost.
+    Lower {
+        /// By what share of what the model predicts: 1, where the cost is quadratic.
+        gain: f64,
+    },
+    /// It raised the cost, or lowered it by nothing.
+    Higher,
+    /// It left the domain of a factor, or its cost is not finite.
+    Undefined,
+}
+
+/// A solve under way: the problem, its costs and its records. It is the seam for a solver of one's own: ask for a step,
+/// try it, take it or ask for another.
+///
+/// ```
+/// use manifactor_solve::{Descent, Observer, Outcome, Problem, Step, Stopping, Tried};
+///
+/// /// Gauss-Newton, as long as the cost falls.
+/// fn solve(problem: &mut Problem, stop: &Stopping, observer: &mut dyn Observer) -> Outcome {
+///     let mut descent = match Descent::begin(problem, stop, observer) {
+///         Ok(descent) => descent,
+///         Err(outcome) => return *outcome,
+///     };
+///     let mut step = Step::default();
+///     loop {
+///         if let Some(termination) = descent.next() {
+///             return descent.end(termination);
+///         }
+///         let lower = descent.undamped(&mut step) && matches!(descent.attempt(&step), Tried::Lower { .. });
+///         descent.record(&step, lower);
+///         let ended = if lower { descent.take(&step) } else { Some(descent.stalled()) };
+///         if let Some(termination) = ended {
+///             return descent.end(termination);
+///         }
+///     }
+/// }
+/// ```
+pub struct Descent<'a> {
+    pub(crate) problem: &'a mut Problem,
+    pub(crate) stop: &'a Stopping,
+    /// At the last linearization.
+    pub(crate) at: Evaluation,
+    /// Of the last step tried.
+    pub(crate) trial: Evaluation,
+    pub(crate) iterations: usize,
+    observer: &'a mut dyn Observer,
+    initial_cost: f64,
+    clock: Instant,
+    compile: f64,
+    history: Vec<IterationRecord>,
+    interrupted: bool,
+    /// Something is open: steps that are not damped cannot be had.
+    is_open: bool,
+}
+
+impl<'a> Descent<'a> {
+    /// Linearizes at the initial estimate.
+    ///
+    /// # Errors
+    /// The end of the solve, where a residual or a derivative is not finite there.
+    pub fn begin(
+        problem: &'a mut Problem,
+        stop: &'a Stopping,
+        observer: &'a mut dyn Observer,
+    ) -> Result<Self, Box<Outcome>> {
+        let clock = Instant::now();
+        let compile = problem.times.compile;
+        problem.times = Times { compile, ..Times::default() };
+        let at = problem.linearize();
+        let mut descent = Self {
+            problem,
+            stop,
+            at,
+            trial: at,
+            iterations: 0,
+            observer,
+            initial_cost: at.cost,
+            clock,
+            compile,
+            history: Vec::with_capacity(stop.max_iterations.min(HISTORY)),
+            interrupted: false,
+            is_open: false,
+        };
+        match descent.not_finite() {
+            None => Ok(descent),
+            Some(termination) => Err(Box::new(descent.account(termination, None))),
+        }
+    }
+
+    /// The factor that makes the linearization not finite, if one does.
+    fn not_finite(&self) -> Option<Termination> {
+        self.at.not_finite.map(|factor| self.blame(factor))
+    }
+
+    fn blame(&self, factor: usize) -> Termination {
+        Termination::NonFinite { factor, keys: self.problem.model.keys(factor) }
+    }
+
+    /// ½ Σ ρ at the estimate.
+    pub fn cost(&self) -> f64 {
+        self.at.cost
+    }
+
+    /// The gradient g = Jᵀr at the estimate.
+    pub fn gradient(&self) -> &[f64] {
+        &self.problem.system.g
+    }
+
+    /// The diagonal of H = JᵀJ at the estimate.
+    pub fn diagonal(&self) -> Vec<f64> {
+        self.problem.system.diagonal().copied().collect()
+    }
+
+    /// A reason to stop before another step; where there is none, that step's iteration begins.
+    #[allow(clippy::should_implement_trait, reason = "the next iteration; an end has a reason")]
+    pub fn next(&mut self) -> Option<Termination> {
+        let finished = self.finished();
+        self.iterations += usize::from(finished.is_none());
+        finished
+    }
+
+    /// The step (H + diag(damping)) δ = -g. Whether there is one: the matrix is positive definite, δ is finite, and no
+    /// observer has interrupted it.
+    pub fn damped(&mut self, damping: &[f64], step: &mut Step) -> bool {
+        if !self.factorize(Some(damping)) || !self.newton_step(&mut step.delta) {
+            return false;
+        }
+        let damped = step.delta.iter().zip(damping).map(|(d, a)| a * d * d).sum::<f64>();
+        step.predicted = 0.5 * (damped - dot(&step.delta, &self.problem.system.g));
+        step.norm = norm(&step.delta);
+        true
+    }
+
+    /// The step H δ = -g, as [`damped`](Self::damped). Where something is open, a direction that nothing constrains, it is
+    /// left alone.
+    pub fn undamped(&mut self, step: &mut Step) -> bool {
+        if !self.factorize_undamped() || !self.newton_step(&mut step.delta) {
+            return false;
+        }
+        step.predicted = -0.5 * dot(&step.delta, &self.problem.system.g);
+        step.norm = norm(&step.delta);
+        true
+    }
+
+    /// Factorizes H + diag(damping), and takes -g half the way to the step; whether that was possible.
+    fn factorize(&mut self, damping: Option<&[f64]>) -> bool {
+        let Self { problem, observer, interrupted, .. } = self;
+        problem.factorize(damping, &mut || go_on(*observer, interrupted)).is_ok()
+    }
+
+    /// The step of the last factorization; whether it is finite, and no interrupt has cut it short.
+    fn newton_step(&mut self, delta: &mut Vec<f64>) -> bool {
+        let Self { problem, observer, interrupted, .. } = self;
+        problem.newton_step(delta, &mut || go_on(*observer, interrupted));
+        let finite = delta.iter().all(|x| x.is_finite());
+        if !finite {
+            self.trial = Evaluation { cost: f64::NAN, ..Evaluation::default() };
+        }
+        finite && !self.interrupted
+    }
+
+    fn finished(&self) -> Option<Termination> {
+        let gradient = self.largest_gradient();
+        if let Some(termination) = self.not_finite() {
+            Some(termination)
+        } else if self.interrupted {
+            Some(Termination::Interrupted)
+        } else if self.at.cost <= self.stop.absolute_cost {
+            Some(Termination::Converged { reason: Tolerance::AbsoluteCost })
+        } else if gradient <= self.stop.gradient {
+            Some(Termination::Converged { reason: Tolerance::Gradient })
+        } else if self.iterations >= self.stop.max_iterations {
+            Some(Termination::MaxIterations)
+        } else {
+            None
+        }
+    }
+
+    /// Whether an observer has asked for an end.
+    pub fn interrupted(&self) -> bool {
+        self.interrupted
+    }
+
+    fn largest_gradient(&self) -> f64 {
+        // `f64::max` would drop what is not a number
+        self.problem.system.g.iter().fold(0.0, |m, g| if m.is_nan() || g.abs() <= m { m } else { g.abs() })
+    }
+
+    /// Evaluates the cost after a step. The estimate stays.
+    pub fn attempt(&mut self, step: &Step) -> Tried {
+        self.trial = self.problem.try_step(&step.delta);
+        let trial = &self.trial;
+        if trial.left > 0 || trial.not_finite.is_some() || !trial.cost.is_finite() {
+            return Tried::Undefined;
+        }
+        let gain = (self.at.cost - trial.cost) / step.predicted;
+        if trial.cost < self.at.cost && gain > 0.0 { Tried::Lower { gain } } else { Tried::Higher }
+    }
+
+    /// Whether the last trial and its model both say that there is nothing left to gain.
+    pub(crate) fn settled(&self, step: &Step) -> bool {
+        self.is_small(self.at.cost - self.trial.cost) && self.is_small(step.predicted)
+    }
+
+    /// Whether a change of the cost is within the tolerance.
+    pub(crate) fn is_small(&self, change: f64) -> bool {
+        change.abs() <= self.stop.relative_cost * self.at.cost.abs()
+    }
+
+    /// Why no step is good enough, as the last one shows, which is next to nothing.
+    pub fn stalled(&self) -> Termination {
+        self.stalled_by(Stall::Damping)
+    }
+
+    /// The same; `other`, where the last step shows nothing.
+    pub(crate) fn stalled_by(&self, other: Stall) -> Termination {
+        const ROUNDING: f64 = 1e-10;
+        let Evaluation { cost, left, not_finite, .. } = self.trial;
+        let reason = if self.interrupted {
+            return Termination::Interrupted;
+        } else if left > 0 {
+            Stall::Domain
+        } else if !cost.is_finite() {
+            return self.blame(not_finite.unwrap_or_else(|| self.problem.model.not_finite_factor()));
+        } else if cost - self.at.cost > ROUNDING * self.at.cost.abs() {
+            Stall::Jump
+        } else {
+            other
+        };
+        Termination::Stalled { reason }
+    }
+
+    /// Takes the last step that was tried, and linearizes there; a reason to stop, if it brings one.
+    pub fn take(&mut self, step: &Step) -> Option<Termination> {
+        self.problem.model.accept();
+        let (before, after) = (self.at.cost, self.trial.cost);
+        let inactive = self.at.inactive;
+        self.at = self.problem.linearize();
+        self.trial = self.at;
+        if let Some(termination) = self.not_finite() {
+            return Some(termination);
+        }
+        // factors that come back into their domain change the cost: go on with them
+        if self.at.inactive != inactive {
+            return None;
+        }
+        if (before - after).abs() <= self.stop.relative_cost * before.abs() {
+            Some(Termination::Converged { reason: Tolerance::RelativeCost })
+        } else if step.norm <= self.stop.step {
+            Some(Termination::Converged { reason: Tolerance::Step })
+        } else {
+            None
+        }
+    }
+
+    /// Keeps a record of the step that was tried last, and shows it to the observer.
+    pub fn record(&mut self, step: &Step, accepted: bool) {
+        let defined = self.trial.left == 0 && self.trial.cost.is_finite();
+        let record = IterationRecord {
+            iteration: self.iterations,
+            cost: self.at.cost,
+            trial_cost: defined.then_some(self.trial.cost),
+            gradient: self.largest_gradient(),
+            step: step.norm,
+            control: step.control,
+            accepted,
+            inactive: self.at.inactive,
+            seconds: self.clock.elapsed().as_secs_f64(),
+        };
+        let IterationRecord { iteration, cost, trial_cost, gradient, step, control, .. } = record;
+        tracing::debug!(iteration, cost, trial_cost, gradient, step, control, accepted, "step");
+        self.interrupted |= self.observer.iteration(&record).is_break();
+        self.history.push(record);
+    }
+
+    /// The account of the solve, with what nothing constrains at the estimate, which takes a factorization.
+    pub fn end(mut self, termination: Termination) -> Outcome {
+        let looks = self.iterations > 0 && !self.interrupted && self.at.not_finite.is_none();
+        let open = looks.then(|| self.problem.undetermined()).flatten();
+        self.account(termination, open)
+    }
+
+    /// The account of the solve, with what is known to be open.
+    pub(crate) fn account(
+        &mut self,
+        termination: Termination,
+        undetermined: Option<Undetermined>,
+    ) -> Outcome {
+        let mut times = self.problem.times;
+        let solve = self.clock.elapsed().as_secs_f64();
+        times.total = solve + self.compile;
+        times.other = (solve - times.stages()).max(0.0);
+        let untouched = self.problem.untouched();
+        let moving = match termination {
+            Termination::MaxIterations if self.iterations > 0 => self.problem.moving(),
+            _ => None,
+        };
+        let termination = match (&untouched, termination) {
+            // a minimum, but not of what these variables are
+            (
+                Some(untouched),
+                Termination::Converged { .. } | Termination::Stalled { reason: Stall::Jump },
+            ) => Termination::Indeterminate(untouched.clone()),
+            (_, termination) => termination,
+        };
+        Outcome {
+            initial_cost: self.initial_cost,
+            final_cost: self.at.cost,
+            iterations: self.iterations,
+            termination,
+            undetermined,
+            moving,
+            untouched,
+            factors: self.problem.factors(),
+            inactive: self.at.inactive,
+            inactive_factors: self.problem.inactive_factors(),
+            rejected: vec![],
+            times,
+            history: std::mem::take(&mut self.history),
+        }
+    }
+}
+
+/// Whether an observer lets a step go on.
+fn go_on(observer: &mut dyn Observer, interrupted: &mut bool) -> bool {
+    *interrupted |= observer.poll().is_break();
+    !*interrupted
+}
+
+/// The best estimate so far, for solvers whose steps may raise the cost.
+pub(crate) struct Best {
+    cost: f64,
+    columns: Columns,
+}
+
+impl Best {
+    pub(crate) fn new(descent: &Descent<'_>) -> Self {
+        Self { cost: descent.at.cost, columns: descent.problem.model.columns().clone() }
+    }
+    pub(crate) fn update(&mut self, descent: &Descent<'_>) {
+        if descent.at.cost < self.cost {
+            self.cost = descent.at.cost;
+            self.columns.clone_from(descent.problem.model.columns());
+        }
+    }
+    /// Goes back to the best estimate, where that is not the last.
+    pub(crate) fn restore(self, descent: &mut Descent<'_>) {
+        if self.cost < descent.at.cost || !descent.at.cost.is_finite() {
+            descent.problem.model.restore(self.columns);
+            descent.at = descent.problem.linearize();
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Which way the folders of a crate depend on one another: the rooms of a house, in floors.
+//!
+//! A room is a module at the root of a crate, with all that lies in its folder. Rooms that need each other are one room.
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Files of source that a folder may have: what a reader takes in at a glance.
+const FILES: usize = 14;
+
+/// Rooms that need each other, each pair for a reason: a trait and what makes its objects.
+const PAIRS: [(&str, &str, &str); 0] = [];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn crates() -> Vec<PathBuf> {
+    let folders = ["core", "plugins"].into_iter().flat_map(|f| std::fs::read_dir(root().join(f)).unwrap());
+    let mut crates: Vec<_> =
+        folders.map(|entry| entry.unwrap().path()).filter(|path| path.join("lib.rs").is_file()).collect();
+    crates.sort();
+    crates
+}
+
+/// The files of source below a folder, but for tests and examples.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut files = vec![];
+    for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        if path.is_dir() && !["tests", "examples", "plugin_template"].contains(&name) {
+            files.extend(sources(&path));
+        } else if name.ends_with(".rs") && !name.ends_with("tests.rs") {
+            files.push(path);
+        }
+    }
+    files
+}
+
+/// The first names behind `crate::` in what a file imports or names, without its comments and its tests.
+fn named(source: &str) -> BTreeSet<String> {
+    let code: String = source
+        .split("#[cfg(test)]\nmod")
+        .next()
+        .unwrap_or_default()
+        .lines()
+        .map(|line| line.split("//").next().unwrap_or_default().to_owned() + "\n")
+        .collect();
+    let word = |text: &str| text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let mut names = BTreeSet::new();
+    for (at, marker) in code.match_indices("crate::") {
+        let before = code[..at].chars().next_back();
+        if before.is_some_and(|c| c == '$' || c == '_' || c.is_alphanumeric()) {
+            continue;
+        }
+        let rest = &code[at + marker.len()..];
+        match rest.strip_prefix('{').and_then(|group| group.split_once(';')) {
+            None => names.extend([word(rest)]),
+            Some((group, _)) => {
+                let mut depth = 0;
+                let parts = group.split(|c| {
+                    depth += i32::from(c == '{') - i32::from(c == '}');
+                    c == ',' && depth == 0
+                });
+                names.extend(parts.map(|part| word(part.trim_start())));
+            }
+        }
+    }
+    names
+}
+
+/// By name that a crate shows at its root: the room that it comes from.
+fn shown(lib: &str) -> BTreeMap<String, String> {
+    let uses = lib.split(';').filter_map(|part| part.rsplit_once("pub use ")).map(|(_, path)| path);
+    let mut shown = BTreeMap::new();
+    for (room, names) in uses.filter_map(|path| path.split_once("::")) {
+        for name in names.split([',', '{', '}', ':']).map(str::trim).filter(|name| !name.is_empty()) {
+            shown.insert(name.to_owned(), room.trim().to_owned());
+        }
+    }
+    shown
+}
+
+/// By room: those that it needs.
+fn needs(of_crate: &Path) -> BTreeMap<String, BTreeSet<String>> {
+    let lib = std::fs::read_to_string(of_crate.join("lib.rs")).unwrap();
+    let shown = shown(&lib);
+    let mut needs: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let room_of = |file: &Path| {
+        let first = file.strip_prefix(of_crate).unwrap().components().next().unwrap();
+        first.as_os_str().to_str().unwrap().trim_end_matches(".rs").to_owned()
+    };
+    let files = sources(of_crate);
+    let rooms: BTreeSet<String> = files
+        .iter()
+        .map(|file| room_of(file))
+        .filter(|r| !["lib", "main", "testing"].contains(&r.as_str()))
+        .collect();
+    for file in &files {
+        let room = room_of(file);
+        if !rooms.contains(&room) {
+            continue;
+        }
+        let text = std::fs::read_to_string(file).unwrap();
+        let others = named(&text).into_iter().map(|name| shown.get(&name).cloned().unwrap_or(name));
+        let others: Vec<_> = others.filter(|other| rooms.contains(other) && *other != room).collect();
+        needs.entry(room).or_default().extend(others);
+    }
+    needs
+}
+
+#[test]
+fn rooms_are_in_floors() {
+    let mut circles = vec![];
+    for of_crate in crates() {
+        let mut left = needs(&of_crate);
+        for (a, b, _) in PAIRS {
+            if let Some(needs) = left.get_mut(a) {
+                needs.remove(b);
+            }
+        }
+        // floor by floor, from the ground: rooms that need none of those left, until only circles are
+        loop {
+            let names: BTreeSet<String> = left.keys().cloned().collect();
+            left.iter_mut().for_each(|(_, needs)| needs.retain(|need| names.contains(need)));
+            left.retain(|_, needs| !needs.is_empty());
+            if left.len() == names.len() {
+                break;
+            }
+        }
+        let name = of_crate.strip_prefix(root()).unwrap().display();
+        circles.extend(left.into_iter().map(|(room, needs)| format!("{name}: {room} needs {needs:?}")));
+    }
+    assert!(circles.is_empty(), "rooms that need each other, and what needs those:\n{}", circles.join("\n"));
+}
+
+#[test]
+fn no_folder_has_more_files_than_a_reader_takes_in() {
+    for of_crate in crates() {
+        let mut files: BTreeMap<PathBuf, usize> = BTreeMap::new();
+        for file in sources(&of_crate) {
+            *files.entry(file.parent().unwrap().to_owned()).or_default() += 1;
+        }
+        for (folder, count) in files {
+            assert!(count <= FILES, "{} has {count} files; sort them into folders", folder.display());
+        }
+    }
+}
