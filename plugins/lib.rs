@@ -1,8 +1,14 @@
 //! Manifactor: nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 //!
-//! This crate is the front door: [`graph`], [`solve`] and [`config`] are the core; each plugin is a module and a cargo
-//! feature, all of them on by default. Linking a plugin is all that it takes to use its types by name.
+//! # What to import
+//! - [`prelude`]: what most programs and all plugins need, under the names of this page.
+//! - [`geometry`], [`quadric`], [`semantic`]: variables and factors. [`expression`] makes factors of formulas.
+//! - [`config`]: graphs as documents. [`solve`] and [`graph`]: all of the core, for solvers and tools.
+//! - `formats`, `slam` and `viz`, by the cargo feature of that name or `full`: files, runs and pictures.
 //!
+//! Linking a plugin is all that it takes to use its types by name in a document.
+//!
+//! # A graph, solved
 //! ```
 //! use manifactor::prelude::*;
 //! use manifactor::geometry::{Between, Prior, Se2};
@@ -16,13 +22,65 @@
 //! values.insert("x0", Se2::identity());
 //! values.insert("x1", Se2::identity());
 //!
-//! let solution = solve(&graph, &values, &LevenbergMarquardt::default(), &mut Silent)?;
+//! let solution = solve(&graph, &values, &Auto::default(), &mut Silent)?;
 //! assert!(solution.outcome.termination.is_converged());
+//! let uncertainty = &solution.marginals(&graph, &["x1"])?[0];
+//! assert!(uncertainty.covariance[(0, 0)] > 1.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Where to read on: the author's guide (`docs/authors-guide.md`) writes a factor from an empty file to a config that
-//! uses it; [`graph::Residual`] is the trait that it implements.
+//! # A factor of one's own
+//! The residual is written once, over a scalar that is a number or a dual number; its Jacobian follows.
+//! ```
+//! use manifactor::prelude::*;
+//! use manifactor::geometry::Point2;
+//!
+//! /// A point is on a circle about the origin: r = ‖p‖ - radius.
+//! #[derive(Debug, Clone)]
+//! struct OnCircle {
+//!     radius: f64,
+//! }
+//!
+//! impl Residual for OnCircle {
+//!     type Variables = (Point2,);
+//!     type Dim = U1;
+//!     fn residual<T: Scalar>(&self, (point,): Lifted<Self::Variables, T>) -> Vector1<T> {
+//!         Vector1::new(point.0.dot(&point.0).sqrt() - self.radius)
+//!     }
+//! }
+//! ```
+//! With serde's derives and one line, [`register_factor!`], a document can name it: `docs/authors-guide.md` goes on from here
+//! to its documentation and its laws.
+//!
+//! # A loop that changes measurements
+//! A graph is compiled once; measurements, noise and weights of the compiled [`Problem`](solve::Problem) can be changed.
+//! ```
+//! use manifactor::prelude::*;
+//! use manifactor::geometry::{Point1, Prior};
+//!
+//! let (mut graph, mut values) = (Graph::new(), Values::new());
+//! values.insert("x", Point1::new([0.0].into()));
+//! graph.add(["x"], Prior { value: Point1::new([0.0].into()) });
+//! let mut problem = Problem::compile(&graph, &values)?;
+//! for seen in [1.0, 2.0, 3.0] {
+//!     problem.factor_mut::<Prior<Point1>>(0)?.value = Point1::new([seen].into());
+//!     GaussNewton::default().solve(&mut problem, &mut Silent);
+//!     assert!((problem.values().get::<Point1>("x")?.0[0] - seen).abs() < 1e-12);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Traits in threes
+//! What can be chosen by name has three traits. Authors implement the first; a macro, the second; the core, the third.
+//!
+//! | authors implement | by name, in graphs and values | inside, without its type |
+//! | --- | --- | --- |
+//! | [`Residual`](graph::Residual) | [`Factor`](graph::Factor), by [`register_factor!`] | [`ErasedResidual`](graph::ErasedResidual) |
+//! | [`Manifold`](graph::Manifold) | [`Variable`](graph::Variable), by [`register_manifold!`] | [`ErasedManifold`](graph::ErasedManifold) |
+//! | [`RobustLoss`](graph::loss::RobustLoss) | [`Loss`](graph::loss::Loss), by [`register_loss!`] | [`ErasedLoss`](graph::loss::ErasedLoss) |
+//!
+//! # Where to go on
+//! The book, `docs/SUMMARY.md`: concepts, the author's guide, graphs from documents, how other libraries say the same.
 pub use manifactor_config as config;
 pub use manifactor_graph as graph;
 pub use manifactor_solve as solve;
@@ -55,25 +113,10 @@ pub use manifactor_graph::__private::typetag;
 
 /// The names that most programs and most plugins need.
 pub mod prelude {
-    pub use manifactor_graph::__private::typetag;
-    pub use manifactor_graph::checked::Positive;
-    pub use manifactor_graph::loss::{Loss, RobustLoss};
-    pub use manifactor_graph::quantity::Quantity;
-    pub use manifactor_graph::{
-        Dimension, Direction, Factor, Graph, Jacobians, Jet, JetOf, Key, Lift, Lifted, Manifold, Many, Noise,
-        Refs, Residual, Scalar, Tangent, Values, Variable, Variables, Vector,
-    };
-    pub use manifactor_graph::{
-        register, register_factor, register_functions, register_invariance, register_loss, register_manifold,
-        register_quantity,
-    };
+    pub use manifactor_graph::prelude::*;
     pub use manifactor_solve::{
         Auto, Descent, Dogleg, GaussNewton, Gnc, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome,
         Problem, Silent, Solution, Start, StartError, Step, Stopping, Termination, Tried, solve,
-    };
-    pub use nalgebra::{
-        Matrix2, Matrix3, Matrix4, U1, U2, U3, U4, U5, U6, U7, U8, U9, Vector1, Vector2, Vector3, Vector4,
-        Vector5, Vector6,
     };
 }
 

@@ -5,4 +5,4 @@ mod scalar;
 
 pub use dimension::{Block, Dimension, Matrix, Vector};
 pub use direction::{Direction, NoDirection};
-pub use scalar::{Jet, JetOf, Lift, Scalar};
+pub use scalar::{Jet, JetOf, Lift, Scalar, abs};

@@ -11,12 +11,13 @@ mod factor;
 mod graph;
 pub mod loss;
 pub mod noise;
+pub mod prelude;
 pub mod quantity;
 mod registry;
 mod residual;
 mod variable;
 
-pub use algebra::{Block, Dimension, Direction, Jet, JetOf, Lift, Matrix, NoDirection, Scalar, Vector};
+pub use algebra::{Block, Dimension, Direction, Jet, JetOf, Lift, Matrix, NoDirection, Scalar, Vector, abs};
 pub use factor::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows, batch, invariance};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
 pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices, Version};

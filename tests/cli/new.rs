@@ -18,7 +18,10 @@ fn a_new_plugin_compiles_and_passes_outside_of_the_workspace() {
     // the versions that are built already
     std::fs::copy(root().join("Cargo.lock"), folder.path().join("on_the_shelf/Cargo.lock")).unwrap();
     let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["test", "--offline", "--quiet"]).current_dir(&name).env("CARGO_TARGET_DIR", target());
+    cargo
+        .args(["test", "--offline", "--quiet", "--features", "cli"])
+        .current_dir(&name)
+        .env("CARGO_TARGET_DIR", target());
     // all of ours are built anew for a crate outside: quickly, rather than well
     cargo.env("CARGO_INCREMENTAL", "0").args(["--config", "profile.dev.opt-level=0"]);
     // with it, the dependencies would not be those that are built already

@@ -14,6 +14,12 @@ use num_dual::{Derivative, DualNum, DualSVec64};
 pub trait Scalar: RealField + Copy + DualNum<Primitive = f64> {}
 impl<T: RealField + Copy + DualNum<Primitive = f64>> Scalar for T {}
 
+/// |x|. Where x is zero, the derivative is that of x > 0.
+#[inline(always)]
+pub fn abs<T: Scalar>(x: T) -> T {
+    if x < T::zero() { -x } else { x }
+}
+
 /// A dual number whose derivative part can be written and read.
 pub trait Jet: Scalar {
     /// A value with its gradient; `gradient` has as many entries as the jet has directions.
