@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, U1};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The noise of a measurement; unit, where nothing is said.
+/// The noise of a measurement. Default: unit.
 ///
 /// In documents one of `{ sigma = 0.1 }`, `{ sigmas = [0.1, 0.2] }`, `{ covariance = [[…], […]] }`,
 /// `{ information = [[…], […]] }` or `{}`; with `observed = [true, false, …]` where some rows of the
@@ -47,7 +47,7 @@ struct Spec {
     /// Information matrix, by rows: symmetric and positive definite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     information: Option<Vec<Vec<f64>>>,
-    /// Which rows of the residual were measured; all, where nothing is said.
+    /// Which rows of the residual were measured. Default: all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     observed: Option<Vec<bool>>,
 }

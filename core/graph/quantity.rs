@@ -1,6 +1,6 @@
 //! What formulas compute with: numbers, vectors, rotations and whatever else a plugin registers.
 //!
-//! A [`Quantity`] is a type with a flat form, so many scalars in a row. A [`Manifold`](crate::Manifold) whose points are
+//! A [`Quantity`] is a type with a flat form: a fixed number of scalars. A [`Manifold`](crate::Manifold) whose points are
 //! quantities is entered by [`register_quantity!`](crate::register_quantity), and functions of quantities by
 //! [`register_functions!`](crate::register_functions): with both, a formula in a config can use them by name.
 use crate::algebra::Dimension;
@@ -44,7 +44,7 @@ impl fmt::Display for Shape {
 pub trait Quantity: 'static {
     /// Its name and size.
     const SHAPE: Shape;
-    /// It, over another scalar.
+    /// The same type over another scalar.
     type Of<T: Scalar>;
     /// From its flat form, of which `from` is at least as long.
     fn read<T: Scalar>(from: &[T]) -> Self::Of<T>;
@@ -105,7 +105,7 @@ pub fn with<A, B>(x: A, f: impl FnOnce(A) -> B) -> B {
     f(x)
 }
 
-/// What variables of a type are in formulas; `None` where nobody says.
+/// What variables of a type are in formulas; `None` for a type that is not registered as a quantity.
 pub fn variable_quantity(id: TypeId) -> Option<&'static VariableQuantity> {
     inventory::iter::<VariableQuantity>.into_iter().find(|q| (q.type_id)() == id)
 }
@@ -122,9 +122,9 @@ pub struct Function {
     pub summary: &'static str,
     /// The module that registered it.
     pub module: &'static str,
-    /// It, over numbers.
+    /// The function over numbers.
     pub over_numbers: Call<f64>,
-    /// It, over dual numbers.
+    /// The function over dual numbers.
     pub over_lanes: Call<Lanes>,
 }
 inventory::collect!(Function);
@@ -205,7 +205,7 @@ macro_rules! register_quantity {
 ///     /// a · b.
 ///     fn dot(a: Vector3<f64>, b: Vector3<f64>) -> f64 { a.dot(&b) }
 ///
-///     /// The vector, so many times as long.
+///     /// The vector, scaled.
 ///     "*" fn scale(v: Vector3<f64>, by: f64) -> Vector3<f64> { v * by }
 /// }
 /// ```

@@ -32,7 +32,7 @@ pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
     read.map(drop).map_err(|e| problem(entry, format!("its example: {e}")))
 }
 
-/// Checks a factor's example, see [`FactorCheck`], at so many points. Returns what was found.
+/// Checks a factor's example at this number of points, see [`FactorCheck`]. Returns what was found.
 ///
 /// # Errors
 /// The law that is broken, or what the catalogue lacks.

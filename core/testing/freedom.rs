@@ -12,7 +12,7 @@ pub struct Freedom {
     pub directions: usize,
     /// Directions that the residual sees.
     pub rank: usize,
-    /// Free directions: alone, or so many combinations of several. Positions are over all variables, in order.
+    /// Free directions: single ones, and the number of combinations of several. Positions are over all variables, in order.
     pub free: Vec<Free>,
 }
 

@@ -65,7 +65,7 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// Of so many diagnostics each is told; of more, how many more.
+/// Diagnostics that are shown; of further ones, the number.
 const TOLD: usize = 200;
 
 /// Everything that is wrong with a document, sorted by place. Never empty.

@@ -1,7 +1,7 @@
 //! One document over another, as variants of a run are.
 use crate::node::{Node, Table, Value};
 
-/// Puts `patch` over `base`: tables are merged field by field, everything else is replaced. A table whose `type` differs
+/// Puts `patch` over `base`: tables are merged field by field, all other values are replaced. A table whose `type` differs
 /// replaces the other as well, since its fields belong to another type.
 pub fn merge(base: &mut Node, patch: Node) {
     match (&mut base.value, patch.value) {

@@ -47,7 +47,7 @@ pub enum Problem {
         /// The name.
         name: String,
     },
-    /// A field that nobody reads.
+    /// A field that no type reads.
     #[error("unknown field `{field}`")]
     UnknownField {
         /// The field.

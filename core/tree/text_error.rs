@@ -11,7 +11,7 @@ use std::ops::Range;
 /// did you mean `dot`?
 /// ```
 /// An error of serde carries no more than such a message: [`TextError::parse`] gets the error back out of it, so that
-/// whoever knows where the text is written can point there.
+/// a caller that knows where the text is written can point there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TextError {
     /// The text, on one line.

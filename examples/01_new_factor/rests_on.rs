@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct RestsOn {
     /// The plane's height along `up`, in metres.
     pub(crate) height: f64,
-    /// The world's up, of any length but zero; z, where nothing is said.
+    /// The world's up, of any length but zero. Default: z.
     #[serde(default)]
     pub(crate) up: Direction,
 }

@@ -1,4 +1,4 @@
-//! What is said: results on standard output, everything else on standard error.
+//! Output: results on standard output, all else on standard error.
 //!
 //! Nothing else in this crate writes to the two: `print!` and `eprintln!` panic where they cannot write.
 pub(crate) mod report;

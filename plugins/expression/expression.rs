@@ -32,7 +32,7 @@ struct Document {
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     #[schemars(with = "std::collections::BTreeMap<String, Constant>")]
     constants: IndexMap<String, Constant>,
-    /// The world's up, of any length but zero; z, where nothing is said.
+    /// The world's up, of any length but zero. Default: z.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     up: Option<Direction>,
     /// Formulas that are above zero wherever the factor means something.

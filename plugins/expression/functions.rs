@@ -108,13 +108,13 @@ macro_rules! vectors {
         /// The other way.
         "-" fn negate(v: $vector) -> $vector { -v }
 
-        /// So many times as long.
+        /// The vector, scaled.
         "*" fn scale(v: $vector, by: f64) -> $vector { v * by }
 
-        /// So many times as long.
+        /// The vector, scaled.
         "*" fn scale(by: f64, v: $vector) -> $vector { v * by }
 
-        /// So many times shorter.
+        /// The vector, divided by a number.
         "/" fn shorten(v: $vector, by: f64) -> $vector { v / by }
 
         /// Component by component.

@@ -1,7 +1,7 @@
 //! A factor that is written as a formula in a config.
 //!
 //! A formula is parsed, checked and compiled once, to a program of calls over flat
-//! values, which runs over numbers and over dual numbers. What it can call is registered by whoever owns the geometry:
+//! values, which runs over numbers and over dual numbers. What it can call is registered by the crate with the geometry:
 //! see [`manifactor_graph::quantity`].
 // strangers' input comes in here: no place of it is taken for granted
 #![warn(clippy::indexing_slicing)]

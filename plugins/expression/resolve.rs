@@ -70,7 +70,7 @@ impl Library {
                 expected.dedup();
                 let message =
                     format!("`{name}` takes {} here, found {}", one_of(&expected), with_article(found.name));
-                // what a number or a vector is good for, nobody has to be told
+                // numbers and vectors need no explanation
                 let takers = match found.is_vector() || *found == f64::SHAPE {
                     true => String::new(),
                     false => format!("; {}", self.takers(*found)),

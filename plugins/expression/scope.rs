@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 /// The name of the world's up.
 pub(crate) const UP: &str = "up";
-/// The names that are always there, and so free to nobody.
+/// Reserved names.
 const TAKEN: [&str; 2] = [UP, "pi"];
 /// What a name stands for.
 pub(crate) enum Named {

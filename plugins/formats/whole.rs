@@ -119,7 +119,7 @@ fn create(path: &Path, replaced: Option<&Metadata>) -> io::Result<File> {
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     let file = options.open(path)?;
-    // a file system without permissions is no reason to lose results; what the owner alone can read hurts nobody
+    // a file system without permissions is no reason to lose results; a file that only its owner can read does no harm
     let _ = file.set_permissions(replaced.permissions());
     Ok(file)
 }

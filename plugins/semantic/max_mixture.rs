@@ -57,7 +57,7 @@ struct Document {
 pub struct Component {
     /// How likely it is, relative to the others.
     pub weight: Positive,
-    /// The factor that holds then; none, where nothing is said.
+    /// The factor that holds then. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "any_factor")]
     pub factor: Option<Arc<dyn Factor>>,
@@ -68,7 +68,7 @@ pub struct Component {
 
 /// The definition that a document's schema has of all factors.
 fn any_factor(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({ "$ref": "#/$defs/factor", "description": "The factor that holds then; none, where nothing is said." })
+    json_schema!({ "$ref": "#/$defs/factor", "description": "The factor that holds then. Default: none." })
 }
 
 /// Why components make no mixture.

@@ -161,7 +161,7 @@ impl Estimate {
         Ok(estimate)
     }
 
-    /// Solves once, beginning at `values`, with at most so many refinements.
+    /// Solves once, from `values`, with at most this number of refinements.
     ///
     /// Objects are [refined](Refiner) alone before the joint solve. That may leave one on the edge of a valley of its
     /// orientation factor, where no joint step is possible: so poses are solved with the shapes of such objects held,

@@ -33,7 +33,7 @@ manifactor_graph::kind!(dyn Gravity, "gravity");
 pub struct MapFrame {
     /// Takes the poses of the odometry to the map.
     pub map_from_odometry: Se3,
-    /// Up in the map; `None` where nobody knows.
+    /// Up in the map; `None` if unknown.
     pub up: Option<Direction>,
 }
 

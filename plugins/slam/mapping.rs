@@ -69,7 +69,7 @@ pub enum MappingError {
     /// A sequence of nothing.
     #[error("the sequence has no frames")]
     NoFrames,
-    /// Nobody knows up.
+    /// Up is unknown.
     #[error(transparent)]
     Gravity(#[from] GravityError),
     /// A semantic rule that cannot be applied.

@@ -39,7 +39,7 @@ pub(super) fn within(
     number
 }
 
-/// A number from 0 to 1; 0, where nothing is said.
+/// A number from 0 to 1. Default: 0.
 pub(crate) fn share(section: &mut Section<'_>, field: &str) -> f64 {
     within(section, field, 0.0, 0.0..=1.0)
 }

@@ -16,8 +16,8 @@ pub fn run_root(definitions: &mut Definitions) -> Value {
     let text = |description: &str| json!({ "type": "string", "description": description });
     let own = json!({
         "title": text("What it is called in reports."),
-        "output": text("Where its results go; out/ and the document's name, where nothing is said."),
-        "folder": text("From which its files are named; its own, where nothing is said."),
+        "output": text("Where its results go. Default: out/ and the document's name."),
+        "folder": text("The folder that its paths are relative to. Default: its own."),
         "variants": {
             "type": "array",
             "description": "Ways to do the run, to compare.",
@@ -147,7 +147,7 @@ pub fn experiment_root(definitions: &mut Definitions) -> Value {
     });
     let properties = json!({
         "title": text("What it is called in reports."),
-        "output": text("Where its results go; out/ and the document's name, where nothing is said."),
+        "output": text("Where its results go. Default: out/ and the document's name."),
         "base": text("The run that it varies: a path from this document."),
         "set": set("Settings of the base that are others in all trials."),
         "axes": { "type": "array", "items": axis, "description": "What is varied; all combinations are run." },

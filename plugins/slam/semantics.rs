@@ -46,7 +46,7 @@ pub const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 const ANY: &str = "*";
 /// A class with a smaller share of an object's scores is no alternative.
 const LEAST_SHARE: f64 = 0.05;
-/// In a mixture, that nothing holds is as likely as a residual of so many σ.
+/// In a mixture, the alternative that no factor holds is as likely as a residual of this many σ.
 const DOUBT: f64 = 3.0;
 
 /// Objects of these classes get this factor.
@@ -112,7 +112,7 @@ impl Rule {
     /// is the one or nothing, by `share`: w = p for the factor, (1 - p) exp(-3²/2) for nothing.
     ///
     /// # Errors
-    /// Where the factor needs to know up, and nobody does.
+    /// If the factor needs to know up and up is unknown.
     pub fn entry(&self, keys: Vec<Key>, up: Option<Direction>, share: f64) -> Result<FactorEntry, RuleError> {
         let factor: Arc<dyn Factor> = Arc::from(self.factor.instantiate(up)?);
         let (noise, loss) = (self.noise.clone(), self.loss.clone());

@@ -51,7 +51,7 @@ pub struct Settings {
     /// Names of classes that mean the same, besides the usual ones.
     #[serde(skip_serializing_if = "no_aliases")]
     pub aliases: Aliases,
-    /// How the noise is estimated; it is as given, where nothing is said.
+    /// How the noise is estimated. Default: it is as given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_components: Option<VarianceSettings>,
     /// How the graph is solved.
@@ -69,7 +69,7 @@ fn no_aliases(aliases: &Aliases) -> bool {
 /// `[odometry]`: r = Log(Z⁻¹ Xᵢ⁻¹ Xᵢ₊₁), rotation before translation.
 #[derive(Debug, Clone, Serialize)]
 pub struct OdometrySettings {
-    /// Of a relative pose: rad, then m. σ = 0.01, where nothing is said.
+    /// Of a relative pose: rad, then m. Default: σ = 0.01.
     pub noise: Noise,
     /// How much of a large error counts.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -79,7 +79,7 @@ pub struct OdometrySettings {
 /// `[prior]`: r = Log(Z⁻¹ X₀).
 #[derive(Debug, Clone, Serialize)]
 pub struct PriorSettings {
-    /// Of the first pose: rad, then m. σ = 0.001, where nothing is said.
+    /// Of the first pose: rad, then m. Default: σ = 0.001.
     pub noise: Noise,
 }
 
@@ -154,7 +154,7 @@ fn noise(section: &mut Section<'_>, sigma: f64, rows: usize) -> Noise {
     given.unwrap_or_else(|| Noise::sigma(sigma).unwrap_or_default())
 }
 
-/// Reports a section's noise that does not fit a residual of so many rows: once, and not for each factor that gets it.
+/// Reports a section's noise that does not fit a residual of `rows` rows: once, and not for each factor that gets it.
 pub(crate) fn check_rows(section: &Section<'_>, noise: Option<&Noise>, rows: usize) {
     if let Some(Err(error)) = noise.map(|noise| noise.whitener(rows)) {
         section.report("noise", Problem::invalid(error.to_string()));

@@ -51,7 +51,7 @@ fn track(kind: TrackKind, name: &str, poses: &[StampedPose], frame: &Similarity)
     Track { kind, name: name.into(), positions }
 }
 
-/// Up in the frame of the picture. Where nobody knows it, up in the first image is the best guess.
+/// Up in the frame of the picture. If it is unknown, up in the first image is the best guess.
 fn up(estimate: &Estimate, frame: &Similarity) -> Direction {
     let image_up = || estimate.trajectory().first().map(|p| p.pose.rotation.act(&-Vector3::y()));
     let known = estimate.mapping.frame.up.map(|up| *up);

@@ -97,7 +97,7 @@ impl Reader<'_> {
     }
 }
 
-/// Whole numbers that fit are integers; everything else, and the negative zero, the nearest `f64`.
+/// Whole numbers that fit are integers; all other numbers, and negative zero, are read as the nearest `f64`.
 fn number_of(text: &str) -> Value {
     match text.parse::<i64>() {
         Ok(value) if value != 0 || !text.starts_with('-') => Value::Integer(value),

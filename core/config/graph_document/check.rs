@@ -8,7 +8,7 @@ use manifactor_tree::{Problem, quoted_list};
 
 /// Up to this many variables are listed for a key that is none of them.
 const LISTED: usize = 12;
-/// For so many unknown keys the nearest is searched; the search goes through all variables.
+/// Unknown keys for which the nearest known key is searched: each search goes through all variables.
 const SEARCHED: usize = 100;
 
 /// Reports everything that the graph finds wrong between itself and its values.

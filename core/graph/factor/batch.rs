@@ -91,7 +91,7 @@ pub struct FactorRows<'a> {
 pub trait Batch: Send + Sync {
     /// Whether a factor of the same type belongs here, by its noise and loss.
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool;
-    /// Makes room for so many factors, with so many variables in all.
+    /// Reserves room for `factors` more factors, with `variables` variables in total.
     fn reserve(&mut self, factors: usize, variables: usize);
     /// Adds a factor of this batch's type; others are left out.
     fn push(&mut self, member: &Member<'_>);
@@ -130,7 +130,7 @@ pub(crate) struct BatchOf<F: Kernel> {
     slots: Vec<Slot>,
     whiteners: Whiteners<F::Dim>,
     losses: Option<Box<dyn LossColumn>>,
-    /// What each factor's cost is multiplied by; empty, where nobody weighs them.
+    /// What each factor's cost is multiplied by; empty if no weights were set.
     weights: Vec<f64>,
     active: Vec<bool>,
     /// One for each chunk of a window, and of the next, for threads; empty until they are used.

@@ -15,7 +15,7 @@ use smallvec::SmallVec;
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
 
-/// The most rows that a [`DynamicResidual`] may have: so many loops are compiled for each of its types.
+/// The most rows that a [`DynamicResidual`] may have: its loops are compiled once for each number of rows.
 pub const MAX_ROWS: usize = 9;
 
 /// A residual that says at run time how many rows it has and what types its variables are of.

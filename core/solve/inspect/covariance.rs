@@ -34,7 +34,7 @@ pub enum CovarianceError {
     Compile(#[from] CompileError),
 }
 
-/// One variable in so many is asked for by itself; more of them are faster by the selected inverse.
+/// If fewer than one variable in this many is asked for, each is computed by itself; else the selected inverse is faster.
 const FEW: usize = 8;
 
 /// The uncertainty of one variable.

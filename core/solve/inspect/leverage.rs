@@ -10,7 +10,7 @@ const FLOOR: f64 = 1e-9;
 
 impl Problem {
     /// The leverage of each row of each factor at the estimate, in the order of the graph: the diagonal of J H⁻¹ Jᵀ, J
-    /// whitened and with robust weights. From 0, where all other measurements say the same, to 1, where nobody else
+    /// whitened and with robust weights. From 0, where all other measurements say the same, to 1, where no other measurement
     /// says anything and the residual is zero whatever is measured. One less it is the row's redundancy; all leverages
     /// together are the number of unknowns that anything constrains. Empty for a factor that takes no part.
     ///

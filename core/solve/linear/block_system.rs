@@ -1,4 +1,4 @@
-//! Symmetric positive definite systems of small dense blocks: A X = B, for who has a linear problem of his own.
+//! Symmetric positive definite systems of small dense blocks: A X = B, for callers with their own linear systems.
 use crate::linear::Cholesky;
 use crate::linear::layout::Layout;
 use crate::linear::ordering::Order;

@@ -403,7 +403,7 @@ mod tests {
         (vec![6; 120], clique(0, 80).chain(clique(40, 120)).collect())
     }
 
-    /// Factor and solution of a system, by so many threads.
+    /// Factor and solution of a system on `threads` threads.
     fn solved((dims, pairs): (Vec<usize>, Vec<(u32, u32)>), threads: usize) -> (Vec<f64>, Vec<f64>) {
         let layout = Layout::new(&dims, pairs, &Order::Best).unwrap();
         let mut h: Vec<f64> = (0..layout.row_idx.len()).map(|i| (i as f64 * 0.7).sin()).collect();

@@ -23,13 +23,13 @@ pub fn available_memory() -> u64 {
     left.min(below_limit())
 }
 
-/// The most address space that this process may have, in bytes (`ulimit -v`); `None` where nobody has set a limit.
+/// The most address space that this process may have, in bytes (`ulimit -v`); `None` if no limit is set.
 #[cfg(unix)]
 pub fn memory_limit() -> Option<u64> {
     rustix::process::getrlimit(rustix::process::Resource::As).current
 }
 
-/// The most address space that this process may have, in bytes: nobody knows of a limit.
+/// The most address space that this process may have, in bytes: no limit is known on this system.
 #[cfg(not(unix))]
 pub fn memory_limit() -> Option<u64> {
     None
@@ -45,13 +45,13 @@ pub(crate) fn below_limit() -> u64 {
     // for what has no large products
     const LEAST: u64 = 4 << 20;
     let Some(limit) = memory_limit() else { return u64::MAX };
-    // what earlier solves have given back is resident still, and to be had again: so it is asked once
+    // memory that earlier solves have freed is still resident but available: ask once
     static BEFORE: OnceLock<u64> = OnceLock::new();
     let taken = PROGRAM + THREAD * rayon::current_num_threads() as u64 + BEFORE.get_or_init(resident);
     limit.saturating_sub(taken).max(LEAST)
 }
 
-/// Bytes that a limit leaves for a factor beside a compiled graph whose H has so many entries.
+/// Bytes that a limit leaves for a factor beside a compiled graph whose H has `entries` entries.
 pub(crate) fn beside(entries: usize) -> u64 {
     // graph, values, batches and fronts take up to eighteen times what H does
     const BESIDE: u64 = 18 * 16;
@@ -63,10 +63,10 @@ pub(crate) fn for_factor(entries: usize) -> u64 {
     available_memory().min(beside(entries))
 }
 
-/// Bytes in use. What an allocator has reserved beyond that is still to be had.
+/// Bytes in use, without what the allocator has reserved beyond that.
 fn resident() -> u64 {
     const PAGE: u64 = 4096;
-    // where there is no such file, nobody knows
+    // without such a file it is unknown
     let pages = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
     let resident = pages.split(' ').nth(1).and_then(|n| n.parse::<u64>().ok());
     resident.unwrap_or_default() * PAGE

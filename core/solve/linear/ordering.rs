@@ -24,7 +24,7 @@ pub(crate) enum Order {
     First(Vec<bool>),
 }
 
-/// Other orders are tried from so many operations a block on. Each try takes about 1 µs a block; on graphs in space, the
+/// Other orders are tried if the factorization takes more operations per block than this. Each try takes about 1 µs per block; on graphs in space, the
 /// best of three saves up to a fifth of the operations, at each of some six factorizations.
 const WORTH_TRIES: f64 = 2e4;
 /// The same of nested dissection, which takes about 6 µs a block and pays on large graphs in space.

@@ -8,7 +8,7 @@ use crate::problem::model::Place;
 use manifactor_graph::{Key, Values};
 use std::collections::HashMap;
 
-/// Systems of at most so many unknowns are factorized as one dense matrix.
+/// Systems of at most this many unknowns are factorized as one dense matrix.
 const DENSE: usize = 24;
 
 /// The blocks of a linear system: what variables they are.

@@ -51,7 +51,7 @@ impl FactorPlace {
 pub(crate) struct Model {
     pub variables: Vec<Place>,
     pub factors: Vec<FactorPlace>,
-    /// By factor: how often it counts; empty, where nobody weighs them.
+    /// The weight of each factor; empty if none were set.
     weights: Vec<f64>,
     /// The estimate, and room for a trial step.
     columns: Columns,

@@ -70,7 +70,7 @@ const GAIN: f64 = 1e-4;
 const NEGLIGIBLE: f64 = 1e-3;
 /// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal.
 const TRUSTED: f64 = 1.0;
-/// Damping up to which one small step is sign enough; above, it takes two.
+/// Damping up to which one small step means convergence; above, it takes two.
 const LIGHT: f64 = 1e-2;
 
 #[typetag::serialize(name = "levenberg_marquardt")]

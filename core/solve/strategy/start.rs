@@ -16,8 +16,8 @@ pub trait Start: Debug + Send + Sync {
     /// Where the strategy does not apply to the graph, or the graph does not fit its values.
     fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError>;
 
-    /// Whether `minimum`, which a solve from other values has led to, looks wrong, so that it is worth while to begin
-    /// here as well. [`Auto`](crate::Auto) asks after each solve: the answer has to be had in next to no time, and may
+    /// Whether `minimum`, which a solve from other values has led to, looks wrong, so that it is worth beginning
+    /// here as well. [`Auto`](crate::Auto) asks after each solve: the answer must take almost no time, and may
     /// not depend on the unit of the noise. Default: no.
     fn doubts(&self, _graph: &Graph, _minimum: &Values) -> bool {
         false

@@ -57,7 +57,7 @@ pub struct NamedEntry {
     pub at: Value,
 }
 
-/// Directions that are free, alone or in so many combinations.
+/// Free directions: single ones, and the number of combinations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreeDirections {
     /// How many combinations are free.

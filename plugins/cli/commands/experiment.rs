@@ -31,7 +31,7 @@ pub(crate) struct Experiment {
     /// The folder where public data sets lie.
     #[arg(long, value_name = "DIR", env = "MANIFACTOR_DATA")]
     data: Option<PathBuf>,
-    /// The folder for the results; that of the document, where nothing is said.
+    /// The folder for the results. Default: the one that the document names.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write into a folder that holds files of something else, over those of the same names.

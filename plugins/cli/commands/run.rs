@@ -21,7 +21,7 @@ use std::sync::atomic::Ordering;
 pub(crate) struct Run {
     #[command(flatten)]
     run: RunArguments,
-    /// The folder for the results; that of the document, where nothing is said.
+    /// The folder for the results. Default: the one that the document names.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Write into a folder that holds files of something else, over those of the same names.

@@ -30,13 +30,13 @@ impl SolverArguments {
         Ok(document.set(&self.set)?)
     }
 
-    /// Takes the field `solver` out of a document's table: `auto`, where nobody says anything.
+    /// Takes the field `solver` out of a document's table: default: `auto`.
     pub(crate) fn take(&self, section: &mut Section<'_>, document: &Source) -> Option<Box<dyn Optimizer>> {
         let argument = ("--solver", self.solver.as_deref());
         choose(section, "solver", argument, "auto", document)
     }
 
-    /// Takes the field `start`: the values as they are, where nobody says anything.
+    /// Takes the field `start`. Default: the values as they are.
     pub(crate) fn take_start(&self, section: &mut Section<'_>, document: &Source) -> Option<Box<dyn Start>> {
         choose(section, "start", ("--start", self.start.as_deref()), "given", document)
     }

@@ -7,7 +7,7 @@ mod table;
 pub(crate) use printable::{json, on_one_line, printable, same_length, shortened};
 pub(crate) use table::Table;
 
-/// Columns where nobody says how wide the terminal is.
+/// Columns if the width of the terminal is unknown.
 const WIDTH: u16 = 110;
 
 /// A paragraph, broken into lines.

@@ -19,7 +19,7 @@ fn pose(i: usize) -> Se3 {
     Se3::new(So3::exp(&Vector3::new(a.sin(), 0.3, 0.2 * a.cos())), Vector3::new(a.cos(), a.sin(), 0.01 * a))
 }
 
-/// Objects q, poses x and y, points p: so many of each.
+/// Objects q, poses x and y, points p: `n` of each.
 fn values() -> Values {
     let mut values = Values::new();
     for i in 0..COUNT {

@@ -42,7 +42,7 @@ fn main() {
     println!("\nThe largest ratio where both end at the same minimum: {worst:.2}");
 }
 
-/// The same graph with its information so many times as large.
+/// The same graph with its information multiplied.
 fn scaled(graph: &Graph, times: f64) -> Graph {
     let mut graph = graph.clone();
     for entry in graph.factors_mut() {

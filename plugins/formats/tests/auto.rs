@@ -40,7 +40,7 @@ fn auto_reaches_the_best_known_minimum_of_every_graph() {
     assert!(missed.is_empty(), "{missed:#?}");
 }
 
-/// The same graph with its information so many times as large.
+/// The same graph with its information multiplied.
 fn scaled(graph: &Graph, times: f64) -> Graph {
     let mut graph = graph.clone();
     for entry in graph.factors_mut() {

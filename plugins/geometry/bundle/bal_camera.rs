@@ -3,10 +3,8 @@
 use crate::groups::Coordinates;
 use crate::groups::Se3;
 use crate::groups::Xyzw;
-use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
-use nalgebra::{SVector, U9, Vector2, Vector3, Vector6};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use nalgebra::SVector;
 
 /// A camera of unknown pose, focal length and radial distortion, as in bundle adjustment in the large (BAL).
 ///

@@ -1,9 +1,7 @@
 //! A point is seen by a camera that is calibrated.
 use crate::{Camera, Coordinates, Point3, Se3};
-use manifactor_graph::{Jacobians, Lift, Lifted, Refs, Residual, Scalar, register_factor};
-use nalgebra::{Matrix2x3, U2, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use nalgebra::Matrix2x3;
 
 /// The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 ///

@@ -1,9 +1,7 @@
 //! A point is seen by a camera whose focal length and distortion are estimated too: bundle adjustment.
 use crate::{BalCamera, Coordinates, Point3};
-use manifactor_graph::{Jacobians, Lift, Lifted, Refs, Residual, Scalar, register_factor};
-use nalgebra::{Matrix2x3, U2, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use nalgebra::Matrix2x3;
 
 /// The point is seen at `pixel` by a camera with radial distortion: r = f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p - z, in pixels.
 ///

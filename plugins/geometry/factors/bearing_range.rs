@@ -6,11 +6,7 @@
 use crate::factors::range::NEAREST;
 use crate::groups::{Angle, atan2};
 use crate::{Point2, Se2, So2, wrap};
-use manifactor_graph::checked::Positive;
-use manifactor_graph::{Lifted, Refs, Residual, Scalar, register_factor};
-use nalgebra::{U2, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 
 /// The point is `range` away in the direction `bearing`, seen from the pose: r = (atan2(q) - β, ‖q‖ - d),
 /// q = Rᵀ(p - t).

@@ -5,11 +5,7 @@
 use crate::factors::range::NEAREST;
 use crate::groups::atan2;
 use crate::{Point3, Se3};
-use manifactor_graph::checked::Positive;
-use manifactor_graph::{Direction, Lift, Lifted, Refs, Residual, Scalar, register_factor};
-use nalgebra::{U3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 
 /// The point is `range` away in the direction `direction`, seen from the pose.
 ///

@@ -3,11 +3,8 @@
 //! The logarithm jumps where measurement and estimate differ by a rotation of π.
 use crate::groups::LieGroup;
 use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
-use manifactor_graph::{
-    Block, Dimension, Jacobians, Lifted, Matrix, Refs, Residual, Scalar, Tangent, Vector, register_factor,
-};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use manifactor_graph::{Block, Matrix};
 
 /// The second variable is at `relative`, seen from the first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,10 +1,8 @@
 //! A relative pose, compared by chords instead of angles: ‖R_b - R_a Z‖ instead of |Log(Zᵀ R_aᵀ R_b)|.
 use crate::groups::LieGroup;
 use crate::{Se2, Se3};
-use manifactor_graph::{Lifted, Manifold, Residual, Scalar, Vector, register_factor};
-use nalgebra::{SVector, U6};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use nalgebra::SVector;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// The second pose is at `relative`, seen from the first, with the chordal distance between rotations.

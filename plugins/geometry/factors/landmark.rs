@@ -1,10 +1,7 @@
 //! A point seen from a pose, with its distance: r = Rᵀ(p - t) - z.
 use crate::groups::quarter;
 use crate::{Coordinates, Point2, Point3, Se2, Se3};
-use manifactor_graph::{Jacobians, Lift, Lifted, Refs, Residual, Scalar, register_factor};
-use nalgebra::{Matrix2, Matrix3, U2, U3, Vector2, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 
 /// The point is at `position`, seen from the pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,10 +1,7 @@
 //! Where a pose is, as GPS or a total station measures it: r = R l + t - z.
 use crate::groups::quarter;
 use crate::{Coordinates, Se2, Se3};
-use manifactor_graph::{Jacobians, Lift, Lifted, Refs, Residual, Scalar, register_factor};
-use nalgebra::{U2, U3, Vector2, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 
 /// The pose's antenna is at `position`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -3,9 +3,7 @@
 //! The logarithm jumps where X differs from Z by a rotation of π.
 use crate::groups::LieGroup;
 use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
-use manifactor_graph::{Jacobians, Lifted, Refs, Residual, Scalar, Tangent, Vector, register_factor};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 
 /// The variable is close to `value`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

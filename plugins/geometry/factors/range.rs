@@ -3,11 +3,7 @@
 //! At distance zero there is no direction to move in: within a nanometre the factor is not defined.
 use crate::factors::Located;
 use crate::{Point2, Point3, Se2, Se3};
-use manifactor_graph::checked::Positive;
-use manifactor_graph::{Lifted, Refs, Residual, Scalar, Variables, register_factor};
-use nalgebra::{U1, Vector1};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 use std::marker::PhantomData;
 
 /// Below this distance, in metres, the direction between two points means nothing.

@@ -1,10 +1,8 @@
 //! SO(2): rotations in the plane, by their angle.
 use crate::groups::LieGroup;
-use manifactor_graph::quantity::{Quantity, Shape};
-use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
-use nalgebra::{Matrix1, Matrix2, U1, Vector1, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use manifactor_graph::quantity::Shape;
+use nalgebra::Matrix1;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// A rotation in the plane: tangent (theta), in radians, counter-clockwise.

@@ -117,7 +117,7 @@ fn sphere(error: f64) -> (Graph, Values) {
     (graph, values)
 }
 
-/// The same graph with its information so many times as large.
+/// The same graph with its information multiplied.
 fn scaled(graph: &Graph, times: f64) -> Graph {
     let mut graph = graph.clone();
     for entry in graph.factors_mut() {

@@ -5,10 +5,8 @@ use crate::shapes::Ellipsoid;
 use crate::shapes::tangent_line::TangentLine;
 use crate::shapes::{Ellipse, Side};
 use manifactor_geometry::{Camera, Se3};
-use manifactor_graph::{Jacobians, Lifted, Refs, Residual, Scalar, register_factor};
-use nalgebra::{Matrix4x6, SMatrix, U4, Vector4};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use nalgebra::{Matrix4x6, SMatrix};
 
 /// What of a cut object has to be left in the image, in pixels: no detector draws boxes of less.
 const VISIBLE: f64 = 1.0;

@@ -1,9 +1,7 @@
 //! What is known of an object beforehand.
 use crate::DualQuadric;
-use manifactor_graph::{Jacobians, Lift, Lifted, Manifold, Refs, Residual, Scalar, register_factor};
-use nalgebra::{SMatrix, SVector, U9};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use nalgebra::{SMatrix, SVector};
 
 /// An object is close to `value`: r = (Log(Z⁻¹X), log(s/s₀)), pose first.
 ///

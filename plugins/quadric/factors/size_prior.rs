@@ -1,10 +1,7 @@
 //! How large, and of what shape, objects of a class are.
 use crate::DualQuadric;
 use crate::shapes::SemiAxes;
-use manifactor_graph::{Lifted, Residual, Scalar, register_factor};
-use nalgebra::{U3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 
 /// Whether semi-axes are compared in the order that they have in the object.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

@@ -1,12 +1,7 @@
 //! An object stands beside another.
 use crate::directions::axis::extent;
-use manifactor_graph::{
-    Direction, Lift, Lifted, Refs, Residual, Scalar, register_factor, register_invariance,
-};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
-use nalgebra::{U1, Vector1, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// Two objects stand beside each other, so far apart: r = |h| - e₀ - e₁ - gap, in metres.
 ///
@@ -24,10 +19,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Beside {
-    /// How far they are apart, in metres; 0, where nothing is said: they touch.
+    /// How far they are apart, in metres. Default: 0, they touch.
     #[serde(default)]
     pub gap: f64,
-    /// The world's up, of any length but zero; z, where nothing is said.
+    /// The world's up, of any length but zero. Default: z.
     #[serde(default)]
     pub up: Direction,
 }

@@ -1,9 +1,6 @@
 //! Three objects stand in a row.
-use manifactor_graph::{Lifted, Refs, Residual, Scalar, register_factor, register_invariance};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
-use nalgebra::{U3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// The second of three objects is on the line through the other two: r = (c₁ - c₀) × u, u = (c₂ - c₀)/|c₂ - c₀|, in metres.
 ///

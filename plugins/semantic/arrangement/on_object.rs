@@ -1,10 +1,7 @@
 //! An object stands on another.
 use crate::directions::axis::extent;
-use manifactor_graph::{Direction, Lift, Lifted, Residual, Scalar, register_factor, register_invariance};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
-use nalgebra::{U1, Vector1, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// The lowest point of an object is as high as the highest point of another: r = (c₁ - c₀) · up - e₁ - e₀, in metres.
 ///
@@ -22,7 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OnObject {
-    /// The world's up, of any length but zero; z, where nothing is said.
+    /// The world's up, of any length but zero. Default: z.
     #[serde(default)]
     pub up: Direction,
 }

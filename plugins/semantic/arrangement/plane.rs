@@ -1,10 +1,6 @@
 //! Planes as variables.
 use crate::S2;
-use manifactor_graph::{Direction, Jet, JetOf, Lifted, Manifold, Residual, Scalar};
-use manifactor_graph::{register_factor, register_manifold};
-use nalgebra::{U3, Vector2, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 
 /// A plane in Hessian normal form, S² × R: the points x with n · x = offset.
 ///

@@ -1,10 +1,7 @@
 //! Points that were seen on an object are inside of it.
 use manifactor_geometry::{Coordinates, Se3};
-use manifactor_graph::{Lifted, Refs, Residual, Scalar, register_factor, register_invariance};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
-use nalgebra::{U1, Vector1, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// A measured point belongs to an object: r = max(0, ρ - 1), with ρ = ‖S⁻¹Rᵀ(X p - c)‖ its distance in semi-axes.
 ///
@@ -25,7 +22,7 @@ use serde::{Deserialize, Serialize};
 pub struct PointInside {
     /// The point in the frame of the pose, in metres.
     pub point: Coordinates<3>,
-    /// Whether the point is on the surface; inside is enough, where nothing is said.
+    /// Whether the point is on the surface. Default: false, inside is enough.
     #[serde(default)]
     pub surface: bool,
 }

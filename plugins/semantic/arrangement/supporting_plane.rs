@@ -1,11 +1,8 @@
 //! An object rests on a plane.
 use crate::Plane;
 use crate::directions::axis::extent;
-use manifactor_graph::{Lifted, Residual, Scalar, register_factor, register_invariance};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
-use nalgebra::{U1, Vector1};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// The lowest point of an object is on a plane that is estimated too: r = n · c - offset - e, in metres.
 ///

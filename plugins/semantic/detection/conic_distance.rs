@@ -1,11 +1,8 @@
 //! An object's outline is the ellipse that a detector drew: Wasserstein's distance between conics.
 use manifactor_geometry::{Camera, Se3};
-use manifactor_graph::checked::Positive;
-use manifactor_graph::{Lifted, Refs, Residual, Scalar, register_factor};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::{DualQuadric, Ellipsoid};
-use nalgebra::{Matrix2, SVector, U6, Vector2};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use nalgebra::SVector;
 
 /// The outline of an object is the ellipse that was measured: r = (μ - μ₀, A^½ U - A₀^½), in pixels.
 ///
@@ -30,7 +27,7 @@ pub struct ConicDistance {
     pub centre: [f64; 2],
     /// Half its extents along its own axes, in pixels.
     pub semi_axes: [Positive; 2],
-    /// The angle from the image's x axis (right) to the first semi-axis, towards y (down), in radians; 0, where nothing is said.
+    /// The angle from the image's x axis (right) to the first semi-axis, towards y (down), in radians. Default: 0.
     #[serde(default)]
     pub angle: f64,
     /// The camera that saw it.

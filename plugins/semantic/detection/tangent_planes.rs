@@ -1,10 +1,8 @@
 //! A box whose sides bound an object, in space: from starts that have no box yet.
 use manifactor_geometry::{Camera, Se3};
-use manifactor_graph::{Lifted, Residual, Scalar, register_factor};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::{BoundingBox, DualQuadric, Ellipsoid};
-use nalgebra::{RowVector3, U4, Vector3, Vector4};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use nalgebra::RowVector3;
 
 /// The planes through a camera and the sides of a box touch the object: rₖ = nₖ · c - eₖ, in metres.
 ///

@@ -1,10 +1,7 @@
 //! Gravity, as a variable that an accelerometer measures.
 use crate::S2;
 use manifactor_geometry::{Se3, So3};
-use manifactor_graph::{Direction, Lift, Lifted, Residual, Scalar, register_factor, register_invariance};
-use nalgebra::{U3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
 
 /// A body at rest feels up where it is: r = R⁻¹ g - a, of length 2 sin(angle / 2).
 ///

@@ -1,10 +1,7 @@
 //! Two objects are aligned.
 use crate::Axis;
-use manifactor_graph::{Lifted, Residual, Scalar, register_factor, register_invariance};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
-use nalgebra::{U3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// An axis of an object is parallel to an axis of another: r = a₀ × a₁, of length sin(angle).
 ///
@@ -22,7 +19,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parallel {
-    /// The axis of each: longest, shortest, x, y or z; the longest of both, where nothing is said.
+    /// The axis of each: longest, shortest, x, y or z. Default: the longest of both.
     #[serde(default)]
     pub axes: [Axis; 2],
 }

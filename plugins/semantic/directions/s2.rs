@@ -1,9 +1,7 @@
 //! Directions in space as variables.
-use manifactor_graph::quantity::{Quantity, Shape};
-use manifactor_graph::{Direction, Jet, JetOf, Manifold, Scalar, register_manifold, register_quantity};
-use nalgebra::{Matrix3x2, U2, Vector2, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use manifactor_graph::prelude::*;
+use manifactor_graph::quantity::Shape;
+use nalgebra::Matrix3x2;
 
 /// A direction in space, such as gravity's: a point on the unit sphere.
 ///

@@ -1,10 +1,7 @@
 //! A named axis of an object is upright.
 use crate::{Axis, S2};
-use manifactor_graph::{Direction, Lift, Lifted, Residual, Scalar, register_factor, register_invariance};
+use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
-use nalgebra::{U3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// A named axis of an object is vertical: r = a × up, of length sin(tilt).
 ///
@@ -22,10 +19,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Upright {
-    /// The axis: longest, shortest, x, y or z; the longest, where nothing is said.
+    /// The axis: longest, shortest, x, y or z. Default: longest.
     #[serde(default)]
     pub axis: Axis,
-    /// The world's up, of any length but zero; z, where nothing is said.
+    /// The world's up, of any length but zero. Default: z.
     #[serde(default)]
     pub up: Direction,
 }
@@ -62,7 +59,7 @@ register_invariance!(Upright, "moving, growing, and turning about its axis", |fa
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UprightAlong {
-    /// The axis: longest, shortest, x, y or z; the longest, where nothing is said.
+    /// The axis: longest, shortest, x, y or z. Default: longest.
     #[serde(default)]
     pub axis: Axis,
 }

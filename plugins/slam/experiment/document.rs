@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 pub struct Experiment {
     /// What it is called in reports.
     pub title: String,
-    /// Where its results go; `out/` and the document's name, where nothing is said.
+    /// Where its results go. Default: `out/` and the document's name.
     pub output: PathBuf,
     /// What tells trials apart.
     pub columns: Vec<String>,

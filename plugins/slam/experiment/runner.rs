@@ -61,7 +61,7 @@ pub fn run(
     written.map(|()| done == trials)
 }
 
-/// A trial on one thread: solvers that would share their work find nobody to share it with.
+/// A trial on one thread: its solver has a pool of one.
 fn alone(trial: &Trial, folders: &Folders, interrupt: &Interrupt) -> Option<Record> {
     let failed = |reason: String| Record {
         labels: trial.labels.clone(),

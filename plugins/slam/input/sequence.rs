@@ -102,7 +102,7 @@ pub struct Acceleration {
 pub struct GroundTruth {
     /// `world_from_camera` by time; its time stamps need not be those of the frames.
     pub trajectory: Vec<StampedPose>,
-    /// The objects; empty, where nobody measured them.
+    /// The objects; empty if they were not measured.
     pub objects: Vec<TrueObject>,
 }
 

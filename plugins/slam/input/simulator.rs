@@ -38,7 +38,7 @@ pub use trajectory::TrajectorySettings;
 pub struct Simulated {
     /// What all noise depends on.
     pub seed: u64,
-    /// The camera; the paper's, where nothing is said.
+    /// The camera. Default: the paper's.
     pub camera: Camera,
     /// Which objects there are.
     pub scene: SceneSettings,

@@ -72,13 +72,13 @@ pub enum SourceError {
         name: PathBuf,
         /// Where it was looked for.
         tried: Vec<PathBuf>,
-        /// Whether nobody said where data sets lie.
+        /// Whether no data folder was given.
         no_data_folder: bool,
     },
     /// A file that cannot be read, or that is not what it should be.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// A sequence whose camera nobody knows.
+    /// A sequence with an unknown camera.
     #[error(
         "the camera of `{}` is not known by the name of its folder: set `camera` to \
          {{ fx = …, fy = …, cx = …, cy = …, width = …, height = … }}, or to one of {}", folder.display(), known.join(", ")

@@ -85,7 +85,7 @@ impl<'a> Judge<'a> {
     /// What all rules have for an object.
     ///
     /// # Errors
-    /// Where a rule needs to know up and nobody does.
+    /// If a rule needs to know up and up is unknown.
     pub fn judge(&mut self, object: &Candidate) -> Result<Verdict, RuleError> {
         let mut verdict = Verdict::default();
         for (i, rule) in self.rules.iter().enumerate() {

@@ -30,7 +30,7 @@ pub struct Conditions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Near {
-    /// Its class; any, where nothing is said.
+    /// Its class. Default: any.
     #[serde(default = "any")]
     pub classes: Vec<String>,
     /// How wide the gap between the two is at most, along the line through their centres, where the solve begins.

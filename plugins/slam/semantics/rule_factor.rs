@@ -33,7 +33,7 @@ pub struct RuleFactor {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RuleError {
-    /// It needs to know up, and nobody does.
+    /// It needs to know up, and up is unknown.
     #[error(
         "the semantic factor `{factor}` needs to know which way is up, and the data source does not say: \
          set `[gravity]`, for example gravity = {{ type = \"vector\", up = [0.0, 0.0, 1.0] }}"
@@ -165,7 +165,7 @@ impl RuleFactor {
     /// The factor itself.
     ///
     /// # Errors
-    /// Where it needs to know up, and nobody does.
+    /// If it needs to know up and up is unknown.
     pub fn instantiate(&self, up: Option<Direction>) -> Result<Box<dyn Factor>, RuleError> {
         let factor = || self.name.clone();
         let mut fields = Value::Object(self.fields.clone());

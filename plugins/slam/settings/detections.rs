@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// `[detections]`: which boxes are used, and how.
 #[derive(Debug, Clone, Serialize)]
 pub struct DetectionSettings {
-    /// Of a box: xmin, ymin, xmax, ymax, in pixels. σ = 20, where nothing is said.
+    /// Of a box: xmin, ymin, xmax, ymax, in pixels. Default: σ = 20.
     pub noise: Noise,
     /// How much of a large error counts.
     #[serde(skip_serializing_if = "Option::is_none")]

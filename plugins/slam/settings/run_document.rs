@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 pub struct RunDocument {
     /// What it is called in reports.
     pub title: String,
-    /// Where its results go; `out/` and the document's name, where nothing is said.
+    /// Where its results go. Default: `out/` and the document's name.
     pub output: PathBuf,
     /// At least one; with the settings that they have in common.
     pub variants: Vec<Variant>,
@@ -125,7 +125,7 @@ pub(crate) fn folder(document: &Document, errors: &Errors) -> PathBuf {
     named.map_or_else(|| beside.to_owned(), |named| beside.join(named))
 }
 
-/// The same folder, wherever a program is run; as it stands, where nobody knows the current one.
+/// The same folder, wherever a program is run; unchanged if the current folder is unknown.
 pub(crate) fn absolute(folder: &Path) -> PathBuf {
     std::env::current_dir().map_or_else(|_| folder.to_owned(), |at| at.join(folder).components().collect())
 }

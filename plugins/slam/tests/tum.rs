@@ -10,7 +10,7 @@ use manifactor_slam::run_document::RunDocument;
 use manifactor_solve::{Silent, Stall, Termination};
 use std::path::{Path, PathBuf};
 
-/// Where the data lie; `None`, said aloud, where nobody said.
+/// The data folder; `None`, with a message, if it is not given.
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("MANIFACTOR_DATA").map(PathBuf::from);
     if data.is_none() {

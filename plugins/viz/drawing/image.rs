@@ -38,7 +38,7 @@ pub fn frames_seen(estimate: &Estimate, count: usize) -> Vec<usize> {
     spread(&Vec::from_iter(frames), count)
 }
 
-/// So many of a list, its first and its last among them; all, where there are no more.
+/// An even choice of `n` items of a list, the first and the last among them; all if there are no more.
 fn spread(frames: &[usize], count: usize) -> Vec<usize> {
     let count = count.min(frames.len());
     let last = count.saturating_sub(1).max(1);

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 pub struct Scene {
     /// Written over the picture.
     pub title: String,
-    /// Up, in the frame of everything else.
+    /// Up, in the frame of the scene.
     pub up: Direction,
     /// Trajectories, drawn in this order.
     pub tracks: Vec<Track>,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// Columns that are eliminated together, and columns of a product that are summed up in registers.
 const COLUMNS: usize = 4;
-/// From so many multiplications on, a front is large.
+/// Multiplications from which a front counts as large.
 const LARGE: usize = 1 << 24;
 /// From so many multiplications on, and so many for each of its entries, threads share an update. Where there are fewer,
 /// it takes longer to bring the entries together again. Tests are to see it in small problems too.
@@ -51,7 +51,7 @@ pub(crate) fn eliminate<S: Simd, const REPLACE: bool>(
     Ok(())
 }
 
-/// Some columns of an update, from the `first` on. Each entry is a sum of its own: the same whoever has its column.
+/// Some columns of an update, from the `first` on. Each entry is a sum of its own: the same whichever thread has its column.
 struct Update<'a, const REPLACE: bool> {
     panel: &'a [f64],
     width: usize,

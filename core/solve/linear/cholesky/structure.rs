@@ -213,7 +213,7 @@ impl Structure {
     }
 }
 
-/// A front is opened early where updates of its children take so many times its room.
+/// A front is opened early if the updates of its children take this many times its room.
 const EARLY: usize = 2;
 
 /// A supernode before its rows are known.

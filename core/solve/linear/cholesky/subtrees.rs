@@ -13,7 +13,7 @@ const SAVED: f64 = 0.05;
 const HANDED_ON: f64 = 20.0;
 
 /// Disjoint ranges of nodes, each a whole subtree, whose root is its last; the others are above them, or small. None,
-/// where so many threads would save next to nothing.
+/// if more threads would save almost nothing.
 pub(crate) fn subtrees(structure: &Structure, threads: usize) -> Vec<Range<usize>> {
     let n = structure.nodes.len();
     let (mut work, mut begin, mut parent) = (vec![0.0; n], vec![0; n], vec![None; n]);

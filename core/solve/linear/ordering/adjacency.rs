@@ -1,6 +1,6 @@
 //! Which blocks are coupled, as a graph.
 
-/// The rest of a graph is dense once it has so many times the couplings of the whole.
+/// The rest of a graph counts as dense once it has this many times the couplings of the whole.
 const DENSE: usize = 32;
 
 /// An undirected graph with weights, in compressed rows; no loops, no repeated edges.

@@ -3,7 +3,7 @@ use super::adjacency::Adjacency;
 use super::minimum_degree;
 use super::separator::{self, SEPARATOR};
 
-/// Pieces of at most so many vertices are ordered by minimum degree.
+/// Pieces of at most this many vertices are ordered by minimum degree.
 const PIECE: usize = 120;
 
 /// An order of elimination of the vertices; `None` where there is no memory for it.

@@ -9,7 +9,7 @@ use std::collections::BinaryHeap;
 /// Mark of the vertices of a separator; the two sides are 0 and 1.
 pub(crate) const SEPARATOR: u8 = 2;
 
-/// Graphs of at most so many vertices are not shrunk further.
+/// Graphs of at most this many vertices are not coarsened further.
 const SMALL: usize = 80;
 /// How often a small graph is split, each time from another vertex.
 const TRIES: usize = 8;
@@ -17,7 +17,7 @@ const TRIES: usize = 8;
 const LARGEST: f64 = 0.6;
 /// Most passes of a refinement.
 const PASSES: usize = 4;
-/// A pass ends after so many moves that bring nothing.
+/// A pass ends after this many moves without improvement.
 const PATIENCE: usize = 40;
 
 /// By vertex: side 0 or 1, or [`SEPARATOR`]. No edge leads from one side to the other.

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 /// Most rounds until the weights stay; two or three are the rule.
 const ROUNDS: usize = 10;
-/// Of what an inlier may cost, the shares up to which factors are kept where other minima are looked for.
+/// Thresholds for keeping a factor in the search for other minima, as multiples of the inlier bound.
 const SHARES: [f64; 5] = [1.0, 0.1, 0.03, 10.0, 100.0];
 /// Share of a cost by which another has to be lower to be so by more than what solves leave open.
 const LESS: f64 = 1e-5;
@@ -91,7 +91,7 @@ impl<'a> Graduation<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Another estimate, by what costs less than this share of what an inlier may; whether it has a lower robust
+    /// Another estimate, from the factors that cost less than this share of the inlier bound; whether it has a lower robust
     /// cost, else the estimate stays.
     fn settle_from(&mut self, share: f64) -> ControlFlow<Box<Outcome>, bool> {
         let within =

@@ -29,7 +29,7 @@ pub struct Recorded {
     /// The detections in the folder.
     #[serde(default = "detections")]
     pub detections: PathBuf,
-    /// The ground truth in the folder; `groundtruth.txt`, where nothing is said and there is such a file.
+    /// The ground truth in the folder. Default: `groundtruth.txt`, if there is such a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
     /// Up in the odometry's frame, where it is known.

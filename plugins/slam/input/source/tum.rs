@@ -29,10 +29,10 @@ pub struct TumRgbd {
     /// The detections in it.
     #[serde(default = "detections")]
     pub detections: PathBuf,
-    /// The ground truth in it; `groundtruth.txt`, where nothing is said and there is such a file.
+    /// The ground truth in it. Default: `groundtruth.txt`, if there is such a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
-    /// The camera: by name, or by its numbers. The folder's name tells, where nothing is said.
+    /// The camera: by name, or by its numbers. Default: the one that the folder's name tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraChoice>,
     /// How far apart in time a detection and its pose may be, in seconds. Time stamps are written to the

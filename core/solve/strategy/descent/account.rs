@@ -1,0 +1,72 @@
+//! What is written down of a solve: a record of each step, and an account of all.
+use super::{Descent, Step};
+use crate::outcome::{IterationRecord, Outcome, Stall, Termination, Undetermined};
+
+impl Descent<'_> {
+    /// Keeps a record of the step that was tried last, and shows it to the observer.
+    pub fn record(&mut self, step: &Step, accepted: bool) {
+        let defined = self.trial.left == 0 && self.trial.cost.is_finite();
+        let record = IterationRecord {
+            iteration: self.iterations,
+            cost: self.at.cost,
+            trial_cost: defined.then_some(self.trial.cost),
+            gradient: self.largest_gradient(),
+            step: step.norm,
+            control: step.control,
+            accepted,
+            inactive: self.at.inactive,
+            seconds: self.clock.elapsed().as_secs_f64(),
+        };
+        let IterationRecord { iteration, cost, trial_cost, gradient, step, control, .. } = record;
+        tracing::debug!(iteration, cost, trial_cost, gradient, step, control, accepted, "step");
+        self.interrupted |= self.observer.iteration(&record).is_break();
+        self.history.push(record);
+    }
+
+    /// The account of the solve, with what nothing constrains at the estimate, which takes a factorization.
+    pub fn end(mut self, termination: Termination) -> Outcome {
+        let looks = self.iterations > 0 && !self.interrupted && self.at.not_finite.is_none();
+        let open = looks.then(|| self.problem.undetermined()).flatten();
+        self.account(termination, open)
+    }
+
+    /// The account of the solve, with what is known to be open.
+    pub(crate) fn account(
+        &mut self,
+        termination: Termination,
+        undetermined: Option<Undetermined>,
+    ) -> Outcome {
+        let mut times = self.problem.times;
+        let solve = self.clock.elapsed().as_secs_f64();
+        times.total = solve + self.compile;
+        times.other = (solve - times.stages()).max(0.0);
+        let untouched = self.problem.untouched();
+        let moving = match termination {
+            Termination::MaxIterations if self.iterations > 0 => self.problem.moving(),
+            _ => None,
+        };
+        let termination = match (&untouched, termination) {
+            // a minimum, but not of what these variables are
+            (
+                Some(untouched),
+                Termination::Converged { .. } | Termination::Stalled { reason: Stall::Jump },
+            ) => Termination::Indeterminate(untouched.clone()),
+            (_, termination) => termination,
+        };
+        Outcome {
+            initial_cost: self.initial_cost,
+            final_cost: self.at.cost,
+            iterations: self.iterations,
+            termination,
+            undetermined,
+            moving,
+            untouched,
+            factors: self.problem.factors(),
+            inactive: self.at.inactive,
+            inactive_factors: self.problem.inactive_factors(),
+            rejected: vec![],
+            times,
+            history: std::mem::take(&mut self.history),
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! The best estimate so far, for solvers whose steps may raise the cost.
+use super::Descent;
+use manifactor_graph::column::Columns;
+
+/// The best estimate so far, for solvers whose steps may raise the cost.
+pub(crate) struct Best {
+    cost: f64,
+    columns: Columns,
+}
+
+impl Best {
+    pub(crate) fn new(descent: &Descent<'_>) -> Self {
+        Self { cost: descent.at.cost, columns: descent.problem.model.columns().clone() }
+    }
+    pub(crate) fn update(&mut self, descent: &Descent<'_>) {
+        if descent.at.cost < self.cost {
+            self.cost = descent.at.cost;
+            self.columns.clone_from(descent.problem.model.columns());
+        }
+    }
+    /// Goes back to the best estimate, where that is not the last.
+    pub(crate) fn restore(self, descent: &mut Descent<'_>) {
+        if self.cost < descent.at.cost || !descent.at.cost.is_finite() {
+            descent.problem.model.restore(self.columns);
+            descent.at = descent.problem.linearize();
+        }
+    }
+}
