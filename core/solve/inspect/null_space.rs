@@ -48,9 +48,7 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
     if !failed {
         let mut suspicious = false;
         let share = PIVOT.max(10.0 * damping);
-        let diagonal: Vec<f64> = system.diagonal().copied().collect();
-        system.cholesky()?.pivots(&mut |i, pivot| {
-            let entry = diagonal[i];
+        system.pivots(&mut |pivot, entry| {
             // a pivot that is not a number is suspicious too
             suspicious |= pivot.is_nan() || pivot < share * entry || entry <= ROUNDING * largest;
         });

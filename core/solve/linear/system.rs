@@ -193,6 +193,18 @@ impl LinearSystem {
         self.is_factorized
     }
 
+    /// Visits the pivots of the last factor by Cholesky, each with its entry on the diagonal of H.
+    pub(crate) fn pivots(&self, visit: &mut impl FnMut(f64, f64)) {
+        let cholesky = match &self.method {
+            Method::Cholesky(cholesky) => Some(cholesky),
+            _ => self.direct.as_ref(),
+        };
+        let diagonal = self.layout.diagonal();
+        if let Some(cholesky) = cholesky {
+            cholesky.pivots(&mut |i, pivot| visit(pivot, self.h[diagonal[i]]));
+        }
+    }
+
     /// The last factor by Cholesky: the method's own, or that of [`factorize_directly`](Self::factorize_directly).
     pub(crate) fn cholesky(&mut self) -> Option<&mut Cholesky> {
         match &mut self.method {

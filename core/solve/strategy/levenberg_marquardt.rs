@@ -126,15 +126,15 @@ impl LevenbergMarquardt {
 
     fn iterate(&self, descent: &mut Descent<'_>, lambda: &mut f64, bounds: Bounds<'_>) -> Termination {
         let (mut rise, mut small_before) = (2.0, false);
-        let mut step = Step::default();
+        let (mut step, mut damping) = (Step::default(), vec![]);
         'linearized: loop {
             if let Some(termination) = descent.next() {
                 return termination;
             }
             loop {
                 let [least, most] = bounds(descent);
-                let mut damping = descent.diagonal();
-                damping.iter_mut().for_each(|d| *d = *lambda * d.max(least).min(most));
+                damping.clear();
+                damping.extend(descent.problem.system.diagonal().map(|d| *lambda * d.max(least).min(most)));
                 step.control = *lambda;
                 if descent.damped(&damping, &mut step) {
                     let tried = descent.attempt(&step);

@@ -135,7 +135,7 @@ mod tests {
     fn data_sets_are_found_one_folder_deep() {
         let data = Path::new(env!("CARGO_MANIFEST_DIR"));
         let folders = Folders { data: Some(data.parent().unwrap().to_owned()), document: data.into() };
-        assert_eq!(folders.data_set(Path::new("source")).unwrap(), data.join("source"));
+        assert_eq!(folders.data_set(Path::new("settings")).unwrap(), data.join("settings"));
         let found = folders.data_set(Path::new("gravity")).unwrap();
         assert_eq!(found, data.join("gravity"));
         let deep = Folders { document: "elsewhere".into(), ..folders };
