@@ -19,9 +19,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 
+#[allow(clippy::indexing_slicing, reason = "by places that it has made itself")]
 pub(crate) mod anchor;
 mod build;
-#[allow(clippy::indexing_slicing, reason = "by places that it has made itself")]
 pub mod g2o;
 mod information;
 pub(crate) mod record;

@@ -127,7 +127,7 @@ const SETTLED: f64 = 1e-3;
 
 impl Estimate {
     /// Solves a graph that was made of a sequence, as often as it takes to know its noise; see
-    /// [`variance`](crate::estimate::variance). The graph of the estimate has the noise of its last solve.
+    /// [`variance`]. The graph of the estimate has the noise of its last solve.
     ///
     /// # Errors
     /// Where graph and values do not fit each other, or the noise cannot be estimated.
