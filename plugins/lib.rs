@@ -45,7 +45,7 @@
 //!     type Variables = (Point2,);
 //!     type Dim = U1;
 //!     fn residual<T: Scalar>(&self, (point,): Lifted<Self::Variables, T>) -> Vector1<T> {
-//!         Vector1::new(point.0.dot(&point.0).sqrt() - self.radius)
+//!         Vector1::new(point.norm() - self.radius)
 //!     }
 //! }
 //! ```
@@ -59,11 +59,11 @@
 //! use manifactor::geometry::{Point1, Prior};
 //!
 //! let (mut graph, mut values) = (Graph::new(), Values::new());
-//! values.insert("x", Point1::new([0.0].into()));
-//! graph.add(["x"], Prior { value: Point1::new([0.0].into()) });
+//! values.insert("x", Point1::new([0.0]));
+//! graph.add(["x"], Prior { value: Point1::new([0.0]) });
 //! let mut problem = Problem::compile(&graph, &values)?;
 //! for seen in [1.0, 2.0, 3.0] {
-//!     problem.factor_mut::<Prior<Point1>>(0)?.value = Point1::new([seen].into());
+//!     problem.factor_mut::<Prior<Point1>>(0)?.value = Point1::new([seen]);
 //!     GaussNewton::default().solve(&mut problem, &mut Silent);
 //!     assert!((problem.values().get::<Point1>("x")?.0[0] - seen).abs() < 1e-12);
 //! }
