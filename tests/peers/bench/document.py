@@ -1,4 +1,4 @@
-"""docs/benchmarks.md, as the benchmark writes it."""
+"""docs/benchmarks.md and docs/benchmarks-methods.md, as the benchmark writes them."""
 
 from pathlib import Path
 
@@ -31,19 +31,36 @@ sphere2500 0.54 s; it stops M3500 at 339.8 with its default λ), and gtsam-quadr
 AUTO = Path(__file__).resolve().parent.parent / "auto.md"
 
 
+METHODS = """# Benchmarks: every method
+<!-- written by `tests/peers/run --write`; change that, not this -->
+All methods on each problem of the [benchmarks](benchmarks.md), which say how they were measured: those that reach the best known cost first,
+the fastest first.
+"""
+
+
 def render(all_measured, stop, machine, solvers, repeat):
-    sections = [
+    """By name of the page, its text: what the default solver takes beside the best peer; and every method."""
+    default, *others = solvers
+    page = [
         INTRODUCTION.format(**vars(stop), **machine, repeat=repeat),
-        "## Summary",
-        *(tables.summary(all_measured, solver) for solver in solvers),
-        "## Growth with size",
+        "## How fast is the default solver?",
+        tables.summary(all_measured, default),
+        "[Every method on every problem](benchmarks-methods.md), with stages and memory.",
+        "## How does time grow with size?",
         "Cubes of poses with loop closures, off their optimum by as much at each pose whatever the size.",
         tables.growth(all_measured, *GROWING[0]),
         "Bundle adjustment: for each camera 100 points, each seen by five cameras on average.",
         tables.growth(all_measured, *GROWING[1]),
         AUTO.read_text(),
         QUOTED,
-        "## Every method",
+    ]
+    methods = [
+        METHODS,
+        *(tables.summary(all_measured, solver) for solver in others),
         *(tables.of_problem(measured) for measured in all_measured),
     ]
+    return {"benchmarks.md": joined(page), "benchmarks-methods.md": joined(methods)}
+
+
+def joined(sections):
     return "\n\n".join(section.strip() for section in sections if section) + "\n"
