@@ -10,6 +10,7 @@ use manifactor_graph::catalogue::{self, Kind};
 use manifactor_graph::{Graph, Values};
 use manifactor_tree::Node;
 use std::cmp::Ordering;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Damping of the first step where next to none has been tried.
@@ -24,15 +25,19 @@ pub(crate) struct Point {
     pub damping: Option<f64>,
 }
 
-/// The registered starts, with their defaults, but for the values as they are given.
-fn registered() -> impl Iterator<Item = Box<dyn Start>> {
-    let others = catalogue::entries(<dyn Start>::NAME).into_iter().filter(|e| e.name != Given::NAME);
-    others.filter_map(|entry| entry.read::<dyn Start>(&Node::empty_table()).ok())
+/// The registered starts, with their defaults, but for the values as they are given. Made once: small graphs are solved in
+/// less time than it takes to make them.
+fn registered() -> &'static [Box<dyn Start>] {
+    static REGISTERED: OnceLock<Vec<Box<dyn Start>>> = OnceLock::new();
+    REGISTERED.get_or_init(|| {
+        let others = catalogue::entries(<dyn Start>::NAME).into_iter().filter(|e| e.name != Given::NAME);
+        others.filter_map(|entry| entry.read::<dyn Start>(&Node::empty_table()).ok()).collect()
+    })
 }
 
 /// What the registered starts have to offer.
 pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> Vec<Point> {
-    let point = |start: Box<dyn Start>| {
+    let mut point = |start: &dyn Start| {
         // one that does not apply has nothing to offer
         let values = start.start(graph, values).ok()?;
         problem.set_values(&values).ok()?;
@@ -40,17 +45,16 @@ pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> V
         let point = Point { inactive: at.inactive, cost: at.cost, values, damping: None };
         at.not_finite.is_none().then_some(point)
     };
-    registered().filter_map(point).collect()
+    registered().iter().filter_map(|start| point(&**start)).collect()
 }
 
 /// Whether a start doubts the minimum that the problem is in.
 pub(super) fn is_doubted(graph: &Graph, problem: &Problem) -> bool {
-    let mut starts = registered().peekable();
-    if starts.peek().is_none() {
+    if registered().is_empty() {
         return false;
     }
     let minimum = problem.values();
-    starts.any(|start| start.doubts(graph, &minimum))
+    registered().iter().any(|start| start.doubts(graph, &minimum))
 }
 
 impl Auto {
