@@ -6,6 +6,7 @@ use crate::linear::system::NoFactor;
 use crate::problem::Problem;
 use manifactor_graph::Key;
 use nalgebra::DMatrix;
+use std::time::Instant;
 
 /// H = JᵀJ at the estimate, factorized without damping, with robust weights as they are there. Covariances are blocks of
 /// H⁻¹, in the units of the noise; what is held, whole or in part, has zeros.
@@ -35,7 +36,7 @@ impl Problem {
         let revision = Some(self.model.revision());
         if self.determined != revision || !self.system.is_factorized() {
             self.determined = None;
-            let failed = match self.system.factorize_directly(None) {
+            let failed = match self.factorize_directly() {
                 Err(NoFactor::OutOfMemory) => return Err(self.out_of_memory()),
                 done => done.is_err(),
             };
@@ -44,11 +45,18 @@ impl Problem {
             }
             // the search may have left another factorization
             if !self.system.is_factorized() {
-                self.system.factorize_directly(None).map_err(|_| CovarianceError::NotPositiveDefinite)?;
+                self.factorize_directly().map_err(|_| CovarianceError::NotPositiveDefinite)?;
             }
             self.determined = revision;
         }
         Ok(Factorized { problem: self })
+    }
+
+    fn factorize_directly(&mut self) -> Result<(), NoFactor> {
+        let clock = Instant::now();
+        let done = self.system.factorize_directly(None);
+        self.times.factorize += clock.elapsed().as_secs_f64();
+        done
     }
 
     pub(crate) fn out_of_memory(&self) -> CovarianceError {

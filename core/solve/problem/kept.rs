@@ -31,7 +31,10 @@ impl Solution {
             && !matches!(problem.system.method, Method::ConjugateGradients(_))
             && problem.version == graph.version()
         {
-            problem.model.put(&self.values);
+            // not at once: what an earlier question has factorized would be lost
+            if !problem.model.is_at(&self.values) {
+                problem.model.put(&self.values);
+            }
             return Ok(question(&mut problem));
         }
         Ok(question(&mut self.problem(graph)?))

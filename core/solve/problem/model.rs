@@ -124,6 +124,15 @@ impl Model {
         }
     }
 
+    /// Whether the estimate is these values: then what is known of it still holds.
+    pub(crate) fn is_at(&self, values: &Values) -> bool {
+        self.variables.iter().all(|place| {
+            let here = self.columns.column(place.column).get(place.index);
+            let (Some(here), Some(there)) = (here, values.variable(place.key.as_str())) else { return false };
+            here.erased().local(there).is_some_and(|step| step.iter().all(|x| *x == 0.0))
+        })
+    }
+
     /// Goes back to an estimate of before.
     pub(crate) fn restore(&mut self, columns: Columns) {
         self.revision += 1;

@@ -123,11 +123,11 @@ fn a_question_takes_the_factorization_at_hand() {
         let of_all = &all.iter().find(|(k, _)| k.as_str() == key).unwrap().1;
         assert!((&one - of_all).amax() < 1e-12, "{key}");
     }
-    assert_eq!(problem.times().factorize, factorized);
+    assert!(factorized > 0.0 && problem.times().factorize == factorized);
     // of a changed estimate, the covariance is another: here a weight has changed
     problem.set_weights(&vec![0.25; problem.factors()]).unwrap();
     let one = problem.factorized().unwrap().marginal("p77").unwrap();
-    assert!((one - &all[77].1 * 4.0).amax() < 1e-9);
+    assert!((one - &all[77].1 * 4.0).amax() < 1e-9 && problem.times().factorize > factorized);
 }
 
 #[test]
