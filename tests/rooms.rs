@@ -7,9 +7,6 @@ use std::path::{Path, PathBuf};
 /// Files of source that a folder may have: what a reader takes in at a glance.
 const FILES: usize = 14;
 
-/// Rooms that need each other, each pair for a reason: a trait and what makes its objects.
-const PAIRS: [(&str, &str, &str); 0] = [];
-
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -113,11 +110,6 @@ fn rooms_are_in_floors() {
     let mut circles = vec![];
     for of_crate in crates() {
         let mut left = needs(&of_crate);
-        for (a, b, _) in PAIRS {
-            if let Some(needs) = left.get_mut(a) {
-                needs.remove(b);
-            }
-        }
         // floor by floor, from the ground: rooms that need none of those left, until only circles are
         loop {
             let names: BTreeSet<String> = left.keys().cloned().collect();
