@@ -64,7 +64,7 @@
 //! let mut problem = Problem::compile(&graph, &values)?;
 //! for seen in [1.0, 2.0, 3.0] {
 //!     problem.factor_mut::<Prior<Point1>>(0)?.value = Point1::new([seen]);
-//!     GaussNewton::default().solve(&mut problem, &mut Silent);
+//!     GaussNewton::default().descend(&mut problem, &mut Silent);
 //!     assert!((problem.values().get::<Point1>("x")?.0[0] - seen).abs() < 1e-12);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -56,7 +56,7 @@ pub fn solve(
     observer: &mut dyn Observer,
 ) -> Result<Solution, CompileError> {
     optimizer.check()?;
-    let solution = optimizer.solve_graph(graph, values, observer)?;
+    let solution = optimizer.solve(graph, values, observer)?;
     let Outcome { termination, iterations, initial_cost, final_cost, times, .. } = &solution.outcome;
     let (solver, seconds) = (optimizer.typetag_name(), times.total);
     tracing::info!(solver, iterations, initial_cost, final_cost, seconds, "{termination}");

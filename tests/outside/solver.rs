@@ -14,7 +14,7 @@ struct Marquardt {
 
 #[typetag::serialize(name = "test_marquardt")]
 impl Optimizer for Marquardt {
-    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+    fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let stop = Stopping::default();
         let mut descent = match Descent::begin(problem, &stop, observer) {
             Ok(descent) => descent,

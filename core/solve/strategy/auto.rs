@@ -27,7 +27,8 @@ pub(crate) use search::starts;
 /// settled after ten steps, or where a registered start doubts the minimum, every registered start that applies to the
 /// graph is tried, those of the lowest cost first, until one leads to a minimum. The best minimum found is the estimate.
 /// None of this depends on the unit of the noise: covariances that are too small by a factor change nothing. Where no
-/// start applies, it is Levenberg-Marquardt with next to no damping.
+/// start applies, it is Levenberg-Marquardt with next to no damping. Starts need the graph, and those of a plugin are there
+/// once it is linked: so a compiled problem alone (`descend`) is moved by damped steps from where it is.
 ///
 /// ```toml
 /// solver = { type = "auto", stop = { relative_cost = 1e-6 } }
@@ -63,11 +64,11 @@ impl Optimizer for Auto {
         self.linear.check()
     }
 
-    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+    fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         self.damped(DAMPING, problem, observer)
     }
 
-    fn solve_graph(
+    fn solve(
         &self,
         graph: &Graph,
         values: &Values,
@@ -75,7 +76,7 @@ impl Optimizer for Auto {
     ) -> Result<Solution, CompileError> {
         let mut problem = Problem::compile_for(graph, values, &self.linear)?;
         let mut watch = Watch::new(observer);
-        let mut outcome = self.solve(&mut problem, &mut watch);
+        let mut outcome = self.descend(&mut problem, &mut watch);
         if let (Some(Pause::Rise { step }), Termination::Interrupted) = (watch.pause, &outcome.termination)
             && !watch.stopped
         {
@@ -113,7 +114,7 @@ impl Auto {
     }
 
     fn full_steps(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        GaussNewton { stop: self.stop.clone(), linear: self.linear.clone() }.solve(problem, observer)
+        GaussNewton { stop: self.stop.clone(), linear: self.linear.clone() }.descend(problem, observer)
     }
 
     /// Takes a step of this length that has raised the cost, and goes on by full ones, if the next is much shorter: weights

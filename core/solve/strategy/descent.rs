@@ -60,7 +60,7 @@ pub enum Tried {
 /// use manifactor_solve::{Descent, Observer, Outcome, Problem, Step, Stopping, Tried};
 ///
 /// /// Gauss-Newton, as long as the cost falls.
-/// fn solve(problem: &mut Problem, stop: &Stopping, observer: &mut dyn Observer) -> Outcome {
+/// fn descend(problem: &mut Problem, stop: &Stopping, observer: &mut dyn Observer) -> Outcome {
 ///     let mut descent = match Descent::begin(problem, stop, observer) {
 ///         Ok(descent) => descent,
 ///         Err(outcome) => return *outcome,

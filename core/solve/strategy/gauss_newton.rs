@@ -45,7 +45,7 @@ impl Optimizer for GaussNewton {
         self.linear.check()
     }
 
-    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+    fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         let mut descent = match Descent::begin(problem, &self.stop, observer) {
             Ok(descent) => descent,
             Err(outcome) => return *outcome,

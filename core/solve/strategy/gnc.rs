@@ -89,7 +89,7 @@ impl Default for Gnc {
 
 #[typetag::serialize(name = "gnc")]
 impl Optimizer for Gnc {
-    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+    fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         Graduation::new(self, problem, None, observer).run()
     }
 
@@ -101,7 +101,7 @@ impl Optimizer for Gnc {
         self.solver.check()
     }
 
-    fn solve_graph(
+    fn solve(
         &self,
         graph: &Graph,
         values: &Values,

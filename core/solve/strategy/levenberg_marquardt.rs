@@ -92,7 +92,7 @@ impl Optimizer for LevenbergMarquardt {
         self.linear.check()
     }
 
-    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+    fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         self.solve_within(&|_| self.diagonal, problem, observer)
     }
 }

@@ -16,9 +16,9 @@ use crate::setting::{SettingError, not_negative as all_not_negative};
 /// A strategy that lowers the cost of a problem. Chosen by name.
 #[typetag::serialize(tag = "type")]
 pub trait Optimizer: Debug + Send + Sync {
-    /// Moves the problem's estimate to a minimum of its cost, or as far as it gets. The estimate is
-    /// the best found, however the solve ends.
-    fn solve(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome;
+    /// Moves a compiled problem's estimate downhill from where it is, to a minimum or as far as it gets. The estimate is the
+    /// best found, however that ends. It is what a loop calls that keeps its problem.
+    fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome;
 
     /// How the linear system of each step is solved.
     fn linear(&self) -> LinearSolver {
@@ -34,18 +34,19 @@ pub trait Optimizer: Debug + Send + Sync {
         Ok(())
     }
 
-    /// Compiles a graph and solves it. Override to begin somewhere else than at `values`.
+    /// Solves a graph: compiles it, and [`descend`](Self::descend)s from `values`. A solver that begins elsewhere as well, as
+    /// `auto` does with the registered starts, overrides this. [`solve`](crate::solve()) calls it, once settings are checked.
     ///
     /// # Errors
     /// Where graph and values do not fit each other.
-    fn solve_graph(
+    fn solve(
         &self,
         graph: &Graph,
         values: &Values,
         observer: &mut dyn Observer,
     ) -> Result<Solution, CompileError> {
         let mut problem = Problem::compile_for(graph, values, &self.linear())?;
-        let outcome = self.solve(&mut problem, observer);
+        let outcome = self.descend(&mut problem, observer);
         Ok(Solution::of(problem, outcome))
     }
 }

@@ -12,7 +12,7 @@ fn tracked() -> (Graph, Values) {
 }
 
 fn solved(problem: &mut Problem) -> f64 {
-    assert!(GaussNewton::default().solve(problem, &mut Silent).termination.is_converged());
+    assert!(GaussNewton::default().descend(problem, &mut Silent).termination.is_converged());
     problem.values().get::<Plane>("x").unwrap().x
 }
 

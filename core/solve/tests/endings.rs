@@ -150,7 +150,7 @@ fn a_factor_of_weight_zero_takes_no_part() {
     graph.add(["q"], At { at: [2.0, 3.0] });
     let mut problem = manifactor_solve::Problem::compile(&graph, &values).unwrap();
     problem.set_weights(&[1.0, 0.0]).unwrap();
-    let outcome = solver("levenberg_marquardt", "auto").solve(&mut problem, &mut Silent);
+    let outcome = solver("levenberg_marquardt", "auto").descend(&mut problem, &mut Silent);
     let Termination::Indeterminate(untouched) = outcome.termination else { panic!("{outcome:?}") };
     assert_eq!((untouched.keys, untouched.active), (vec!["q".into()], 1));
 }

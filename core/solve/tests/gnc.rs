@@ -119,7 +119,7 @@ fn a_weight_counts_like_so_many_factors() {
 fn it_solves_a_compiled_problem_as_well() {
     let (graph, values) = ladder(12, 3);
     let mut problem = Problem::compile(&graph, &values).unwrap();
-    let outcome = Gnc::default().solve(&mut problem, &mut Silent);
+    let outcome = Gnc::default().descend(&mut problem, &mut Silent);
     assert_eq!(outcome.rejected.len(), 3);
     assert_eq!(problem.weights().iter().filter(|w| **w == 0.0).count(), 3);
 }

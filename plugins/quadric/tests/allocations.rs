@@ -21,7 +21,7 @@ fn allocations((graph, values): &(Graph, Values), solver: &dyn Optimizer) -> Vec
         region.reset();
         ControlFlow::Continue(())
     };
-    let outcome = solver.solve(&mut problem, &mut observer);
+    let outcome = solver.descend(&mut problem, &mut observer);
     assert!(outcome.final_cost < outcome.initial_cost && counts.len() > 3, "{solver:?}: {outcome:?}");
     assert!(counts[0] > 0, "the allocator counts");
     counts.split_off(1)

@@ -72,7 +72,7 @@ impl<'a> Refiner<'a> {
             if problem.set_values(&values).is_err() {
                 continue;
             }
-            solver().solve(&mut problem, &mut Silent);
+            solver().descend(&mut problem, &mut Silent);
             let found = problem.values().get::<DualQuadric>(key).copied();
             if let (Ok(found), rank) = (found, rank(&problem))
                 && rank < best.0

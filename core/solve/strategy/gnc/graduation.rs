@@ -56,7 +56,7 @@ impl<'a> Graduation<'a> {
         let mut outcome = match self.graduate() {
             ControlFlow::Continue(()) => {
                 self.weigh(self.gnc.cost.last());
-                let last = self.gnc.solver.solve(self.problem, self.observer);
+                let last = self.gnc.solver.descend(self.problem, self.observer);
                 self.account(last)
             }
             ControlFlow::Break(outcome) => *outcome,
@@ -142,7 +142,7 @@ impl<'a> Graduation<'a> {
 
     /// Solves with the weights as they are; the cost that is reached.
     fn solve(&mut self) -> ControlFlow<Box<Outcome>, f64> {
-        let next = self.inner.solve(self.problem, self.observer);
+        let next = self.inner.descend(self.problem, self.observer);
         let outcome = self.account(next);
         if matches!(outcome.termination, Termination::NonFinite { .. } | Termination::Interrupted) {
             return ControlFlow::Break(Box::new(outcome));
@@ -179,7 +179,7 @@ impl<'a> Graduation<'a> {
         let best = points.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         if let Some(point) = &best {
             self.problem.model.put(&point.values);
-            let there = self.inner.solve(self.problem, &mut Quiet(self.observer));
+            let there = self.inner.descend(self.problem, &mut Quiet(self.observer));
             if there.final_cost < cost && !matches!(there.termination, Termination::NonFinite { .. }) {
                 return true;
             }
