@@ -3,19 +3,32 @@ use crate::algebra::{Block, Dimension, Matrix};
 use crate::variable::column::FIXED;
 use nalgebra::U1;
 
-/// Where one block of H goes. Entry (r, c) of the block is at `at + c·stride - c(c-1)/2 + r`: the
-/// packed columns of a lower triangle get shorter by one each.
+/// Where one block of H goes, in the packed columns of its lower triangle. Those get shorter by one each, so the columns of
+/// a block are not equally far apart:
+///
+/// ```text
+/// H    h00                 packed by columns:  h00 h10 h20 h30 | h11 h21 h31 | h22 h32 | h33
+///      h10 h11             the block of rows 2, 3 and columns 0, 1
+///      h20 h21 h22         begins at 2 (h20), and its second column at 2 + stride = 5 (h21): stride 3
+///      h30 h31 h32 h33
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Slot {
     /// Index of entry (0, 0).
     pub at: usize,
-    /// Distance from the first column to the second.
+    /// Distance from the first column to the second; to each further one it is less by one.
     pub stride: u32,
     /// The factor's earlier variable comes later in the ordering: the transposed block is stored.
     pub swapped: bool,
 }
 
 impl Slot {
+    /// Where entry (row, column) of the block is. In a block on the diagonal, the row is no less than the column.
+    #[inline(always)]
+    pub fn index(self, row: usize, column: usize) -> usize {
+        self.at + column * self.stride as usize - column * column.saturating_sub(1) / 2 + row
+    }
+
     /// The same block, its rows as columns.
     #[must_use]
     pub fn transposed(self) -> Self {

@@ -88,9 +88,7 @@ impl BlockSystem {
         let Some(slot) = self.layout.slot(a, b).filter(|_| block.len() == rows * columns) else {
             return false;
         };
-        let mut add = |r: usize, c: usize, x: f64| {
-            self.values[slot.at + c * slot.stride as usize + r - c * c.saturating_sub(1) / 2] += x;
-        };
+        let mut add = |r: usize, c: usize, x: f64| self.values[slot.index(r, c)] += x;
         for c in 0..columns {
             for r in if a == b { c } else { 0 }..rows {
                 let x = block[r + c * rows];

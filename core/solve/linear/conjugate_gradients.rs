@@ -61,8 +61,7 @@ impl Damped<'_> {
     /// Entry (row, column) of a block.
     fn entry(self, slot: Slot, row: usize, column: usize) -> f64 {
         let (row, column) = if slot.swapped { (column, row) } else { (row, column) };
-        let above = column * column.saturating_sub(1) / 2;
-        self.h[slot.at + column * slot.stride as usize + row - above]
+        self.h[slot.index(row, column)]
     }
 }
 

@@ -155,7 +155,7 @@ mod tests {
                 let (row, column) = if slot.swapped { (b, a) } else { (a, b) };
                 for c in 0..dims[column] {
                     for r in if a == b { c } else { 0 }..dims[row] {
-                        let at = slot.at + c * slot.stride as usize - c * c.saturating_sub(1) / 2 + r;
+                        let at = slot.index(r, c);
                         let scalar = layout.start[column] as usize + c;
                         prop_assert!((layout.col_ptr[scalar]..layout.col_ptr[scalar + 1]).contains(&at));
                         prop_assert_eq!(layout.row_idx[at] as usize, layout.start[row] as usize + r);

@@ -46,9 +46,7 @@ fn main() {
 fn scaled(graph: &Graph, times: f64) -> Graph {
     let mut graph = graph.clone();
     for entry in graph.factors_mut() {
-        let rows = entry.factor.erased().signature().rows.unwrap();
-        let information = entry.noise.information_matrix(rows).unwrap();
-        entry.noise = Noise::information(information * times).unwrap();
+        entry.noise = entry.noise.weighted(times).unwrap();
     }
     graph
 }

@@ -121,8 +121,7 @@ fn sphere(error: f64) -> (Graph, Values) {
 fn scaled(graph: &Graph, times: f64) -> Graph {
     let mut graph = graph.clone();
     for entry in graph.factors_mut() {
-        let rows = entry.factor.erased().signature().rows.unwrap();
-        entry.noise = Noise::information(entry.noise.information_matrix(rows).unwrap() * times).unwrap();
+        entry.noise = entry.noise.weighted(times).unwrap();
     }
     graph
 }

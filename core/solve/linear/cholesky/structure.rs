@@ -1,4 +1,14 @@
-//! What a factor will look like: supernodes, their rows, and where everything goes.
+//! What a factor will look like: supernodes, their rows, and where each entry goes.
+//!
+//! ```text
+//!            width
+//!          ┌───────┐
+//!          │ L     │  the supernode's own columns: its part of the factor …
+//!  height  ├───────┼─────────┐
+//!          │ L     │ update  │  … and the rows below; the update goes to the parent
+//!          └───────┴─────────┘
+//!            panel    below²
+//! ```
 //!
 //! Columns of the factor with the same rows below them are a supernode; its dense panel of columns, and the
 //! dense update that it passes on to its parent, make up a front (multifrontal method: Duff and Reid, 1983; Liu,
