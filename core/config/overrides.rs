@@ -100,7 +100,7 @@ fn put(root: &mut Node, steps: &[Step], value: Node, source: &Source) -> Result<
             Step::Key(key, span) => {
                 let place = source.place(span.clone());
                 if node.value == Value::Null {
-                    *node = Node::new(place.clone(), Value::Table(Table::new()));
+                    *node = Node::new(place.clone(), Value::Table(Table::default()));
                 }
                 let path = source.text().get(..done).unwrap_or_default();
                 let words = node.in_words();

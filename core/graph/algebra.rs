@@ -4,5 +4,5 @@ mod direction;
 mod scalar;
 
 pub use dimension::{Block, Dimension, Matrix, Vector};
-pub use direction::{Direction, NoDirection};
+pub use direction::{Direction, NoDirection, Up};
 pub use scalar::{Jet, JetOf, Lift, Scalar, abs};

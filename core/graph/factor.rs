@@ -4,7 +4,7 @@ mod dynamic;
 pub mod invariance;
 mod kernel;
 
-use crate::algebra::Dimension;
+use crate::algebra::{Dimension, Direction};
 use crate::factor::batch::{Batch, BatchOf};
 use crate::loss::Loss;
 use crate::noise::{Noise, Whitener};
@@ -29,8 +29,13 @@ pub use dynamic::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows};
 )]
 #[typetag::serialize(tag = "type")]
 pub trait Factor: Debug + Send + Sync {
-    /// Everything else.
+    /// The type-erased view of its residual.
     fn erased(&self) -> &dyn ErasedResidual;
+
+    /// The same with this up, where it takes the world's [`Up`] and its document leaves that open; `None` elsewhere.
+    fn with_up(&self, _up: Direction) -> Option<Box<dyn Factor>> {
+        None
+    }
 }
 
 crate::kind!(dyn Factor, "factor");

@@ -17,7 +17,9 @@ mod registry;
 mod residual;
 mod variable;
 
-pub use algebra::{Block, Dimension, Direction, Jet, JetOf, Lift, Matrix, NoDirection, Scalar, Vector, abs};
+pub use algebra::{
+    Block, Dimension, Direction, Jet, JetOf, Lift, Matrix, NoDirection, Scalar, Up, Vector, abs,
+};
 pub use factor::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows, batch, invariance};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
 pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices, Version};

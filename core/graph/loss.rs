@@ -32,7 +32,7 @@ pub trait RobustLoss: Debug + Clone + Send + Sync + 'static {
 /// A robust loss, chosen by name.
 #[typetag::serialize(tag = "type")]
 pub trait Loss: Debug + Send + Sync {
-    /// Everything else.
+    /// The type-erased view of it.
     fn erased(&self) -> &dyn ErasedLoss;
 }
 

@@ -22,7 +22,7 @@ pub use values::{ValueError, Values};
 )]
 #[typetag::serialize(tag = "type")]
 pub trait Variable: Debug + Send + Sync {
-    /// Everything else.
+    /// The type-erased view of it.
     fn erased(&self) -> &dyn ErasedManifold;
 }
 

@@ -49,7 +49,7 @@ impl Diagnostic {
     }
 
     fn order(&self) -> (&str, usize, usize) {
-        (self.place.source.name(), self.place.span.start, self.place.span.end)
+        (self.place.source.name(), self.place.span().start, self.place.span().end)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::node::{Node, Table, Value};
 pub fn merge(base: &mut Node, patch: Node) {
     match (&mut base.value, patch.value) {
         (Value::Table(old), Value::Table(new)) if same_type(old, &new) => {
-            for (name, field) in new {
+            for (name, field) in *new {
                 match old.get_mut(&name) {
                     Some(there) => {
                         there.key = field.key;

@@ -2,6 +2,7 @@
 use crate::diagnostic::Diagnostic;
 use crate::source::Place;
 use crate::text_error::TextError;
+use foldhash::fast::RandomState;
 use indexmap::IndexMap;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde::{Serialize, Serializer};
@@ -38,8 +39,9 @@ pub enum Value {
     Table(Table),
 }
 
-/// Named values, in the order of the document.
-pub type Table = IndexMap<String, Field>;
+/// Named values, in the order of the document. Boxed: most nodes of a large document are numbers, and a node is as large as
+/// the largest of its kinds.
+pub type Table = Box<IndexMap<String, Field, RandomState>>;
 
 /// A named value: the name is the table's key.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,7 +60,7 @@ impl Node {
 
     /// A table of no fields and no place.
     pub fn empty_table() -> Self {
-        Node::new(Place::nowhere(), Value::Table(Table::new()))
+        Node::new(Place::nowhere(), Value::Table(Table::default()))
     }
 
     /// As JSON, in which serde types are read; every number that is not finite is an error.
@@ -96,7 +98,7 @@ impl Node {
                 let written = self.place.text();
                 let quote = written.len() - written.trim_start_matches(['"', '\'', '\n', '\r']).len();
                 let plain = written.get(quote..quote + text.len()) == Some(text);
-                let start = self.place.span.start + quote;
+                let start = self.place.span().start + quote;
                 let within = start + error.span.start..start + error.span.end;
                 Some(if plain { self.place.source.place(within) } else { self.place.clone() })
             }
@@ -192,7 +194,7 @@ impl<'de> Deserialize<'de> for Node {
                 Ok(Value::Array(array))
             }
             fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<Value, A::Error> {
-                let mut table = Table::new();
+                let mut table = Table::default();
                 while let Some((name, node)) = fields.next_entry()? {
                     table.insert(name, Field { key: Place::nowhere(), node });
                 }

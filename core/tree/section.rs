@@ -4,7 +4,6 @@ use crate::node::{Node, Table, Value};
 use crate::problem::Problem;
 use crate::source::Place;
 use crate::suggest::nearest;
-use indexmap::IndexMap;
 use serde::de::DeserializeOwned;
 
 /// A table that is being read. Each method takes a field out; [`finish`](Section::finish) reports those that nobody
@@ -16,7 +15,7 @@ pub struct Section<'e> {
     place: Place,
     rest: Table,
     /// What was asked for, and where it was.
-    asked: IndexMap<String, Option<Place>>,
+    asked: Vec<(String, Option<Place>)>,
     /// Required and not there: reported at the end, when it is known which fields are left.
     missing: Vec<String>,
 }
@@ -26,14 +25,14 @@ impl<'e> Section<'e> {
     pub fn new(node: Node, errors: &'e Errors) -> Option<Self> {
         let rest = match node.value {
             Value::Table(table) => table,
-            Value::Null => Table::new(),
+            Value::Null => Table::default(),
             _ => {
                 let problem = Problem::wrong_type("a table", node.in_words());
                 errors.report(node.place, problem);
                 return None;
             }
         };
-        Some(Section { errors, place: node.place, rest, asked: IndexMap::new(), missing: Vec::new() })
+        Some(Section { errors, place: node.place, rest, asked: Vec::new(), missing: Vec::new() })
     }
 
     /// Where errors go.
@@ -48,7 +47,7 @@ impl<'e> Section<'e> {
 
     /// Where the value of a field is or was, for errors found later; the table's place, if it is not there.
     pub fn place_of(&self, field: &str) -> Place {
-        let asked = || self.asked.get(field).cloned().flatten();
+        let asked = || self.asked.iter().find(|(name, _)| name == field)?.1.clone();
         let place = self.rest.get(field).map(|f| f.node.place.clone());
         place.or_else(asked).unwrap_or_else(|| self.place.clone())
     }
@@ -67,11 +66,9 @@ impl<'e> Section<'e> {
     pub fn take(&mut self, field: &str) -> Option<Node> {
         let taken = self.rest.shift_remove(field).map(|f| f.node);
         let place = taken.as_ref().map(|node| node.place.clone());
-        match self.asked.get_mut(field) {
-            Some(known) => *known = place.or(known.take()),
-            None => {
-                self.asked.insert(field.to_owned(), place);
-            }
+        match self.asked.iter_mut().find(|(name, _)| name == field) {
+            Some((_, known)) => *known = place.or(known.take()),
+            None => self.asked.push((field.to_owned(), place)),
         }
         taken.filter(|node| node.value != Value::Null)
     }
@@ -156,8 +153,8 @@ impl<'e> Section<'e> {
 
     /// Reports every field that was not asked for.
     pub fn finish(mut self) {
-        let known: Vec<String> = std::mem::take(&mut self.asked).into_keys().collect();
-        for (field, value) in std::mem::take(&mut self.rest) {
+        let known: Vec<String> = std::mem::take(&mut self.asked).into_iter().map(|(name, _)| name).collect();
+        for (field, value) in *std::mem::take(&mut self.rest) {
             // what is misspelled is not missing as well
             let meant = nearest(&field, known.iter().map(String::as_str));
             self.missing.retain(|missing| Some(missing.as_str()) != meant);

@@ -43,7 +43,8 @@ impl Source {
     /// A place in this text, cut to its length.
     pub fn place(&self, span: Range<usize>) -> Place {
         let end = span.end.min(self.text().len());
-        Place { source: self.clone(), span: span.start.min(end)..end }
+        // a text of 4 GiB is never read: see `MAX_BYTES` of `manifactor_config`
+        Place { source: self.clone(), start: span.start.min(end) as u32, end: end as u32 }
     }
 
     /// Line and column of a byte offset, both from 1; the column counts characters.
@@ -76,8 +77,8 @@ impl fmt::Debug for Source {
 pub struct Place {
     /// The text.
     pub source: Source,
-    /// The bytes.
-    pub span: Range<usize>,
+    start: u32,
+    end: u32,
 }
 
 impl Place {
@@ -87,27 +88,33 @@ impl Place {
         NOWHERE.get_or_init(|| Source::new("document", "")).place(0..0)
     }
 
+    /// The bytes.
+    pub fn span(&self) -> Range<usize> {
+        self.start as usize..self.end as usize
+    }
+
     /// The line, from 1.
     pub fn line(&self) -> usize {
-        self.source.line_and_column(self.span.start).0
+        self.source.line_and_column(self.span().start).0
     }
 
     /// The column in characters, from 1.
     pub fn column(&self) -> usize {
-        self.source.line_and_column(self.span.start).1
+        self.source.line_and_column(self.span().start).1
     }
 
     /// The part on the first line, so that a message about a long table does not show all of it.
     #[must_use]
     pub fn first_line(mut self) -> Place {
-        let length = self.text().find(['\n', '\r']).unwrap_or(self.span.len());
-        self.span.end = self.span.start + length;
+        if let Some(length) = self.text().find(['\n', '\r']) {
+            self.end = self.start + length as u32;
+        }
         self
     }
 
     /// What is written there.
     pub fn text(&self) -> &str {
-        self.source.text().get(self.span.clone()).unwrap_or_default()
+        self.source.text().get(self.span()).unwrap_or_default()
     }
 }
 
@@ -116,7 +123,7 @@ impl fmt::Display for Place {
         if self.source.0.argument {
             return f.write_str(self.source.name());
         }
-        let (line, column) = self.source.line_and_column(self.span.start);
+        let (line, column) = self.source.line_and_column(self.span().start);
         write!(f, "{}:{line}:{column}", self.source.name())
     }
 }

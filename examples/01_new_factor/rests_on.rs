@@ -23,7 +23,7 @@ pub(crate) struct RestsOn {
     pub(crate) height: f64,
     /// The world's up, of any length but zero. Default: z.
     #[serde(default)]
-    pub(crate) up: Direction,
+    pub(crate) up: Up,
 }
 
 impl Residual for RestsOn {
@@ -37,4 +37,4 @@ impl Residual for RestsOn {
         Vector1::new(quadric.centroid().dot(&up) - e - self.height)
     }
 }
-register_factor!("rests_on", RestsOn);
+register_factor!("rests_on", RestsOn, up);

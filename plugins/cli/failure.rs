@@ -222,16 +222,16 @@ pub(crate) fn render(diagnostic: &Diagnostic) -> String {
         // a file that could not be read has no line to show
         return fancy(plain(&format!("{}: {}", source.name(), diagnostic.message()), help.as_deref()).into());
     }
-    let around = lines_around(source.text(), &diagnostic.place.span);
+    let around = lines_around(source.text(), &diagnostic.place.span());
     if around.split('\n').any(|line| line.len() > LONG) {
         let at = format!("{}: {}", diagnostic.place, diagnostic.message());
         return fancy(plain(&at, help.as_deref()).into());
     }
-    let mut labels = vec![LabeledSpan::underline(diagnostic.place.span.clone())];
+    let mut labels = vec![LabeledSpan::underline(diagnostic.place.span())];
     let mut message = message;
     if let Some((place, label)) = &diagnostic.related {
         if place.source == *source {
-            labels.push(LabeledSpan::at(place.span.clone(), text::shortened(label)));
+            labels.push(LabeledSpan::at(place.span(), text::shortened(label)));
         } else {
             message.message += &text::shortened(&format!("; {label}: {place}"));
         }

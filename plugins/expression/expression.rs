@@ -5,7 +5,7 @@ use crate::language::page;
 use crate::program::Program;
 use crate::scope::Scope;
 use indexmap::IndexMap;
-use manifactor_graph::{Direction, Dynamic, ErasedResidual, Factor, TextError, WrongRows, register};
+use manifactor_graph::{Direction, Dynamic, ErasedResidual, Factor, TextError, Up, WrongRows, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +34,7 @@ struct Document {
     constants: IndexMap<String, Constant>,
     /// The world's up, of any length but zero. Default: z.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    up: Option<Direction>,
+    up: Option<Up>,
     /// Formulas that are above zero wherever the factor means something.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     domain: Vec<String>,
@@ -71,11 +71,11 @@ impl TryFrom<Document> for Expression {
         if variables.is_empty() || variables.len() > MOST {
             return Err(ExpressionError::WrongVariables(variables.len()));
         }
-        let scope = Scope::new(variables, constants, up.unwrap_or_default())?;
+        let scope = Scope::new(variables, constants, *up.unwrap_or_default())?;
         let (program, uses_up) = compile(&scope, residual, domain)?;
         let program = Dynamic::new(program)?;
         // written down with the up that it uses, so that the document is complete
-        document.up = document.up.or(uses_up.then(Direction::default));
+        document.up = document.up.or(uses_up.then(Up::default));
         Ok(Self { document, program })
     }
 }
@@ -116,7 +116,7 @@ impl Expression {
     /// # Errors
     /// As [`Expression::new`].
     pub fn with_up(mut self, up: Direction) -> Result<Self, ExpressionError> {
-        self.document.up = Some(up);
+        self.document.up = Some(up.into());
         self.document.try_into()
     }
     /// What runs.
@@ -129,6 +129,12 @@ impl Expression {
 impl Factor for Expression {
     fn erased(&self) -> &dyn ErasedResidual {
         &self.program
+    }
+    fn with_up(&self, up: Direction) -> Option<Box<dyn Factor>> {
+        // read once already, so it is read again
+        let is_open = self.document.up.is_some_and(|mut open| open.fill(up));
+        let filled = is_open.then(|| self.clone().with_up(up).ok()).flatten()?;
+        Some(Box::new(filled))
     }
 }
 register!(dyn Factor, "expression", Expression);

@@ -3,8 +3,8 @@ use manifactor_graph::catalogue::{self, Kind};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{
-    AsVariable, Dynamic, DynamicBlocks, DynamicResidual, ErasedResidual, Factor, Noise, Variable, WrongRows,
-    as_variable, register,
+    AsVariable, Direction, Dynamic, DynamicBlocks, DynamicResidual, ErasedResidual, Factor, Noise, Variable,
+    WrongRows, as_variable, register,
 };
 use nalgebra::{DMatrix, DVector};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -132,6 +132,17 @@ impl From<MaxMixture> for Document {
 impl Factor for MaxMixture {
     fn erased(&self) -> &dyn ErasedResidual {
         &self.mixture
+    }
+    fn with_up(&self, up: Direction) -> Option<Box<dyn Factor>> {
+        let mut components = self.document.components.clone();
+        let mut is_open = false;
+        for factor in components.iter_mut().filter_map(|component| component.factor.as_mut()) {
+            if let Some(filled) = factor.with_up(up) {
+                (*factor, is_open) = (filled.into(), true);
+            }
+        }
+        let filled = is_open.then(|| Self::new(components).ok()).flatten()?;
+        Some(Box::new(filled))
     }
 }
 register!(dyn Factor, "max_mixture", MaxMixture);

@@ -17,7 +17,7 @@ pub(super) fn table<T>(
 }
 
 fn empty(place: manifactor_config::Place) -> Node {
-    Node::new(place, Value::Table(Table::new()))
+    Node::new(place, Value::Table(Table::default()))
 }
 
 /// A number within bounds, or its default.

@@ -22,7 +22,7 @@ use crate::input::class::Aliases;
 use manifactor_config::{Errors, Place, Problem, Section};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Loss;
-use manifactor_graph::{Direction, Factor, FactorEntry, Key, Noise, Values};
+use manifactor_graph::{Direction, FactorEntry, Key, Noise, Values};
 use manifactor_semantic::{Component, MaxMixture};
 use serde::Serialize;
 use std::sync::Arc;
@@ -108,13 +108,13 @@ impl Rule {
         }
     }
 
-    /// The factor between these variables; `up` fills the fields of that name that the rule leaves open. In a mixture, it
+    /// The factor between these variables; `up` is for what takes the world's up and leaves it open. In a mixture, it
     /// is the one or nothing, by `share`: w = p for the factor, (1 - p) exp(-3²/2) for nothing.
     ///
     /// # Errors
     /// If the factor needs to know up and up is unknown.
     pub fn entry(&self, keys: Vec<Key>, up: Option<Direction>, share: f64) -> Result<FactorEntry, RuleError> {
-        let factor: Arc<dyn Factor> = Arc::from(self.factor.instantiate(up)?);
+        let factor = self.factor.instantiate(up)?;
         let (noise, loss) = (self.noise.clone(), self.loss.clone());
         let nothing = (1.0 - share) * (-0.5 * DOUBT * DOUBT).exp();
         match (Positive::new(share), Positive::new(nothing)) {

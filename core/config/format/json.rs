@@ -75,7 +75,8 @@ impl Reader<'_> {
     }
 
     fn table(&mut self, object: &Object<'_>, depth: usize) -> Table {
-        let mut table = Table::with_capacity(object.properties.len());
+        let mut table = Table::default();
+        table.reserve(object.properties.len());
         for property in &object.properties {
             let key = self.place(property.name.range());
             let node = self.value(&property.value, depth + 1);

@@ -73,13 +73,14 @@ impl Reader<'_> {
     }
 
     fn table(&mut self, table: &DeTable<'_>, depth: usize) -> Table {
-        table
+        let fields = table
             .iter()
             .map(|(key, value)| {
                 let node = self.value(value, depth + 1);
                 (key.get_ref().to_string(), Field { key: self.source.place(key.span()), node })
             })
-            .collect()
+            .collect();
+        Box::new(fields)
     }
 
     fn integer(&mut self, integer: &DeInteger<'_>, place: &Place) -> Value {
@@ -142,7 +143,7 @@ fn tables<'a, 'i>(value: &'a Spanned<DeValue<'i>>) -> Vec<(Range<usize>, &'a DeT
 
 /// Moves the places of a value that was parsed out of the middle of a text.
 fn shift(node: &mut Node, source: &Source, by: usize) {
-    let moved = |place: &Place| source.place(place.span.start + by..place.span.end + by);
+    let moved = |place: &Place| source.place(place.span().start + by..place.span().end + by);
     node.place = moved(&node.place);
     match &mut node.value {
         Value::Array(items) => items.iter_mut().for_each(|item| shift(item, source, by)),

@@ -99,12 +99,12 @@ impl<'a> Builder<'a> {
                 self.open(place, anchor, Kind::Array(Vec::new()), tag, "seq")?;
             }
             Event::MappingStart(anchor, tag) => {
-                self.open(place, anchor, Kind::Table(Table::new(), None), tag, "map")?;
+                self.open(place, anchor, Kind::Table(Table::default(), None), tag, "map")?;
             }
             Event::SequenceEnd | Event::MappingEnd => {
                 if let Some(done) = self.open.pop() {
                     // a flow collection ends with its bracket, a block with its last value
-                    let end = if place.text().is_empty() { done.end } else { place.span.end };
+                    let end = if place.text().is_empty() { done.end } else { place.span().end };
                     let value = match done.kind {
                         Kind::Array(items) => Value::Array(items),
                         Kind::Table(table, _) => Value::Table(table),
@@ -132,7 +132,7 @@ impl<'a> Builder<'a> {
         if let Some(tag) = tag.filter(|tag| !(tag.is_yaml_core_schema() && tag.suffix == core)) {
             self.errors.push(syntax(place.clone(), &format!("the tag {tag} has no meaning here")));
         }
-        self.open.push(Open { start: place.span.start, end: place.span.end, anchor, kind });
+        self.open.push(Open { start: place.span().start, end: place.span().end, anchor, kind });
         Ok(())
     }
 
@@ -147,7 +147,7 @@ impl<'a> Builder<'a> {
             self.root = Some(node);
             return Ok(());
         };
-        parent.end = parent.end.max(node.place.span.end);
+        parent.end = parent.end.max(node.place.span().end);
         match &mut parent.kind {
             Kind::Array(items) => items.push(node),
             Kind::Table(_, key @ None) => *key = Some(key_of(node, &mut self.errors)),

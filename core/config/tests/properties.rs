@@ -122,11 +122,11 @@ fn same(a: &Json, b: &Json) -> bool {
 
 /// Every place lies within the text, and scalars within the tables that hold them.
 fn check_places(node: &Node, text: &str) {
-    assert!(text.get(node.place.span.clone()).is_some());
+    assert!(text.get(node.place.span()).is_some());
     match &node.value {
         Value::Array(items) => items.iter().for_each(|item| check_places(item, text)),
         Value::Table(table) => table.values().for_each(|field| {
-            assert!(text.get(field.key.span.clone()).is_some());
+            assert!(text.get(field.key.span()).is_some());
             check_places(&field.node, text);
         }),
         _ => {}

@@ -84,6 +84,64 @@ impl JsonSchema for Direction {
     }
 }
 
+/// The world's up, as a factor's document says it, or open: then it is z, until something that knows better fills it in, as
+/// a run does with its gravity. Name the field at the registration: `register_factor!("name", Type, up);`.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(from = "Direction", into = "Direction")]
+pub struct Up {
+    direction: Direction,
+    is_given: bool,
+}
+
+impl Up {
+    /// Takes this direction, where none is given; whether it was open.
+    pub fn fill(&mut self, up: Direction) -> bool {
+        let is_open = !self.is_given;
+        if is_open {
+            *self = up.into();
+        }
+        is_open
+    }
+}
+
+impl From<Direction> for Up {
+    fn from(direction: Direction) -> Self {
+        Self { direction, is_given: true }
+    }
+}
+
+impl From<Up> for Direction {
+    fn from(up: Up) -> Self {
+        up.direction
+    }
+}
+
+impl Deref for Up {
+    type Target = Direction;
+    fn deref(&self) -> &Direction {
+        &self.direction
+    }
+}
+
+/// Whether they point the same way, given or open.
+impl PartialEq for Up {
+    fn eq(&self, other: &Self) -> bool {
+        self.direction == other.direction
+    }
+}
+
+impl JsonSchema for Up {
+    fn schema_name() -> Cow<'static, str> {
+        Direction::schema_name()
+    }
+    fn schema_id() -> Cow<'static, str> {
+        Direction::schema_id()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        Direction::json_schema(generator)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,6 +153,16 @@ mod tests {
         for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
             assert!(Direction::try_from(bad).is_err());
         }
+    }
+
+    #[test]
+    fn up_is_filled_where_it_is_open() {
+        let x = Direction::new(Vector3::x()).unwrap();
+        let mut open = Up::default();
+        assert_eq!(*open, Direction::Z);
+        assert!(open.fill(x) && *open == x && !open.fill(Direction::Z) && *open == x);
+        let mut given: Up = serde_json::from_str("[0.0, 0.0, 2.0]").unwrap();
+        assert!(!given.fill(x) && *given == Direction::Z);
     }
 
     #[test]

@@ -190,10 +190,11 @@ macro_rules! register {
     };
 }
 
-/// Registers a [`Residual`](crate::Residual) as a factor: `register_factor!("between_se3", Between<Se3>);`
+/// Registers a [`Residual`](crate::Residual) as a factor: `register_factor!("between_se3", Between<Se3>);`. One that takes
+/// the world's up names its field of type [`Up`](crate::Up): `register_factor!("upright", Upright, up);`
 #[macro_export]
 macro_rules! register_factor {
-    ($name:literal, $type:ty) => {
+    ($name:literal, $type:ty $(, $up:ident)?) => {
         const _: () = {
             use $crate::__private::typetag;
             #[typetag::serialize(name = $name)]
@@ -201,6 +202,18 @@ macro_rules! register_factor {
                 fn erased(&self) -> &dyn $crate::ErasedResidual {
                     self
                 }
+                $(
+                    fn with_up(
+                        &self,
+                        up: $crate::Direction,
+                    ) -> ::std::option::Option<::std::boxed::Box<dyn $crate::Factor>> {
+                        let mut filled = ::std::clone::Clone::clone(self);
+                        match filled.$up.fill(up) {
+                            true => ::std::option::Option::Some(::std::boxed::Box::new(filled)),
+                            false => ::std::option::Option::None,
+                        }
+                    }
+                )?
             }
             $crate::register!(dyn $crate::Factor, $name, $type, $crate::signature::<$type>());
         };

@@ -20,7 +20,7 @@ where
         Some(node) => chosen(node),
         None => {
             let nothing = Source::argument(argument, name.unwrap_or(default));
-            chosen(Node::new(nothing.place(0..0), Value::Table(Table::new())))
+            chosen(Node::new(nothing.place(0..0), Value::Table(Table::default())))
         }
     };
     node.read(section.errors())

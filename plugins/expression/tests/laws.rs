@@ -62,9 +62,19 @@ fn the_built_in_factors_are_the_same_formulas() {
     let of = |text, up| formula(&[("q", "dual_quadric")], &[text]).with_up(up).unwrap();
     check((any_quadric(), direction()), |(q, up)| {
         let up = Direction::new(up.into_inner()).unwrap();
-        same(&of("1 - abs(dot(major_axis(q), up))", up), &VerticalOrientation { up }, &[&q], 1e-15);
-        same(&of("0 - abs(dot(major_axis(q), up))", up), &HorizontalOrientation { up }, &[&q], 1e-15);
-        same(&of("cross(major_axis(q), up)", up), &VerticalOrientationSmooth { up }, &[&q], 1e-15);
+        same(
+            &of("1 - abs(dot(major_axis(q), up))", up),
+            &VerticalOrientation { up: up.into() },
+            &[&q],
+            1e-15,
+        );
+        same(
+            &of("0 - abs(dot(major_axis(q), up))", up),
+            &HorizontalOrientation { up: up.into() },
+            &[&q],
+            1e-15,
+        );
+        same(&of("cross(major_axis(q), up)", up), &VerticalOrientationSmooth { up: up.into() }, &[&q], 1e-15);
         Ok(())
     });
 }

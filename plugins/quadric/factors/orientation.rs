@@ -14,7 +14,7 @@ macro_rules! orientation {
         pub struct $type {
             /// The world's up, of any length but zero. Default: z.
             #[serde(default)]
-            pub up: Direction,
+            pub up: Up,
         }
 
         impl Residual for $type {
@@ -26,7 +26,7 @@ macro_rules! orientation {
                 $residual
             }
         }
-        register_factor!($name, $type);
+        register_factor!($name, $type, up);
         register_invariance!($type, $free, |$factor, ($quadric,), random| {
             (turned($quadric, &$axis, random),)
         });

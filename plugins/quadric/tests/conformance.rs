@@ -334,9 +334,11 @@ fn view(input: &Node<'_>, output: &Node<'_>) -> Checked {
             "aabb_min" => node.is(dense(q.axes_aligned_box().min), VALUES),
             "aabb_max" => node.is(dense(q.axes_aligned_box().max), VALUES),
             "cosine" => node.is(row(&[q.major_axis().dot(&up).abs()]), VALUES),
-            "vertical_residual" => node.is(dense(VerticalOrientation { up }.residual::<f64>((q,))), VALUES),
+            "vertical_residual" => {
+                node.is(dense(VerticalOrientation { up: up.into() }.residual::<f64>((q,))), VALUES)
+            }
             "horizontal_residual" => {
-                node.is(dense(HorizontalOrientation { up }.residual::<f64>((q,))), VALUES)
+                node.is(dense(HorizontalOrientation { up: up.into() }.residual::<f64>((q,))), VALUES)
             }
             "axis_gap" => node.is(row(&[(squares[2] - squares[1]) / squares[2]]), VALUES),
             _ => return None,

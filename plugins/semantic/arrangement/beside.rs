@@ -24,7 +24,7 @@ pub struct Beside {
     pub gap: f64,
     /// The world's up, of any length but zero. Default: z.
     #[serde(default)]
-    pub up: Direction,
+    pub up: Up,
 }
 
 /// Below this distance, in metres, there is no direction from the one to the other.
@@ -51,11 +51,11 @@ impl Residual for Beside {
         self.across(a, b).norm() > SAME_PLACE
     }
 }
-register_factor!("beside", Beside);
+register_factor!("beside", Beside, up);
 register_invariance!(Beside, "moving along up, and changing places", |factor, (a, b), random| {
     let (mut a, mut b) = (*a, *b);
-    a.pose.translation += *factor.up * random(5.0);
-    b.pose.translation += *factor.up * random(5.0);
+    a.pose.translation += factor.up.scale(random(5.0));
+    b.pose.translation += factor.up.scale(random(5.0));
     (b, a)
 });
 

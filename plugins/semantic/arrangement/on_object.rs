@@ -21,7 +21,7 @@ use manifactor_quadric::DualQuadric;
 pub struct OnObject {
     /// The world's up, of any length but zero. Default: z.
     #[serde(default)]
-    pub up: Direction,
+    pub up: Up,
 }
 
 impl Residual for OnObject {
@@ -34,14 +34,14 @@ impl Residual for OnObject {
         Vector1::new(rise - extent(&top, &up) - extent(&below, &up))
     }
 }
-register_factor!("on_object", OnObject);
+register_factor!("on_object", OnObject, up);
 register_invariance!(
     OnObject,
     "moving the object on top sideways, and turning it about up",
     |factor, (top, below), random| {
         let mut moved = *top;
         moved.pose.translation += factor.up.cross(&Vector3::new(random(5.0), random(5.0), random(5.0)));
-        let turn = manifactor_geometry::So3::exp(&(*factor.up * random(3.0)));
+        let turn = manifactor_geometry::So3::exp(&factor.up.scale(random(3.0)));
         moved.pose.rotation = turn.compose(&moved.pose.rotation);
         (moved, *below)
     }

@@ -24,7 +24,7 @@ pub struct Upright {
     pub axis: Axis,
     /// The world's up, of any length but zero. Default: z.
     #[serde(default)]
-    pub up: Direction,
+    pub up: Up,
 }
 
 impl Residual for Upright {
@@ -35,7 +35,7 @@ impl Residual for Upright {
         self.axis.of(&quadric).cross(&self.up.lift())
     }
 }
-register_factor!("upright", Upright);
+register_factor!("upright", Upright, up);
 register_invariance!(Upright, "moving, growing, and turning about its axis", |factor, (quadric,), random| {
     let turn = manifactor_geometry::So3::exp(&(factor.axis.of(quadric) * random(3.0)));
     let mut moved = *quadric;

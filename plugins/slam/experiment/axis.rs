@@ -49,7 +49,7 @@ impl Axis {
     pub(super) fn of_options(column: Column, options: Vec<Declared>) -> Self {
         let choice = |Declared { name, place, set }| Choice {
             labels: vec![name],
-            sets: vec![set.unwrap_or_else(|| Node::new(place.clone(), Value::Table(Table::new())))],
+            sets: vec![set.unwrap_or_else(|| Node::new(place.clone(), Value::Table(Table::default())))],
             place,
         };
         Self { columns: vec![column], options: options.into_iter().map(choice).collect() }
@@ -98,7 +98,7 @@ fn nested(path: &str, value: Node) -> Node {
     path.rsplit('.').fold(value, |node, key| {
         let place = node.place.clone();
         let field = Field { key: place.clone(), node };
-        Node::new(place, Value::Table(Table::from_iter([(key.trim().to_owned(), field)])))
+        Node::new(place, Value::Table(Box::new([(key.trim().to_owned(), field)].into_iter().collect())))
     })
 }
 

@@ -135,7 +135,7 @@ fn overlapping(axes: &[Axis], errors: &Errors) {
 /// Visits the paths of all values that are no tables.
 fn leaves<'a>(node: &'a Node, path: &mut Vec<&'a str>, visit: &mut impl FnMut(&[&'a str], &'a Place)) {
     let Value::Table(table) = &node.value else { return visit(path, &node.place) };
-    for (key, field) in table {
+    for (key, field) in table.iter() {
         path.push(key);
         leaves(&field.node, path, visit);
         path.pop();

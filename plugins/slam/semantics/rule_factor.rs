@@ -1,26 +1,22 @@
-use manifactor_config::{Errors, Node, Place, Problem, ReadError, Value as NodeValue};
-use manifactor_graph::catalogue::{Kind, find};
+//! The factor of a semantic rule.
+use manifactor_config::{Errors, Node, Place, Problem};
 use manifactor_graph::manifold_name;
 use manifactor_graph::{Direction, Factor, Key, Values};
 use manifactor_quadric::DualQuadric;
 use manifactor_semantic::MixtureError;
 use serde::Serialize;
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 use std::any::TypeId;
+use std::sync::Arc;
 
-/// The field that gravity fills.
-const UP: &str = "up";
-
-/// A factor of an object, and perhaps of others, whose `up` is open until gravity is known.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A factor of an object, and perhaps of others, whose up may be open until gravity is known.
+#[derive(Debug, Clone, Serialize)]
+#[serde(transparent)]
 pub struct RuleFactor {
-    #[serde(rename = "type")]
-    name: String,
-    #[serde(flatten)]
-    fields: Map<String, Value>,
-    /// The factor as it writes itself, with the fields that the config leaves open.
+    /// As the config has it, so that what it leaves open stays open in a config that is written.
+    document: Value,
     #[serde(skip)]
-    written: Value,
+    factor: Arc<dyn Factor>,
     /// The types of its variables.
     #[serde(skip)]
     variables: Vec<TypeId>,
@@ -42,20 +38,6 @@ pub enum RuleError {
         /// The factor's type.
         factor: String,
     },
-    /// Its type is not linked any more.
-    #[error("the factor `{factor}` is not registered")]
-    NotRegistered {
-        /// The factor's type.
-        factor: String,
-    },
-    /// It does not take the direction that it gets.
-    #[error("the semantic factor `{factor}`: {source}")]
-    Fields {
-        /// The factor's type.
-        factor: String,
-        /// What is wrong with its fields.
-        source: ReadError,
-    },
     /// It cannot be one of two possibilities.
     #[error("the semantic factor `{factor}` as a mixture: {source}")]
     Mixture {
@@ -69,15 +51,9 @@ pub enum RuleError {
 impl RuleFactor {
     /// Reads and checks a factor; what is wrong is reported.
     pub(super) fn read(node: &Node, errors: &Errors) -> Option<Self> {
-        let (place, json) = (node.place.clone(), node.to_json());
-        let name = match &node.value {
-            NodeValue::Table(table) => match table.get("type").map(|field| &field.node.value) {
-                Some(NodeValue::String(name)) => name.clone(),
-                _ => String::new(),
-            },
-            _ => String::new(),
-        };
-        let factor = node.read::<Box<dyn Factor>>(errors)?;
+        let place = node.place.clone();
+        let factor: Arc<dyn Factor> = node.read::<Box<dyn Factor>>(errors)?.into();
+        let name = factor.typetag_name();
         let signature = factor.erased().signature();
         let variables = signature.variables;
         if signature.many || !variables.contains(&TypeId::of::<DualQuadric>()) {
@@ -88,21 +64,17 @@ impl RuleFactor {
             errors.report(place, Problem::with_help(message, help));
             return None;
         }
-        let Ok(Value::Object(mut fields)) = json else { return None };
-        fields.shift_remove("type");
-        let written = serde_json::to_value(&factor).ok()?;
-        Some(Self { name, fields, written, variables, rows: signature.rows })
+        Some(Self { document: node.to_json().ok()?, factor, variables, rows: signature.rows })
     }
 
     /// Its type.
-    pub fn name(&self) -> &str {
-        &self.name
+    pub fn name(&self) -> &'static str {
+        self.factor.typetag_name()
     }
 
     /// Whether it waits for gravity.
     pub fn wants_up(&self) -> bool {
-        let mut fields = Value::Object(self.fields.clone());
-        fill(&mut fields, &self.written, &Value::Null)
+        self.factor.with_up(Direction::Z).is_some()
     }
 
     /// How many objects it connects the object with.
@@ -133,7 +105,7 @@ impl RuleFactor {
             let types: Vec<_> = wanted.iter().map(|id| format!("a `{}`", manifold_name(**id))).collect();
             let types = if types.is_empty() { "nothing".into() } else { types.join(" and ") };
             let message =
-                format!("besides objects `{}` connects {types}, found {} in `with`", self.name, with.len());
+                format!("besides objects `{}` connects {types}, found {} in `with`", self.name(), with.len());
             let help =
                 "declare such variables as `[[variables]]` and name them in their order: with = [\"table\"]";
             errors.report(place.clone(), Problem::with_help(message, help));
@@ -144,7 +116,7 @@ impl RuleFactor {
             match own.variable(key.as_str()) {
                 Some(found) if found.typetag_name() == expected => {}
                 Some(found) => {
-                    let (name, found) = (&self.name, found.typetag_name());
+                    let (name, found) = (self.name(), found.typetag_name());
                     let message = format!(
                         "`{name}` takes a variable of type `{expected}` here, `{key}` is of type `{found}`"
                     );
@@ -166,37 +138,11 @@ impl RuleFactor {
     ///
     /// # Errors
     /// If it needs to know up and up is unknown.
-    pub fn instantiate(&self, up: Option<Direction>) -> Result<Box<dyn Factor>, RuleError> {
-        let factor = || self.name.clone();
-        let mut fields = Value::Object(self.fields.clone());
-        let known = up.map_or(Value::Null, |up| json!([up.x, up.y, up.z]));
-        if fill(&mut fields, &self.written, &known) && up.is_none() {
-            return Err(RuleError::NoUp { factor: factor() });
+    pub fn instantiate(&self, up: Option<Direction>) -> Result<Arc<dyn Factor>, RuleError> {
+        match (up, self.wants_up()) {
+            (None, true) => Err(RuleError::NoUp { factor: self.name().to_owned() }),
+            (Some(up), true) => Ok(self.factor.with_up(up).map_or_else(|| self.factor.clone(), Arc::from)),
+            (_, false) => Ok(self.factor.clone()),
         }
-        let entry = find(<dyn Factor as Kind>::NAME, &self.name);
-        let entry = entry.ok_or_else(|| RuleError::NotRegistered { factor: factor() })?;
-        let parsed = serde_json::from_value::<Node>(fields).map_err(serde::de::Error::custom);
-        let parsed = parsed.and_then(|fields: Node| entry.read::<dyn Factor>(&fields));
-        parsed.map_err(|source| RuleError::Fields { factor: factor(), source })
-    }
-}
-
-/// Puts `up` into each factor that has a field of that name, and leaves it open: this one, or one within it, as in a
-/// mixture. A factor that uses up writes the one that it has. Whether there was such a field.
-fn fill(given: &mut Value, written: &Value, up: &Value) -> bool {
-    match (given, written) {
-        (Value::Object(given), Value::Object(written)) => {
-            let open = written.contains_key("type") && written.contains_key(UP) && !given.contains_key(UP);
-            if open {
-                given.insert(UP.to_owned(), up.clone());
-            }
-            let within = written.iter().filter_map(|(name, w)| Some(fill(given.get_mut(name)?, w, up)));
-            within.fold(open, |any, filled| any || filled)
-        }
-        (Value::Array(given), Value::Array(written)) => {
-            let within = given.iter_mut().zip(written).map(|(g, w)| fill(g, w, up));
-            within.filter(|filled| *filled).count() > 0
-        }
-        _ => false,
     }
 }

@@ -19,16 +19,16 @@ fn any_tilt() -> impl Strategy<Value = f64> {
 }
 
 jacobian_laws! {
-    the_paper_s_jacobian_is_right: leaning().prop_map(|(up, q)| (VerticalOrientation { up }, q));
+    the_paper_s_jacobian_is_right: leaning().prop_map(|(up, q)| (VerticalOrientation { up: up.into() }, q));
     the_smooth_jacobian_is_right: (up(), unequal_quadric())
-        .prop_map(|(up, q)| (VerticalOrientationSmooth { up }, q));
+        .prop_map(|(up, q)| (VerticalOrientationSmooth { up: up.into() }, q));
     the_paper_s_jacobian_is_right_at_any_tilt:
         any_tilt().prop_map(|tilt| (VerticalOrientation::default(), tilted(tilt)));
     the_smooth_jacobian_is_right_at_any_tilt:
         any_tilt().prop_map(|tilt| (VerticalOrientationSmooth::default(), tilted(tilt)));
-    the_paper_s_jacobian_of_a_lying_one_is_right: leaning().prop_map(|(up, q)| (HorizontalOrientation { up }, q));
+    the_paper_s_jacobian_of_a_lying_one_is_right: leaning().prop_map(|(up, q)| (HorizontalOrientation { up: up.into() }, q));
     the_smooth_jacobian_of_a_lying_one_is_right: (up(), unequal_quadric())
-        .prop_map(|(up, q)| (HorizontalOrientationSmooth { up }, q));
+        .prop_map(|(up, q)| (HorizontalOrientationSmooth { up: up.into() }, q));
     the_smooth_jacobian_of_a_lying_one_is_right_at_any_tilt:
         any_tilt().prop_map(|tilt| (HorizontalOrientationSmooth::default(), tilted(tilt)));
 }
@@ -80,8 +80,8 @@ fn up_is_checked_and_may_be_left_out() {
 #[test]
 fn both_forms_have_the_same_square() {
     check((up(), any_quadric()), |(up, quadric)| {
-        let paper = HorizontalOrientation { up }.residual::<f64>((quadric,))[0];
-        let smooth = HorizontalOrientationSmooth { up }.residual::<f64>((quadric,))[0];
+        let paper = HorizontalOrientation { up: up.into() }.residual::<f64>((quadric,))[0];
+        let smooth = HorizontalOrientationSmooth { up: up.into() }.residual::<f64>((quadric,))[0];
         assert!(paper <= 0.0 && (paper.abs() - smooth.abs()).abs() < 1e-15);
         Ok(())
     });
