@@ -10,7 +10,7 @@ use manifactor::graph::catalogue::{self, Entry};
 use manifactor::graph::invariance::invariances_of;
 use manifactor::slam::schema::{experiment_root, rules_root, run_root};
 use serde_json::Value;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 const HEAD: &str = "# Config reference
 Written by `manifactor list --markdown`; a test fails where it is not what is linked. `manifactor explain NAME` prints one of
@@ -41,6 +41,7 @@ pub(crate) fn markdown() -> String {
         out += &format!("- [{title}](#{})\n", title.to_lowercase().replace(' ', "-"));
     }
     out += &format!("- [Noise](#noise)\n{}", contents());
+    out += "- [Settings that several types share](#settings-that-several-types-share)\n";
     for (title, root) in roots {
         let mut definitions = Definitions::new();
         let root = root(&mut definitions);
@@ -51,14 +52,62 @@ pub(crate) fn markdown() -> String {
     let schema = noise.of::<Noise>();
     let docs = schema.get("description").and_then(Value::as_str).unwrap_or_default().to_owned();
     out += &format!("\n## Noise\n{docs}\n{}", table(&fields(&noise.document(schema))));
+    let shared = shared();
     for of_kind in catalogue::all().chunk_by(|a, b| a.kind == b.kind) {
         // not the kind alone, which a type of another kind may have for its name
         out += &format!("\n## Every {}\n", of_kind.first().map_or("", |e| e.kind));
         for entry in of_kind {
-            out += &format!("\n### `{}`\n{}\n", entry.name, section(entry));
+            out += &format!("\n### `{}`\n{}\n", entry.name, section(entry, &shared));
         }
     }
+    out += "\n## Settings that several types share\n";
+    for (name, fields) in &shared {
+        out += &format!("\n### `{name}`, shared\n{}", table(fields));
+    }
     out
+}
+
+/// Settings that are a table of their own, alike in several types, as `stop` and `linear` are in solvers: by name, their
+/// fields. They are described once.
+fn shared() -> BTreeMap<String, Vec<Field>> {
+    let mut met: BTreeMap<String, Vec<(Vec<Field>, usize)>> = BTreeMap::new();
+    for entry in catalogue::all() {
+        let fields = fields((entry.schema)().as_value());
+        for field in fields.iter().filter(|field| !field.name.contains('.')) {
+            let within = within(&fields, &field.name);
+            let of_name = met.entry(field.name.clone()).or_default();
+            match of_name.iter_mut().find(|(known, _)| *known == within) {
+                Some((_, count)) => *count += 1,
+                None => of_name.push((within, 1)),
+            }
+        }
+    }
+    let common = |(name, mut all): (String, Vec<(Vec<Field>, usize)>)| {
+        all.retain(|(fields, count)| !fields.is_empty() && *count > 1);
+        Some((name, all.into_iter().max_by_key(|(_, count)| *count)?.0))
+    };
+    met.into_iter().filter_map(common).collect()
+}
+
+/// The fields of the table that is called so.
+fn within(fields: &[Field], name: &str) -> Vec<Field> {
+    let prefix = format!("{name}.");
+    fields.iter().filter(|field| field.name.starts_with(&prefix)).cloned().collect()
+}
+
+/// A type's own fields: of those that it shares, the table's name alone, with a link.
+fn own(fields: Vec<Field>, shared: &BTreeMap<String, Vec<Field>>) -> Vec<Field> {
+    let is_shared: Vec<String> = shared
+        .iter()
+        .filter(|(name, of)| within(&fields, name) == **of)
+        .map(|(name, _)| name.clone())
+        .collect();
+    let of_shared = |field: &Field| is_shared.iter().any(|name| field.name.starts_with(&format!("{name}.")));
+    let mut own: Vec<Field> = fields.into_iter().filter(|field| !of_shared(field)).collect();
+    for field in own.iter_mut().filter(|field| is_shared.contains(&field.name)) {
+        field.docs += &format!(" [Its fields](#{}-shared).", field.name);
+    }
+    own
 }
 
 /// Each name with a link to where it is described. Names that several kinds have are numbered as they come, as in the anchors
@@ -79,13 +128,13 @@ fn contents() -> String {
     out
 }
 
-fn section(entry: &Entry) -> String {
+fn section(entry: &Entry, shared: &BTreeMap<String, Vec<Field>>) -> String {
     let mut out = format!("{}\n", entry.docs().trim());
     let notes = notes(entry);
     if !notes.is_empty() {
         out += &format!("\n{}\n", notes.join(" "));
     }
-    out + &table(&fields((entry.schema)().as_value()))
+    out + &table(&own(fields((entry.schema)().as_value()), shared))
 }
 
 /// What a type has beyond its docs: variables, rows, directions, invariances.

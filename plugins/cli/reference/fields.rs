@@ -3,7 +3,7 @@ use manifactor::graph::catalogue;
 use serde_json::Value;
 
 /// A field, in words.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Field {
     /// Its name; `stop.step` within another, `variables[].key` within the items of a list.
     pub name: String,
