@@ -1,10 +1,12 @@
 //! What every registered type has to have, checked by walking the catalogue.
-use manifactor::config::{Document, Format, Node, Value};
+use manifactor::config::{Definitions, Document, Format, Node, Value};
 use manifactor::graph::catalogue::{Entry, Kind, all, entries};
 use manifactor::graph::loss::Loss;
 use manifactor::graph::{Factor, Noise, Variable};
 use manifactor::quadric::initialise::Initialiser;
 use manifactor::slam::gravity::Gravity;
+use manifactor::slam::run_document::RunDocument;
+use manifactor::slam::schema::run_root;
 use manifactor::slam::source::Source;
 use manifactor::solve::{Optimizer, Start};
 use manifactor_testing::catalogue::{documentation_law, factor_law, loss_law, manifold_law};
@@ -158,12 +160,91 @@ macro_rules! for_kind {
     };
 }
 
-fn round_trip(entry: &Entry, tagged: &Json) {
-    fn again<T: Serialize + DeserializeOwned>(tagged: &Json) -> Result<Json, serde_json::Error> {
+/// What is read out of a table, written again.
+fn again(entry: &Entry, tagged: &Json) -> Result<Json, serde_json::Error> {
+    fn of<T: Serialize + DeserializeOwned>(tagged: &Json) -> Result<Json, serde_json::Error> {
         serde_json::to_value(serde_json::from_value::<T>(tagged.clone())?)
     }
-    let written = for_kind!(entry.kind, again(tagged)).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
+    for_kind!(entry.kind, of(tagged))
+}
+
+fn round_trip(entry: &Entry, tagged: &Json) {
+    let written = again(entry, tagged).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
     assert_eq!(written["type"], entry.name);
-    let twice = for_kind!(entry.kind, again(&written)).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
+    let twice = again(entry, &written).unwrap_or_else(|e| panic!("{}: {e}", id(entry)));
     assert_eq!(written, twice, "{}", id(entry));
+}
+
+/// A default that stands in a schema is the one that is read where a document says nothing.
+fn defaults_are_those_read(schema: &Json, root: &Json, read: &Json, at: &str) -> usize {
+    let named = schema.get("$ref").and_then(Json::as_str).and_then(|r| r.strip_prefix('#'));
+    let schema = named.and_then(|pointer| root.pointer(pointer)).unwrap_or(schema);
+    let properties = schema.get("properties").and_then(Json::as_object).into_iter().flatten();
+    let mut compared = 0;
+    for (name, property) in properties {
+        let (at, read) = (format!("{at}.{name}"), read.get(name).unwrap_or(&Json::Null));
+        if let Some(default) = property.get("default") {
+            assert!(same(default, read), "{at}: the schema says {default}, what is read is {read}");
+            compared += 1;
+        }
+        compared += defaults_are_those_read(property, root, read, &at);
+    }
+    compared
+}
+
+/// Equal, where nothing, an empty list and an empty table are not written.
+fn same(a: &Json, b: &Json) -> bool {
+    let is_nothing = |x: &Json| {
+        matches!(x, Json::Null | Json::Bool(false))
+            || *x == Json::Array(vec![])
+            || *x == serde_json::json!({})
+    };
+    match (a, b) {
+        (Json::Object(a), Json::Object(b)) => {
+            let names: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+            names
+                .into_iter()
+                .all(|name| same(a.get(name).unwrap_or(&Json::Null), b.get(name).unwrap_or(&Json::Null)))
+        }
+        _ => a == b || (is_nothing(a) && is_nothing(b)),
+    }
+}
+
+#[test]
+fn the_defaults_of_a_runs_schema_are_those_that_are_read() {
+    let mut definitions = Definitions::new();
+    let root = run_root(&mut definitions);
+    let schema = definitions.document(root);
+    let document = Document::parse("run.toml", "source = { type = 'simulated' }", Format::Toml).unwrap();
+    let run = RunDocument::read(&document).unwrap();
+    let read = serde_json::to_value(&run.variants[0].settings).unwrap();
+    let compared = defaults_are_those_read(&schema, &schema, &read, "run");
+    assert!(compared > 25, "{compared}");
+}
+
+#[test]
+fn the_defaults_of_every_schema_are_those_that_are_read() {
+    let mut compared = 0;
+    for entry in all() {
+        let schema = Json::from((entry.schema)());
+        let required: Vec<&str> = schema
+            .get("required")
+            .and_then(Json::as_array)
+            .into_iter()
+            .flatten()
+            .filter_map(Json::as_str)
+            .collect();
+        for table in tables_of_type(example(entry).root(), entry.name) {
+            let mut least = table.to_json().unwrap();
+            least
+                .as_object_mut()
+                .unwrap()
+                .retain(|name, _| name == "type" || required.contains(&name.as_str()));
+            // some need one of two fields, which no list of required ones says
+            if let Ok(read) = again(entry, &least) {
+                compared += defaults_are_those_read(&schema, &schema, &read, &id(entry));
+            }
+        }
+    }
+    assert!(compared > 100, "{compared}");
 }

@@ -107,7 +107,7 @@ impl Document {
     /// );
     /// # Ok::<(), manifactor_config::Diagnostics>(())
     /// ```
-    pub fn section<'e>(&self, errors: &'e Errors) -> Option<Section<'e>> {
-        Section::new(self.root.clone(), errors)
+    pub fn section<'e>(&'e self, errors: &'e Errors) -> Option<Section<'e>> {
+        Section::new(&self.root, errors)
     }
 }

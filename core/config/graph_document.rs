@@ -3,5 +3,6 @@ mod check;
 mod read;
 mod write;
 
+pub(crate) use read::{FactorDocument, VariableDocument};
 pub use read::{read_graph, read_graph_section};
 pub use write::write_graph;

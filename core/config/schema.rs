@@ -2,9 +2,9 @@
 //!
 //! Each registered type's schema is that of its fields. Its tag `type` is put in among them: a schema that denies other
 //! properties would deny the tag if it stood beside (`allOf`).
+use crate::graph_document::{FactorDocument, VariableDocument};
 use indexmap::IndexMap;
 use manifactor_graph::catalogue::{Entry, entries};
-use manifactor_graph::{Fixed, Noise};
 use schemars::{JsonSchema, Schema, schema_for};
 use serde_json::{Map, Value, json};
 
@@ -19,28 +19,7 @@ pub fn graph_schema() -> Value {
 
 /// [`graph_schema`] without its definitions, which are put among the others.
 pub fn graph_root(definitions: &mut Definitions) -> Value {
-    let key = json!({ "type": "string", "description": "The name of a variable." });
-    let variable = json!({
-        "type": "object",
-        "properties": {
-            "key": key,
-            "value": definitions.kind("variable"),
-            "fixed": definitions.of::<Fixed>(),
-        },
-        "required": ["key", "value"],
-        "additionalProperties": false,
-    });
-    let factor = json!({
-        "type": "object",
-        "properties": {
-            "keys": { "type": "array", "items": key, "minItems": 1 },
-            "factor": definitions.kind("factor"),
-            "noise": definitions.of::<Noise>(),
-            "loss": definitions.kind("loss"),
-        },
-        "required": ["keys", "factor"],
-        "additionalProperties": false,
-    });
+    let (variable, factor) = (definitions.of::<VariableDocument>(), definitions.of::<FactorDocument>());
     let (start, solver) = (definitions.kind("start"), definitions.kind("solver"));
     json!({
         "title": "A factor graph",
@@ -71,10 +50,20 @@ impl Definitions {
     pub fn kind(&mut self, kind: &str) -> Value {
         if !self.0.contains_key(kind) {
             self.0.insert(kind.to_owned(), Value::Null);
-            let each: Vec<Value> = entries(kind).into_iter().map(|entry| self.entry(entry)).collect();
-            // where nothing is linked, nothing fits
-            let one_of = if each.is_empty() { json!(false) } else { json!({ "oneOf": each }) };
-            self.0.insert(kind.to_owned(), one_of);
+            let entries = entries(kind);
+            let names: Vec<&str> = entries.iter().map(|entry| entry.name).collect();
+            let each: Vec<Value> = entries.into_iter().map(|entry| self.chosen(entry)).collect();
+            let any = match names.is_empty() {
+                // where nothing is linked, nothing fits
+                true => json!(false),
+                false => json!({
+                    "type": "object",
+                    "properties": { "type": { "enum": names } },
+                    "required": ["type"],
+                    "allOf": each,
+                }),
+            };
+            self.0.insert(kind.to_owned(), any);
         }
         reference(kind)
     }
@@ -94,13 +83,31 @@ impl Definitions {
         Value::Object(schema)
     }
 
-    /// A reference to a registered type with its tag.
-    fn entry(&mut self, entry: &Entry) -> Value {
+    /// A registered type, where it is the one that `type` names: so a mistake in its fields is told once, and not as one of
+    /// each type that the table is not.
+    fn chosen(&mut self, entry: &Entry) -> Value {
         let name = format!("{}.{}", entry.kind, entry.name);
         let mut schema = self.hoist((entry.schema)(), &name);
         tag(&mut schema, entry.name, &self.0);
         self.0.insert(name.clone(), schema);
-        reference(&name)
+        let named = json!({ "properties": { "type": { "const": entry.name } }, "required": ["type"] });
+        json!({ "if": named, "then": reference(&name) })
+    }
+
+    /// Puts in the kinds of registered types that a schema refers to.
+    fn kinds_of(&mut self, schema: &Value) {
+        match schema {
+            Value::Object(object) => {
+                let named =
+                    object.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix("#/$defs/"));
+                if let Some(kind) = named.filter(|name| !self.0.contains_key(*name)) {
+                    self.kind(kind);
+                }
+                object.values().for_each(|value| self.kinds_of(value));
+            }
+            Value::Array(items) => items.iter().for_each(|item| self.kinds_of(item)),
+            _ => {}
+        }
     }
 
     /// The schema without its own definitions, which move here; those whose name is taken by another get one with
@@ -109,7 +116,10 @@ impl Definitions {
         let mut schema = Value::from(schema);
         let Some(object) = schema.as_object_mut() else { return schema };
         object.shift_remove("$schema");
-        let Some(Value::Object(definitions)) = object.shift_remove("$defs") else { return schema };
+        let Some(Value::Object(definitions)) = object.shift_remove("$defs") else {
+            self.kinds_of(&schema);
+            return schema;
+        };
         let taken = |name: &str, value: &Value| self.0.get(name).is_some_and(|other| other != value);
         let renamed: Vec<(String, String)> = definitions
             .iter()
@@ -123,6 +133,8 @@ impl Definitions {
             self.0.insert(name, value);
         }
         rename(&mut schema, &renamed);
+        let moved: Vec<Value> = self.0.values().cloned().collect();
+        moved.iter().chain([&schema]).for_each(|schema| self.kinds_of(schema));
         schema
     }
 }

@@ -27,12 +27,18 @@ pub struct Graph {
 
 /// How much of a variable is held at its initial value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected true, false, or an array of directions of the tangent space")]
 pub enum Fixed {
     /// All of it (`true`), or nothing.
     Whole(bool),
     /// These directions of its tangent space, by name.
     Directions(Vec<String>),
+}
+
+impl Default for Fixed {
+    fn default() -> Self {
+        Self::Whole(false)
+    }
 }
 
 /// What is wrong between a graph and its values. `factor` counts from 0 in the order of the graph.

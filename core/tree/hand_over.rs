@@ -5,11 +5,13 @@
 //! a [`Reader`](crate::Reader) that is asked for it runs the function on its node and leaves the result.
 use crate::node::Node;
 use crate::read_error::ReadError;
-use serde::de::{Deserialize, Deserializer, Error, Visitor};
+use crate::source::Place;
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error, Visitor};
 use std::any::Any;
 use std::cell::RefCell;
 use std::fmt;
 use std::marker::PhantomData;
+use std::ops::Deref;
 
 /// The name that is asked for.
 pub(crate) const NODE: &str = "$manifactor::Node";
@@ -74,7 +76,39 @@ impl<'de, T: 'static> Visitor<'de> for Handed<T> {
     /// Any other deserializer.
     fn visit_newtype_struct<D: Deserializer<'de>>(self, deserializer: D) -> Result<T, D::Error> {
         SLOT.set(Slot::Empty);
-        let node = Node::deserialize(deserializer)?;
+        let node = Node::without_places(deserializer)?;
         Self::unpack((self.0)(&node).map_err(D::Error::custom)?)
+    }
+}
+
+/// A value and where it is written, for what can be wrong with it only beside others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Placed<T> {
+    /// Where it is written.
+    pub place: Place,
+    /// What is written.
+    pub value: T,
+}
+
+impl<T> Deref for Placed<T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        &self.value
+    }
+}
+
+impl<'de, T: DeserializeOwned + 'static> Deserialize<'de> for Placed<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserialize_with(deserializer, |node| {
+            let (place, value) = (node.place.clone(), node.try_read::<T>()?);
+            Ok(Box::new(Self { place, value }))
+        })
+    }
+}
+
+/// As it is written, with its places; from any other format, without.
+impl<'de> Deserialize<'de> for Node {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserialize_with(deserializer, |node| Ok(Box::new(node.clone())))
     }
 }

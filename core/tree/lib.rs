@@ -19,7 +19,7 @@ mod suggest;
 mod text_error;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Errors};
-pub use hand_over::deserialize_with;
+pub use hand_over::{Placed, deserialize_with};
 pub use merge::merge;
 pub use node::{Field, MAX_DEPTH, Node, Table, Value};
 pub use problem::{Problem, quoted_list};

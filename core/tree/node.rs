@@ -63,6 +63,29 @@ impl Node {
         Node::new(Place::nowhere(), Value::Table(Table::default()))
     }
 
+    /// A field of a table.
+    pub fn field(&self, name: &str) -> Option<&Node> {
+        match &self.value {
+            Value::Table(table) => table.get(name).map(|field| &field.node),
+            _ => None,
+        }
+    }
+
+    /// Keeps the fields of a table whose names are wanted.
+    pub fn retain(&mut self, mut wanted: impl FnMut(&str) -> bool) {
+        if let Value::Table(table) = &mut self.value {
+            table.retain(|name, _| wanted(name));
+        }
+    }
+
+    /// The elements of a field that is an array; none elsewhere.
+    pub fn items(&self, name: &str) -> &[Node] {
+        match self.field(name) {
+            Some(Node { value: Value::Array(items), .. }) => items,
+            _ => &[],
+        }
+    }
+
     /// As JSON, in which serde types are read; every number that is not finite is an error.
     pub fn to_json(&self) -> Result<serde_json::Value, Vec<Diagnostic>> {
         let mut errors = Vec::new();
@@ -153,9 +176,18 @@ impl Serialize for Node {
     }
 }
 
-/// From any other format, without places.
-impl<'de> Deserialize<'de> for Node {
+/// A part of what is read from another format.
+struct Part(Node);
+
+impl<'de> Deserialize<'de> for Part {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Node::without_places(deserializer).map(Part)
+    }
+}
+
+impl Node {
+    /// From any other format.
+    pub(crate) fn without_places<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Anything;
         impl<'de> Visitor<'de> for Anything {
             type Value = Value;
@@ -188,14 +220,14 @@ impl<'de> Deserialize<'de> for Node {
             }
             fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
                 let mut array = vec![];
-                while let Some(item) = items.next_element()? {
+                while let Some(Part(item)) = items.next_element()? {
                     array.push(item);
                 }
                 Ok(Value::Array(array))
             }
             fn visit_map<A: MapAccess<'de>>(self, mut fields: A) -> Result<Value, A::Error> {
                 let mut table = Table::default();
-                while let Some((name, node)) = fields.next_entry()? {
+                while let Some((name, Part(node))) = fields.next_entry()? {
                     table.insert(name, Field { key: Place::nowhere(), node });
                 }
                 Ok(Value::Table(table))

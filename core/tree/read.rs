@@ -9,9 +9,16 @@ use crate::suggest::nearest;
 use serde::de::DeserializeOwned;
 
 impl Node {
-    /// Reads a serde type; what is wrong goes to `errors`. Serde stops at the first error; an unknown field is taken out
-    /// and reading goes on, so that all of them are found.
+    /// Reads a serde type; what is wrong goes to `errors`. Serde stops at the first error, so the field that has it is taken
+    /// out and reading goes on: all errors are found.
     pub fn read<T: DeserializeOwned>(&self, errors: &Errors) -> Option<T> {
+        let before = errors.len();
+        self.read_what_is_right(&[], errors).filter(|_| errors.len() == before)
+    }
+
+    /// The same, and what could be read without the fields that have errors: for checks that do not need those. `others` are
+    /// fields of this table that are read elsewhere.
+    pub fn read_what_is_right<T: DeserializeOwned>(&self, others: &[String], errors: &Errors) -> Option<T> {
         let before = errors.len();
         self.report_not_finite(errors);
         if errors.len() > before {
@@ -21,24 +28,24 @@ impl Node {
             Ok(value) => return Some(value),
             Err(failure) => failure,
         };
-        let mut rest = self.clone();
-        let mut meant: Vec<String> = Vec::new();
+        let mut rest = Rest { node: self.clone(), cut: Vec::new(), meant: Vec::new() };
         loop {
-            let (problem, place) = (failure.problem(), failure.place().unwrap_or(&self.place).clone());
-            let mut removed = false;
-            if let Problem::UnknownField { field, known } = &problem {
-                meant.extend(nearest(field, known.iter().map(String::as_str)).map(str::to_owned));
-                // a variant that is unknown would leave nothing behind
-                removed = failure.is_unread_field() && rest.remove(field, &place);
+            let place = failure.place().unwrap_or(&self.place).clone();
+            let mut problem = failure.problem();
+            if let (Problem::UnknownField { field, known }, Value::Table(table)) = (&mut problem, &self.value)
+                && table.get(field).is_some_and(|found| found.key == place)
+            {
+                known.extend_from_slice(others);
             }
-            match &problem {
-                // the unknown field's message has said what it should be called
-                Problem::MissingField { field } if meant.contains(field) => {}
-                _ => errors.report(place, problem),
+            let is_told = rest.explains(&place, &problem);
+            let goes_on = rest.cut(&place, &problem, failure.is_unread_field());
+            if !is_told {
+                errors.report(place, problem);
             }
-            failure = match removed.then(|| rest.try_read::<T>()) {
+            failure = match goes_on.then(|| rest.node.try_read::<T>()) {
                 Some(Err(next)) => next,
-                Some(Ok(_)) | None => return None,
+                Some(Ok(value)) => return Some(value),
+                None => return None,
             };
         }
     }
@@ -68,16 +75,104 @@ impl Node {
         };
         Diagnostic::new(self.place.clone(), Problem::NotFinite { text })
     }
+}
 
-    /// Takes out the field whose name is written there; whether it was found.
-    fn remove(&mut self, field: &str, key: &Place) -> bool {
-        match &mut self.value {
-            Value::Array(items) => items.iter_mut().any(|item| item.remove(field, key)),
-            Value::Table(table) => match table.get(field) {
-                Some(found) if found.key == *key => table.shift_remove(field).is_some(),
-                _ => table.values_mut().any(|inner| inner.node.remove(field, key)),
-            },
-            _ => false,
+/// What is left of a node once the fields with errors are taken out of it.
+struct Rest {
+    node: Node,
+    /// Tables and arrays from which something was taken, directly or within; and the field by which.
+    cut: Vec<(Place, String)>,
+    /// What unknown fields should have been called.
+    meant: Vec<String>,
+}
+
+impl Rest {
+    /// Whether an error only says that something is missing which was taken out, or was called otherwise.
+    fn explains(&self, place: &Place, problem: &Problem) -> bool {
+        let is_cut =
+            |by: &str| self.cut.iter().any(|(at, field)| at == place && (by.is_empty() || by == field));
+        match problem {
+            Problem::MissingField { field } => self.meant.contains(field) || is_cut(field),
+            Problem::UnknownField { .. } => false,
+            _ => is_cut(""),
         }
     }
+
+    /// Takes out the field that an error is of; whether there is one. `unread`: its name is there, and nothing reads it.
+    fn cut(&mut self, place: &Place, problem: &Problem, unread: bool) -> bool {
+        let Problem::UnknownField { field, known } = problem else {
+            return cut_around(&mut self.node, place, &mut self.cut) == Cut::Done;
+        };
+        self.meant.extend(nearest(field, known.iter().map(String::as_str)).map(str::to_owned));
+        match unread {
+            true => cut_named(&mut self.node, field, place),
+            // the name of a variant: without it, nothing is left of the value
+            false => cut_around(&mut self.node, place, &mut self.cut) == Cut::Done,
+        }
+    }
+}
+
+/// Takes out the field whose name is written there; whether it was found.
+fn cut_named(node: &mut Node, field: &str, key: &Place) -> bool {
+    match &mut node.value {
+        Value::Array(items) => items.iter_mut().any(|item| cut_named(item, field, key)),
+        Value::Table(table) => match table.get(field) {
+            Some(found) if found.key == *key => table.shift_remove(field).is_some(),
+            _ => table.values_mut().any(|inner| cut_named(&mut inner.node, field, key)),
+        },
+        _ => false,
+    }
+}
+
+#[derive(PartialEq)]
+enum Cut {
+    /// The place is not of this node.
+    Elsewhere,
+    /// It is this node that has to go.
+    This,
+    /// It is gone.
+    Done,
+}
+
+/// Takes out the innermost field, or table in an array, that a place is of.
+fn cut_around(node: &mut Node, place: &Place, cut: &mut Vec<(Place, String)>) -> Cut {
+    let (mut through, mut found) = (String::new(), Cut::Elsewhere);
+    match &mut node.value {
+        Value::Array(items) => {
+            for i in 0..items.len() {
+                let Some(item) = items.get_mut(i) else { break };
+                found = cut_around(item, place, cut);
+                if found == Cut::This && matches!(item.value, Value::Table(_)) {
+                    items.remove(i);
+                    found = Cut::Done;
+                }
+                if found != Cut::Elsewhere {
+                    break;
+                }
+            }
+        }
+        Value::Table(table) => {
+            for (name, field) in table.iter_mut() {
+                found = match field.key == *place {
+                    true => Cut::This,
+                    false => cut_around(&mut field.node, place, cut),
+                };
+                if found != Cut::Elsewhere {
+                    through.clone_from(name);
+                    break;
+                }
+            }
+            if found == Cut::This {
+                table.shift_remove(&through);
+                found = Cut::Done;
+            }
+        }
+        _ => {}
+    }
+    match found {
+        Cut::Done => cut.push((node.place.clone(), through)),
+        Cut::Elsewhere if node.place.contains(place) => return Cut::This,
+        Cut::Elsewhere | Cut::This => {}
+    }
+    found
 }

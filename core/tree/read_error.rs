@@ -107,7 +107,13 @@ impl What {
                 let found = node.map_or_else(|| "something else".to_owned(), Node::in_words);
                 Problem::invalid(format!("{found} has none of the forms that are possible here"))
             }
-            Self::Message(message) => Problem::invalid(message),
+            // of a type with several forms, which cannot say itself what it found
+            Self::Message(message) => match (message.strip_prefix("expected "), node) {
+                (Some(expected), Some(node)) if !message.contains(" got ") => {
+                    Problem::WrongType { expected: expected.to_owned(), found: node.in_words() }
+                }
+                _ => Problem::invalid(message),
+            },
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Reading a table field by field, so that everything that is wrong with it is found.
 use crate::diagnostic::Errors;
-use crate::node::{Node, Table, Value};
+use crate::node::{Field, Node, Value};
 use crate::problem::Problem;
 use crate::source::Place;
 use crate::suggest::nearest;
@@ -12,27 +12,21 @@ use serde::de::DeserializeOwned;
 #[derive(Debug)]
 pub struct Section<'e> {
     errors: &'e Errors,
-    place: Place,
-    rest: Table,
-    /// What was asked for, and where it was.
-    asked: Vec<(String, Option<Place>)>,
+    node: &'e Node,
+    /// What was asked for, in this order.
+    asked: Vec<String>,
     /// Required and not there: reported at the end, when it is known which fields are left.
     missing: Vec<String>,
 }
 
 impl<'e> Section<'e> {
     /// A table to be read; anything else is an error. Nothing at all, as an empty YAML file is, is an empty table.
-    pub fn new(node: Node, errors: &'e Errors) -> Option<Self> {
-        let rest = match node.value {
-            Value::Table(table) => table,
-            Value::Null => Table::default(),
-            _ => {
-                let problem = Problem::wrong_type("a table", node.in_words());
-                errors.report(node.place, problem);
-                return None;
-            }
-        };
-        Some(Section { errors, place: node.place, rest, asked: Vec::new(), missing: Vec::new() })
+    pub fn new(node: &'e Node, errors: &'e Errors) -> Option<Self> {
+        if !matches!(node.value, Value::Table(_) | Value::Null) {
+            errors.report(node.place.clone(), Problem::wrong_type("a table", node.in_words()));
+            return None;
+        }
+        Some(Section { errors, node, asked: Vec::new(), missing: Vec::new() })
     }
 
     /// Where errors go.
@@ -41,20 +35,18 @@ impl<'e> Section<'e> {
     }
 
     /// Where the table is.
-    pub fn place(&self) -> &Place {
-        &self.place
+    pub fn place(&self) -> &'e Place {
+        &self.node.place
     }
 
-    /// Where the value of a field is or was, for errors found later; the table's place, if it is not there.
+    /// Where the value of a field is, for errors found later; the table's place, if it is not there.
     pub fn place_of(&self, field: &str) -> Place {
-        let asked = || self.asked.iter().find(|(name, _)| name == field)?.1.clone();
-        let place = self.rest.get(field).map(|f| f.node.place.clone());
-        place.or_else(asked).unwrap_or_else(|| self.place.clone())
+        self.node.field(field).unwrap_or(self.node).place.clone()
     }
 
     /// Whether the field is there and not yet taken.
     pub fn has(&self, field: &str) -> bool {
-        self.rest.contains_key(field)
+        self.node.field(field).is_some() && !self.is_asked(field)
     }
 
     /// Reports a problem with a field, or with the table, if the field is not there.
@@ -62,19 +54,17 @@ impl<'e> Section<'e> {
         self.errors.report(self.place_of(field), problem);
     }
 
-    /// Takes a field as it stands; nothing if it is not there, or null.
-    pub fn take(&mut self, field: &str) -> Option<Node> {
-        let taken = self.rest.shift_remove(field).map(|f| f.node);
-        let place = taken.as_ref().map(|node| node.place.clone());
-        match self.asked.iter_mut().find(|(name, _)| name == field) {
-            Some((_, known)) => *known = place.or(known.take()),
-            None => self.asked.push((field.to_owned(), place)),
+    /// Takes a field as it stands; nothing if it is not there, null, or taken already.
+    pub fn take(&mut self, field: &str) -> Option<&'e Node> {
+        if self.is_asked(field) {
+            return None;
         }
-        taken.filter(|node| node.value != Value::Null)
+        self.asked.push(field.to_owned());
+        self.node.field(field).filter(|node| node.value != Value::Null)
     }
 
     /// Takes a field as it stands; an error if it is not there.
-    pub fn take_required(&mut self, field: &str) -> Option<Node> {
+    pub fn take_required(&mut self, field: &str) -> Option<&'e Node> {
         let node = self.take(field);
         if node.is_none() {
             self.missing.push(field.to_owned());
@@ -84,14 +74,12 @@ impl<'e> Section<'e> {
 
     /// A field that has to be there.
     pub fn required<T: DeserializeOwned>(&mut self, field: &str) -> Option<T> {
-        let node = self.take_required(field)?;
-        node.read(self.errors)
+        self.take_required(field)?.read(self.errors)
     }
 
     /// A field that may be left out.
     pub fn optional<T: DeserializeOwned>(&mut self, field: &str) -> Option<T> {
-        let node = self.take(field)?;
-        node.read(self.errors)
+        self.take(field)?.read(self.errors)
     }
 
     /// A field that has a default; the default, too, after an error.
@@ -101,75 +89,76 @@ impl<'e> Section<'e> {
 
     /// A table that has to be there.
     pub fn section(&mut self, field: &str) -> Option<Section<'e>> {
-        let node = self.take_required(field)?;
-        Section::new(node, self.errors)
+        Section::new(self.take_required(field)?, self.errors)
     }
 
     /// A table that may be left out.
     pub fn optional_section(&mut self, field: &str) -> Option<Section<'e>> {
-        let node = self.take(field)?;
-        Section::new(node, self.errors)
+        Section::new(self.take(field)?, self.errors)
     }
 
     /// The elements of an array; none if it is not there.
-    pub fn nodes(&mut self, field: &str) -> Vec<Node> {
+    pub fn nodes(&mut self, field: &str) -> &'e [Node] {
         let taken = self.take(field);
-        taken.map(|node| self.elements(node)).unwrap_or_default()
+        self.elements(taken)
     }
 
-    /// The tables of an array, as `[[field]]` writes them; none if it is not there. What is no table is an error.
-    pub fn items(&mut self, field: &str) -> Vec<Section<'e>> {
-        let nodes = self.nodes(field);
-        self.sections(nodes)
-    }
-
-    /// The tables of an array that has to be there, empty or not.
-    pub fn required_items(&mut self, field: &str) -> Vec<Section<'e>> {
+    /// The elements of an array that has to be there, empty or not.
+    pub fn required_nodes(&mut self, field: &str) -> &'e [Node] {
         let taken = self.take_required(field);
-        let nodes = taken.map(|node| self.elements(node)).unwrap_or_default();
-        self.sections(nodes)
+        self.elements(taken)
     }
 
-    fn elements(&self, node: Node) -> Vec<Node> {
-        match node.value {
-            Value::Array(items) => items,
-            _ => {
-                let problem = Problem::wrong_type("an array", node.in_words());
-                self.errors.report(node.place, problem);
-                Vec::new()
+    fn elements(&self, node: Option<&'e Node>) -> &'e [Node] {
+        match node {
+            None => &[],
+            Some(Node { value: Value::Array(items), .. }) => items,
+            Some(other) => {
+                let problem = Problem::wrong_type("an array", other.in_words());
+                self.errors.report(other.place.clone(), problem);
+                &[]
             }
         }
     }
 
-    fn sections(&self, nodes: Vec<Node>) -> Vec<Section<'e>> {
-        let errors = self.errors;
-        nodes.into_iter().filter_map(|node| Section::new(node, errors)).collect()
-    }
-
     /// All fields that are left, as one serde type that denies unknown fields.
     pub fn rest<T: DeserializeOwned>(mut self) -> Option<T> {
-        Node::new(self.place.clone(), Value::Table(std::mem::take(&mut self.rest))).read(self.errors)
+        let left = self.left().into_iter().map(|(name, field)| (name.clone(), field.clone())).collect();
+        let rest = Node::new(self.node.place.clone(), Value::Table(Box::new(left)));
+        let before = self.errors.len();
+        let asked = std::mem::take(&mut self.asked);
+        rest.read_what_is_right(&asked, self.errors).filter(|_| self.errors.len() == before)
     }
 
     /// Reports every field that was not asked for.
     pub fn finish(mut self) {
-        let known: Vec<String> = std::mem::take(&mut self.asked).into_iter().map(|(name, _)| name).collect();
-        for (field, value) in *std::mem::take(&mut self.rest) {
+        for (field, value) in self.left() {
             // what is misspelled is not missing as well
-            let meant = nearest(&field, known.iter().map(String::as_str));
+            let meant = nearest(field, self.asked.iter().map(String::as_str));
             self.missing.retain(|missing| Some(missing.as_str()) != meant);
-            self.errors.report(value.key, Problem::UnknownField { field, known: known.clone() });
+            let problem = Problem::UnknownField { field: field.clone(), known: self.asked.clone() };
+            self.errors.report(value.key.clone(), problem);
         }
     }
 
     /// Drops the fields that are left without a word.
     pub fn ignore_rest(self) {}
+
+    fn is_asked(&self, field: &str) -> bool {
+        self.asked.iter().any(|name| name == field)
+    }
+
+    /// The fields that were not asked for.
+    fn left(&self) -> Vec<(&'e String, &'e Field)> {
+        let Value::Table(table) = &self.node.value else { return Vec::new() };
+        table.iter().filter(|(name, _)| !self.is_asked(name)).collect()
+    }
 }
 
 impl Drop for Section<'_> {
     fn drop(&mut self) {
         for field in self.missing.drain(..) {
-            self.errors.report(self.place.clone(), Problem::MissingField { field });
+            self.errors.report(self.node.place.clone(), Problem::MissingField { field });
         }
     }
 }

@@ -112,6 +112,14 @@ impl Place {
         self
     }
 
+    /// Whether all of another place is within this one, or is this one. What was not read from a text is nowhere.
+    pub fn contains(&self, other: &Place) -> bool {
+        self.start <= other.start
+            && other.end <= self.end
+            && self.start < self.end
+            && self.source == other.source
+    }
+
     /// What is written there.
     pub fn text(&self) -> &str {
         self.source.text().get(self.span()).unwrap_or_default()

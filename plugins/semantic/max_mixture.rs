@@ -7,7 +7,7 @@ use manifactor_graph::{
     WrongRows, as_variable, register,
 };
 use nalgebra::{DMatrix, DVector};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::any::{Any, TypeId};
 use std::sync::Arc;
@@ -59,16 +59,10 @@ pub struct Component {
     pub weight: Positive,
     /// The factor that holds then. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(schema_with = "any_factor")]
     pub factor: Option<Arc<dyn Factor>>,
     /// What the factor's residual is measured in.
     #[serde(default, skip_serializing_if = "Noise::is_default")]
     pub noise: Noise,
-}
-
-/// The definition that a document's schema has of all factors.
-fn any_factor(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({ "$ref": "#/$defs/factor", "description": "The factor that holds then. Default: none." })
 }
 
 /// Why components make no mixture.

@@ -39,6 +39,7 @@ mod table;
 mod trial;
 
 pub use bootstrap::{Interval, bootstrap};
+pub(crate) use document::ExperimentDocument;
 pub use document::{Documents, Experiment};
 pub use journal::{Journal, JournalError};
 pub use measures::{measure_names, measures};

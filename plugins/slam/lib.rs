@@ -10,7 +10,6 @@ pub mod gravity;
 mod input;
 pub mod mapping;
 pub mod metrics;
-mod number;
 pub mod output;
 pub mod run;
 pub mod schema;

@@ -19,12 +19,12 @@
 //! for an object apply to it.
 use crate::fusion::FusedClass;
 use crate::input::class::Aliases;
-use manifactor_config::{Errors, Place, Problem, Section};
-use manifactor_graph::checked::Positive;
+use manifactor_graph::checked::{Positive, Share};
 use manifactor_graph::loss::Loss;
-use manifactor_graph::{Direction, FactorEntry, Key, Noise, Values};
+use manifactor_graph::{Direction, Factor, FactorEntry, Key, Noise};
 use manifactor_semantic::{Component, MaxMixture};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 mod apply;
@@ -35,8 +35,8 @@ mod rule_factor;
 mod tests;
 
 pub use apply::{Applied, Candidate, Judge, LeftOut, Verdict};
-pub use condition::{Conditions, Near};
-pub(crate) use read::read_semantics;
+pub use condition::Near;
+pub(crate) use read::{RulesDocument, SemanticsDocument, read_semantics};
 pub use rule_factor::{RuleError, RuleFactor};
 
 /// The paper's Table I.
@@ -49,28 +49,39 @@ const LEAST_SHARE: f64 = 0.05;
 /// In a mixture, the alternative that no factor holds is as likely as a residual of this many σ.
 const DOUBT: f64 = 3.0;
 
-/// Objects of these classes get this factor.
-#[derive(Debug, Clone, Serialize)]
+/// Objects of these classes get this factor. All rules that are for an object apply to it.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Rule {
     /// Names of classes, as any detector spells them; `*` for all.
     pub classes: Vec<String>,
-    /// What else has to hold.
-    #[serde(flatten)]
-    pub conditions: Conditions,
-    /// Whether the factor holds only as likely as the object is of these classes; and then for objects that might be of
-    /// them, too.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    /// The score of its class, averaged over its detections, is at least this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_score: Option<Share>,
+    /// It is at least this long, twice its longest semi-axis, where the solve begins, in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_size_m: Option<Positive>,
+    /// It is at most this long, in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_size_m: Option<Positive>,
+    /// Another object is near.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub near: Option<Near>,
+    /// Whether the factor holds only as likely as the object is of these classes, as one component of a `max_mixture` whose
+    /// other one is nothing; and then for all objects that may be of them.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub mixture: bool,
-    /// Variables of the document that the factor connects besides objects.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    /// Keys of the document's own `variables` that the factor connects besides objects.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub with: Vec<Key>,
-    /// A factor of one object, or of several that are near each other.
+    /// A factor of one object, or of several that are near each other. Where its `up` is left open, it gets the run's gravity.
+    #[schemars(with = "Box<dyn Factor>")]
     pub factor: RuleFactor,
     /// Its noise.
-    #[serde(skip_serializing_if = "Noise::is_default")]
+    #[serde(default, skip_serializing_if = "Noise::is_default")]
     pub noise: Noise,
-    /// Its loss.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Its loss. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub loss: Option<Arc<dyn Loss>>,
     /// Whether it comes from a table that is shipped, and so names more classes than any one scene has.
     #[serde(skip)]
@@ -149,7 +160,7 @@ pub fn table_one() -> Result<Vec<Rule>, manifactor_config::Diagnostics> {
 
 /// Classes that a rule names and the data do not have, each once.
 pub fn unmatched<'a>(rule: &'a Rule, seen: &[String], aliases: &Aliases) -> Vec<&'a str> {
-    let near = rule.conditions.near.iter().flat_map(|near| &near.classes);
+    let near = rule.near.iter().flat_map(|near| &near.classes);
     let mut missing: Vec<&str> = vec![];
     for name in rule.classes.iter().chain(near).map(String::as_str) {
         if name != ANY && !seen.contains(&aliases.canonical(name)) && !missing.contains(&name) {
@@ -157,39 +168,4 @@ pub fn unmatched<'a>(rule: &'a Rule, seen: &[String], aliases: &Aliases) -> Vec<
         }
     }
     missing
-}
-
-/// One `[[semantics]]`, over the document's own variables.
-fn read_rule(mut section: Section<'_>, own: &Values) -> Option<Rule> {
-    let errors = section.errors();
-    let classes = section.required::<Vec<String>>("classes");
-    let conditions = Conditions::take(&mut section);
-    let mixture = section.or_default("mixture");
-    let with: Vec<(Place, Key)> = section
-        .nodes("with")
-        .into_iter()
-        .filter_map(|node| Some((node.place.clone(), Key::from(node.read::<String>(errors)?))))
-        .collect();
-    let factor = section.take_required("factor").and_then(|node| RuleFactor::read(&node, errors));
-    let noise = section.or_default::<Noise>("noise");
-    let loss = section.optional::<Box<dyn Loss>>("loss").map(Arc::from);
-    let (place, of_noise) = (section.place_of("factor"), section.place_of("noise"));
-    section.finish();
-    let factor = factor?;
-    factor.check(&with, &place, own, errors)?;
-    check_noise(&factor, &noise, of_noise, errors);
-    if factor.partners() > 0 && conditions.near.is_none() {
-        let message = format!("`{}` connects objects, and the rule does not say which", factor.name());
-        let help = "say where the other one is: near = { classes = [\"tv monitor\"], within_m = 0.5 }";
-        errors.report(place, Problem::with_help(message, help));
-        return None;
-    }
-    let with = with.into_iter().map(|(_, key)| key).collect();
-    Some(Rule { classes: classes?, conditions, mixture, with, factor, noise, loss, shipped: false })
-}
-
-fn check_noise(factor: &RuleFactor, noise: &Noise, place: Place, errors: &Errors) {
-    if let Some(Err(error)) = factor.rows.map(|rows| noise.whitener(rows)) {
-        errors.report(place, Problem::invalid(error.to_string()));
-    }
 }

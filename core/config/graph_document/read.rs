@@ -3,12 +3,10 @@ use super::check::check;
 use crate::document::Document;
 use indexmap::IndexMap;
 use manifactor_graph::loss::Loss;
-use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Values, Variable};
-use manifactor_tree::Place;
-use manifactor_tree::Problem;
-use manifactor_tree::Section;
-use manifactor_tree::{Diagnostic, Diagnostics, Errors};
-use manifactor_tree::{Node, Value};
+use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Noise, Values, Variable};
+use manifactor_tree::{Diagnostic, Diagnostics, Errors, Node, Problem, Section, Value};
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::sync::Arc;
 
 /// Reads a document that is a graph: every variable and every factor by key.
@@ -45,125 +43,92 @@ pub fn read_graph(document: &Document) -> Result<(Graph, Values), Diagnostics> {
 pub fn read_graph_section(section: &mut Section<'_>) -> (Graph, Values) {
     let errors = section.errors();
     let mut read = Read::default();
-    for variable in section.required_items("variables") {
-        read.variable(variable);
+    for variable in section.required_nodes("variables") {
+        read.variable(variable, errors);
     }
-    for factor in section.items("factors") {
-        read.factor(factor);
+    for factor in section.nodes("factors") {
+        read.factor(factor, errors);
     }
     check(&read, section.place(), errors);
     (read.graph, read.values)
 }
 
+/// A variable, as it is written.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct VariableDocument {
+    /// Its name, by which factors have it.
+    key: Key,
+    /// Where the solve begins.
+    value: Box<dyn Variable>,
+    /// How much of it is held at its value.
+    #[serde(default)]
+    fixed: Fixed,
+}
+
+/// A factor, as it is written.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct FactorDocument {
+    /// The variables that it connects.
+    #[schemars(length(min = 1))]
+    keys: Vec<Key>,
+    /// What it says of them.
+    factor: Box<dyn Factor>,
+    /// Of its residual.
+    #[serde(default)]
+    noise: Noise,
+    /// How much of a large residual counts. Default: all of it.
+    #[serde(default)]
+    loss: Option<Box<dyn Loss>>,
+}
+
 /// What was read, and where.
 #[derive(Default)]
-pub(super) struct Read {
+pub(super) struct Read<'a> {
     pub graph: Graph,
     pub values: Values,
-    /// Every variable that was declared, readable or not.
-    pub variables: IndexMap<Key, VariablePlace>,
-    /// The places of every factor, and which factor of the graph it became.
-    pub factors: Vec<FactorPlace>,
+    /// Every variable that was declared, readable or not, as it is written.
+    pub variables: IndexMap<Key, &'a Node>,
+    /// Every factor that is in the graph, as it is written.
+    pub factors: Vec<&'a Node>,
+    /// Those that could not be read.
+    pub unread: Vec<&'a Node>,
 }
 
-pub(super) struct VariablePlace {
-    pub key: Place,
-    /// The directions to be held, or `true`.
-    pub fixed: Vec<(Place, String)>,
-}
-
-pub(super) struct FactorPlace {
-    pub keys: Place,
-    /// Each key and its place.
-    pub each: Vec<(Place, Key)>,
-    /// The noise; the factor, where there is none.
-    pub noise: Place,
-    /// Whether it is in the graph: in it are only those that could be read.
-    pub read: bool,
-}
-
-impl Read {
-    fn variable(&mut self, mut section: Section<'_>) {
-        let errors = section.errors();
-        let key = section.required::<String>("key").map(Key::from);
-        let place = section.place_of("key");
-        let value = section.required::<Box<dyn Variable>>("value");
-        let fixed = section.take("fixed").and_then(|node| fixed(&node, errors));
-        section.finish();
-        let Some(key) = key else { return };
+impl<'a> Read<'a> {
+    fn variable(&mut self, node: &'a Node, errors: &Errors) {
+        let read = node.read_what_is_right::<VariableDocument>(&[], errors);
+        let key = match (&read, node.field("key")) {
+            (Some(variable), _) => variable.key.clone(),
+            // one that could not be read is declared all the same
+            (None, Some(Node { value: Value::String(key), .. })) => Key::from(key.as_str()),
+            (None, _) => return,
+        };
+        let place = &node.field("key").unwrap_or(node).place;
         if key.as_str().is_empty() {
-            errors.push(Diagnostic::new(place, Problem::invalid("a key needs at least one character")));
+            let problem = Problem::invalid("a key needs at least one character");
+            errors.push(Diagnostic::new(place.clone(), problem));
             return;
         }
         if let Some(first) = self.variables.get(&key) {
-            errors.push(Diagnostic::duplicate("variable", key.as_str(), place, first.key.clone()));
+            let first = first.field("key").unwrap_or(first).place.clone();
+            errors.push(Diagnostic::duplicate("variable", key.as_str(), place.clone(), first));
             return;
         }
-        let (directions, fixed) = fixed.unwrap_or((Vec::new(), Fixed::Whole(false)));
-        if let Some(value) = value {
-            self.values.insert_boxed(key.clone(), value);
-            self.graph.set_fixed(key.clone(), fixed);
+        if let Some(variable) = read {
+            self.values.insert_boxed(key.clone(), variable.value);
+            self.graph.set_fixed(key.clone(), variable.fixed);
         }
-        self.variables.insert(key, VariablePlace { key: place, fixed: directions });
+        self.variables.insert(key, node);
     }
 
-    fn factor(&mut self, mut section: Section<'_>) {
-        let errors = section.errors();
-        let keys = section.take_required("keys");
-        let place = section.place_of("keys");
-        let each = keys.and_then(|node| keys_of(node, errors));
-        let noise = if section.has("noise") { "noise" } else { "factor" };
-        let factor = section.required::<Box<dyn Factor>>("factor");
-        let noise_before = errors.len();
-        let noise_value = section.or_default("noise");
-        let noise_read = errors.len() == noise_before;
-        let loss = section.optional::<Box<dyn Loss>>("loss");
-        let noise = section.place_of(noise);
-        section.finish();
-        let mut read = false;
-        if let (Some(factor), Some(each)) = (factor, &each) {
-            // with a noise that could not be read, the keys can be checked all the same
-            let noise = if noise_read { noise_value } else { Default::default() };
-            let keys = each.iter().map(|(_, key)| key.clone()).collect();
-            self.graph.push(FactorEntry {
-                keys,
-                factor: Arc::from(factor),
-                noise,
-                loss: loss.map(Arc::from),
-            });
-            read = true;
-        }
-        self.factors.push(FactorPlace { keys: place, each: each.unwrap_or_default(), noise, read });
-    }
-}
-
-/// The keys of a factor, each with its place.
-fn keys_of(node: Node, errors: &Errors) -> Option<Vec<(Place, Key)>> {
-    let Value::Array(items) = node.value else {
-        let problem = Problem::wrong_type("an array of keys", node.in_words());
-        errors.report(node.place, problem);
-        return None;
-    };
-    let read = |item: &Node| Some((item.place.clone(), Key::from(item.read::<String>(errors)?)));
-    let keys: Vec<Option<(Place, Key)>> = items.iter().map(read).collect();
-    keys.into_iter().collect()
-}
-
-/// `true`, `false`, or the names of directions, each with its place.
-fn fixed(node: &Node, errors: &Errors) -> Option<(Vec<(Place, String)>, Fixed)> {
-    match &node.value {
-        Value::Bool(whole) => Some((vec![(node.place.clone(), String::new())], Fixed::Whole(*whole))),
-        Value::Array(items) => {
-            let names: Vec<Option<String>> = items.iter().map(|item| item.read(errors)).collect();
-            let names: Option<Vec<String>> = names.into_iter().collect();
-            let places = items.iter().map(|item| item.place.clone());
-            let names = names?;
-            Some((places.zip(names.iter().cloned()).collect(), Fixed::Directions(names)))
-        }
-        _ => {
-            let expected = "true, false, or an array of directions of the tangent space";
-            errors.report(node.place.clone(), Problem::wrong_type(expected, node.in_words()));
-            None
-        }
+    fn factor(&mut self, node: &'a Node, errors: &Errors) {
+        let read = node.read_what_is_right(&[], errors);
+        let Some(FactorDocument { keys, factor, noise, loss }) = read else {
+            return self.unread.push(node);
+        };
+        self.graph.push(FactorEntry { keys, factor: Arc::from(factor), noise, loss: loss.map(Arc::from) });
+        self.factors.push(node);
     }
 }

@@ -242,7 +242,7 @@ fn parts_may_be_left_out_and_the_rest_read_as_one() {
     assert_eq!(read(Format::Toml, shape, parts), Ok((Some(3.0), 0, sheet)));
     assert_eq!(
         said(Format::Toml, "[sheet]\nwidth = 1\nheight = 2\ncolour = 'red'\ntags = 3\n", parts),
-        "file:4:1: unknown field `colour` (there are `width`, `height` and `name`)\n\
+        "file:4:1: unknown field `colour` (there are `width`, `height`, `name` and `tags`)\n\
          file:5:8: expected an array, found the number 3"
     );
 }

@@ -133,6 +133,12 @@ pub fn check_names(sorted: &[&Entry]) -> Result<(), NameTaken> {
 
 pub use crate::registry::registered::read;
 
+/// The schema of a trait object: a reference to the definition that a document's schema has of all that are linked.
+#[doc(hidden)]
+pub fn reference(kind: &str) -> Schema {
+    schemars::json_schema!({ "$ref": format!("#/$defs/{kind}") })
+}
+
 /// The entry of this kind and name.
 pub fn find(kind: &str, name: &str) -> Option<&'static Entry> {
     static INDEX: OnceLock<HashMap<(&str, &str), &Entry>> = OnceLock::new();
@@ -158,6 +164,19 @@ macro_rules! kind {
                     let read: Self = $crate::catalogue::read::<$kind>(node)?;
                     Ok(::std::boxed::Box::new(read))
                 })
+            }
+        }
+        impl $crate::__private::schemars::JsonSchema for $kind {
+            fn inline_schema() -> bool {
+                true
+            }
+            fn schema_name() -> ::std::borrow::Cow<'static, str> {
+                $name.into()
+            }
+            fn json_schema(
+                _: &mut $crate::__private::schemars::SchemaGenerator,
+            ) -> $crate::__private::schemars::Schema {
+                $crate::catalogue::reference($name)
             }
         }
     };

@@ -31,6 +31,22 @@ impl Positive {
     }
 }
 
+/// A number from 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct Share(
+    #[serde(deserialize_with = "within::<0, 1, _>")]
+    #[schemars(range(min = 0, max = 1))]
+    f64,
+);
+
+impl Share {
+    /// The number.
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+}
+
 /// For fields that are plain numbers in code: `#[serde(deserialize_with = "positive")]`.
 ///
 /// # Errors
@@ -75,6 +91,21 @@ pub fn least_and_most<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 2], D:
         return Ok([least, most]);
     }
     Err(D::Error::custom(format!("expected two numbers, 0 ≤ least ≤ most, got [{least}, {most}]")))
+}
+
+/// The same for a number within bounds: `#[serde(deserialize_with = "within::<0, 180, _>")]`.
+///
+/// # Errors
+/// Where it is not.
+pub fn within<'de, const LEAST: i32, const MOST: i32, D: Deserializer<'de>>(
+    from: D,
+) -> Result<f64, D::Error> {
+    let x = f64::deserialize(from)?;
+    if (f64::from(LEAST)..=f64::from(MOST)).contains(&x) {
+        Ok(x)
+    } else {
+        Err(D::Error::custom(format!("expected a number from {LEAST} to {MOST}, got {x}")))
+    }
 }
 
 /// A count that is at most `MOST`, for fields that are plain numbers in code:

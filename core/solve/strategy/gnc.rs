@@ -11,7 +11,7 @@ use crate::strategy::optimizer::Optimizer;
 use graduation::Graduation;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Values, register};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -60,16 +60,7 @@ pub struct Gnc {
     /// Factor from one μ to the next; the paper's is 1.4.
     pub step: Growth,
     /// Solves with the weights that are found at the end.
-    #[schemars(schema_with = "solver")]
     pub solver: Arc<dyn Optimizer>,
-}
-
-fn solver(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({
-        "type": "object",
-        "required": ["type"],
-        "description": "Solves with the weights that are found at the end."
-    })
 }
 
 impl Default for Gnc {

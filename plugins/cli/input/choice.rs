@@ -16,8 +16,8 @@ where
 {
     let chosen = |node| named(argument, name.unwrap_or(default), node, document);
     let node = match section.take(field) {
-        Some(node) if name.is_none() && has_type(&node) => node,
-        Some(node) => chosen(node),
+        Some(node) if name.is_none() && has_type(node) => node.clone(),
+        Some(node) => chosen(node.clone()),
         None => {
             let nothing = Source::argument(argument, name.unwrap_or(default));
             chosen(Node::new(nothing.place(0..0), Value::Table(Table::default())))

@@ -33,30 +33,33 @@ fn collect(root: &Value, schema: &Value, prefix: &str, out: &mut Vec<Field>) {
         let docs = property.get("description").or_else(|| target.get("description"));
         let docs = docs.and_then(Value::as_str).unwrap_or_default();
         let docs = docs.split("\n\n").next().unwrap_or_default().replace('\n', " ");
-        let within = within(root, property).filter(|_| prefix.matches('.').count() < 3);
-        let nested = within.is_some();
-        let default = property.get("default").filter(|_| !nested).map(value);
+        let mut within = if prefix.matches('.').count() < 3 { within(root, property) } else { Vec::new() };
+        within.dedup();
+        let nested = !within.is_empty();
+        let default = property.get("default").filter(|default| !nested && !default.is_null()).map(value);
         let kind = kind(root, property);
         out.push(Field { name: path.clone(), kind, default, required: required(name), docs });
-        if let Some((table, item)) = within {
+        for (table, item) in within {
             collect(root, table, &format!("{path}{item}."), out);
         }
     }
 }
 
-/// The table that a field is, or a list of, with what its fields' names have before them. What is described elsewhere has
+/// The tables that a field is, or a list of, with what their fields' names have before them. What is described elsewhere has
 /// none: registered types, and noise.
-fn within<'a>(root: &'a Value, schema: &'a Value) -> Option<(&'a Value, &'static str)> {
+fn within<'a>(root: &'a Value, schema: &'a Value) -> Vec<(&'a Value, &'static str)> {
     if registered(schema).is_some() {
-        return None;
+        return Vec::new();
     }
     let schema = resolve(root, schema);
     if schema.get("properties").is_some() {
-        return (!is_noise(schema)).then_some((schema, ""));
+        return if is_noise(root, schema) { Vec::new() } else { vec![(schema, "")] };
+    }
+    if let Some(items) = schema.get("items") {
+        return within(root, items).into_iter().map(|(table, _)| (table, "[]")).collect();
     }
     let alternatives = schema.get("anyOf").and_then(Value::as_array).into_iter().flatten();
-    let mut lists = std::iter::once(schema).chain(alternatives).filter_map(|list| list.get("items"));
-    lists.find_map(|items| Some((within(root, items)?.0, "[]")))
+    alternatives.flat_map(|alternative| within(root, alternative)).collect()
 }
 
 /// The kind of registered types that a schema refers to.
@@ -65,12 +68,21 @@ fn registered(schema: &Value) -> Option<&'static str> {
     catalogue::all().iter().map(|entry| entry.kind).find(|kind| *kind == name)
 }
 
-fn is_noise(schema: &Value) -> bool {
-    schema.get("title").is_some_and(|title| title == "Noise")
+/// Whether it is the noise, by itself or as the definition that others refer to.
+fn is_noise(root: &Value, schema: &Value) -> bool {
+    let defined = || root.pointer("/$defs/Noise").is_some_and(|noise| noise == schema);
+    schema.get("title").is_some_and(|title| title == "Noise") || defined()
 }
 
-/// A default as people write it: `1e15`, not a one and fifteen zeros.
+/// A default as people write it: `1e15`, not a one and fifteen zeros; of a registered type its name.
 fn value(default: &Value) -> String {
+    if let Some(Value::String(name)) = default.get("type") {
+        return name.clone();
+    }
+    if let Value::Object(fields) = default {
+        let fields: Vec<_> = fields.iter().map(|(name, x)| format!("{name} = {}", value(x))).collect();
+        return if fields.is_empty() { "{}".into() } else { format!("{{ {} }}", fields.join(", ")) };
+    }
     match default.as_f64() {
         Some(x) if x != 0.0 && !(1e-3..1e6).contains(&x.abs()) => format!("{x:e}"),
         _ => default.to_string(),
@@ -89,7 +101,7 @@ fn kind(root: &Value, schema: &Value) -> String {
         return kind.to_owned();
     }
     let schema = resolve(root, schema);
-    if is_noise(schema) {
+    if is_noise(root, schema) {
         return "noise".into();
     }
     let list = |key| schema.get(key).and_then(Value::as_array);
@@ -100,8 +112,9 @@ fn kind(root: &Value, schema: &Value) -> String {
         return value.to_string();
     }
     if let Some(alternatives) = list("anyOf").or_else(|| list("oneOf")) {
-        let words = alternatives.iter().map(|s| kind(root, s)).filter(|k| k != "null");
-        return words.collect::<Vec<_>>().join(" or ");
+        let mut words: Vec<_> = alternatives.iter().map(|s| kind(root, s)).filter(|k| k != "null").collect();
+        words.dedup();
+        return words.join(" or ");
     }
     match schema.get("type") {
         Some(Value::String(name)) if name == "array" => {
@@ -112,14 +125,21 @@ fn kind(root: &Value, schema: &Value) -> String {
                 _ => format!("list of {items}"),
             }
         }
-        Some(Value::String(name)) if name == "object" => "table".into(),
-        Some(Value::String(name)) if name == "string" => "text".into(),
-        Some(Value::String(name)) => name.clone(),
+        Some(Value::String(name)) => in_words(name).into(),
         Some(Value::Array(names)) => {
             let names = names.iter().filter_map(Value::as_str).filter(|n| *n != "null");
-            names.collect::<Vec<_>>().join(" or ")
+            names.map(in_words).collect::<Vec<_>>().join(" or ")
         }
         _ => "anything".into(),
+    }
+}
+
+fn in_words(name: &str) -> &str {
+    match name {
+        "object" => "table",
+        "string" => "text",
+        "array" => "list",
+        other => other,
     }
 }
 

@@ -2,7 +2,7 @@
 use super::{InitialiseError, Initialiser, View};
 use crate::shapes::DualQuadric;
 use manifactor_graph::register;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The first of several initialisers that succeeds.
@@ -16,12 +16,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct FirstOf {
     /// What to try, in this order.
-    #[schemars(schema_with = "list")]
+    #[schemars(length(min = 1))]
     pub initialisers: Vec<Box<dyn Initialiser>>,
-}
-
-fn list(_: &mut SchemaGenerator) -> Schema {
-    json_schema!({ "type": "array", "items": { "type": "object", "required": ["type"] }, "minItems": 1 })
 }
 
 #[typetag::serialize(name = "first_of")]

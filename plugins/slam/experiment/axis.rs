@@ -1,6 +1,9 @@
 //! What an experiment varies.
 use crate::settings::run_document::Declared;
-use manifactor_config::{Errors, Field, Node, Place, Problem, Section, Table, Value};
+use manifactor_config::{Errors, Field, Node, Place, Placed, Problem, Table, Value, deserialize_with};
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
 
 /// Columns of the table that change together, and the ways they do.
 #[derive(Debug, Clone)]
@@ -26,28 +29,67 @@ pub(super) struct Choice {
     pub(super) sets: Vec<Node>,
 }
 
+/// What is varied: columns with rows of values, or a name with options.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+pub(super) enum AxisDocument {
+    Rows(Rows),
+    Options(Options),
+}
+
+/// Columns that change together.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Rows {
+    /// Columns, and the setting that each changes: { seed = "source.seed" }.
+    #[schemars(with = "BTreeMap<String, String>")]
+    columns: Node,
+    /// Their values: a list for each row, or the value itself where there is one column.
+    #[schemars(with = "Vec<serde_json::Value>")]
+    rows: Placed<Vec<Node>>,
+}
+
+/// One column of options.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Options {
+    /// The column.
+    #[schemars(with = "String")]
+    name: Placed<String>,
+    /// Ways to set it.
+    #[schemars(with = "Vec<Declared>")]
+    options: Placed<Vec<Declared>>,
+}
+
+impl<'de> Deserialize<'de> for AxisDocument {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserialize_with(deserializer, |node| {
+            Ok(Box::new(match node.field("columns") {
+                Some(_) => Self::Rows(node.try_read()?),
+                None => Self::Options(node.try_read()?),
+            }))
+        })
+    }
+}
+
 impl Axis {
-    /// Reads one of `[[axes]]`; `None` where it is not as it should be, which is reported.
-    pub(super) fn read(mut section: Section<'_>) -> Option<Self> {
-        let axis = if section.has("columns") {
-            Self::of_rows(&mut section)
-        } else {
-            let name = section.required::<String>("name");
-            let options: Vec<_> =
-                section.required_items("options").into_iter().filter_map(Declared::read).collect();
-            let place = section.place_of("name");
-            name.map(|name| Self::of_options(Column { name, place }, options))
+    /// What one of `[[axes]]` says; `None` where that makes no sense, which is reported.
+    pub(super) fn read(document: AxisDocument, errors: &Errors) -> Option<Self> {
+        let (place, axis) = match document {
+            AxisDocument::Rows(rows) => (rows.rows.place.clone(), Self::of_rows(rows, errors)?),
+            AxisDocument::Options(Options { name: Placed { place, value: name }, options }) => {
+                (options.place, Self::of_options(Column { name, place }, options.value))
+            }
         };
-        if axis.as_ref().is_some_and(|axis| axis.options.is_empty()) {
-            section.report("options", Problem::invalid("an axis without options leaves nothing to run"));
+        if axis.options.is_empty() {
+            errors.report(place, Problem::invalid("an axis without options leaves nothing to run"));
         }
-        section.finish();
-        axis
+        Some(axis)
     }
 
     /// One column, each option with a name.
     pub(super) fn of_options(column: Column, options: Vec<Declared>) -> Self {
-        let choice = |Declared { name, place, set }| Choice {
+        let choice = |Declared { name: Placed { place, value: name }, set }| Choice {
             labels: vec![name],
             sets: vec![set.unwrap_or_else(|| Node::new(place.clone(), Value::Table(Table::default())))],
             place,
@@ -55,9 +97,7 @@ impl Axis {
         Self { columns: vec![column], options: options.into_iter().map(choice).collect() }
     }
 
-    fn of_rows(section: &mut Section<'_>) -> Option<Self> {
-        let errors = section.errors();
-        let columns = section.take_required("columns")?;
+    fn of_rows(Rows { columns, rows }: Rows, errors: &Errors) -> Option<Self> {
         let Value::Table(columns) = columns.value else {
             let problem = Problem::wrong_type("a table of columns and what they set", columns.in_words());
             errors.report(columns.place, problem);
@@ -69,8 +109,8 @@ impl Axis {
             .unzip();
         let paths: Vec<Option<String>> = keys.into_iter().map(|key| key.read(errors)).collect();
         let paths: Vec<String> = paths.into_iter().collect::<Option<_>>()?;
-        let rows = section.nodes("rows").into_iter().map(|row| choice(row, &paths, errors));
-        let options: Vec<Option<Choice>> = rows.collect();
+        let options: Vec<Option<Choice>> =
+            rows.value.into_iter().map(|row| choice(row, &paths, errors)).collect();
         Some(Self { columns, options: options.into_iter().collect::<Option<_>>()? })
     }
 }

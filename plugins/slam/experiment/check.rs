@@ -152,7 +152,8 @@ mod tests {
         let document = Document::parse("sweep.toml", text, Format::Toml).unwrap();
         let errors = Errors::new();
         let read = document.section(&errors).map(|mut section| {
-            let all: Vec<Axis> = section.items("axes").into_iter().filter_map(Axis::read).collect();
+            let read = |axis: &Node| Axis::read(axis.read(&errors)?, &errors);
+            let all: Vec<Axis> = section.nodes("axes").iter().filter_map(read).collect();
             axes(&all, &errors);
             section.finish();
         });

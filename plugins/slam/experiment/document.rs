@@ -1,10 +1,13 @@
 //! The document that describes an experiment.
-use super::axis::{Axis, Choice, Column};
+use super::axis::{Axis, AxisDocument, Choice, Column};
 use super::names::Names;
 use super::{SummarySettings, Trial, check};
 use crate::settings::Settings;
-use crate::settings::run_document::{Declared, absolute, common, folder};
-use manifactor_config::{Diagnostics, Document, Errors, Node, Problem, Section, merge};
+use crate::settings::run_document::{absolute, split, stem};
+use manifactor_config::{Diagnostics, Document, Errors, Node, Problem, merge};
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::Map;
 use std::path::{Path, PathBuf};
 
 /// An experiment: all its trials, in the order of the table.
@@ -24,6 +27,31 @@ pub struct Experiment {
     pub folder: PathBuf,
     /// The experiment and its base as they were read, whatever was set from outside; they are written beside the results.
     pub documents: Documents,
+}
+
+/// An experiment, as it is written: a run over a grid of settings and seeds.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ExperimentDocument {
+    /// What it is called in reports. Default: the document's name.
+    #[serde(default)]
+    title: Option<String>,
+    /// Where its results go. Default: `out/` and the document's name.
+    #[serde(default)]
+    output: Option<PathBuf>,
+    /// The run that it varies: a path from this document.
+    base: String,
+    /// Settings of the base that are others in all trials.
+    #[serde(default)]
+    #[schemars(with = "Option<Map<String, serde_json::Value>>")]
+    set: Option<Node>,
+    /// What is varied; all combinations are run.
+    #[serde(default)]
+    axes: Vec<AxisDocument>,
+    /// What is averaged, and what is compared with what.
+    #[serde(default)]
+    #[schemars(with = "Option<SummarySettings>")]
+    summary: Option<Node>,
 }
 
 /// What repeats an experiment.
@@ -46,37 +74,34 @@ impl Experiment {
     /// # Errors
     /// Everything that is wrong with either; of the settings of the trials, what is wrong with the first that has errors.
     pub fn read(document: &Document) -> Result<Self, Diagnostics> {
-        let path = Path::new(document.source().name());
-        let stem = path.file_stem().map_or_else(|| "experiment".into(), |s| s.to_string_lossy().into_owned());
+        let stem = stem(document, "experiment");
         let errors = Errors::new();
-        let read = document.section(&errors).and_then(|mut section| {
-            let title = section.or_default::<Option<String>>("title").unwrap_or_else(|| stem.clone());
-            let output = section.optional("output").unwrap_or_else(|| Path::new("out").join(&stem));
-            let base = open_base(&mut section, path.parent().unwrap_or(Path::new("")));
-            let set = section.take("set");
-            let mut axes: Vec<Axis> = section.items("axes").into_iter().filter_map(Axis::read).collect();
-            let (place, written) = (section.place_of("summary"), section.take("summary"));
-            let summary =
-                written.clone().and_then(|node| node.read::<SummarySettings>(&errors)).unwrap_or_default();
-            section.finish();
-            let base = base?;
-            let folder = folder(&base, &errors);
-            let variants = Declared::all(&base, &errors);
+        let read = document.root().read::<ExperimentDocument>(&errors).and_then(|written| {
+            let base = open_base(document, &written.base, &errors)?;
+            let (header, mut node) = split(base.root(), &errors)?;
+            let folder = header.folder(&base);
+            let mut axes: Vec<Axis> =
+                written.axes.into_iter().filter_map(|axis| Axis::read(axis, &errors)).collect();
             let has_variants = |axis: &Axis| axis.columns.iter().any(|column| column.name == VARIANT);
-            if !variants.is_empty() && !axes.iter().any(has_variants) {
+            if !header.variants.is_empty() && !axes.iter().any(has_variants) {
                 let place = base.source().place(0..0);
-                axes.push(Axis::of_options(Column { name: VARIANT.to_owned(), place }, variants));
+                axes.push(Axis::of_options(Column { name: VARIANT.to_owned(), place }, header.variants));
             }
             check::axes(&axes, &errors);
-            let names = Names { settings: &summary, written: written.as_ref(), place, errors: &errors };
+            let summary = written.summary.as_ref().and_then(|node| node.read(&errors)).unwrap_or_default();
+            let place =
+                written.summary.as_ref().map_or_else(|| document.root().place.clone(), |s| s.place.clone());
+            let names =
+                Names { settings: &summary, written: written.summary.as_ref(), place, errors: &errors };
             names.check(&axes);
-            let mut node = common(base.root());
-            if let Some(set) = set {
+            if let Some(set) = written.set {
                 merge(&mut node, set);
             }
             let trials = if errors.is_empty() { trials(&node, &axes, &folder, &errors)? } else { vec![] };
             names.check_alignments(&trials);
             let columns = axes.into_iter().flat_map(|axis| axis.columns).map(|column| column.name).collect();
+            let title = written.title.unwrap_or_else(|| stem.clone());
+            let output = written.output.unwrap_or_else(|| Path::new("out").join(&stem));
             let documents = Documents::new((&title, document), &base, &folder, &errors)?;
             Some(Self { title, output, columns, trials, summary, folder, documents })
         });
@@ -108,15 +133,9 @@ impl Documents {
 }
 
 /// The run that `base` names, with an error of its own where it cannot be read.
-fn open_base(section: &mut Section<'_>, folder: &Path) -> Option<Document> {
-    let name = section.required::<String>("base")?;
-    match Document::open(folder.join(name)) {
-        Ok(base) => Some(base),
-        Err(diagnostics) => {
-            section.errors().extend(diagnostics);
-            None
-        }
-    }
+fn open_base(document: &Document, name: &str, errors: &Errors) -> Option<Document> {
+    let beside = Path::new(document.source().name()).parent().unwrap_or(Path::new(""));
+    Document::open(beside.join(name)).map_err(|diagnostics| errors.extend(diagnostics)).ok()
 }
 
 /// All combinations, the last axis changing fastest.

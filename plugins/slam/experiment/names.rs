@@ -131,14 +131,14 @@ mod tests {
         );
         let document = Document::parse("sweep.toml", text, Format::Toml).unwrap();
         let errors = Errors::new();
-        let read = document.section(&errors).map(|mut section| {
-            let axes: Vec<Axis> = section.items("axes").into_iter().filter_map(Axis::read).collect();
-            let (place, written) = (section.place_of("summary"), section.take("summary"));
-            let settings: SummarySettings = written.clone().and_then(|node| node.read(&errors)).unwrap();
-            Names { settings: &settings, written: written.as_ref(), place, errors: &errors }.check(&axes);
-            section.finish();
-        });
-        errors.finish(read).map_or_else(|e| e.to_string(), |()| String::new())
+        let axes =
+            document.root().items("axes").iter().filter_map(|axis| Axis::read(axis.read(&errors)?, &errors));
+        let axes: Vec<Axis> = axes.collect();
+        let written = document.root().field("summary").unwrap();
+        let settings: SummarySettings = written.read(&errors).unwrap();
+        let place = written.place.clone();
+        Names { settings: &settings, written: Some(written), place, errors: &errors }.check(&axes);
+        errors.finish(Some(())).map_or_else(|e| e.to_string(), |()| String::new())
     }
 
     #[test]

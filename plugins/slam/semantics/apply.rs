@@ -91,7 +91,7 @@ impl<'a> Judge<'a> {
         for (i, rule) in self.rules.iter().enumerate() {
             let Some(share) = rule.share(object.class.as_ref(), self.aliases) else { continue };
             let factor = rule.factor.name().to_owned();
-            if self.up.is_none() && rule.conditions.near.as_ref().is_some_and(|near| near.below) {
+            if self.up.is_none() && rule.near.as_ref().is_some_and(|near| near.below) {
                 return Err(RuleError::NoUp { factor });
             }
             match self.keys(i, rule, object) {
@@ -109,7 +109,7 @@ impl<'a> Judge<'a> {
     /// The variables of a rule's factor, with reasons; `Err` has the reason why there are none.
     fn keys(&mut self, i: usize, rule: &Rule, object: &Candidate) -> Result<(Vec<Key>, Vec<String>), String> {
         let partners = rule.factor.partners();
-        let met = rule.conditions.judge(object, &self.objects, partners, self.up, self.aliases)?;
+        let met = rule.met(object, &self.objects, partners, self.up, self.aliases)?;
         let others: Vec<Key> = met.others.iter().take(partners).map(|other| other.key.clone()).collect();
         if partners > 0 {
             let mut all = others.clone();

@@ -1,30 +1,12 @@
 //! Which objects a rule is for, besides their class: by score, by size, by what is near.
-use super::{ANY, Candidate};
+use super::{ANY, Candidate, Rule};
 use crate::input::class::Aliases;
-use manifactor_config::Section;
 use manifactor_graph::Direction;
-use manifactor_graph::checked::Positive;
+use manifactor_graph::checked::{Positive, Share};
 use manifactor_quadric::DualQuadric;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// What has to hold of an object, beyond its class, for a rule to apply.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Conditions {
-    /// The score of its class, averaged over its detections, from 0 to 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub min_score: Option<f64>,
-    /// Its length, twice its longest semi-axis, where the solve begins.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub min_size_m: Option<Positive>,
-    /// The same, from above.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_size_m: Option<Positive>,
-    /// Another object that is near.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub near: Option<Near>,
-}
 
 /// Another object, near the one that a rule is for; where the rule's factor connects two objects, the other of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -50,19 +32,9 @@ pub(super) struct Met<'a> {
     pub others: Vec<&'a Candidate>,
 }
 
-impl Conditions {
-    pub(super) fn take(section: &mut Section<'_>) -> Self {
-        let min_score = section.has("min_score").then(|| crate::number::share(section, "min_score"));
-        Self {
-            min_score,
-            min_size_m: section.optional("min_size_m"),
-            max_size_m: section.optional("max_size_m"),
-            near: section.optional("near"),
-        }
-    }
-
+impl Rule {
     /// Looks at an object among all; `Err` has the condition that does not hold, in words.
-    pub(super) fn judge<'a>(
+    pub(super) fn met<'a>(
         &self,
         object: &Candidate,
         all: &'a [Candidate],
@@ -78,7 +50,7 @@ impl Conditions {
             }
             Err(format!("{what}, not {bound}"))
         };
-        if let Some(least) = self.min_score {
+        if let Some(least) = self.min_score.map(Share::get) {
             require(score >= least, format!("score {score:.2}"), format!("at least {least}"))?;
         }
         let size = 2.0 * object.start.semi_axes.max();

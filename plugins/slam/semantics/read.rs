@@ -1,26 +1,48 @@
 //! `semantics = "table_one"`, `semantics = "my_rules.toml"`, or `[[semantics]]` rule by rule.
-use super::{Rule, SHIPPED, read_rule, shipped};
-use manifactor_config::{
-    Diagnostics, Document, Errors, Format, Node, Problem, Section, Value, nearest, quoted_list,
-};
+use super::{Rule, SHIPPED, shipped};
+use manifactor_config::{Diagnostics, Document, Errors, Format, Node, Problem, Value, nearest, quoted_list};
 use manifactor_graph::Values;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::path::Path;
 
-/// Takes the rules out of a run's document. Files are found from `folder`, the document's own; `own` are the variables
-/// that it declares.
-pub(crate) fn read_semantics(section: &mut Section<'_>, folder: &Path, own: &Values) -> Vec<Rule> {
-    let errors = section.errors();
-    match section.take("semantics") {
+/// `semantics` of a run: which objects get which factors.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "says what may be written; a name is looked up as it is read")]
+pub(crate) enum SemanticsDocument {
+    /// The name of a shipped table, or a file.
+    Named(String),
+    /// Rules.
+    Rules(Vec<Rule>),
+}
+
+/// A file of semantic rules, which runs name: `semantics = "this_file.toml"`.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RulesDocument {
+    /// Which objects get which factors.
+    #[schemars(with = "Vec<Rule>")]
+    semantics: Vec<Node>,
+}
+
+/// The rules of a run's document. Files are found from `folder`, the document's own; `own` are the variables that it declares.
+pub(crate) fn read_semantics(
+    semantics: Option<&Node>,
+    folder: &Path,
+    own: &Values,
+    errors: &Errors,
+) -> Vec<Rule> {
+    match semantics {
         None => Vec::new(),
-        Some(Node { place, value: Value::String(name) }) => match rules_named(&name, folder, own) {
+        Some(Node { place, value: Value::String(name) }) => match rules_named(name, folder, own) {
             Ok(rules) => rules,
             Err(Unread::Unknown) => {
                 let known: Vec<String> = SHIPPED.iter().map(|s| (*s).to_owned()).collect();
-                let meant =
-                    nearest(&name, SHIPPED).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+                let meant = nearest(name, SHIPPED).map_or(String::new(), |n| format!("did you mean `{n}`? "));
                 let help =
                     format!("{meant}there is {}, or give the path of a .toml file", quoted_list(&known));
-                errors.report(place, Problem::with_help(format!("unknown semantics `{name}`"), help));
+                errors.report(place.clone(), Problem::with_help(format!("unknown semantics `{name}`"), help));
                 Vec::new()
             }
             Err(Unread::Wrong(diagnostics)) => {
@@ -28,15 +50,42 @@ pub(crate) fn read_semantics(section: &mut Section<'_>, folder: &Path, own: &Val
                 Vec::new()
             }
         },
-        Some(Node { value: Value::Array(items), .. }) => {
-            let sections = items.into_iter().filter_map(|item| Section::new(item, errors));
-            sections.filter_map(|section| read_rule(section, own)).collect()
-        }
+        Some(Node { value: Value::Array(items), .. }) => rules(items, own, errors),
         Some(other) => {
             let expected = "an array of rules, or the name of a file with rules";
             errors.report(other.place.clone(), Problem::wrong_type(expected, other.in_words()));
             Vec::new()
         }
+    }
+}
+
+/// Each rule, over the document's own variables; what is wrong is reported and left out.
+fn rules(items: &[Node], own: &Values, errors: &Errors) -> Vec<Rule> {
+    let read = |item: &Node| {
+        let rule = item.read::<Rule>(errors)?;
+        rule.check(item, own, errors)?;
+        Some(rule)
+    };
+    items.iter().filter_map(read).collect()
+}
+
+impl Rule {
+    /// Whether it makes sense as a whole; what does not is reported where it is written.
+    fn check(&self, written: &Node, own: &Values, errors: &Errors) -> Option<()> {
+        let place = written.field("factor").unwrap_or(written).place.clone();
+        self.factor.check(self.with.iter().zip(written.items("with")), &place, own, errors)?;
+        if let Some(Err(error)) = self.factor.rows.map(|rows| self.noise.whitener(rows)) {
+            let place = written.field("noise").unwrap_or(written).place.clone();
+            errors.report(place, Problem::invalid(error.to_string()));
+        }
+        if self.factor.partners() > 0 && self.near.is_none() {
+            let message =
+                format!("`{}` connects objects, and the rule does not say which", self.factor.name());
+            let help = "say where the other one is: near = { classes = [\"tv monitor\"], within_m = 0.5 }";
+            errors.report(place, Problem::with_help(message, help));
+            return None;
+        }
+        Some(())
     }
 }
 
@@ -65,11 +114,7 @@ pub(super) fn shipped_rules(name: &str, text: &str) -> Result<Vec<Rule>, Diagnos
 /// The rules of a document with nothing else in it.
 fn rules_of(document: &Document, own: &Values) -> Result<Vec<Rule>, Diagnostics> {
     let errors = Errors::new();
-    let rules = document.section(&errors).map(|mut section| {
-        let rules = section.required_items("semantics").into_iter();
-        let rules = rules.filter_map(|section| read_rule(section, own)).collect();
-        section.finish();
-        rules
-    });
+    let read = document.root().read::<RulesDocument>(&errors);
+    let rules = read.map(|document| rules(&document.semantics, own, &errors));
     errors.finish(rules)
 }

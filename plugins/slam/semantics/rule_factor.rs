@@ -1,10 +1,10 @@
 //! The factor of a semantic rule.
-use manifactor_config::{Errors, Node, Place, Problem};
+use manifactor_config::{Errors, Node, Place, Problem, ReadError, deserialize_with};
 use manifactor_graph::manifold_name;
 use manifactor_graph::{Direction, Factor, Key, Values};
 use manifactor_quadric::DualQuadric;
 use manifactor_semantic::MixtureError;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use std::any::TypeId;
 use std::sync::Arc;
@@ -49,10 +49,9 @@ pub enum RuleError {
 }
 
 impl RuleFactor {
-    /// Reads and checks a factor; what is wrong is reported.
-    pub(super) fn read(node: &Node, errors: &Errors) -> Option<Self> {
-        let place = node.place.clone();
-        let factor: Arc<dyn Factor> = node.read::<Box<dyn Factor>>(errors)?.into();
+    /// Reads and checks a factor.
+    fn read(node: &Node) -> Result<Self, ReadError> {
+        let factor: Arc<dyn Factor> = node.try_read::<Box<dyn Factor>>()?.into();
         let name = factor.typetag_name();
         let signature = factor.erased().signature();
         let variables = signature.variables;
@@ -61,10 +60,11 @@ impl RuleFactor {
             let message = format!("`{name}` connects {}", names.join(" and "));
             let help = "a semantic rule adds a factor of one dual_quadric, such as `vertical_orientation`, or of several, such \
                         as `beside`";
-            errors.report(place, Problem::with_help(message, help));
-            return None;
+            return Err(ReadError::new(node.place.clone(), Problem::with_help(message, help)));
         }
-        Some(Self { document: node.to_json().ok()?, factor, variables, rows: signature.rows })
+        // numbers that are not finite were refused before
+        let document = node.to_json().unwrap_or_default();
+        Ok(Self { document, factor, variables, rows: signature.rows })
     }
 
     /// Its type.
@@ -93,9 +93,9 @@ impl RuleFactor {
     }
 
     /// Checks that `with` names a variable for each place that is not an object's.
-    pub(super) fn check(
+    pub(super) fn check<'a>(
         &self,
-        with: &[(Place, Key)],
+        with: impl ExactSizeIterator<Item = (&'a Key, &'a Node)>,
         place: &Place,
         own: &Values,
         errors: &Errors,
@@ -111,7 +111,7 @@ impl RuleFactor {
             errors.report(place.clone(), Problem::with_help(message, help));
             return None;
         }
-        for ((place, key), id) in with.iter().zip(wanted) {
+        for ((key, Node { place, .. }), id) in with.zip(wanted) {
             let expected = manifold_name(*id);
             match own.variable(key.as_str()) {
                 Some(found) if found.typetag_name() == expected => {}
@@ -144,5 +144,11 @@ impl RuleFactor {
             (Some(up), true) => Ok(self.factor.with_up(up).map_or_else(|| self.factor.clone(), Arc::from)),
             (_, false) => Ok(self.factor.clone()),
         }
+    }
+}
+
+impl<'de> Deserialize<'de> for RuleFactor {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserialize_with(deserializer, |node| Ok(Box::new(Self::read(node)?)))
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use manifactor_config::{Document, Format};
+use manifactor_config::{Document, Errors, Format};
 use manifactor_geometry::{Se3, So3};
 use manifactor_quadric::DualQuadric;
 use nalgebra::Vector3;
@@ -52,7 +52,7 @@ fn read(text: &str) -> Result<Vec<Rule>, String> {
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
         let (_, own) = manifactor_config::read_graph_section(&mut section);
-        read_semantics(&mut section, std::path::Path::new(""), &own)
+        read_semantics(section.take("semantics"), std::path::Path::new(""), &own, &errors)
     });
     errors.finish(read).map_err(|e| e.to_string())
 }

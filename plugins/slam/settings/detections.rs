@@ -1,7 +1,6 @@
-use super::{loss, noise};
-use crate::number::{table, within};
-use manifactor_config::Section;
+use super::poses::{every_row, noise_of};
 use manifactor_graph::Noise;
+use manifactor_graph::checked::{not_negative, within};
 use manifactor_graph::loss::Loss;
 use manifactor_quadric::BoxModel;
 use schemars::JsonSchema;
@@ -9,11 +8,13 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// `[detections]`: which boxes are used, and how.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct DetectionSettings {
-    /// Of a box: xmin, ymin, xmax, ymax, in pixels. Default: σ = 20.
+    /// Of a box: xmin, ymin, xmax, ymax, in pixels.
+    #[serde(deserialize_with = "noise_of::<SIDES, _>")]
     pub noise: Noise,
-    /// How much of a large error counts.
+    /// How much of a large error counts. Default: all of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<Arc<dyn Loss>>,
     /// What of an object a box goes around.
@@ -21,8 +22,12 @@ pub struct DetectionSettings {
     /// What becomes of a box with sides at the border.
     pub cut_sides: CutSides,
     /// Sides this near to the border count as cut, in pixels.
+    #[serde(deserialize_with = "not_negative")]
+    #[schemars(range(min = 0))]
     pub border_px: f64,
     /// Detections whose best class scores less are left out.
+    #[serde(deserialize_with = "within::<0, 1, _>")]
+    #[schemars(range(min = 0, max = 1))]
     pub min_score: f64,
 }
 
@@ -61,23 +66,12 @@ impl DetectionSettings {
             _ => self.noise.clone(),
         }
     }
-
-    pub(super) fn take(parent: &mut Section<'_>) -> Option<Self> {
-        table(parent, "detections", |section| Self {
-            noise: noise(section, 20.0, SIDES),
-            loss: loss(section),
-            model: section.or_default("model"),
-            cut_sides: section.or_default("cut_sides"),
-            border_px: within(section, "border_px", 20.0, 0.0..=f64::INFINITY),
-            min_score: within(section, "min_score", 0.0, 0.0..=1.0),
-        })
-    }
 }
 
 impl Default for DetectionSettings {
     fn default() -> Self {
         Self {
-            noise: Noise::sigma(20.0).unwrap_or_default(),
+            noise: every_row(20.0),
             loss: None,
             model: BoxModel::Standard,
             cut_sides: CutSides::Drop,

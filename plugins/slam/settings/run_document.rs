@@ -20,8 +20,10 @@
 //! name = "with orientation"
 //! ```
 use crate::settings::Settings;
-use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Node, Place, Section, Value, merge};
-use serde::Serialize;
+use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Node, Placed, Section, merge};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::Map;
 use std::path::{Path, PathBuf};
 
 /// A run: one set of settings, or several to compare.
@@ -56,89 +58,83 @@ impl RunDocument {
     /// # Errors
     /// Everything that is wrong with it, in all variants, each at its place.
     pub fn read(document: &Document) -> Result<Self, Diagnostics> {
-        let name = Path::new(document.source().name());
-        let stem = name.file_stem().map_or_else(|| "run".into(), |s| s.to_string_lossy().into_owned());
+        let stem = stem(document, "run");
         let errors = Errors::new();
-        let run = document.section(&errors).and_then(|mut section| {
-            let title = section.or_default::<Option<String>>("title").unwrap_or_else(|| stem.clone());
-            let output = section.optional("output").unwrap_or_else(|| Path::new("out").join(&stem));
-            let folder = folder(document, &errors);
-            let declared = Declared::all(document, &errors);
-            let base = common(document.root());
-            let variants = read_variants(declared, &base, &folder, &errors);
-            // what the settings have read, in each variant, is not unknown here
-            section.ignore_rest();
-            Some(Self { title, output, variants: variants?, folder })
+        let run = split(document.root(), &errors).and_then(|(header, settings)| {
+            let folder = header.folder(document);
+            let variants = read_variants(header.variants, &settings, &folder, &errors)?;
+            let title = header.title.unwrap_or_else(|| stem.clone());
+            let output = header.output.unwrap_or_else(|| Path::new("out").join(&stem));
+            Some(Self { title, output, variants, folder })
         });
         errors.finish(run)
     }
 }
 
+/// What a document is called, without its extension.
+pub(crate) fn stem(document: &Document, otherwise: &str) -> String {
+    let stem = Path::new(document.source().name()).file_stem();
+    stem.map_or_else(|| otherwise.to_owned(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// What the document of a run says beside the settings.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Header {
+    /// What it is called in reports. Default: the document's name.
+    title: Option<String>,
+    /// Where its results go. Default: `out/` and the document's name.
+    output: Option<PathBuf>,
+    /// The folder that its paths are relative to. Default: its own.
+    folder: Option<PathBuf>,
+    /// Ways to do the run, to compare.
+    pub(crate) variants: Vec<Declared>,
+}
+
+impl Header {
+    const FIELDS: [&str; 4] = ["title", "output", "folder", "variants"];
+
+    /// The folder from which a run's files are named: what it says, from where it lies.
+    pub(crate) fn folder(&self, document: &Document) -> PathBuf {
+        let beside = Path::new(document.source().name()).parent().unwrap_or(Path::new(""));
+        self.folder.as_ref().map_or_else(|| beside.to_owned(), |named| beside.join(named))
+    }
+}
+
 /// A variant, as it is written.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct Declared {
-    pub(crate) name: String,
-    /// Where the name is.
-    pub(crate) place: Place,
-    /// What it puts over the settings that all variants have in common.
+    /// Its name, one of its own.
+    #[schemars(with = "String")]
+    pub(crate) name: Placed<String>,
+    /// Settings of the document that are others here.
+    #[schemars(with = "Option<Map<String, serde_json::Value>>")]
     pub(crate) set: Option<Node>,
 }
 
-impl Declared {
-    /// All variants of a run's document. Two of one name are reported.
-    pub(crate) fn all(document: &Document, errors: &Errors) -> Vec<Self> {
-        let Some(mut section) = document.section(errors) else { return vec![] };
-        let declared: Vec<_> = section.items("variants").into_iter().filter_map(Self::read).collect();
-        section.ignore_rest();
-        twice(&declared, errors);
-        declared
-    }
-
-    /// A name, and what it sets.
-    pub(crate) fn read(mut section: Section<'_>) -> Option<Self> {
-        let name = section.required::<String>("name");
-        let place = section.place_of("name");
-        let set = section.take("set");
-        section.finish();
-        Some(Self { name: name?, place, set })
-    }
-}
-
-fn twice(declared: &[Declared], errors: &Errors) {
-    for (i, second) in declared.iter().enumerate() {
-        let earlier = declared.get(..i).unwrap_or_default();
+/// The header of a run's document, and its settings as they are written. What is wrong with the header is reported, and it
+/// is as if nothing had been said.
+pub(crate) fn split(root: &Node, errors: &Errors) -> Option<(Header, Node)> {
+    let (mut header, mut settings) = (root.clone(), root.clone());
+    header.retain(|field| Header::FIELDS.contains(&field));
+    settings.retain(|field| !Header::FIELDS.contains(&field));
+    Section::new(root, errors)?.ignore_rest();
+    let header = header.read::<Header>(errors).unwrap_or_default();
+    for (i, second) in header.variants.iter().enumerate() {
+        let mut earlier = header.variants.iter().take(i);
         // their folders would be one
-        if let Some(first) = earlier.iter().find(|first| slug(&first.name) == slug(&second.name)) {
-            let place = first.place.clone();
-            errors.push(Diagnostic::duplicate("variant", &second.name, second.place.clone(), place));
+        if let Some(first) = earlier.find(|first| slug(&first.name) == slug(&second.name)) {
+            let (first, second) = (&first.name, &second.name);
+            errors.push(Diagnostic::duplicate("variant", second, second.place.clone(), first.place.clone()));
         }
     }
-}
-
-/// The folder from which a run's files are named: what it says, from where it lies.
-pub(crate) fn folder(document: &Document, errors: &Errors) -> PathBuf {
-    let beside = Path::new(document.source().name()).parent().unwrap_or(Path::new(""));
-    let named = document.section(errors).and_then(|mut section| {
-        let named = section.optional::<PathBuf>("folder");
-        section.ignore_rest();
-        named
-    });
-    named.map_or_else(|| beside.to_owned(), |named| beside.join(named))
+    Some((header, settings))
 }
 
 /// The same folder, wherever a program is run; unchanged if the current folder is unknown.
 pub(crate) fn absolute(folder: &Path) -> PathBuf {
     std::env::current_dir().map_or_else(|_| folder.to_owned(), |at| at.join(folder).components().collect())
-}
-
-/// The document without what is no setting.
-pub(crate) fn common(root: &Node) -> Node {
-    let mut base = root.clone();
-    if let Value::Table(table) = &mut base.value {
-        for field in ["title", "output", "folder", "variants"] {
-            table.shift_remove(field);
-        }
-    }
-    base
 }
 
 fn read_variants(
@@ -163,7 +159,7 @@ fn read_variants(
         if let Some(set) = variant.set {
             merge(&mut node, set);
         }
-        read(variant.name, node)
+        read(variant.name.value, node)
     });
     let variants: Vec<Option<Variant>> = variants.collect();
     variants.into_iter().collect()
