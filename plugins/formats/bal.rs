@@ -16,8 +16,10 @@
 //! camera that is farthest from it; this changes no cost. Gauss-Newton needs it. Damped steps do not, but
 //! end with a note that something is undetermined.
 use crate::error::{FormatError, Mistake, Problems};
+use crate::graph_format::{GraphFormat, GraphRead};
 use crate::lines::{Fields, lines, number};
 use crate::text::read_text;
+use crate::words::list;
 use manifactor_geometry::{BalCamera, Coordinates, Point3, ProjectionBal, Se3, So3};
 use manifactor_graph::{Graph, Key, Values};
 use nalgebra::{Vector2, Vector3};
@@ -46,6 +48,37 @@ pub struct Report {
     /// Cameras and points without any observation: they are held.
     pub unobserved: Vec<Key>,
 }
+
+impl Report {
+    /// In words, what the file left open and how it was filled in.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if !self.unobserved.is_empty() {
+            notes.push(format!("nothing observes {}: held", list(self.unobserved.iter())));
+        }
+        if !self.anchored.is_empty() {
+            let held = list(self.anchored.iter());
+            notes.push(format!(
+                "nothing fixes the gauge: held pose and scale by {held} (--no-anchor does not)"
+            ));
+        }
+        notes
+    }
+}
+
+crate::register_graph_format!(GraphFormat {
+    name: "BAL",
+    extensions: &["bal"],
+    begins,
+    parse: |text, path, reading| {
+        let Bundle { graph, values, report } = parse(text, path, reading.anchor)?;
+        Ok(GraphRead { graph, values, notes: report.notes() })
+    },
+    format: Some(|graph, values| {
+        let (text, omitted) = format(graph, values);
+        (text, omitted.notes())
+    }),
+});
 
 /// Cameras, points and observations, as the first line counts them.
 struct Counts([usize; 3]);

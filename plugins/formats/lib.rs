@@ -9,6 +9,7 @@ pub mod accelerometer;
 pub mod bal;
 pub mod detections;
 mod error;
+mod graph_format;
 mod lines;
 pub mod pose_graph;
 pub mod table;
@@ -16,7 +17,14 @@ mod text;
 pub mod timestamps;
 pub mod tum;
 pub mod whole;
+pub mod words;
 
 pub use error::{FormatError, Malformed, Mistake, Problem};
+pub use graph_format::{GraphFormat, GraphRead, Reading, Repair};
 pub use pose_graph::g2o;
 pub use text::read_text;
+
+#[doc(hidden)]
+pub mod __private {
+    pub use inventory;
+}

@@ -9,8 +9,10 @@
 //! - in each connected part of the graph that no `FIX` line holds, the first pose is held, unless
 //!   [`Options::anchor`] says not to.
 use crate::error::{FormatError, Mistake, Problems};
+use crate::graph_format::{GraphFormat, GraphRead};
 use crate::lines::lines;
 use crate::text::read_text;
+use crate::words::{count, list};
 use manifactor_geometry::Tree;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Key, Values};
@@ -27,7 +29,24 @@ mod information;
 pub(crate) mod record;
 mod toro;
 
+pub use crate::graph_format::Repair;
 use record::Record;
+
+crate::register_graph_format!(GraphFormat {
+    name: "g2o",
+    extensions: &["g2o", "toro"],
+    // what is in no other format is read as a pose graph, whose errors show what one looks like
+    begins: |text| GraphFormat::all().iter().all(|other| other.name == "g2o" || !(other.begins)(text)),
+    parse: |text, path, reading| {
+        let options = Options { repair: reading.repair, anchor: reading.anchor, ..Options::default() };
+        let PoseGraph { graph, values, report } = parse(text, path, &options)?;
+        Ok(GraphRead { graph, values, notes: report.notes() })
+    },
+    format: Some(|graph, values| {
+        let (text, omitted) = g2o::format(graph, values);
+        (text, omitted.notes())
+    }),
+});
 
 /// A graph from a file, with initial values for all of its variables.
 #[derive(Debug, Clone, Default)]
@@ -65,19 +84,6 @@ impl Default for Options {
     }
 }
 
-/// What to do with an information matrix that is not positive definite.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Repair {
-    /// Say so, with its line.
-    #[default]
-    Error,
-    /// Leave its edge out.
-    Reject,
-    /// Raise its eigenvalues to 1e-9 of the largest; leave the edge out where none is above zero.
-    Clamp,
-}
-
 /// What a file did not say, or what had to be done to it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Report {
@@ -99,6 +105,40 @@ pub struct Report {
     pub equivalences_by_edge: usize,
     /// `EQUIV` lines for which a factor was added.
     pub equivalences_added: usize,
+}
+
+impl Report {
+    /// In words, what the file left open and how it was filled in.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (tag, n) in &self.unknown {
+            notes.push(format!("unknown tag `{tag}`: {} left out", count(*n, "line")));
+        }
+        if !self.filled.is_empty() {
+            let filled = count(self.filled.len(), "variable");
+            notes.push(format!(
+                "{filled} have no vertex line; their values come from a spanning tree of the edges"
+            ));
+        }
+        if !self.anchored.is_empty() {
+            let held = list(self.anchored.iter());
+            notes.push(format!("nothing fixes the gauge: held {held} (--no-anchor does not)"));
+        }
+        if !self.rejected.is_empty() {
+            let lines = list(self.rejected.iter());
+            notes.push(format!(
+                "edges left out, as their information is not positive definite: lines {lines}"
+            ));
+        }
+        if !self.clamped.is_empty() {
+            notes.push(format!("information made positive definite: lines {}", list(self.clamped.iter())));
+        }
+        if self.equivalences_added > 0 {
+            let lines = count(self.equivalences_added, "EQUIV line");
+            notes.push(format!("{lines} without an edge: tied by a factor"));
+        }
+        notes
+    }
 }
 
 /// Reads a g2o or TORO file.

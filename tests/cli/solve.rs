@@ -67,7 +67,7 @@ fn a_bundle_adjustment_is_known_by_its_extension_or_its_first_line() {
     for file in ["problem.bal", "problem.txt"] {
         let ran = manifactor(&format!("solve {} --out {solved} --force --json", path(&folder, file)));
         ran.complains("nothing fixes the gauge: held pose and scale by c0, c1");
-        ran.complains("BAL has no word for what is held: 2 left out");
+        ran.complains("BAL cannot express what is held: 2 left out");
         let json = ran.json();
         assert!(json["initial_cost"].as_f64().unwrap() > 1.0);
         assert!(json["final_cost"].as_f64().unwrap() < 1e-6, "{json}");
@@ -174,7 +174,7 @@ fn files_that_are_not_there_are_named() {
     manifactor("solve nowhere.toml").ended(3).complains("nowhere.toml");
     let folder = folder(&[("graph.toml", GRAPH)]);
     let ran = manifactor(&format!("solve {} --out {}", path(&folder, "graph.toml"), path(&folder, "a.txt")));
-    ran.ended(2).complains("use .toml, .json, .yaml, .g2o or .bal");
+    ran.ended(2).complains("use .toml, .json, .yaml, .bal or .g2o");
 }
 
 #[test]

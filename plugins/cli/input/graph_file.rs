@@ -1,13 +1,12 @@
 //! Graphs in files, by extension.
 use crate::failure::Failure;
 use crate::input::solver::SolverArguments;
-use crate::output::text::{count, list};
+use crate::output::text::count;
 use clap::{Args, ValueEnum};
 use manifactor::config::{Document, Errors, Format, read_graph_section, write_graph};
-use manifactor::formats::pose_graph::{self, Options, Repair, Report};
 use manifactor::formats::whole::{can_write, write_whole};
-use manifactor::formats::{FormatError, bal, g2o, read_text};
-use manifactor::graph::{Graph, Key, Values};
+use manifactor::formats::{self, GraphFormat, GraphRead, Repair, read_text};
+use manifactor::graph::{Graph, Values};
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -54,7 +53,7 @@ impl Reading {
         }
     }
 
-    /// g2o, TORO or BAL: solver and start are all that `--set` can set.
+    /// A file in a registered format: solver and start are all that `--set` can set.
     fn plain(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         let mut settings = Document::parse("settings", "", Format::Toml)?;
         solver.apply(&mut settings)?;
@@ -68,49 +67,19 @@ impl Reading {
         let (optimizer, start) = errors.finish(chosen)?;
         // a pipe can be read once
         let text = read_text(path)?;
-        let read = if is_bal(path, &text) { Self::bundle } else { Self::pose_graph };
-        let (graph, values, notes) = read(self, &text, path)?;
+        let format = GraphFormat::of(path, &text).ok_or_else(|| no_format(path))?;
+        let GraphRead { graph, values, notes } = (format.parse)(&text, path, self.choices())?;
         Ok(GraphFile { graph, values, optimizer, start, notes })
     }
 
-    fn pose_graph(&self, text: &str, path: &Path) -> Result<Noted, Failure> {
+    fn choices(&self) -> formats::Reading {
         let repair = match self.repair {
             RepairChoice::Error => Repair::Error,
             RepairChoice::Reject => Repair::Reject,
             RepairChoice::Clamp => Repair::Clamp,
         };
-        let options = Options { repair, anchor: !self.no_anchor, ..Options::default() };
-        let read = pose_graph::parse(text, path, &options)?;
-        let notes = notes(&read.report);
-        Ok((read.graph, read.values, notes))
+        formats::Reading { repair, anchor: !self.no_anchor }
     }
-
-    fn bundle(&self, text: &str, path: &Path) -> Result<Noted, Failure> {
-        let bal::Bundle { graph, values, report } = bal::parse(text, path, !self.no_anchor)?;
-        let mut notes = Vec::new();
-        if !report.unobserved.is_empty() {
-            notes.push(format!("nothing observes {}: held", keys(&report.unobserved)));
-        }
-        if !report.anchored.is_empty() {
-            let held = keys(&report.anchored);
-            notes.push(format!(
-                "nothing fixes the gauge: held pose and scale by {held} (--no-anchor does not)"
-            ));
-        }
-        Ok((graph, values, notes))
-    }
-}
-
-/// A graph, its values, and what the reader had to decide.
-type Noted = (Graph, Values, Vec<String>);
-
-/// `.bal`; or a text that begins like one, as such files are often called `.txt`.
-fn is_bal(path: &Path, text: &str) -> bool {
-    is_named(path, "bal") || (is_named(path, "txt") && bal::begins(text))
-}
-
-fn keys(keys: &[Key]) -> String {
-    list(keys.iter().map(ToString::to_string))
 }
 
 /// A literal graph, which may name its solver and its start.
@@ -125,41 +94,6 @@ pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Resul
         Some(GraphFile { graph, values, optimizer: optimizer?, start: start?, notes: Vec::new() })
     });
     Ok(errors.finish(read.flatten())?)
-}
-
-/// What a pose graph's file left open, and how it was filled in.
-fn notes(report: &Report) -> Vec<String> {
-    let mut notes = Vec::new();
-    let lines = |lines: &[usize]| list(lines.iter().map(ToString::to_string));
-    for (tag, n) in &report.unknown {
-        notes.push(format!("unknown tag `{tag}`: {} left out", count(*n, "line")));
-    }
-    if !report.filled.is_empty() {
-        let filled = count(report.filled.len(), "variable");
-        notes.push(format!(
-            "{filled} have no vertex line; their values come from a spanning tree of the edges"
-        ));
-    }
-    if !report.anchored.is_empty() {
-        notes
-            .push(format!("nothing fixes the gauge: held {} (--no-anchor does not)", keys(&report.anchored)));
-    }
-    if !report.rejected.is_empty() {
-        notes.push(format!(
-            "edges left out, as their information is not positive definite: lines {}",
-            lines(&report.rejected)
-        ));
-    }
-    if !report.clamped.is_empty() {
-        notes.push(format!("information made positive definite: lines {}", lines(&report.clamped)));
-    }
-    if report.equivalences_added > 0 {
-        notes.push(format!(
-            "{} without an edge: tied by a factor",
-            count(report.equivalences_added, "EQUIV line")
-        ));
-    }
-    notes
 }
 
 /// Refuses a file that is too large to be read, before it is.
@@ -189,7 +123,7 @@ fn check_memory(path: &Path) -> Result<(), Failure> {
 
 /// Whether the graph of `input` can be written here, and over what is there: asked before it is solved.
 pub(crate) fn check_place(path: &Path, input: &Path, force: bool) -> Result<(), Failure> {
-    if Format::of_path(path).is_none() && !is_named(path, "g2o") && !is_named(path, "bal") {
+    if Format::of_path(path).is_none() && writer(path).is_none() {
         return Err(no_format(path));
     }
     if !force {
@@ -215,70 +149,35 @@ fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
     ))
 }
 
-fn is_named(path: &Path, extension: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
+type Writer = fn(&Graph, &Values) -> (String, Vec<String>);
+
+/// What writes a graph that is no document, by the extension.
+fn writer(path: &Path) -> Option<Writer> {
+    GraphFormat::of_path(path)?.format
 }
 
 fn no_format(path: &Path) -> Failure {
+    let written = GraphFormat::all().into_iter().filter(|format| format.format.is_some());
+    let mut extensions = vec![".toml", ".json", ".yaml"];
+    let others: Vec<String> =
+        written.filter_map(|format| Some(format!(".{}", format.extensions.first()?))).collect();
+    extensions.extend(others.iter().map(String::as_str));
+    let last = extensions.pop().unwrap_or_default();
     Failure::with_help(
         format!("{}: the extension names no format that graphs are written in", path.display()),
-        "use .toml, .json, .yaml, .g2o or .bal",
+        format!("use {} or {last}", extensions.join(", ")),
     )
 }
 
-/// Writes a graph with these values; returns what the format has no word for.
+/// Writes a graph with these values; returns what the format cannot express.
 pub(crate) fn write(path: &Path, graph: &Graph, values: &Values) -> Result<Vec<String>, Failure> {
-    match Format::of_path(path) {
-        Some(format) => {
-            let text = write_graph(graph, values, format).map_err(Failure::input)?;
-            write_whole(path, text.as_bytes()).map_err(Failure::at(path))?;
-            Ok(Vec::new())
-        }
-        None if is_named(path, "g2o") => {
-            Ok(omitted(&g2o::write(path, graph, values).map_err(|e: FormatError| Failure::from(e))?))
-        }
-        None if is_named(path, "bal") => {
-            Ok(omitted_from_bal(&bal::write(path, graph, values).map_err(Failure::from)?))
-        }
-        None => Err(no_format(path)),
-    }
-}
-
-fn omitted(omitted: &g2o::Omitted) -> Vec<String> {
-    let mut notes = omitted_types("g2o", &omitted.variables, &omitted.factors);
-    if omitted.losses > 0 {
-        notes.push(format!("g2o has no word for robust losses: {} left out", omitted.losses));
-    }
-    if !omitted.partly_fixed.is_empty() {
-        notes.push(format!(
-            "g2o has no word for directions that are held: {} left out",
-            omitted.partly_fixed.len()
-        ));
-    }
-    if !omitted.renamed.is_empty() {
-        notes.push(format!("{} renamed: g2o has numbers only", count(omitted.renamed.len(), "variable")));
-    }
-    notes
-}
-
-fn omitted_from_bal(omitted: &bal::Omitted) -> Vec<String> {
-    let mut notes = omitted_types("BAL", &omitted.variables, &omitted.factors);
-    let others =
-        [("robust losses", omitted.losses), ("noise", omitted.noise), ("what is held", omitted.held)];
-    for (what, n) in others.into_iter().filter(|(_, n)| *n > 0) {
-        notes.push(format!("BAL has no word for {what}: {n} left out"));
-    }
-    notes
-}
-
-type ByName = BTreeMap<&'static str, usize>;
-
-fn omitted_types(format: &str, variables: &ByName, factors: &ByName) -> Vec<String> {
-    let counts = variables.iter().map(|c| (c, "variable")).chain(factors.iter().map(|c| (c, "factor")));
-    let note = |((name, n), what): ((&&str, &usize), &str)| {
-        format!("{format} has no word for {} of type {name}: left out", count(*n, what))
+    let (text, notes) = match (Format::of_path(path), writer(path)) {
+        (Some(format), _) => (write_graph(graph, values, format).map_err(Failure::input)?, Vec::new()),
+        (None, Some(writer)) => writer(graph, values),
+        (None, None) => return Err(no_format(path)),
     };
-    counts.map(note).collect()
+    write_whole(path, text.as_bytes()).map_err(Failure::at(path))?;
+    Ok(notes)
 }
 
 /// What is in a graph, in a few lines.

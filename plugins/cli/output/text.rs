@@ -4,6 +4,7 @@ use manifactor::graph::Key;
 mod printable;
 mod table;
 
+pub(crate) use manifactor::formats::words::{count, list};
 pub(crate) use printable::{json, on_one_line, printable, same_length, shortened};
 pub(crate) use table::Table;
 
@@ -24,19 +25,6 @@ pub(crate) fn wrap(paragraph: &str) -> String {
         }
     }
     lines.join("\n")
-}
-
-/// `sphere2500: 2500 poses` and the like: a noun with its number.
-pub(crate) fn count(n: usize, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
-}
-
-/// The first few of a list, and how many more there are.
-pub(crate) fn list(items: impl ExactSizeIterator<Item = String>) -> String {
-    const SHOWN: usize = 8;
-    let more = items.len().saturating_sub(SHOWN);
-    let text = items.take(SHOWN).collect::<Vec<_>>().join(", ");
-    if more > 0 { format!("{text} and {more} more") } else { text }
 }
 
 /// `x0, x1`.

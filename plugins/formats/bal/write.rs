@@ -1,13 +1,14 @@
 //! Problems of bundle adjustment as BAL files.
 use crate::error::FormatError;
 use crate::text::write_text;
+use crate::words::omitted;
 use manifactor_geometry::{BalCamera, Point3, ProjectionBal};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::path::Path;
 
-/// What BAL has no word for, and was left out.
+/// What BAL cannot express, and was left out.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Omitted {
     /// Factors, by the name of their type: whatever is no observation of a point by a camera.
@@ -20,6 +21,18 @@ pub struct Omitted {
     pub noise: usize,
     /// Variables that are held, wholly or in part; they are written as free.
     pub held: usize,
+}
+
+impl Omitted {
+    /// In words, what was left out.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = omitted("BAL", &self.variables, &self.factors);
+        let others = [("robust losses", self.losses), ("noise", self.noise), ("what is held", self.held)];
+        for (what, n) in others.into_iter().filter(|(_, n)| *n > 0) {
+            notes.push(format!("BAL cannot express {what}: {n} left out"));
+        }
+        notes
+    }
 }
 
 /// The BAL text of a graph, and what could not be written. Cameras and points are numbered in their order.

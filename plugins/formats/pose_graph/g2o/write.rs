@@ -2,13 +2,14 @@
 use crate::error::FormatError;
 use crate::pose_graph::record::exchange_halves;
 use crate::text::write_text;
+use crate::words::{count, omitted};
 use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3};
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Manifold, Values, Variable};
 use nalgebra::DMatrix;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
-/// What g2o's format has no word for, and was left out.
+/// What g2o cannot express, and was left out.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Omitted {
     /// Factors, by the name of their type: priors, and whatever is no edge between two vertices.
@@ -21,6 +22,25 @@ pub struct Omitted {
     pub partly_fixed: Vec<Key>,
     /// Numbers that vertices got, where the keys are not all `x<id>` for poses and `l<id>` for points.
     pub renamed: Vec<(Key, u64)>,
+}
+
+impl Omitted {
+    /// In words, what was left out.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = omitted("g2o", &self.variables, &self.factors);
+        if self.losses > 0 {
+            notes.push(format!("g2o cannot express robust losses: {} left out", self.losses));
+        }
+        if !self.partly_fixed.is_empty() {
+            let n = self.partly_fixed.len();
+            notes.push(format!("g2o cannot express held directions: {n} left out"));
+        }
+        if !self.renamed.is_empty() {
+            let renamed = count(self.renamed.len(), "variable");
+            notes.push(format!("{renamed} renamed: g2o has numbers only"));
+        }
+        notes
+    }
 }
 
 /// The g2o text of a graph, and what could not be written.

@@ -1,0 +1,27 @@
+//! Numbers and lists in words.
+use std::collections::BTreeMap;
+
+/// `1 edge`, `2 edges`.
+pub fn count(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+/// The first few of a list, and how many more there are.
+pub fn list(items: impl ExactSizeIterator<Item = impl ToString>) -> String {
+    const SHOWN: usize = 8;
+    let more = items.len().saturating_sub(SHOWN);
+    let text = items.take(SHOWN).map(|item| item.to_string()).collect::<Vec<_>>().join(", ");
+    if more > 0 { format!("{text} and {more} more") } else { text }
+}
+
+/// What a format cannot express, by the names of types.
+pub(crate) fn omitted(format: &str, variables: &ByName, factors: &ByName) -> Vec<String> {
+    let counts = variables.iter().map(|c| (c, "variable")).chain(factors.iter().map(|c| (c, "factor")));
+    let note = |((name, n), what): ((&&str, &usize), &str)| {
+        format!("{format} cannot express {} of type {name}: left out", count(*n, what))
+    };
+    counts.map(note).collect()
+}
+
+/// How many there are of each type.
+pub(crate) type ByName = BTreeMap<&'static str, usize>;
