@@ -2,6 +2,7 @@
 mod bounding_box;
 mod orientation;
 mod quadric_prior;
+mod shape_prior;
 mod size_prior;
 
 pub use bounding_box::{BoundingBoxFactor, BoxModel};
@@ -9,4 +10,5 @@ pub use orientation::{
     HorizontalOrientation, HorizontalOrientationSmooth, VerticalOrientation, VerticalOrientationSmooth,
 };
 pub use quadric_prior::QuadricPrior;
-pub use size_prior::{AxisOrder, ShapePrior, SizePrior};
+pub use shape_prior::ShapePrior;
+pub use size_prior::SizePrior;

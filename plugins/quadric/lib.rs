@@ -6,12 +6,12 @@ mod shapes;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
-pub use factors::{AxisOrder, BoundingBoxFactor, BoxModel, QuadricPrior, ShapePrior, SizePrior};
+pub use factors::{BoundingBoxFactor, BoxModel, QuadricPrior, ShapePrior, SizePrior};
 pub use factors::{
     HorizontalOrientation, HorizontalOrientationSmooth, VerticalOrientation, VerticalOrientationSmooth,
 };
 pub use manifactor_geometry::{Camera, NotACamera};
 pub use shapes::{
-    BoundingBox, Box3, DualConic, DualQuadric, Ellipse, Ellipsoid, LONGEST, LandmarkError, NotABox, NotABox3,
-    NotAnEllipsoid, NotSemiAxes, OnHyperboloid, SHORTEST, SIDES, SemiAxes,
+    AxisOrder, BoundingBox, Box3, DualConic, DualQuadric, Ellipse, Ellipsoid, LONGEST, LandmarkError,
+    NotABox, NotABox3, NotAnEllipsoid, NotSemiAxes, OnHyperboloid, SHORTEST, SIDES, SemiAxes,
 };

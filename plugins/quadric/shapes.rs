@@ -1,4 +1,5 @@
 //! Ellipsoids and boxes in space, and ellipses and boxes in an image.
+mod axis_order;
 mod bounding_box;
 mod box3;
 mod dual_conic;
@@ -11,6 +12,7 @@ mod outline;
 mod semi_axes;
 pub(crate) mod tangent_line;
 
+pub use axis_order::AxisOrder;
 pub use bounding_box::{BoundingBox, NotABox, SIDES};
 pub use box3::{Box3, NotABox3};
 pub use dual_conic::DualConic;

@@ -1,5 +1,5 @@
 //! Strategies for quadrics and for views of them, with the places where formulas tend to break.
-use crate::{Camera, DualQuadric, Ellipsoid};
+use crate::{AxisOrder, Camera, DualQuadric, Ellipsoid, SemiAxes};
 use manifactor_geometry::testing::{any_se3, any_so3, se3_tangent};
 use manifactor_geometry::{Se3, So3};
 use manifactor_testing::register_points;
@@ -45,6 +45,13 @@ pub fn unequal_quadric() -> impl Strategy<Value = DualQuadric> + Clone {
         let s = &q.semi_axes;
         [(0, 1), (1, 2), (0, 2)].iter().all(|&(a, b)| (s[a] / s[b]).ln().abs() > 0.05)
     })
+}
+
+/// The usual semi-axes of a class, and how they are compared.
+pub fn usual() -> impl Strategy<Value = (SemiAxes, AxisOrder)> {
+    let lengths =
+        prop::array::uniform3(0.01..2.0).prop_filter_map("semi-axes", |s| SemiAxes::new(s.into()).ok());
+    (lengths, prop_oneof![Just(AxisOrder::Sorted), Just(AxisOrder::AsGiven)])
 }
 
 /// A bottle of half a metre whose long axis, its own z, leans by an angle in radians from the vertical.

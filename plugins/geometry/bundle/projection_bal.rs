@@ -113,11 +113,4 @@ mod tests {
         assert!(defined([0.0, 0.0, -1e-9]) && defined([1.0, 0.0, -1e-5]));
         assert!(!defined([0.0, 0.0, 1.0]) && !defined([0.0; 3]) && !defined([1.0, 0.0, -1e-7]));
     }
-
-    #[test]
-    fn a_document_reads_back() {
-        let factor = ProjectionBal { pixel: Coordinates::new(Vector2::new(1.5, -2.0)).unwrap() };
-        let text = serde_json::to_string(&factor).unwrap();
-        assert_eq!(serde_json::from_str::<ProjectionBal>(&text).unwrap(), factor);
-    }
 }

@@ -116,12 +116,4 @@ mod tests {
         assert!((r - Vector2::new(PI / 2.0 - 0.5, 1.0)).norm() < 1e-15);
         assert!(!factor.is_defined((&Se2::identity(), &Point2::new([0.0, 0.0]))));
     }
-
-    #[test]
-    fn a_document_reads_back() {
-        let factor = BearingRange2::new(So2::exp(0.1), Positive::literal(0.2));
-        let text = serde_json::to_string(&factor).unwrap();
-        assert_eq!(serde_json::from_str::<BearingRange2>(&text).unwrap(), factor);
-        assert!(serde_json::from_str::<BearingRange2>(r#"{"bearing":0.1,"range":0}"#).is_err());
-    }
 }

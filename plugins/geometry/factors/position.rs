@@ -112,10 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_document_reads_back_and_need_not_mention_the_arm() {
-        let factor = position_at(Vector2::new(0.1, 0.2), Vector2::new(0.3, 0.0));
-        let text = serde_json::to_string(&factor).unwrap();
-        assert_eq!(serde_json::from_str::<Position<2>>(&text).unwrap(), factor);
+    fn a_document_need_not_mention_the_arm() {
         let bare: Position<2> = serde_json::from_str(r#"{ "position": [0.1, 0.2] }"#).unwrap();
         assert_eq!(*bare.lever_arm, Vector2::zeros());
         assert!(serde_json::from_str::<Position<2>>(r#"{ "position": [0.1] }"#).is_err());

@@ -1,5 +1,5 @@
 //! What prior and between need of a manifold: that it is a Lie group with x ⊞ δ = x·Exp(δ).
-use manifactor_graph::{Manifold, Matrix, Scalar, Tangent, Vector};
+use manifactor_graph::{Block, Dimension, Manifold, Matrix, Scalar, Tangent, Vector};
 
 /// A manifold that is a group, with the chart x ⊞ δ = x·Exp(δ), y ⊟ x = Log(x⁻¹y).
 pub trait LieGroup: Manifold {
@@ -25,4 +25,25 @@ pub trait LieGroup: Manifold {
     fn inverse_right_jacobian(xi: &Tangent<Self>) -> Matrix<Self::Dim, Self::Dim>;
     /// Ad(x⁻¹): x⁻¹·Exp(δ)·x = Exp(Ad(x⁻¹)δ).
     fn adjoint_of_inverse(x: &Self::Of<f64>) -> Matrix<Self::Dim, Self::Dim>;
+
+    /// -AB of two Jacobians of this group, without what nalgebra would ask of a generic dimension.
+    #[inline(always)]
+    fn minus_product(
+        a: &Matrix<Self::Dim, Self::Dim>,
+        b: &Matrix<Self::Dim, Self::Dim>,
+    ) -> Matrix<Self::Dim, Self::Dim> {
+        let n = <Self::Dim as Dimension>::N;
+        let mut product = <Matrix<Self::Dim, Self::Dim> as Block>::zeros();
+        let (a, b, sum) = (a.as_slice(), b.as_slice(), product.as_mut_slice());
+        // the first row that is not zero in a column
+        let first = |column: usize| if column < Self::LEADING { 0 } else { Self::LEADING };
+        for c in 0..n {
+            for k in first(c)..n {
+                for r in first(k)..n {
+                    sum[r + c * n] -= a[r + k * n] * b[k + c * n];
+                }
+            }
+        }
+        product
+    }
 }

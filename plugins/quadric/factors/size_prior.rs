@@ -1,39 +1,7 @@
-//! How large, and of what shape, objects of a class are.
+//! How large objects of a class are.
 use crate::DualQuadric;
-use crate::shapes::SemiAxes;
+use crate::shapes::{AxisOrder, SemiAxes};
 use manifactor_graph::prelude::*;
-
-/// Whether semi-axes are compared in the order that they have in the object.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum AxisOrder {
-    /// The longest with the longest, and so on: which axis is which does not matter.
-    #[default]
-    Sorted,
-    /// The object's x with the first, its y with the second, its z with the third.
-    AsGiven,
-}
-
-impl AxisOrder {
-    /// log(s/s₀), both in this order, the shortest first if sorted.
-    fn log_ratio<T: Scalar>(self, s: &Vector3<T>, s0: &SemiAxes) -> Vector3<T> {
-        let (mut s, mut s0) = (*s, s0.vector());
-        if self == Self::Sorted {
-            sort(&mut s);
-            sort(&mut s0);
-        }
-        s.zip_map(&s0, |s, s0| (s / s0).ln())
-    }
-}
-
-/// Three numbers by size; written out, as sorting a slice of jets wants a total order of them.
-fn sort<T: Scalar>(s: &mut Vector3<T>) {
-    for (a, b) in [(0, 1), (1, 2), (0, 1)] {
-        if s[a] > s[b] {
-            s.swap_rows(a, b);
-        }
-    }
-}
 
 /// An object is as large as those of its class: r = log(s/s₀), the shortest semi-axis first.
 ///
@@ -74,57 +42,17 @@ impl Residual for SizePrior {
 }
 register_factor!("size_prior", SizePrior);
 
-/// An object has the proportions of those of its class, at any size: r = log(s/s₀) less its mean.
-///
-/// Three rows that add up to zero, so they constrain two directions and leave the size free. The order
-/// of the axes is as in `size_prior`, and so are its kinks and what equal lengths bring about. Defined everywhere.
-///
-/// ```toml
-/// [[factors]]
-/// keys   = ["q0"]
-/// factor = { type = "shape_prior", semi_axes = [1.0, 1.0, 3.0] }
-/// noise  = { sigma = 0.3 }
-/// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ShapePrior {
-    /// The proportions: semi-axes at any scale.
-    pub semi_axes: SemiAxes,
-    /// Which is compared with which.
-    #[serde(default)]
-    pub order: AxisOrder,
-}
-
-impl Residual for ShapePrior {
-    type Variables = (DualQuadric,);
-    type Dim = U3;
-
-    fn residual<T: Scalar>(&self, (quadric,): Lifted<Self::Variables, T>) -> Vector3<T> {
-        let r = self.order.log_ratio(&quadric.semi_axes, &self.semi_axes);
-        let mean = r.sum() / 3.0;
-        r.map(|r| r - mean)
-    }
-}
-register_factor!("shape_prior", ShapePrior);
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{any_quadric, tilted, unequal_quadric};
+    use crate::testing::{any_quadric, tilted, unequal_quadric, usual};
     use manifactor_graph::Factor;
     use manifactor_testing::{check, invariance_law, jacobian_laws};
     use proptest::prelude::*;
 
-    fn usual() -> impl Strategy<Value = (SemiAxes, AxisOrder)> {
-        let lengths = prop::array::uniform3(0.01..2.0).prop_map(|s| SemiAxes::new(s.into()).unwrap());
-        (lengths, prop_oneof![Just(AxisOrder::Sorted), Just(AxisOrder::AsGiven)])
-    }
-
     jacobian_laws! {
-        the_jacobian_of_the_size_is_right: (usual(), unequal_quadric())
+        the_jacobian_is_right: (usual(), unequal_quadric())
             .prop_map(|((semi_axes, order), q)| (SizePrior { semi_axes, order }, q));
-        the_jacobian_of_the_shape_is_right: (usual(), unequal_quadric())
-            .prop_map(|((semi_axes, order), q)| (ShapePrior { semi_axes, order }, q));
     }
 
     #[test]
@@ -133,14 +61,6 @@ mod tests {
             let permuted = Vector3::new(quadric.semi_axes.z, quadric.semi_axes.x, quadric.semi_axes.y);
             let other = DualQuadric { semi_axes: permuted, ..quadric };
             invariance_law(&SizePrior { semi_axes, order: AxisOrder::Sorted }, &[&quadric], &[&other])
-        });
-    }
-
-    #[test]
-    fn the_shape_is_free_of_the_size() {
-        check((usual(), any_quadric(), 0.1..10.0), |((semi_axes, order), quadric, size)| {
-            let other = DualQuadric { semi_axes: quadric.semi_axes * size, ..quadric };
-            invariance_law(&ShapePrior { semi_axes, order }, &[&quadric], &[&other])
         });
     }
 

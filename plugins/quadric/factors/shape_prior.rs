@@ -1,0 +1,58 @@
+//! Of what shape objects of a class are.
+use crate::DualQuadric;
+use crate::shapes::{AxisOrder, SemiAxes};
+use manifactor_graph::prelude::*;
+
+/// An object has the proportions of those of its class, at any size: r = log(s/s₀) less its mean.
+///
+/// Three rows that add up to zero, so they constrain two directions and leave the size free. The order
+/// of the axes is as in `size_prior`, and so are its kinks and what equal lengths bring about. Defined everywhere.
+///
+/// ```toml
+/// [[factors]]
+/// keys   = ["q0"]
+/// factor = { type = "shape_prior", semi_axes = [1.0, 1.0, 3.0] }
+/// noise  = { sigma = 0.3 }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ShapePrior {
+    /// The proportions: semi-axes at any scale.
+    pub semi_axes: SemiAxes,
+    /// Which is compared with which.
+    #[serde(default)]
+    pub order: AxisOrder,
+}
+
+impl Residual for ShapePrior {
+    type Variables = (DualQuadric,);
+    type Dim = U3;
+
+    fn residual<T: Scalar>(&self, (quadric,): Lifted<Self::Variables, T>) -> Vector3<T> {
+        let r = self.order.log_ratio(&quadric.semi_axes, &self.semi_axes);
+        let mean = r.sum() / 3.0;
+        r.map(|r| r - mean)
+    }
+}
+register_factor!("shape_prior", ShapePrior);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{any_quadric, unequal_quadric, usual};
+    use manifactor_testing::{check, invariance_law, jacobian_laws};
+    use proptest::prelude::*;
+
+    jacobian_laws! {
+        the_jacobian_is_right: (usual(), unequal_quadric())
+            .prop_map(|((semi_axes, order), q)| (ShapePrior { semi_axes, order }, q));
+    }
+
+    #[test]
+    fn the_shape_is_free_of_the_size() {
+        check((usual(), any_quadric(), 0.1..10.0), |((semi_axes, order), quadric, size)| {
+            let other = DualQuadric { semi_axes: quadric.semi_axes * size, ..quadric };
+            invariance_law(&ShapePrior { semi_axes, order }, &[&quadric], &[&other])
+        });
+    }
+}
