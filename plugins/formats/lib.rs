@@ -11,6 +11,7 @@ pub mod detections;
 mod error;
 mod lines;
 pub mod pose_graph;
+pub mod replay;
 pub mod table;
 mod text;
 pub mod timestamps;

@@ -1,0 +1,8 @@
+//! Sessions against fresh builds.
+#![allow(missing_docs, clippy::unwrap_used)]
+mod errors;
+mod history;
+mod parking;
+#[path = "../../solve/tests/toy/mod.rs"]
+mod toy;
+mod world;
