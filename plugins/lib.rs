@@ -83,6 +83,7 @@
 //! The book, `docs/SUMMARY.md`: concepts, the author's guide, graphs from documents, how other libraries say the same.
 pub use manifactor_config as config;
 pub use manifactor_graph as graph;
+pub use manifactor_online as online;
 pub use manifactor_solve as solve;
 pub use nalgebra;
 

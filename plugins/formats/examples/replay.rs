@@ -31,6 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let clock = Instant::now();
             session.push(&step.factors, &step.values)?;
             session.update()?;
+            let _newest = step.values.iter().last().and_then(|(key, _)| session.estimate(key.as_str()));
             times.push(clock.elapsed().as_secs_f64());
             if gaps > 0 && times.len() % gaps == 0 {
                 let best = session.finish(&LevenbergMarquardt::default(), &mut Silent)?.outcome.final_cost;
