@@ -59,7 +59,9 @@ pub enum UpdateError {
         keys: Vec<Key>,
     },
     /// Numbers that are finite, but too large for their sums.
-    #[error("the linear system overflows at `{key}`; scale the noise of its factors; the changes are taken back")]
+    #[error(
+        "the linear system overflows at `{key}`; scale the noise of its factors; the changes are taken back"
+    )]
     Overflow {
         /// A variable that is part of it.
         key: Key,

@@ -151,7 +151,13 @@ impl WithSimd for Build<'_> {
 
 /// Assembles and factorizes one front. Where a direction turns out to be open, once more, with that direction held.
 #[inline(always)]
-fn build<S: Simd>(simd: S, fronts: &mut Fronts, tree: &Tree, blocks: &Blocks, f: u32) -> Result<(), Overflow> {
+fn build<S: Simd>(
+    simd: S,
+    fronts: &mut Fronts,
+    tree: &Tree,
+    blocks: &Blocks,
+    f: u32,
+) -> Result<(), Overflow> {
     let front = &tree.fronts[f as usize];
     let height = front.width + front.below + 1;
     let (entries, below) = (front.width * height, front.below + 1);
@@ -166,7 +172,8 @@ fn build<S: Simd>(simd: S, fronts: &mut Fronts, tree: &Tree, blocks: &Blocks, f:
         }
         let mut open = Open { panel, update, width: front.width, height };
         take_children::<true>(fronts, tree, blocks, front, &mut open);
-        let eliminated = eliminate::<S, true>(simd, open.panel, open.update, front.width, &mut fronts.scratch);
+        let eliminated =
+            eliminate::<S, true>(simd, open.panel, open.update, front.width, &mut fronts.scratch);
         let failed = eliminated.err().or_else(|| first_open(blocks, front, open.panel, &held));
         match failed {
             None => {

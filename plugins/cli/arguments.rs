@@ -1,6 +1,7 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Replay, Run, Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Replay, Run, Schema, ShowGraph, Simulate,
+    Solve,
 };
 use crate::failure::Failure;
 use crate::output::watch;

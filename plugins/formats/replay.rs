@@ -38,7 +38,9 @@ impl Replay {
         let poses = |entry: &FactorEntry| entry.keys.iter().filter_map(number).collect::<Vec<_>>();
         let mut steps: BTreeMap<u64, Vec<FactorEntry>> = BTreeMap::new();
         for entry in graph.factors() {
-            poses(entry).into_iter().for_each(|pose| drop(steps.entry(pose).or_default()));
+            for pose in poses(entry) {
+                steps.entry(pose).or_default();
+            }
             let latest = poses(entry).into_iter().max().unwrap_or(0);
             steps.entry(latest).or_default().push(entry.clone());
         }

@@ -128,7 +128,12 @@ pub trait Batch: Send + Sync {
     /// the graph, or `None` where the last was the one that went. O(1) where all factors have as many variables.
     fn remove(&mut self, index: usize) -> Option<usize>;
     /// As [`linearize`](Self::linearize), of the factors at these places in the batch, ascending.
-    fn linearize_at(&mut self, indices: &[u32], columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation;
+    fn linearize_at(
+        &mut self,
+        indices: &[u32],
+        columns: &Columns,
+        to: &mut NormalEquations<'_>,
+    ) -> Evaluation;
     /// As [`cost`](Self::cost), of the factors at these places in the batch, ascending.
     fn cost_at(&self, indices: &[u32], columns: &Columns) -> Evaluation;
     /// Makes one factor count as often as its weight says, by its place in the batch.
@@ -356,7 +361,12 @@ impl<F: Kernel> Batch for BatchOf<F> {
         self.swap_remove(index)
     }
 
-    fn linearize_at(&mut self, indices: &[u32], columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation {
+    fn linearize_at(
+        &mut self,
+        indices: &[u32],
+        columns: &Columns,
+        to: &mut NormalEquations<'_>,
+    ) -> Evaluation {
         self.linearize_listed(indices, columns, to)
     }
 

@@ -34,24 +34,35 @@ impl WithSimd for Backward<'_> {
     }
 }
 
-/// Products of up to four columns, from a row on, with a vector.
+/// Products of up to four columns, from a row on, with a vector. There is no closure in it: one would be compiled for the
+/// least processor.
 #[inline(always)]
 fn dots<S: Simd>(simd: S, columns: &[f64], height: usize, from: usize, x: &[f64]) -> [f64; COLUMNS] {
     // fewer than four columns: the last one again
     let last = columns.len() / height - 1;
-    let column = |c: usize| S::as_simd_f64s(&columns[c.min(last) * height + from..][..x.len()]);
-    let columns = [column(0), column(1), column(2), column(3)];
+    let (a, a_tail) = S::as_simd_f64s(&columns[from..][..x.len()]);
+    let (b, b_tail) = S::as_simd_f64s(&columns[last.min(1) * height + from..][..x.len()]);
+    let (c, c_tail) = S::as_simd_f64s(&columns[last.min(2) * height + from..][..x.len()]);
+    let (d, d_tail) = S::as_simd_f64s(&columns[last.min(3) * height + from..][..x.len()]);
     let (x, x_tail) = S::as_simd_f64s(x);
-    let x_tail = simd.partial_load_f64s(x_tail);
-    let mut sums = columns.map(|(_, tail)| simd.mul_f64s(simd.partial_load_f64s(tail), x_tail));
-    let [(first, _), (second, _), (third, _), (fourth, _)] = columns;
-    for ((((x, first), second), third), fourth) in x.iter().zip(first).zip(second).zip(third).zip(fourth) {
-        sums[0] = simd.mul_add_f64s(*first, *x, sums[0]);
-        sums[1] = simd.mul_add_f64s(*second, *x, sums[1]);
-        sums[2] = simd.mul_add_f64s(*third, *x, sums[2]);
-        sums[3] = simd.mul_add_f64s(*fourth, *x, sums[3]);
+    let mut sums = [simd.splat_f64s(0.0); COLUMNS];
+    for ((((x, a), b), c), d) in x.iter().zip(a).zip(b).zip(c).zip(d) {
+        sums[0] = simd.mul_add_f64s(*a, *x, sums[0]);
+        sums[1] = simd.mul_add_f64s(*b, *x, sums[1]);
+        sums[2] = simd.mul_add_f64s(*c, *x, sums[2]);
+        sums[3] = simd.mul_add_f64s(*d, *x, sums[3]);
     }
-    sums.map(|sum| simd.reduce_sum_f64s(sum))
+    let mut total = [0.0; COLUMNS];
+    for (total, sum) in total.iter_mut().zip(sums) {
+        *total = simd.reduce_sum_f64s(sum);
+    }
+    for (i, x) in x_tail.iter().enumerate() {
+        total[0] += a_tail[i] * x;
+        total[1] += b_tail[i] * x;
+        total[2] += c_tail[i] * x;
+        total[3] += d_tail[i] * x;
+    }
+    total
 }
 
 /// x ← L₁⁻¹ x for the panel's own columns, and what that takes from the rows below, from their `below`.

@@ -74,7 +74,8 @@ impl Regions {
 
     /// Whether all numbers of a region are finite.
     pub(crate) fn is_finite(&self, region: Region) -> bool {
-        let (h, g) = (&self.h[region.h..][..region.entries()], &self.g[region.g..][..region.scalars as usize]);
+        let (h, g) =
+            (&self.h[region.h..][..region.entries()], &self.g[region.g..][..region.scalars as usize]);
         h.iter().chain(g).all(|x| x.is_finite())
     }
 

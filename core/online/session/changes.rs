@@ -90,8 +90,9 @@ impl Session {
     /// # Errors
     /// Where a variable is there already, or factors do not fit: everything that is wrong with them. Nothing is added then.
     pub fn push(&mut self, factors: &Graph, values: &Values) -> Result<Vec<FactorId>, ChangeError> {
-        let is_known =
-            |key: &Key| self.model.variable(key.as_str()).is_some() || self.pending.variables.contains_key(key);
+        let is_known = |key: &Key| {
+            self.model.variable(key.as_str()).is_some() || self.pending.variables.contains_key(key)
+        };
         if let Some((key, _)) = values.iter().find(|(key, _)| is_known(key)) {
             return Err(ChangeError::Known { key: key.clone() });
         }
@@ -193,7 +194,8 @@ impl Session {
     /// # Errors
     /// Where there is no such variable, or its tangent space has no such direction.
     pub fn fix(&mut self, key: &Key, fixed: &Fixed) -> Result<(), ChangeError> {
-        let tangent = self.tangent(key.as_str()).ok_or_else(|| ChangeError::NoVariable { key: key.clone() })?;
+        let tangent =
+            self.tangent(key.as_str()).ok_or_else(|| ChangeError::NoVariable { key: key.clone() })?;
         let mut errors = vec![];
         fixed.check(key, tangent, &mut errors);
         if !errors.is_empty() {

@@ -74,7 +74,8 @@ impl Session {
             let place = self.model.place_mut(*v);
             place.parked = !place.parked;
         }
-        let factors: BTreeSet<u32> = moves.flipped.iter().flat_map(|v| self.model.blocks.factors(*v)).collect();
+        let factors: BTreeSet<u32> =
+            moves.flipped.iter().flat_map(|v| self.model.blocks.factors(*v)).collect();
         for f in factors {
             self.model.count(f, self.model.is_whole(f));
         }

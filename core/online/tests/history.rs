@@ -83,7 +83,9 @@ impl History {
         let keys = [self.keys[a].clone(), self.keys[b].clone()];
         let noise = Noise::sigma(0.5 + x.abs()).unwrap();
         match (self.is_plane(a), self.is_plane(b)) {
-            (true, true) if self.count.is_multiple_of(3) => graph.add(keys, Distance { by: 1.0 + x }).loss(Huber::default()),
+            (true, true) if self.count.is_multiple_of(3) => {
+                graph.add(keys, Distance { by: 1.0 + x }).loss(Huber::default())
+            }
             (true, true) => graph.add(keys, Apart { by: [x, 1.0] }).noise(noise),
             (true, false) => graph.add(keys, Shadow { by: [x, 0.3] }).noise(noise),
             (false, true) => {
@@ -152,7 +154,9 @@ impl History {
 
 fn difference(a: &Values, b: &Values) -> f64 {
     let steps = a.iter().map(|(key, x)| x.erased().local(b.variable(key.as_str()).unwrap()).unwrap());
-    steps.flatten().fold(0.0, |most, step| if step.is_nan() { f64::INFINITY } else { f64::max(most, step.abs()) })
+    steps
+        .flatten()
+        .fold(0.0, |most, step| if step.is_nan() { f64::INFINITY } else { f64::max(most, step.abs()) })
 }
 
 /// Everything relinearized, and every change passed on: steps of Gauss-Newton.

@@ -92,9 +92,7 @@ impl Replay {
                 "poses are the variables x0, x1, …",
             ));
         }
-        while let Some(step) =
-            steps.step(|key| replayed.session.estimate(key)).map_err(Failure::input)?
-        {
+        while let Some(step) = steps.step(|key| replayed.session.estimate(key)).map_err(Failure::input)? {
             if interrupt.0.load(Ordering::Relaxed) {
                 replayed.interrupted = true;
                 break;
@@ -102,7 +100,8 @@ impl Replay {
             let clock = Instant::now();
             replayed.session.push(&step.factors, &step.values).map_err(Failure::input)?;
             replayed.report = replayed.session.update().map_err(Failure::input)?;
-            let _newest = step.values.iter().last().and_then(|(key, _)| replayed.session.estimate(key.as_str()));
+            let _newest =
+                step.values.iter().last().and_then(|(key, _)| replayed.session.estimate(key.as_str()));
             replayed.times.push(clock.elapsed().as_secs_f64());
             if (replayed.times.len() as u64).is_multiple_of(self.every) || steps.is_empty() {
                 self.tell_step(&mut replayed, input)?;
@@ -132,7 +131,10 @@ impl Replay {
         } else {
             let (redone, last) = (count(report.redone, "variable"), seconds(last));
             let gap = gap.map_or_else(String::new, |gap| format!(", {gap:.1e} above the batch"));
-            output::say(&format!("{}: cost {cost:.6}{gap}, last update {last} ({redone} redone)", count(poses, "pose")));
+            output::say(&format!(
+                "{}: cost {cost:.6}{gap}, last update {last} ({redone} redone)",
+                count(poses, "pose")
+            ));
         }
         Ok(())
     }
@@ -162,9 +164,15 @@ impl Replay {
         let mut table = Table::of_numbers(&["", "total", "p50", "p99", "max"]);
         let cells = [latencies.total, latencies.p50, latencies.p99, latencies.max].map(seconds);
         table.row(["updates".to_owned()].into_iter().chain(cells));
-        let mut text = table.text() + "\n" + &format!("cost {cost:.6} after {}\n", count(times.len(), "pose"));
+        let mut text =
+            table.text() + "\n" + &format!("cost {cost:.6} after {}\n", count(times.len(), "pose"));
         if let Some(outcome) = outcome {
-            text += &format!("cost {:.6} as one batch, {} more: {}\n", outcome.final_cost, seconds(batch), outcome.termination);
+            text += &format!(
+                "cost {:.6} as one batch, {} more: {}\n",
+                outcome.final_cost,
+                seconds(batch),
+                outcome.termination
+            );
         }
         if !report.parked.is_empty() {
             text += &format!("waiting for factors that determine them: {}\n", keys(&report.parked));

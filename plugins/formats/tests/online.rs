@@ -1,7 +1,7 @@
 //! Published pose graphs through a session, pose by pose, beside batch solves.
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_formats::replay::Replay;
-use manifactor_geometry::{Between, Landmark, Se2, Se3, So2};
+use manifactor_geometry::{Between, Coordinates, Landmark, Se2, Se3, So2};
 use manifactor_graph::{Graph, Key, Manifold, Noise};
 use manifactor_online::{Report, Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
@@ -32,7 +32,9 @@ fn replay(graph: &Graph, most: usize) -> (Session, Report) {
 #[test]
 fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
     // share of the optimum that the running estimate may be above it
-    for (name, most, above) in [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 900, 2e-3)] {
+    for (name, most, above) in
+        [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 900, 2e-3)]
+    {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
         let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
         let (mut session, report) = replay(&graph, most);
@@ -65,7 +67,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
     let bits = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let session = pool.install(|| replay(&graph, 400).0);
+        let session = pool.install(|| replay(&graph, 250).0);
         let local = |pose: &Se3| Se3::identity().local(pose).map(f64::to_bits);
         session.estimates().all::<Se3>().map(|(_, pose)| local(pose)).collect::<Vec<_>>()
     };
@@ -83,13 +85,14 @@ fn victoria_park(path: PathBuf) -> Graph {
         let n = &numbers[2..];
         if fields[0] == "ODOMETRY" {
             let relative = Se2::new(So2::exp(n[2]), Vector2::new(n[0], n[1]));
-            let covariance = DMatrix::from_row_slice(3, 3, &[n[3], n[4], n[5], n[4], n[6], n[7], n[5], n[7], n[8]]);
+            let covariance =
+                DMatrix::from_row_slice(3, 3, &[n[3], n[4], n[5], n[4], n[6], n[7], n[5], n[7], n[8]]);
             let noise = Noise::covariance(covariance).unwrap();
             graph.add([pose, Key::indexed("x", numbers[1])], Between { relative }).noise(noise);
         } else {
             let covariance = DMatrix::from_row_slice(2, 2, &[n[2], n[3], n[3], n[4]]);
             let noise = Noise::covariance(covariance).unwrap();
-            let seen = Landmark::<2> { position: Vector2::new(n[0], n[1]) };
+            let seen = Landmark::<2> { position: Coordinates::new(Vector2::new(n[0], n[1])).unwrap() };
             graph.add([pose, Key::indexed("l", numbers[1])], seen).noise(noise);
         }
     }

@@ -15,7 +15,12 @@ pub struct Batches {
 
 impl Batches {
     /// The place of the batch that such a factor belongs to; a new batch, where it is the first of its kind.
-    pub fn place(&mut self, residual: &dyn ErasedResidual, noise: &Whitener, loss: Option<&dyn Loss>) -> usize {
+    pub fn place(
+        &mut self,
+        residual: &dyn ErasedResidual,
+        noise: &Whitener,
+        loss: Option<&dyn Loss>,
+    ) -> usize {
         let of_type = self.of_type.entry(residual.type_id()).or_default();
         let found = of_type.iter().copied().find(|b| self.all[*b as usize].fits(noise, loss));
         let place = found.unwrap_or_else(|| {
