@@ -1,5 +1,5 @@
 //! Why a session refuses something. It is then as it was.
-use crate::FactorId;
+use crate::factor_id::FactorId;
 use manifactor_graph::{GraphError, Key};
 
 /// Why a change is refused.

@@ -8,7 +8,7 @@
 //! # use manifactor_online::{Session, Settings};
 //! # use manifactor_graph::{Graph, Values};
 //! # fn example(frames: Vec<(Graph, Values)>) -> Result<(), Box<dyn std::error::Error>> {
-//! let mut session = Session::new(Settings::default());
+//! let mut session = Session::new(Settings::default())?;
 //! for (factors, values) in frames {
 //!     session.push(&factors, &values)?;
 //!     let report = session.update()?;
@@ -19,6 +19,7 @@
 //! # }
 //! ```
 mod error;
+mod factor_id;
 mod fronts;
 mod model;
 mod report;
@@ -27,6 +28,7 @@ mod settings;
 mod tree;
 
 pub use error::{ChangeError, UpdateError};
+pub use factor_id::FactorId;
 pub use report::Report;
-pub use session::{CovarianceError, FactorId, Finished, Session};
+pub use session::{CovarianceError, Finished, Session};
 pub use settings::Settings;

@@ -15,22 +15,13 @@ use crate::settings::Settings;
 use crate::tree::{Couplings, Tree};
 use changes::Pending;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
+use manifactor_solve::SettingError;
 use std::any::TypeId;
 use std::collections::BTreeSet;
 use std::fmt;
 
 pub use covariance::CovarianceError;
 pub use finish::Finished;
-
-/// The name of a factor in a session. It stays the same whatever comes and goes, and is not used again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct FactorId(u32);
-
-impl fmt::Display for FactorId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.0)
-    }
-}
 
 /// A factor graph that grows while it is solved. See the [crate](crate).
 ///
@@ -68,8 +59,12 @@ impl fmt::Debug for Session {
 
 impl Session {
     /// An empty session.
-    pub fn new(settings: Settings) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// Where a setting is outside its domain.
+    pub fn new(settings: Settings) -> Result<Self, SettingError> {
+        settings.check()?;
+        Ok(Self {
             settings,
             model: Model::default(),
             tree: Tree::default(),
@@ -86,7 +81,7 @@ impl Session {
             open: BTreeSet::new(),
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),
-        }
+        })
     }
 
     /// The estimate of a variable, as of the last update; `None` where it is not there. O(1).

@@ -1,6 +1,7 @@
 //! Changes of a session: checked when they are asked for, made by the next update, and taken back where that fails.
-use super::{FactorId, Session};
+use super::Session;
 use crate::error::ChangeError;
+use crate::factor_id::FactorId;
 use crate::model::Model;
 use indexmap::IndexMap;
 use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values, Variable};

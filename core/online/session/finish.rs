@@ -1,7 +1,8 @@
 //! The whole of a session as one batch.
+use super::Session;
 use super::changes::Touched;
 use super::parking::Moves;
-use super::{FactorId, Session};
+use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
 use crate::report::Report;
 use manifactor_graph::{Fixed, Graph, Values};

@@ -65,10 +65,7 @@ impl Session {
             let out = factors.iter().filter(|f| !self.model.takes_part(**f)).count();
             if evaluation.not_finite.is_none() && out <= inactive {
                 for f in &factors {
-                    match self.model.takes_part(*f) {
-                        true => self.inactive.remove(f),
-                        false => self.inactive.insert(*f),
-                    };
+                    self.note_activity(*f);
                 }
                 return Relinearized { variables, factors, saved };
             }

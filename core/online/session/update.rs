@@ -1,15 +1,16 @@
 //! One update: changes, the part of the tree that they touch, and the steps that follow from it.
+use super::Session;
 use super::changes::{Change, Touched};
 use super::parking::Moves;
-use super::{FactorId, Session};
 use crate::error::UpdateError;
+use crate::factor_id::FactorId;
+use crate::fronts::Overflow;
 use crate::report::Report;
 use crate::tree::{Affected, Couplings, Redone};
 
 /// What takes changes back.
 struct Undo {
     variables: usize,
-    factors: usize,
     changes: Vec<Change>,
     moves: Moves,
 }
@@ -24,8 +25,8 @@ impl Session {
         let pending = std::mem::take(&mut self.pending);
         let mut report = Report::default();
         let mut touched = Touched::default();
-        let (variables, factors) = (self.model.variables(), self.model.factors());
-        let mut undo = Undo { variables, factors, changes: vec![], moves: Moves::default() };
+        let variables = self.model.variables();
+        let mut undo = Undo { variables, changes: vec![], moves: Moves::default() };
         for (key, (value, held)) in pending.variables {
             self.model.push_variable(key, &*value, held);
         }
@@ -38,8 +39,9 @@ impl Session {
         touched.factors.dedup();
         let evaluation = self.model.linearize(&touched.factors);
         if let Some(factor) = evaluation.not_finite {
+            let entry = self.model.factor(factor as u32).map(|factor| &factor.entry);
+            let keys = entry.map_or(vec![], |entry| entry.keys.clone());
             self.take_back(undo);
-            let keys = self.pending_keys(factor as u32);
             return Err(UpdateError::NonFinite { factor: FactorId(factor as u32), keys });
         }
         self.doubt_inactive(&mut touched);
@@ -90,29 +92,35 @@ impl Session {
         touched.factors.retain(|f| self.model.factor(*f).is_some());
         touched.factors.sort_unstable();
         touched.factors.dedup();
-        self.model.truncate_factors(undo.factors);
         self.model.linearize(&touched.factors);
         for f in touched.factors {
             self.model.count(f, self.model.is_whole(f));
+            self.note_activity(f);
         }
+        self.inactive.retain(|f| self.model.factor(*f).is_some());
         self.model.sum_up();
         self.model.truncate(undo.variables);
         self.resize();
     }
 
-    /// The variables of a factor that was taken back are no longer known by their numbers.
-    fn pending_keys(&self, factor: u32) -> Vec<manifactor_graph::Key> {
-        self.model.factor(factor).map_or(vec![], |factor| factor.entry.keys.clone())
-    }
-
     /// Notes which factors take no part; variables that lose one may not be determined any more.
     pub(super) fn doubt_inactive(&mut self, touched: &mut Touched) {
+        self.inactive.retain(|f| self.model.factor(*f).is_some());
         for f in &touched.factors {
-            if self.model.takes_part(*f) {
-                self.inactive.remove(f);
-            } else if self.inactive.insert(*f) {
+            if self.note_activity(*f) {
                 touched.doubtful.extend(self.model.factor(*f).into_iter().flat_map(|f| f.variables()));
             }
+        }
+    }
+
+    /// Notes whether a factor takes part where it was linearized; whether it has just ceased to.
+    pub(super) fn note_activity(&mut self, factor: u32) -> bool {
+        match self.model.takes_part(factor) {
+            true => {
+                self.inactive.remove(&factor);
+                false
+            }
+            false => self.inactive.insert(factor),
         }
     }
 
@@ -123,7 +131,7 @@ impl Session {
         moves: &Moves,
         is_turn: bool,
         report: &mut Report,
-    ) -> Result<(), crate::fronts::Overflow> {
+    ) -> Result<(), Overflow> {
         self.pass += 1;
         report.passes += 1;
         let mut affected = Affected::default();
@@ -176,10 +184,10 @@ impl Session {
     }
 
     /// H and g of the fronts that are to be built: a number that is not finite would spread.
-    fn check_finite(&self, redone: &Redone) -> Result<(), crate::fronts::Overflow> {
+    fn check_finite(&self, redone: &Redone) -> Result<(), Overflow> {
         let blocks = redone.new.iter().flat_map(|f| &self.tree.fronts[*f as usize].blocks);
         let bad = blocks.copied().find(|v| !self.model.blocks.is_finite(*v));
-        bad.map_or(Ok(()), |v| Err(crate::fronts::Overflow(v)))
+        bad.map_or(Ok(()), |v| Err(Overflow(v)))
     }
 
     /// Puts the new fronts in the place of the affected ones.

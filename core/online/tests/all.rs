@@ -3,6 +3,7 @@
 mod errors;
 mod history;
 mod parking;
+mod steps;
 #[path = "../../solve/tests/toy/mod.rs"]
 mod toy;
 mod world;

@@ -1,10 +1,10 @@
 //! A session that refuses something is as it was.
 use crate::toy::{Apart, At, Careless, Plane};
-use manifactor_graph::{Fixed, Graph, Values};
+use manifactor_graph::{Fixed, Graph, Noise, Values};
 use manifactor_online::{ChangeError, Session, Settings, UpdateError};
 
 fn chain(n: usize) -> Session {
-    let mut session = Session::new(Settings::default());
+    let mut session = Session::new(Settings::default()).unwrap();
     for i in 0..n {
         let (mut graph, mut values) = (Graph::new(), Values::new());
         let key = format!("x{i}");
@@ -36,6 +36,7 @@ fn a_factor_that_is_not_finite_takes_all_changes_back() {
     session.fix(&"x2".into(), &Fixed::Whole(true)).unwrap();
     let error = session.update().unwrap_err();
     assert!(matches!(&error, UpdateError::NonFinite { factor, .. } if *factor == failed[1]), "{error}");
+    assert!(error.to_string().contains("(new)"), "{error}");
     assert!(session.estimate("new").is_none() && session.entry(failed[1]).is_none());
     assert_eq!(bits(&session), before);
     // and goes on as if nothing had been
@@ -68,4 +69,26 @@ fn what_does_not_fit_is_refused_with_its_name() {
     let wrong = Fixed::Directions(vec!["roll".into()]);
     assert!(session.fix(&"x1".into(), &wrong).unwrap_err().to_string().contains("roll"));
     session.update().unwrap();
+}
+
+#[test]
+fn sums_that_overflow_are_refused_and_taken_back() {
+    let mut session = chain(4);
+    let before = bits(&session);
+    let mut graph = Graph::new();
+    for _ in 0..3 {
+        graph.add(["x3"], At { at: [3.0, 0.0] }).noise(Noise::sigma(1e-154).unwrap());
+    }
+    let ids = session.push(&graph, &Values::new()).unwrap();
+    let error = session.update().unwrap_err();
+    assert!(matches!(&error, UpdateError::Overflow { key } if key.as_str() == "x3"), "{error}");
+    assert!(session.entry(ids[0]).is_none());
+    assert_eq!(bits(&session), before);
+    assert_eq!(session.update().unwrap().redone, 0);
+}
+
+#[test]
+fn settings_outside_their_domain_are_named() {
+    let error = Session::new(Settings { bend: f64::NAN, ..Settings::default() }).unwrap_err().to_string();
+    assert!(error.contains("`bend`") && error.contains("0 or more"), "{error}");
 }

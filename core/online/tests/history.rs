@@ -47,7 +47,7 @@ struct History {
 
 impl History {
     fn new(settings: Settings) -> Self {
-        Self { session: Session::new(settings), keys: vec![], ids: vec![], count: 0 }
+        Self { session: Session::new(settings).unwrap(), keys: vec![], ids: vec![], count: 0 }
     }
 
     fn is_plane(&self, v: usize) -> bool {
@@ -184,7 +184,7 @@ proptest! {
         }
         prop_assume!(!values.is_empty());
         // the same factors, pushed at once, where the estimate is: both take the same step from there
-        let mut fresh = Session::new(exact());
+        let mut fresh = Session::new(exact()).unwrap();
         let ids = fresh.push(&graph, &values).unwrap();
         for (id, old) in ids.iter().zip(history.session.graph().1) {
             fresh.set_weight(*id, history.session.weight(old).unwrap()).unwrap();

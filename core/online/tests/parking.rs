@@ -4,7 +4,7 @@ use manifactor_graph::{Graph, Key, Values};
 use manifactor_online::{CovarianceError, Session, Settings};
 
 fn session(priors: &[&str]) -> Session {
-    let mut session = Session::new(Settings::default());
+    let mut session = Session::new(Settings::default()).unwrap();
     let (mut graph, mut values) = (Graph::new(), Values::new());
     for (i, key) in priors.iter().enumerate() {
         let x = i as f64;

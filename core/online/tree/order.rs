@@ -160,15 +160,16 @@ impl Order {
     fn new_element(&mut self, pivot: u32) -> std::ops::Range<usize> {
         let (p, begin) = (pivot as usize, self.members.len());
         (self.alive[p], self.mark[p]) = (false, pivot);
-        for e in std::mem::take(&mut self.elements[p]) {
-            self.absorbed[e as usize] = true;
-            let (first, end) = self.range[e as usize];
+        for i in 0..self.elements[p].len() {
+            let e = self.elements[p][i] as usize;
+            self.absorbed[e] = true;
+            let (first, end) = self.range[e];
             for i in first..end {
                 self.reach(self.members[i as usize], pivot);
             }
         }
-        for v in std::mem::take(&mut self.coupled[p]) {
-            self.reach(v, pivot);
+        for i in 0..self.coupled[p].len() {
+            self.reach(self.coupled[p][i], pivot);
         }
         begin..self.members.len()
     }

@@ -83,7 +83,8 @@ impl Replay {
     }
 
     fn replay(&self, input: &GraphFile, interrupt: &Interrupt) -> Result<Replayed, Failure> {
-        let (session, report) = (Session::new(Settings::default()), Report::default());
+        let session = Session::new(Settings::default()).map_err(Failure::input)?;
+        let report = Report::default();
         let mut replayed = Replayed { session, times: vec![], report, interrupted: false };
         let mut steps = Steps::of(&input.graph);
         if steps.is_empty() {

@@ -1,11 +1,13 @@
 //! Published pose graphs through a session, pose by pose, beside batch solves.
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_formats::replay::Replay;
-use manifactor_geometry::{Between, Coordinates, Landmark, Se2, Se3, So2};
-use manifactor_graph::{Graph, Key, Manifold, Noise};
+use manifactor_geometry::{Between, Coordinates, Landmark, LieGroup, Point2, Range, Se2, Se3, So2};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::loss::Cauchy;
+use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
 use manifactor_online::{Report, Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
-use nalgebra::{DMatrix, Vector2};
+use nalgebra::{DMatrix, Vector2, Vector3};
 use std::path::PathBuf;
 
 fn data(path: &str) -> Option<PathBuf> {
@@ -19,7 +21,7 @@ fn data(path: &str) -> Option<PathBuf> {
 
 /// All steps, and the report of the last.
 fn replay(graph: &Graph, most: usize) -> (Session, Report) {
-    let mut session = Session::new(Settings::default());
+    let mut session = Session::new(Settings::default()).unwrap();
     let (mut steps, mut report) = (Replay::of(graph), Report::default());
     for _ in 0..most {
         let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
@@ -111,4 +113,60 @@ fn victoria_park_is_mapped_by_the_ids_of_its_trees() {
     let best = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap().outcome.final_cost;
     let cost = session.cost();
     assert!(cost <= 1.01 * best, "{cost}, the optimum is {best}");
+}
+
+/// The rows of a table of numbers.
+fn rows(path: PathBuf) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    text.lines().map(|line| line.split_whitespace().map(|field| field.parse().unwrap()).collect()).collect()
+}
+
+#[test]
+fn antennas_wait_for_a_second_range() {
+    let (Some(odometry), Some(ranges)) =
+        (data("online/range_only/Plaza2_DR.txt"), data("online/range_only/Plaza2_TD.txt"))
+    else {
+        return;
+    };
+    let (odometry, ranges) = (rows(odometry), rows(ranges));
+    let mut session = Session::new(Settings::default()).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("x0", Se2::identity());
+    graph.fix("x0");
+    session.push(&graph, &values).unwrap();
+    let (mut first, mut waited, mut pose) = (0, 0, Se2::identity());
+    for (i, row) in ranges.iter().take(600).enumerate() {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        let (here, antenna) = (Key::indexed("x", i + 1), Key::indexed("l", row[2]));
+        let mut relative = Se2::identity();
+        while first < odometry.len() && odometry[first][0] <= row[0] {
+            relative = Se2::compose(
+                &relative,
+                &Se2::exp(&Vector3::new(odometry[first][1], 0.0, odometry[first][2])),
+            );
+            first += 1;
+        }
+        pose = Se2::compose(&pose, &relative);
+        values.insert(here.clone(), pose.clone());
+        graph
+            .add([Key::indexed("x", i), here.clone()], Between { relative })
+            .noise(Noise::sigmas(&[0.05, 0.01, 0.02]).unwrap());
+        if session.estimate(antenna.as_str()).is_none() {
+            // somewhere ahead: a range says no more
+            values.insert(antenna.clone(), Point2::new(pose.act(&Vector2::new(row[3], 1.0))));
+        }
+        let range = Range::<Se2, Point2>::new(Positive::new(row[3]).unwrap());
+        graph.add([here.clone(), antenna], range).noise(Noise::sigma(0.5).unwrap()).loss(Cauchy::default());
+        session.push(&graph, &values).unwrap();
+        let report = session.update().unwrap();
+        assert!(report.parked.iter().all(|key| key.as_str().starts_with('l')), "{:?}", report.parked);
+        waited += report.parked.len();
+        pose = session.get(here.as_str()).unwrap();
+    }
+    assert!(waited > 0, "an antenna that is heard once is not known");
+    let (cost, estimates) = (session.cost(), session.estimates());
+    assert!(cost.is_finite() && estimates.iter().all(|(_, value)| value.erased().is_finite()));
+    let best = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap().outcome.final_cost;
+    println!("{cost} {best}");
+    assert!(cost < 1.1 * best, "{cost}, the optimum is {best}");
 }
