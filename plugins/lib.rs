@@ -70,6 +70,33 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # A graph that grows
+//! A [`Session`](online::Session) keeps the estimate up to date while variables and factors come and go.
+//! ```
+//! use manifactor::geometry::{Between, LieGroup, Se2};
+//! use manifactor::online::{Session, Settings};
+//! use manifactor::prelude::*;
+//!
+//! let mut session = Session::new(Settings::default())?;
+//! // the first pose is held
+//! let (mut factors, mut values) = (Graph::new(), Values::new());
+//! values.insert("x0", Se2::identity());
+//! factors.fix("x0");
+//! session.push(&factors, &values)?;
+//! session.update()?;
+//! // a frame: a new pose, where odometry leads, and a factor to it
+//! let (mut factors, mut values) = (Graph::new(), Values::new());
+//! let relative = Se2::exp(&Vector3::new(1.0, 0.0, 0.1));
+//! values.insert("x1", Se2::compose(&session.get("x0")?, &relative));
+//! factors.add(["x0", "x1"], Between { relative }).noise(Noise::sigma(0.1)?);
+//! let ids = session.push(&factors, &values)?;
+//! let report = session.update()?;
+//! let pose: Se2 = session.get("x1")?;
+//! assert_eq!((ids.len(), report.parked.len()), (1, 0));
+//! assert!((pose.translation.x - 1.0).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # Traits in threes
 //! What can be chosen by name has three traits. Authors implement the first; a macro, the second; the core, the third.
 //!
@@ -83,6 +110,7 @@
 //! The book, `docs/SUMMARY.md`: concepts, the author's guide, graphs from documents, how other libraries say the same.
 pub use manifactor_config as config;
 pub use manifactor_graph as graph;
+pub use manifactor_online as online;
 pub use manifactor_solve as solve;
 pub use nalgebra;
 

@@ -6,7 +6,7 @@ use std::path::Path;
 /// From the bottom up: a plugin may build on those before it.
 const PLUGINS: [&str; 7] = ["geometry", "quadric", "semantic", "formats", "slam", "viz", "expression"];
 /// What a plugin may take from the core.
-const FOR_PLUGINS: [&str; 5] = ["tree", "graph", "solve", "config", "testing"];
+const FOR_PLUGINS: [&str; 6] = ["tree", "graph", "solve", "online", "config", "testing"];
 
 fn packages() -> Vec<Package> {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
@@ -51,6 +51,11 @@ fn solve_config_and_testing_know_tree_and_graph_and_not_each_other() {
     for part in ["solve", "config", "testing"] {
         only(part, &["tree", "graph"]);
     }
+}
+
+#[test]
+fn online_builds_on_solve() {
+    only("online", &["tree", "graph", "solve"]);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use crate::variable::manifold_name;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
+use std::any::TypeId;
 use std::sync::Arc;
 
 pub use version::Version;
@@ -38,6 +39,30 @@ pub enum Fixed {
 impl Default for Fixed {
     fn default() -> Self {
         Self::Whole(false)
+    }
+}
+
+impl Fixed {
+    /// A bit for each direction of a tangent space that is held.
+    pub fn bits(&self, tangent: &[&str]) -> u32 {
+        let bit = |name: &str| tangent.iter().position(|t| *t == name).map_or(0, |i| 1 << i);
+        match self {
+            Self::Whole(true) => u32::MAX.checked_shr(32 - tangent.len().min(32) as u32).unwrap_or(0),
+            Self::Whole(false) => 0,
+            Self::Directions(names) => names.iter().fold(0, |bits, name| bits | bit(name)),
+        }
+    }
+
+    /// Finds directions that a tangent space does not have.
+    pub fn check(&self, key: &Key, tangent: &'static [&'static str], errors: &mut Vec<GraphError>) {
+        if let Self::Directions(directions) = self {
+            let unknown = directions.iter().filter(|d| !tangent.contains(&d.as_str()));
+            errors.extend(unknown.map(|d| GraphError::UnknownDirection {
+                key: key.clone(),
+                direction: d.clone(),
+                tangent,
+            }));
+        }
     }
 }
 
@@ -202,22 +227,15 @@ impl Graph {
         let mut errors = vec![];
         let mut resolved = Vec::with_capacity(self.factors.len());
         for (i, entry) in self.factors.iter().enumerate() {
-            resolved.extend(resolve(i, entry, values, &mut errors));
+            let find = |key: &str| values.find(key).map(|(place, v)| (place, v.erased().type_id()));
+            resolved.extend(entry.resolve(i, find, &mut errors));
         }
         for (key, fixed) in &self.fixed {
             let Some(value) = values.variable(key.as_str()) else {
                 errors.push(GraphError::MissingFixed { key: key.clone() });
                 continue;
             };
-            let tangent = value.erased().tangent();
-            if let Fixed::Directions(directions) = fixed {
-                let unknown = directions.iter().filter(|d| !tangent.contains(&d.as_str()));
-                errors.extend(unknown.map(|d| GraphError::UnknownDirection {
-                    key: key.clone(),
-                    direction: d.clone(),
-                    tangent,
-                }));
-            }
+            fixed.check(key, value.erased().tangent(), &mut errors);
         }
         let bad = values.iter().filter(|(_, v)| !v.erased().is_finite());
         errors.extend(bad.map(|(key, _)| GraphError::NotFinite { key: key.clone() }));
@@ -237,44 +255,49 @@ pub struct Resolved {
     pub whitener: Whitener,
 }
 
-fn resolve(
-    factor: usize,
-    entry: &FactorEntry,
-    values: &Values,
-    errors: &mut Vec<GraphError>,
-) -> Option<Resolved> {
-    let mut variables = VariableIndices::new();
-    let name = entry.factor.typetag_name();
-    let signature = entry.factor.erased().signature();
-    let (found, expected) = (entry.keys.len(), signature.variables.len());
-    if (signature.many && found == 0) || (!signature.many && found != expected) {
-        errors.push(GraphError::WrongArity { factor, name, expected, found });
-    } else {
-        let types = signature.variables.iter().cycle();
-        for (position, (key, expected)) in entry.keys.iter().zip(types).enumerate() {
-            match values.find(key.as_str()) {
-                None => {
-                    let key = key.clone();
-                    errors.push(GraphError::MissingVariable { factor, name, position, key });
+impl FactorEntry {
+    /// Looks up the variables, and checks that they fit: `find` gives the place and the type of a key. `factor` is the
+    /// place in the graph that errors name. `None` where something is wrong, which is added to `errors`.
+    pub fn resolve(
+        &self,
+        factor: usize,
+        find: impl Fn(&str) -> Option<(usize, TypeId)>,
+        errors: &mut Vec<GraphError>,
+    ) -> Option<Resolved> {
+        let mut variables = VariableIndices::new();
+        let before = errors.len();
+        let name = self.factor.typetag_name();
+        let signature = self.factor.erased().signature();
+        let (found, expected) = (self.keys.len(), signature.variables.len());
+        if (signature.many && found == 0) || (!signature.many && found != expected) {
+            errors.push(GraphError::WrongArity { factor, name, expected, found });
+        } else {
+            let types = signature.variables.iter().cycle();
+            for (position, (key, expected)) in self.keys.iter().zip(types).enumerate() {
+                match find(key.as_str()) {
+                    None => {
+                        let key = key.clone();
+                        errors.push(GraphError::MissingVariable { factor, name, position, key });
+                    }
+                    Some((_, id)) if id != *expected => {
+                        let (expected, found) = (manifold_name(*expected), manifold_name(id));
+                        let key = key.clone();
+                        errors.push(GraphError::WrongType { factor, name, position, key, expected, found });
+                    }
+                    Some((place, _)) if variables.contains(&(place as u32)) => {
+                        let key = key.clone();
+                        errors.push(GraphError::RepeatedVariable { factor, name, position, key });
+                    }
+                    Some((place, _)) => variables.push(place as u32),
                 }
-                Some((_, v)) if v.erased().type_id() != *expected => {
-                    let (expected, found, key) = (manifold_name(*expected), v.typetag_name(), key.clone());
-                    errors.push(GraphError::WrongType { factor, name, position, key, expected, found });
-                }
-                Some((place, _)) if variables.contains(&(place as u32)) => {
-                    let key = key.clone();
-                    errors.push(GraphError::RepeatedVariable { factor, name, position, key });
-                }
-                Some((place, _)) => variables.push(place as u32),
             }
         }
-    }
-    let noise = |source| GraphError::Noise { factor, name, source };
-    match entry.noise.whitener(signature.rows.unwrap_or(0)) {
-        Ok(whitener) => Some(Resolved { variables, whitener }),
-        Err(source) => {
-            errors.push(noise(source));
-            None
+        match self.noise.whitener(signature.rows.unwrap_or(0)) {
+            Ok(whitener) => (errors.len() == before).then_some(Resolved { variables, whitener }),
+            Err(source) => {
+                errors.push(GraphError::Noise { factor, name, source });
+                None
+            }
         }
     }
 }

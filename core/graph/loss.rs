@@ -74,6 +74,8 @@ pub trait LossColumn: Send + Sync {
     fn loss_type(&self) -> TypeId;
     /// Appends a loss of that type; others are left out.
     fn push(&mut self, loss: &dyn Loss);
+    /// Puts the last loss in place of the `index`-th.
+    fn swap_remove(&mut self, index: usize);
     /// Turns the squared norms of factors `first..` into weights; returns ½ Σ ρ.
     fn weigh(&self, first: usize, squared: &mut [f64]) -> f64;
 }
@@ -84,6 +86,9 @@ impl<L: RobustLoss> LossColumn for Plain<L> {
     }
     fn push(&mut self, loss: &dyn Loss) {
         self.0.extend(loss.erased().as_any().downcast_ref::<L>().cloned());
+    }
+    fn swap_remove(&mut self, index: usize) {
+        self.0.swap_remove(index);
     }
     fn weigh(&self, first: usize, squared: &mut [f64]) -> f64 {
         let mut cost = 0.0;

@@ -456,6 +456,15 @@ impl<D: Dimension> Whiteners<D> {
         }
         true
     }
+    /// Puts the last in place of the `i`-th.
+    pub(crate) fn swap_remove(&mut self, i: usize) {
+        match self {
+            Self::Unit => {}
+            Self::Isotropic(all) => drop(all.swap_remove(i)),
+            Self::Diagonal(all) => drop(all.swap_remove(i)),
+            Self::Full(all) => drop(all.swap_remove(i)),
+        }
+    }
     /// x ← W x for each column of `x`, in place; whatever stands in rows not observed, zero comes out.
     #[inline(always)]
     pub(crate) fn whiten(&self, i: usize, x: &mut [f64]) {

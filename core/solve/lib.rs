@@ -26,6 +26,13 @@ pub use strategy::{
     UnknownFactor,
 };
 
+/// The dense kernel of a front, for solvers that keep fronts of their own.
+#[doc(hidden)]
+pub mod front {
+    pub use crate::linear::cholesky::kernel::eliminate;
+    pub use crate::linear::cholesky::large::Scratch;
+}
+
 use manifactor_graph::batch::FactorState;
 use manifactor_graph::{Graph, Values};
 

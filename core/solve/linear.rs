@@ -1,6 +1,6 @@
 //! The linear systems of steps: their structure, their settings and the methods that solve them.
 mod block_system;
-mod cholesky;
+pub(crate) mod cholesky;
 mod conjugate_gradients;
 mod elimination;
 pub(crate) mod layout;

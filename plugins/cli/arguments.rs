@@ -1,6 +1,7 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Run, Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Replay, Run, Schema, ShowGraph, Simulate,
+    Solve,
 };
 use crate::failure::Failure;
 use crate::output::watch;
@@ -34,6 +35,7 @@ enum Command {
     Run(Run),
     Experiment(Experiment),
     Solve(Solve),
+    Replay(Replay),
     Check(Check),
     CheckFactor(CheckFactor),
     List(List),
@@ -64,6 +66,7 @@ impl Cli {
             Command::Run(command) => command.run(self.verbose),
             Command::Experiment(command) => command.run(),
             Command::Solve(command) => command.run(self.verbose),
+            Command::Replay(command) => command.run(),
             Command::Check(command) => command.run(),
             Command::CheckFactor(command) => command.run(),
             Command::List(command) => command.run(),
@@ -92,6 +95,7 @@ impl Cli {
             Command::Run(command) => command.json,
             Command::Experiment(command) => command.json,
             Command::Solve(command) => command.json,
+            Command::Replay(command) => command.json,
             Command::Check(command) => command.json,
             Command::CheckFactor(command) => command.json,
             Command::List(command) => command.json,

@@ -44,6 +44,14 @@ pub(crate) fn json(value: &impl Serialize) {
     }
 }
 
+/// Prints one JSON document on a line of its own.
+pub(crate) fn json_line(value: &impl Serialize) {
+    match serde_json::to_string(value) {
+        Ok(text) => print(&(text::json(&text) + "\n")),
+        Err(error) => printed(Err(error.into())),
+    }
+}
+
 /// Says something on standard error, and ends the line.
 pub(crate) fn say(text: &str) {
     say_styled(&text::printable(text));

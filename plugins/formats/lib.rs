@@ -12,6 +12,7 @@ mod error;
 mod graph_format;
 mod lines;
 pub mod pose_graph;
+pub mod replay;
 pub mod table;
 mod text;
 pub mod timestamps;

@@ -1,4 +1,6 @@
 //! Factors of one concrete type, side by side.
+mod batches;
+mod change;
 mod pass;
 mod threads;
 
@@ -12,6 +14,8 @@ use pass::{CHUNK, COST, Work};
 use pulp::Arch;
 use std::any::Any;
 use std::time::Instant;
+
+pub use batches::Batches;
 
 /// A factor on its way into a batch.
 pub struct Member<'a> {
@@ -89,6 +93,12 @@ pub struct FactorRows<'a> {
 
 /// All factors of one concrete type, one kind of noise and one type of loss.
 pub trait Batch: Send + Sync {
+    /// Number of factors.
+    fn len(&self) -> usize;
+    /// Whether there is no factor.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
     /// Whether a factor of the same type belongs here, by its noise and loss.
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool;
     /// Reserves room for `factors` more factors, with `variables` variables in total.
@@ -113,6 +123,26 @@ pub trait Batch: Send + Sync {
     fn inspect(&self, columns: &Columns) -> Vec<FactorState>;
     /// Each defined factor's rows of the Jacobian.
     fn rows(&self, columns: &Columns, visit: &mut dyn FnMut(FactorRows<'_>));
+
+    /// Takes a factor out, by its place in the batch. The last factor takes that place; returns the last factor's place in
+    /// the graph, or `None` where the last was the one that went. O(1) where all factors have as many variables.
+    fn remove(&mut self, index: usize) -> Option<usize>;
+    /// As [`linearize`](Self::linearize), of the factors at these places in the batch, ascending.
+    fn linearize_at(
+        &mut self,
+        indices: &[u32],
+        columns: &Columns,
+        to: &mut NormalEquations<'_>,
+    ) -> Evaluation;
+    /// As [`cost`](Self::cost), of the factors at these places in the batch, ascending.
+    fn cost_at(&self, indices: &[u32], columns: &Columns) -> Evaluation;
+    /// Makes one factor count as often as its weight says, by its place in the batch.
+    fn set_weight(&mut self, index: usize, weight: f64);
+    /// Sets what is held of a factor's variables, by its place in the batch: see [`Member::starts`] and
+    /// [`Member::held`].
+    fn hold(&mut self, index: usize, starts: &[u32], held: &[u32]);
+    /// Whether a factor was defined at its last linearization.
+    fn is_active(&self, index: usize) -> bool;
 }
 
 /// The batch of a residual type.
@@ -172,6 +202,10 @@ impl<F: Kernel> BatchOf<F> {
 }
 
 impl<F: Kernel> Batch for BatchOf<F> {
+    fn len(&self) -> usize {
+        self.factors.len()
+    }
+
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool {
         self.whiteners.fits(noise)
             && self.losses.as_ref().map(|l| l.loss_type()) == loss.map(|l| l.erased().as_any().type_id())
@@ -212,6 +246,9 @@ impl<F: Kernel> Batch for BatchOf<F> {
         if let (Some(losses), Some(loss)) = (&mut self.losses, member.loss) {
             losses.push(loss);
         }
+        if !self.weights.is_empty() {
+            self.weights.push(1.0);
+        }
         self.active.push(true);
     }
 
@@ -251,7 +288,7 @@ impl<F: Kernel> Batch for BatchOf<F> {
             costs.into_iter().fold(Evaluation::default(), Evaluation::and)
         } else {
             (0..chunks)
-                .map(|n| self.chunk_cost(columns, n * CHUNK))
+                .map(|n| self.chunk_cost(columns, n * CHUNK, self.chunk(n)))
                 .fold(Evaluation::default(), Evaluation::and)
         }
     }
@@ -318,5 +355,38 @@ impl<F: Kernel> Batch for BatchOf<F> {
                 visit(FactorRows { entry: self.entries[i] as usize, residual, blocks });
             }
         }
+    }
+
+    fn remove(&mut self, index: usize) -> Option<usize> {
+        self.swap_remove(index)
+    }
+
+    fn linearize_at(
+        &mut self,
+        indices: &[u32],
+        columns: &Columns,
+        to: &mut NormalEquations<'_>,
+    ) -> Evaluation {
+        self.linearize_listed(indices, columns, to)
+    }
+
+    fn cost_at(&self, indices: &[u32], columns: &Columns) -> Evaluation {
+        let columns = F::columns(columns);
+        pass::runs(indices)
+            .map(|(first, len)| self.chunk_cost(columns, first, len))
+            .fold(Evaluation::default(), Evaluation::and)
+    }
+
+    fn set_weight(&mut self, index: usize, weight: f64) {
+        self.weights.resize(self.factors.len(), 1.0);
+        self.weights[index] = weight;
+    }
+
+    fn hold(&mut self, index: usize, starts: &[u32], held: &[u32]) {
+        self.set_held(index, starts, held);
+    }
+
+    fn is_active(&self, index: usize) -> bool {
+        self.active.get(index).is_some_and(|active| *active)
     }
 }

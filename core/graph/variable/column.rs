@@ -15,6 +15,12 @@ pub(crate) struct Plain<T>(pub(crate) Vec<T>);
 pub trait Column: Send + Sync {
     /// For a downcast to the typed column.
     fn as_any(&self) -> &dyn Any;
+    /// Number of variables.
+    fn len(&self) -> usize;
+    /// Whether there is no variable.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
     /// Appends a variable of this column's type; others are left out.
     fn push(&mut self, value: &dyn Variable);
     /// Overwrites a variable by one of this column's type.
@@ -25,6 +31,12 @@ pub trait Column: Send + Sync {
     fn get(&self, index: usize) -> Option<Box<dyn Variable>>;
     /// `self ← from ⊞ step`, where variable i's part of the step begins at `starts[i]`.
     fn retract_from(&mut self, from: &dyn Column, starts: &[u32], step: &[f64]);
+    /// `self[index] ← from[index] ⊞ step`, of one variable.
+    fn retract_at(&mut self, from: &dyn Column, index: usize, step: &[f64]);
+    /// `self[index] ← from[index]`, of one variable.
+    fn copy_at(&mut self, from: &dyn Column, index: usize);
+    /// Keeps the first `len` variables.
+    fn truncate(&mut self, len: usize);
     /// The first variable with a coordinate that is not finite.
     fn first_not_finite(&self) -> Option<usize>;
     /// `self ← from`, a column of the same type, in the memory that is there.
@@ -36,6 +48,9 @@ pub trait Column: Send + Sync {
 impl<M: Manifold + Variable> Column for Plain<M> {
     fn as_any(&self) -> &dyn Any {
         self
+    }
+    fn len(&self) -> usize {
+        self.0.len()
     }
     fn push(&mut self, value: &dyn Variable) {
         self.0.extend(value.erased().as_any().downcast_ref::<M>().cloned());
@@ -60,6 +75,21 @@ impl<M: Manifold + Variable> Column for Plain<M> {
                 old.retract(&M::Dim::vector(|i| step[start as usize + i]))
             };
         }
+    }
+    fn retract_at(&mut self, from: &dyn Column, index: usize, step: &[f64]) {
+        let Some(from) = from.as_any().downcast_ref::<Plain<M>>() else { return };
+        if let (Some(x), Some(old)) = (self.0.get_mut(index), from.0.get(index)) {
+            *x = old.retract(&M::Dim::vector(|i| step[i]));
+        }
+    }
+    fn copy_at(&mut self, from: &dyn Column, index: usize) {
+        let Some(from) = from.as_any().downcast_ref::<Plain<M>>() else { return };
+        if let (Some(x), Some(old)) = (self.0.get_mut(index), from.0.get(index)) {
+            *x = old.clone();
+        }
+    }
+    fn truncate(&mut self, len: usize) {
+        self.0.truncate(len);
     }
     fn first_not_finite(&self) -> Option<usize> {
         self.0.iter().position(|x| !x.is_finite())

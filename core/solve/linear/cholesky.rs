@@ -1,12 +1,12 @@
 //! Supernodal sparse Cholesky: structure once, numbers many times, in memory that is reused.
 mod inverse;
-mod kernel;
-mod large;
+pub(crate) mod kernel;
+pub(crate) mod large;
 pub(crate) mod structure;
 mod subtrees;
 
 use crate::linear::NotPositiveDefinite;
-use faer::dyn_stack::MemBuffer;
+use crate::linear::cholesky::large::Scratch;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -35,7 +35,7 @@ struct Workspace {
     base: [usize; 2],
     /// Nodes whose updates are on the stack.
     open: Vec<usize>,
-    memory: MemBuffer,
+    memory: Scratch,
 }
 
 /// A subtree, and where it is factorized.
@@ -193,7 +193,7 @@ impl Workspace {
             updates: [zeros(size(0))?, zeros(size(1))?],
             base,
             open: Vec::with_capacity(nodes.len()),
-            memory: large::scratch(widest),
+            memory: Scratch::new(widest),
         })
     }
 }

@@ -7,11 +7,9 @@ use crate::outcome::Times;
 use crate::problem::Problem;
 use crate::problem::method::{self, Blocks};
 use crate::problem::model::{FactorPlace, Model, Place};
-use manifactor_graph::batch::{Batch, Member};
+use manifactor_graph::batch::{Batch, Batches, Member};
 use manifactor_graph::column::{Columns, FIXED};
-use manifactor_graph::{Fixed, Graph, GraphError, Key, Resolved, Values};
-use std::any::TypeId;
-use std::collections::HashMap;
+use manifactor_graph::{Graph, GraphError, Key, Resolved, Values};
 use std::time::Instant;
 
 /// Why a graph cannot be compiled.
@@ -172,20 +170,11 @@ fn columns(graph: &Graph, values: &Values) -> (Vec<Place>, Columns) {
         columns.column_mut(column).push(value);
         sizes[column] += 1;
         let tangent = erased.tangent();
-        let held = graph.fixed().get(key).map_or(0, |f| held_bits(f, tangent));
+        let held = graph.fixed().get(key).map_or(0, |f| f.bits(tangent));
         Place { key: key.clone(), column, index: sizes[column] - 1, tangent, start: None, held }
     };
     let variables = values.iter().map(place).collect();
     (variables, columns)
-}
-
-fn held_bits(fixed: &Fixed, tangent: &[&str]) -> u32 {
-    let bit = |name: &str| tangent.iter().position(|t| *t == name).map_or(0, |i| 1 << i);
-    match fixed {
-        Fixed::Whole(true) => u32::MAX.checked_shr(32 - tangent.len().min(32) as u32).unwrap_or(0),
-        Fixed::Whole(false) => 0,
-        Fixed::Directions(names) => names.iter().fold(0, |bits, name| bits | bit(name)),
-    }
 }
 
 /// Factors into batches, by residual type, kind of noise and type of loss; and by factor, where it went.
@@ -196,25 +185,18 @@ fn batches(
     block: &[Option<usize>],
     layout: &Layout,
 ) -> (Vec<Box<dyn Batch>>, Vec<FactorPlace>) {
-    let mut batches: Vec<Box<dyn Batch>> = vec![];
-    let mut of_type: HashMap<TypeId, Vec<usize>> = HashMap::new();
+    let mut batches = Batches::default();
     // by factor its batch, and by batch the numbers of factors and of their variables: room is made once
     let mut places = Vec::with_capacity(resolved.len());
     let mut sizes: Vec<(usize, usize)> = vec![];
     for (factor, Resolved { variables, whitener }) in graph.factors().iter().zip(&resolved) {
-        let (erased, loss) = (factor.factor.erased(), factor.loss.as_deref());
-        let candidates = of_type.entry(erased.type_id()).or_default();
-        let found = candidates.iter().copied().find(|b| batches[*b].fits(whitener, loss));
-        let batch = found.unwrap_or_else(|| {
-            batches.push(erased.new_batch(whitener, loss));
-            candidates.push(batches.len() - 1);
-            sizes.push((0, 0));
-            batches.len() - 1
-        });
+        let batch = batches.place(factor.factor.erased(), whitener, factor.loss.as_deref());
+        sizes.resize(sizes.len().max(batch + 1), (0, 0));
         places.push((batch as u32, sizes[batch].0 as u32));
         sizes[batch].0 += 1;
         sizes[batch].1 += variables.len();
     }
+    let mut batches = batches.into_vec();
     for (batch, (factors, variables)) in batches.iter_mut().zip(sizes) {
         batch.reserve(factors, variables);
     }

@@ -10,6 +10,7 @@
 mod auto;
 mod bal;
 mod gnc;
+mod online;
 mod pose_graphs;
 mod published_graphs;
 mod published_sequences;

@@ -4,6 +4,7 @@ use super::{BatchOf, Evaluation};
 use crate::algebra::{Block, Dimension, Matrix};
 use crate::factor::kernel::Kernel;
 use crate::residual::normal_equations::{NormalEquations, Places};
+use crate::variable::column::Columns;
 use nalgebra::U1;
 use pulp::{Simd, WithSimd};
 
@@ -133,8 +134,7 @@ impl<F: Kernel> BatchOf<F> {
     }
 
     #[inline(always)]
-    pub(super) fn chunk_cost(&self, columns: F::Columns<'_>, first: usize) -> Evaluation {
-        let len = CHUNK.min(self.factors.len() - first);
+    pub(super) fn chunk_cost(&self, columns: F::Columns<'_>, first: usize, len: usize) -> Evaluation {
         let active = &self.active[first..first + len];
         let mut out = Evaluation::default();
         let mut squared = [0.0; CHUNK];
@@ -157,10 +157,17 @@ impl<F: Kernel> BatchOf<F> {
         out
     }
 
+    /// Factors of the n-th chunk.
+    pub(super) fn chunk(&self, n: usize) -> usize {
+        CHUNK.min(self.factors.len() - n * CHUNK)
+    }
+
     /// The costs of chunks `first..`, by threads.
     pub(super) fn chunk_costs(&self, columns: F::Columns<'_>, first: usize, costs: &mut [Evaluation]) {
         if costs.len() <= 1 {
-            costs.iter_mut().for_each(|cost| *cost = self.chunk_cost(columns, first * CHUNK));
+            costs
+                .iter_mut()
+                .for_each(|cost| *cost = self.chunk_cost(columns, first * CHUNK, self.chunk(first)));
             return;
         }
         let middle = costs.len() / 2;
@@ -211,6 +218,27 @@ impl<F: Kernel> BatchOf<F> {
         total
     }
 
+    /// Some factors only, by one thread: neighbours among them share a chunk.
+    pub(super) fn linearize_listed(
+        &mut self,
+        indices: &[u32],
+        columns: &Columns,
+        to: &mut NormalEquations<'_>,
+    ) -> Evaluation {
+        let columns = F::columns(columns);
+        let mut active = std::mem::take(&mut self.active);
+        let mut work = Work::new();
+        let mut total = Evaluation::default();
+        for (first, len) in runs(indices) {
+            let active = &mut active[first..first + len];
+            self.evaluate(columns, first, active, &mut work);
+            total = total.and(work.evaluation);
+            self.scatter(first, active, &work, to);
+        }
+        self.active = active;
+        total
+    }
+
     /// Evaluated by threads, added by one in order: the same sums as alone.
     pub(super) fn linearize_together(
         &self,
@@ -251,6 +279,18 @@ impl<F: Kernel> BatchOf<F> {
         }
         total
     }
+}
+
+/// Ascending places as stretches of neighbours that fit into a chunk: the first of each, and how many they are.
+pub(super) fn runs(indices: &[u32]) -> impl Iterator<Item = (usize, usize)> {
+    let mut rest = indices;
+    std::iter::from_fn(move || {
+        let first = *rest.first()?;
+        let follow = rest.iter().take(CHUNK).zip(first..).take_while(|(index, expected)| *index == expected);
+        let len = follow.count();
+        rest = &rest[len..];
+        Some((first as usize, len))
+    })
 }
 
 /// Whitens residuals and Jacobians of a chunk; the weights become squared norms. As [`Add`], a type of its own to be

@@ -1,6 +1,5 @@
 //! Dense kernels for fronts: small ones here, where a call costs more than the work; large ones by faer.
-use crate::linear::cholesky::large;
-use faer::dyn_stack::MemBuffer;
+use crate::linear::cholesky::large::{self, Scratch};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -20,12 +19,12 @@ const SHARE: usize = 8 * COLUMNS;
 /// # Errors
 /// The column whose pivot is not positive.
 #[inline(always)]
-pub(crate) fn eliminate<S: Simd, const REPLACE: bool>(
+pub fn eliminate<S: Simd, const REPLACE: bool>(
     simd: S,
     panel: &mut [f64],
     update: &mut [f64],
     width: usize,
-    memory: &mut MemBuffer,
+    memory: &mut Scratch,
 ) -> Result<(), usize> {
     let height = panel.len() / width;
     if height * height * width >= LARGE {

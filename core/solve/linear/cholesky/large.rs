@@ -17,8 +17,20 @@ const COLUMNS: usize = 128;
 const ROWS: usize = 256;
 
 /// Room for faer's kernels.
-pub(super) fn scratch(width: usize) -> MemBuffer {
-    MemBuffer::new(cholesky_in_place_scratch::<f64>(width.min(COLUMNS), Par::Seq, Default::default()))
+pub struct Scratch(MemBuffer);
+
+impl std::fmt::Debug for Scratch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Scratch({} bytes)", self.0.len())
+    }
+}
+
+impl Scratch {
+    /// For fronts of up to so many columns.
+    pub fn new(width: usize) -> Self {
+        let room = cholesky_in_place_scratch::<f64>(width.min(COLUMNS), Par::Seq, Default::default());
+        Self(MemBuffer::new(room))
+    }
 }
 
 /// As [`kernel::eliminate`](crate::linear::cholesky::kernel::eliminate).
@@ -26,7 +38,7 @@ pub(super) fn eliminate<const REPLACE: bool>(
     panel: &mut [f64],
     update: &mut [f64],
     width: usize,
-    memory: &mut MemBuffer,
+    memory: &mut Scratch,
 ) -> Result<(), usize> {
     let height = panel.len() / width;
     for first in (0..width).step_by(COLUMNS) {
@@ -37,7 +49,7 @@ pub(super) fn eliminate<const REPLACE: bool>(
         let (mut top, below) = block.split_at_row_mut(n);
         let (beside_top, beside) = left.split_at_row(n);
         square::<false>(top.as_mut(), beside_top);
-        let stack = MemStack::new(memory);
+        let stack = MemStack::new(&mut memory.0);
         cholesky_in_place(top.as_mut(), LltRegularization::default(), Par::Seq, stack, Default::default())
             .map_err(|LltError::NonPositivePivot { index }| first + index)?;
         let top = top.as_ref();

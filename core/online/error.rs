@@ -1,0 +1,82 @@
+//! Why a session refuses something. It is then as it was.
+use crate::factor_id::FactorId;
+use manifactor_graph::{GraphError, Key};
+
+/// Why a change is refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChangeError {
+    /// Factors and values do not fit each other or the session: everything that is wrong. Factors count from 0 in the list
+    /// that was given.
+    #[error("the factors do not fit the session:{}", list(.0))]
+    Graph(Vec<GraphError>),
+    /// A variable that is there already.
+    #[error("there is a variable `{key}` already; push factors on it without a value, or choose another key")]
+    Known {
+        /// Its key.
+        key: Key,
+    },
+    /// A variable that is not there.
+    #[error("there is no variable `{key}`")]
+    NoVariable {
+        /// What was asked for.
+        key: Key,
+    },
+    /// A factor that is not there, or not any more.
+    #[error("there is no factor {factor}: it was removed, or is of another session")]
+    NoFactor {
+        /// What was asked for.
+        factor: FactorId,
+    },
+    /// A factor that is to be replaced by one between other variables.
+    #[error("factor {factor} is between {}; remove it, and push the new one", names(.expected))]
+    Keys {
+        /// The factor.
+        factor: FactorId,
+        /// Its variables.
+        expected: Vec<Key>,
+    },
+    /// A weight that no factor can have.
+    #[error("factor {factor}: expected a finite weight, 0 or more, got {weight}")]
+    Weight {
+        /// The factor.
+        factor: FactorId,
+        /// What was given.
+        weight: f64,
+    },
+}
+
+/// Why an update failed. All changes since the last update are taken back: the session is as that left it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum UpdateError {
+    /// A residual or a derivative that is not finite.
+    #[error("not finite: the residual of factor {factor} ({}), or its derivative; the changes are taken back", names(.keys))]
+    NonFinite {
+        /// The factor: one of those that were pushed or changed.
+        factor: FactorId,
+        /// Its variables.
+        keys: Vec<Key>,
+    },
+    /// Numbers that are finite, but too large for their sums.
+    #[error(
+        "the linear system overflows at `{key}`; scale the noise of its factors; the changes are taken back"
+    )]
+    Overflow {
+        /// A variable that is part of it.
+        key: Key,
+    },
+}
+
+fn list(errors: &[GraphError]) -> String {
+    const SHOWN: usize = 20;
+    let mut text: String = errors.iter().take(SHOWN).map(|e| format!("\n  {e}")).collect();
+    if errors.len() > SHOWN {
+        text += &format!("\n  and {} more", errors.len() - SHOWN);
+    }
+    text
+}
+
+fn names(keys: &[Key]) -> String {
+    keys.iter().map(Key::as_str).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,293 @@
+//! What is estimated, and from what: variables at their linearization points, and factors with their parts of H and g.
+mod blocks;
+mod evaluation;
+mod regions;
+
+use crate::tree::Couplings;
+pub(crate) use blocks::Blocks;
+
+use indexmap::IndexMap;
+use manifactor_graph::batch::{Batches, Member};
+use manifactor_graph::column::{Columns, FIXED};
+use manifactor_graph::normal_equations::Slot;
+use manifactor_graph::{FactorEntry, Key, Resolved, Variable, VariableIndices};
+use regions::{Region, Regions};
+use smallvec::SmallVec;
+use std::any::TypeId;
+
+/// A variable of a session.
+#[derive(Debug, Clone)]
+pub(crate) struct Place {
+    /// Which column, and where in it.
+    pub column: u32,
+    pub index: u32,
+    pub tangent: &'static [&'static str],
+    /// A bit for each direction that is held.
+    pub held: u32,
+    /// Whether it waits, outside of the tree, for factors that determine it.
+    pub parked: bool,
+}
+
+impl Place {
+    /// Whether all of it is held.
+    pub(crate) fn is_held(&self) -> bool {
+        self.held.count_ones() as usize == self.tangent.len()
+    }
+    /// Whether it is solved for.
+    pub(crate) fn is_in_tree(&self) -> bool {
+        !self.parked && !self.is_held()
+    }
+}
+
+/// A factor of a session.
+#[derive(Debug, Clone)]
+pub(crate) struct Factor {
+    pub entry: FactorEntry,
+    /// In the order of its residual.
+    variables: VariableIndices,
+    /// Ascending, each with where it begins among the factor's scalars.
+    members: SmallVec<[(u32, u32); 2]>,
+    batch: u32,
+    index: u32,
+    pub weight: f64,
+}
+
+impl Factor {
+    /// Its variables and its noise, as they were looked up; `None` where that is not possible any more.
+    pub(crate) fn resolved(&self) -> Option<Resolved> {
+        let rows = self.entry.factor.erased().signature().rows.unwrap_or(0);
+        let whitener = self.entry.noise.whitener(rows).ok()?;
+        Some(Resolved { variables: self.variables.clone(), whitener })
+    }
+    /// Its variables, ascending.
+    pub(crate) fn variables(&self) -> impl Iterator<Item = u32> {
+        self.members.iter().map(|(v, _)| *v)
+    }
+}
+
+/// Variables and factors, which come and go.
+#[derive(Default)]
+pub(crate) struct Model {
+    keys: IndexMap<Key, Place, foldhash::fast::RandomState>,
+    /// Linearization points; and where variables are about to be linearized: the same, but during an update.
+    points: Columns,
+    pub trial: Columns,
+    factors: Vec<Option<Factor>>,
+    /// By factor.
+    regions: Vec<Region>,
+    numbers: Regions,
+    batches: Batches,
+    pub blocks: Blocks,
+    /// By batch, factors that are about to be evaluated.
+    listed: Vec<Vec<u32>>,
+}
+
+impl Couplings for Model {
+    fn dim(&self, variable: u32) -> usize {
+        self.blocks.dim(variable)
+    }
+    fn coupled(&self, variable: u32) -> impl Iterator<Item = u32> {
+        self.blocks.coupled(variable).iter().map(|c| c.other)
+    }
+}
+
+impl Model {
+    pub(crate) fn variables(&self) -> usize {
+        self.keys.len()
+    }
+    /// Numbers that factors have had, those that are gone among them.
+    pub(crate) fn factors(&self) -> usize {
+        self.factors.len()
+    }
+    pub(crate) fn factor(&self, factor: u32) -> Option<&Factor> {
+        self.factors.get(factor as usize)?.as_ref()
+    }
+    /// The factors that are there, with their numbers.
+    pub(crate) fn all_factors(&self) -> impl Iterator<Item = (u32, &Factor)> {
+        self.factors.iter().enumerate().filter_map(|(f, factor)| Some((f as u32, factor.as_ref()?)))
+    }
+    pub(crate) fn variable(&self, key: &str) -> Option<u32> {
+        self.keys.get_index_of(key).map(|v| v as u32)
+    }
+    pub(crate) fn place(&self, variable: u32) -> &Place {
+        &self.keys[variable as usize]
+    }
+    pub(crate) fn place_mut(&mut self, variable: u32) -> &mut Place {
+        &mut self.keys[variable as usize]
+    }
+    pub(crate) fn key(&self, variable: u32) -> Option<&Key> {
+        self.keys.get_index(variable as usize).map(|(key, _)| key)
+    }
+    pub(crate) fn keys(&self) -> impl Iterator<Item = &Key> {
+        self.keys.keys()
+    }
+    /// The type of a variable.
+    pub(crate) fn type_of(&self, variable: u32) -> Option<TypeId> {
+        self.point(variable).map(|point| point.erased().type_id())
+    }
+    /// A variable's linearization point.
+    pub(crate) fn point(&self, variable: u32) -> Option<Box<dyn Variable>> {
+        let place = self.place(variable);
+        self.points.column(place.column as usize).get(place.index as usize)
+    }
+
+    /// Appends a variable.
+    pub(crate) fn push_variable(&mut self, key: Key, value: &dyn Variable, held: u32) {
+        let (id, tangent) = (value.erased().type_id(), value.erased().tangent());
+        let column = self.points.position(id).unwrap_or_else(|| {
+            self.trial.add(id, value.erased().new_column());
+            self.points.add(id, value.erased().new_column())
+        });
+        self.points.column_mut(column).push(value);
+        self.trial.column_mut(column).push(value);
+        let index = self.points.column(column).len() as u32 - 1;
+        let column = column as u32;
+        // parked until its factors are looked at
+        self.keys.insert(key, Place { column, index, tangent, held, parked: true });
+        self.blocks.push(tangent.len(), held);
+    }
+
+    /// Keeps the first variables; the others are without factors.
+    pub(crate) fn truncate(&mut self, variables: usize) {
+        while self.keys.len() > variables {
+            let Some((_, place)) = self.keys.pop() else { break };
+            for columns in [&mut self.points, &mut self.trial] {
+                columns.column_mut(place.column as usize).truncate(place.index as usize);
+            }
+        }
+        self.blocks.truncate(variables);
+    }
+
+    /// Puts a factor in, under a number that is unused. It is not linearized yet.
+    pub(crate) fn insert(&mut self, number: u32, entry: &FactorEntry, resolved: &Resolved, weight: f64) {
+        let variables = resolved.variables.clone();
+        let mut members: SmallVec<[(u32, u32); 2]> = variables.iter().map(|v| (*v, 0)).collect();
+        members.sort_unstable();
+        let mut scalars = 0;
+        for (v, at) in &mut members {
+            *at = scalars;
+            scalars += self.blocks.dim(*v) as u32;
+        }
+        let region = self.numbers.take(scalars);
+        if self.factors.len() <= number as usize {
+            self.factors.resize_with(number as usize + 1, || None);
+            self.regions.resize(number as usize + 1, Region::default());
+        }
+        self.regions[number as usize] = region;
+        self.blocks.connect(number, &members);
+        let batch = self.batches.place(entry.factor.erased(), &resolved.whitener, entry.loss.as_deref());
+        let factor =
+            Factor { entry: entry.clone(), variables, members, batch: batch as u32, index: 0, weight };
+        let index: SmallVec<[u32; 4]> =
+            factor.variables.iter().map(|v| self.keys[*v as usize].index).collect();
+        let (starts, held) = self.starts(&factor, region);
+        let slots = self.slots(&factor, region);
+        let to = &mut self.batches.as_mut_slice()[batch];
+        to.push(&Member {
+            entry: number as usize,
+            factor: entry.factor.erased().as_any(),
+            index: &index,
+            starts: &starts,
+            held: &held,
+            slots: &slots,
+            whitener: &resolved.whitener,
+            loss: entry.loss.as_deref(),
+        });
+        let place = to.len() - 1;
+        if weight != 1.0 {
+            to.set_weight(place, weight);
+        }
+        self.factors[number as usize] = Some(Factor { index: place as u32, ..factor });
+    }
+
+    /// By variable of a factor's residual: where it begins in the gradient, and what is held of it.
+    fn starts(&self, factor: &Factor, region: Region) -> (SmallVec<[u32; 4]>, SmallVec<[u32; 4]>) {
+        let one = |v: &u32| {
+            let place = &self.keys[*v as usize];
+            let start = if place.is_held() { FIXED } else { (region.g as u32) + factor.at(*v) };
+            (start, if place.is_held() { 0 } else { place.held })
+        };
+        factor.variables.iter().map(one).unzip()
+    }
+
+    /// By pair of a factor's variables, where its block is.
+    fn slots(&self, factor: &Factor, region: Region) -> SmallVec<[Slot; 3]> {
+        let mut slots = SmallVec::new();
+        for (n, &a) in factor.variables.iter().enumerate() {
+            for &b in &factor.variables[..=n] {
+                let (lower, higher) = (factor.at(a.min(b)), factor.at(a.max(b)));
+                let column = lower as usize;
+                let at = region.column(column) + (higher - lower) as usize;
+                slots.push(Slot { at, stride: region.scalars - 1 - lower, swapped: a < b });
+            }
+        }
+        slots
+    }
+
+    /// Takes a factor out.
+    pub(crate) fn remove(&mut self, number: u32) -> Option<Factor> {
+        let factor = self.factors.get_mut(number as usize)?.take()?;
+        self.blocks.disconnect(number, &factor.members);
+        self.numbers.give(std::mem::take(&mut self.regions[number as usize]));
+        let batch = &mut self.batches.as_mut_slice()[factor.batch as usize];
+        if let Some(moved) = batch.remove(factor.index as usize)
+            && let Some(moved) = &mut self.factors[moved]
+        {
+            moved.index = factor.index;
+        }
+        Some(factor)
+    }
+
+    /// Makes a factor count so many times; returns how many times it did.
+    pub(crate) fn weigh(&mut self, number: u32, weight: f64) -> Option<f64> {
+        let factor = self.factors.get_mut(number as usize)?.as_mut()?;
+        self.batches.as_mut_slice()[factor.batch as usize].set_weight(factor.index as usize, weight);
+        Some(std::mem::replace(&mut factor.weight, weight))
+    }
+
+    /// Sets what is held of a variable; returns what was. Its factors are to be linearized after that.
+    pub(crate) fn hold(&mut self, variable: u32, held: u32) -> u32 {
+        let before = std::mem::replace(&mut self.keys[variable as usize].held, held);
+        self.blocks.hold(variable, held);
+        for f in self.blocks.factors(variable).collect::<Vec<_>>() {
+            let Some(factor) = &self.factors[f as usize] else { continue };
+            let (starts, held) = self.starts(factor, self.regions[f as usize]);
+            self.batches.as_mut_slice()[factor.batch as usize].hold(factor.index as usize, &starts, &held);
+        }
+        before
+    }
+
+    /// Whether a factor takes part: it is defined where it was last linearized, and counts.
+    pub(crate) fn takes_part(&self, number: u32) -> bool {
+        self.factor(number).is_some_and(|factor| {
+            let batch = &self.batches.as_slice()[factor.batch as usize];
+            factor.weight != 0.0 && batch.is_active(factor.index as usize)
+        })
+    }
+
+    /// Whether none of a factor's variables is parked.
+    pub(crate) fn is_whole(&self, number: u32) -> bool {
+        self.factor(number).is_some_and(|factor| factor.variables().all(|v| !self.place(v).parked))
+    }
+
+    /// Says whether a factor's part counts in the sums.
+    pub(crate) fn count(&mut self, number: u32, counts: bool) {
+        let Some(factor) = &self.factors[number as usize] else { return };
+        if std::mem::replace(&mut self.regions[number as usize].counts, counts) != counts {
+            self.blocks.mark_factor(&factor.members);
+        }
+    }
+}
+
+impl Place {
+    fn in_columns(&self) -> (usize, usize) {
+        (self.column as usize, self.index as usize)
+    }
+}
+
+impl Factor {
+    /// Where a variable begins among the factor's scalars.
+    fn at(&self, variable: u32) -> u32 {
+        self.members.iter().find(|(v, _)| *v == variable).map_or(0, |(_, at)| *at)
+    }
+}

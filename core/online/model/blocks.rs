@@ -1,0 +1,297 @@
+//! The blocks of H and g: sums over the regions of factors, made anew where a factor has changed.
+//!
+//! A sum is taken in the order of the factors' numbers, so that it depends on the factors that are there and not on how they
+//! came.
+use super::regions::{Region, Regions};
+use smallvec::SmallVec;
+
+/// Variables that share a factor.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Coupling {
+    pub other: u32,
+    pub pair: u32,
+}
+
+/// A factor of a variable, and where the variable begins among the factor's scalars.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    factor: u32,
+    at: u32,
+}
+
+/// The block of two variables: rows of the higher one, columns of the lower.
+#[derive(Debug, Clone, Default)]
+struct Pair {
+    lower: u32,
+    higher: u32,
+    at: usize,
+    entries: u32,
+    /// By factor, where both begin among its scalars.
+    factors: SmallVec<[(u32, u32, u32); 2]>,
+    is_dirty: bool,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Variable {
+    dim: u32,
+    /// Its first scalar, in the order of variables.
+    start: usize,
+    diagonal: usize,
+    /// A bit for each direction that is held.
+    held: u32,
+    factors: Vec<Part>,
+    coupled: Vec<Coupling>,
+    is_dirty: bool,
+}
+
+/// Blocks of all variables and pairs.
+#[derive(Debug, Default)]
+pub(crate) struct Blocks {
+    variables: Vec<Variable>,
+    pairs: Vec<Pair>,
+    unused: Vec<u32>,
+    /// Column-major; of diagonal blocks, the lower triangle.
+    diagonals: Vec<f64>,
+    off_diagonals: Vec<f64>,
+    /// By scalar: the gradient, and the root of the diagonal of H, which is how precise the factors around are.
+    gradient: Vec<f64>,
+    precision: Vec<f64>,
+    dirty: Vec<u32>,
+    dirty_pairs: Vec<u32>,
+}
+
+impl Blocks {
+    /// Appends a variable.
+    pub(crate) fn push(&mut self, dim: usize, held: u32) {
+        let (start, diagonal) = (self.gradient.len(), self.diagonals.len());
+        self.diagonals.resize(diagonal + dim * dim, 0.0);
+        self.gradient.resize(start + dim, 0.0);
+        self.precision.resize(start + dim, 0.0);
+        let dim = dim as u32;
+        self.variables.push(Variable { dim, start, diagonal, held, ..Variable::default() });
+    }
+
+    /// Keeps the first variables; the others are without factors.
+    pub(crate) fn truncate(&mut self, variables: usize) {
+        let Some(first) = self.variables.get(variables) else { return };
+        self.gradient.truncate(first.start);
+        self.precision.truncate(first.start);
+        self.diagonals.truncate(first.diagonal);
+        self.variables.truncate(variables);
+        self.dirty.retain(|v| (*v as usize) < variables);
+    }
+
+    /// Scalars of all variables.
+    pub(crate) fn scalars(&self) -> usize {
+        self.gradient.len()
+    }
+    pub(crate) fn dim(&self, variable: u32) -> usize {
+        self.variables[variable as usize].dim as usize
+    }
+    /// A variable's scalars.
+    #[inline(always)]
+    pub(crate) fn range(&self, variable: u32) -> std::ops::Range<usize> {
+        let v = &self.variables[variable as usize];
+        v.start..v.start + v.dim as usize
+    }
+    #[inline(always)]
+    pub(crate) fn gradient(&self, variable: u32) -> &[f64] {
+        &self.gradient[self.range(variable)]
+    }
+    /// √Hᵢᵢ by scalar.
+    #[inline(always)]
+    pub(crate) fn precision(&self, variable: u32) -> &[f64] {
+        &self.precision[self.range(variable)]
+    }
+    /// A variable's own block, of which the lower triangle counts.
+    #[inline(always)]
+    pub(crate) fn diagonal(&self, variable: u32) -> &[f64] {
+        let v = &self.variables[variable as usize];
+        &self.diagonals[v.diagonal..v.diagonal + (v.dim * v.dim) as usize]
+    }
+    /// The block of a pair, rows of the higher variable.
+    #[inline(always)]
+    pub(crate) fn block(&self, pair: u32) -> &[f64] {
+        let pair = &self.pairs[pair as usize];
+        &self.off_diagonals[pair.at..pair.at + pair.entries as usize]
+    }
+    pub(crate) fn coupled(&self, variable: u32) -> &[Coupling] {
+        &self.variables[variable as usize].coupled
+    }
+    pub(crate) fn factors(&self, variable: u32) -> impl Iterator<Item = u32> {
+        self.variables[variable as usize].factors.iter().map(|part| part.factor)
+    }
+    pub(crate) fn hold(&mut self, variable: u32, held: u32) {
+        self.variables[variable as usize].held = held;
+        self.mark(variable);
+    }
+
+    fn pair(&self, a: u32, b: u32) -> Option<u32> {
+        // the shorter list: an object has many more neighbours than the pose that sees it
+        let (a, b) = if self.coupled(a).len() <= self.coupled(b).len() { (a, b) } else { (b, a) };
+        self.coupled(a).iter().find(|c| c.other == b).map(|c| c.pair)
+    }
+
+    fn new_pair(&mut self, lower: u32, higher: u32) -> u32 {
+        let entries = self.dim(lower) * self.dim(higher);
+        // the last one only: in most graphs all pairs are of one size
+        let fits = |pair: &&u32| self.pairs[**pair as usize].entries as usize == entries;
+        let pair = match self.unused.last().filter(fits).copied() {
+            Some(pair) => {
+                self.unused.pop();
+                pair
+            }
+            None => {
+                self.pairs.push(Pair {
+                    at: self.off_diagonals.len(),
+                    entries: entries as u32,
+                    ..Pair::default()
+                });
+                self.off_diagonals.resize(self.off_diagonals.len() + entries, 0.0);
+                self.pairs.len() as u32 - 1
+            }
+        };
+        let found = &mut self.pairs[pair as usize];
+        (found.lower, found.higher) = (lower, higher);
+        self.variables[lower as usize].coupled.push(Coupling { other: higher, pair });
+        self.variables[higher as usize].coupled.push(Coupling { other: lower, pair });
+        pair
+    }
+
+    /// Adds a factor of these variables, which ascend, each with its first scalar among the factor's.
+    pub(crate) fn connect(&mut self, factor: u32, members: &[(u32, u32)]) {
+        for (n, &(v, at)) in members.iter().enumerate() {
+            let factors = &mut self.variables[v as usize].factors;
+            let place = factors.partition_point(|part| part.factor < factor);
+            factors.insert(place, Part { factor, at });
+            for &(u, at_lower) in &members[..n] {
+                let pair = self.pair(u, v).unwrap_or_else(|| self.new_pair(u, v));
+                let factors = &mut self.pairs[pair as usize].factors;
+                let place = factors.partition_point(|part| part.0 < factor);
+                factors.insert(place, (factor, at_lower, at));
+            }
+        }
+        self.mark_factor(members);
+    }
+
+    /// Takes a factor away.
+    pub(crate) fn disconnect(&mut self, factor: u32, members: &[(u32, u32)]) {
+        self.mark_factor(members);
+        for (n, &(v, _)) in members.iter().enumerate() {
+            self.variables[v as usize].factors.retain(|part| part.factor != factor);
+            for &(u, _) in &members[..n] {
+                let Some(pair) = self.pair(u, v) else { continue };
+                let factors = &mut self.pairs[pair as usize].factors;
+                factors.retain(|part| part.0 != factor);
+                if factors.is_empty() {
+                    self.variables[u as usize].coupled.retain(|c| c.other != v);
+                    self.variables[v as usize].coupled.retain(|c| c.other != u);
+                    self.unused.push(pair);
+                }
+            }
+        }
+    }
+
+    fn mark(&mut self, variable: u32) {
+        if !std::mem::replace(&mut self.variables[variable as usize].is_dirty, true) {
+            self.dirty.push(variable);
+        }
+    }
+
+    /// Has the sums that a factor is part of made anew.
+    pub(crate) fn mark_factor(&mut self, members: &[(u32, u32)]) {
+        for (n, &(v, _)) in members.iter().enumerate() {
+            self.mark(v);
+            for &(u, _) in &members[..n] {
+                let Some(pair) = self.pair(u, v) else { continue };
+                if !std::mem::replace(&mut self.pairs[pair as usize].is_dirty, true) {
+                    self.dirty_pairs.push(pair);
+                }
+            }
+        }
+    }
+
+    /// Makes the sums anew that a changed factor is part of. `regions` are by factor.
+    pub(crate) fn sum_up(&mut self, regions: &[Region], numbers: &Regions) {
+        for v in std::mem::take(&mut self.dirty) {
+            self.variables[v as usize].is_dirty = false;
+            self.sum_variable(v, regions, numbers);
+        }
+        for pair in std::mem::take(&mut self.dirty_pairs) {
+            self.pairs[pair as usize].is_dirty = false;
+            self.sum_pair(pair, regions, numbers);
+        }
+    }
+
+    /// The sum of a variable's own block, as it would be if all its factors counted that `counts` names.
+    pub(crate) fn own_block(
+        &self,
+        variable: u32,
+        regions: &[Region],
+        numbers: &Regions,
+        counts: impl Fn(u32) -> bool,
+    ) -> SmallVec<[f64; 36]> {
+        let v = &self.variables[variable as usize];
+        let d = v.dim as usize;
+        let mut h = SmallVec::from_elem(0.0, d * d);
+        for part in v.factors.iter().filter(|part| counts(part.factor)) {
+            add_diagonal(&mut h, d, regions[part.factor as usize], part.at as usize, numbers);
+        }
+        (0..d).filter(|c| v.held >> c & 1 == 1).for_each(|c| h[c * d + c] = 1.0);
+        h
+    }
+
+    fn sum_variable(&mut self, variable: u32, regions: &[Region], numbers: &Regions) {
+        let v = &self.variables[variable as usize];
+        let d = v.dim as usize;
+        let h = &mut self.diagonals[v.diagonal..v.diagonal + d * d];
+        let g = &mut self.gradient[v.start..v.start + d];
+        h.fill(0.0);
+        g.fill(0.0);
+        for part in &v.factors {
+            let (region, at) = (regions[part.factor as usize], part.at as usize);
+            if region.counts {
+                add_diagonal(h, d, region, at, numbers);
+                g.iter_mut().zip(&numbers.g[region.g + at..]).for_each(|(g, x)| *g += x);
+            }
+        }
+        for c in 0..d {
+            if v.held >> c & 1 == 1 {
+                h[c * d + c] = 1.0;
+            }
+            self.precision[v.start + c] = h[c * d + c].sqrt();
+        }
+    }
+
+    fn sum_pair(&mut self, pair: u32, regions: &[Region], numbers: &Regions) {
+        let pair = &self.pairs[pair as usize];
+        let (columns, rows) = (self.dim(pair.lower), self.dim(pair.higher));
+        let block = &mut self.off_diagonals[pair.at..pair.at + rows * columns];
+        block.fill(0.0);
+        for &(factor, lower, higher) in &pair.factors {
+            let region = regions[factor as usize];
+            if region.counts {
+                for (c, column) in block.chunks_exact_mut(rows).enumerate() {
+                    let at = lower as usize + c;
+                    let from = &numbers.h[region.column(at) + higher as usize - at..][..rows];
+                    column.iter_mut().zip(from).for_each(|(h, x)| *h += x);
+                }
+            }
+        }
+    }
+
+    /// Whether the diagonal of H and the gradient of a variable are finite: that bounds the rest.
+    pub(crate) fn is_finite(&self, variable: u32) -> bool {
+        let own = self.precision(variable).iter().chain(self.gradient(variable));
+        own.into_iter().all(|x| x.is_finite())
+    }
+}
+
+/// Adds a variable's own part of a region, lower triangle.
+#[inline(always)]
+fn add_diagonal(h: &mut [f64], d: usize, region: Region, at: usize, numbers: &Regions) {
+    for c in 0..d {
+        let from = &numbers.h[region.column(at + c)..][..d - c];
+        h[c * d + c..(c + 1) * d].iter_mut().zip(from).for_each(|(h, x)| *h += x);
+    }
+}

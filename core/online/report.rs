@@ -1,0 +1,30 @@
+//! What an update did.
+use manifactor_graph::Key;
+use serde::Serialize;
+
+/// The account of one update.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Variables whose part of the factorization was made again.
+    pub redone: usize,
+    /// Variables that were linearized at a new point.
+    pub relinearized: usize,
+    /// Variables whose step was computed again.
+    pub solved: usize,
+    /// Multiplications and additions of the factorization.
+    pub operations: f64,
+    /// Passes: one, and one more for each time that something could not wait.
+    pub passes: usize,
+    /// Where the cost would have risen: steps that were halved.
+    pub halved: usize,
+    /// Whether the update ended in a batch solve, as halved steps did not help.
+    pub solved_batch: bool,
+    /// Variables that wait for factors to determine them. Their own block of H has no full rank, so that they and their
+    /// factors take no part yet.
+    pub parked: Vec<Key>,
+    /// Directions that nothing constrains, by variable and name of the tangent direction: a free gauge, say. They are held
+    /// where they were.
+    pub undetermined: Vec<(Key, &'static str)>,
+    /// Factors that are not defined where they were last linearized, and take no part.
+    pub inactive: usize,
+}

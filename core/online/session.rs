@@ -1,0 +1,156 @@
+//! A session: what is known so far, and the estimate.
+mod changes;
+mod covariance;
+mod finish;
+mod parking;
+mod relinearization;
+mod step_control;
+mod substitution;
+mod update;
+
+use crate::fronts::{Fronts, Scalar};
+use crate::model::Model;
+use crate::report::Report;
+use crate::settings::Settings;
+use crate::tree::{Couplings, Tree};
+use changes::Pending;
+use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
+use manifactor_solve::SettingError;
+use std::any::TypeId;
+use std::collections::BTreeSet;
+use std::fmt;
+
+pub use covariance::CovarianceError;
+pub use finish::Finished;
+
+/// A factor graph that grows while it is solved. See the [crate](crate).
+///
+/// Changes are checked when they are asked for, and made by the next [`update`](Self::update). The estimate of a variable
+/// is its linearization point, moved by a step δ that the factorization gives.
+pub struct Session {
+    settings: Settings,
+    model: Model,
+    tree: Tree,
+    fronts: Fronts,
+    pending: Pending,
+    /// By scalar of all variables: their steps, as they were last passed on.
+    delta: Vec<f64>,
+    /// By variable: the pass in which its step last changed.
+    changed: Vec<u64>,
+    pass: u64,
+    updates: usize,
+    /// Variables that have left the region of their linearization.
+    waiting: Vec<u32>,
+    is_waiting: Vec<bool>,
+    /// Steps that the last pass changed, as they were before: to go back half the way.
+    moved: Vec<(u32, usize)>,
+    before: Vec<f64>,
+    /// Directions that nothing constrains, and variables that are parked.
+    open: BTreeSet<Scalar>,
+    parked: BTreeSet<u32>,
+    inactive: BTreeSet<u32>,
+}
+
+impl fmt::Debug for Session {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Session({} variables, {} updates)", self.model.variables(), self.updates)
+    }
+}
+
+impl Session {
+    /// An empty session.
+    ///
+    /// # Errors
+    /// Where a setting is outside its domain.
+    pub fn new(settings: Settings) -> Result<Self, SettingError> {
+        settings.check()?;
+        Ok(Self {
+            settings,
+            model: Model::default(),
+            tree: Tree::default(),
+            fronts: Fronts::default(),
+            pending: Pending::default(),
+            delta: vec![],
+            changed: vec![],
+            pass: 0,
+            updates: 0,
+            waiting: vec![],
+            is_waiting: vec![],
+            moved: vec![],
+            before: vec![],
+            open: BTreeSet::new(),
+            parked: BTreeSet::new(),
+            inactive: BTreeSet::new(),
+        })
+    }
+
+    /// The estimate of a variable, as of the last update; `None` where it is not there. O(1).
+    pub fn estimate(&self, key: &str) -> Option<Box<dyn Variable>> {
+        let variable = self.model.variable(key)?;
+        let point = self.model.point(variable)?;
+        point.erased().retract(&self.delta[self.model.blocks.range(variable)])
+    }
+
+    /// The same, of a type that is known.
+    ///
+    /// # Errors
+    /// Where there is no such variable, or it has another type.
+    pub fn get<M: Variable + Clone + 'static>(&self, key: &str) -> Result<M, ValueError> {
+        let value = self.estimate(key).ok_or_else(|| ValueError::Missing { key: key.into() })?;
+        let found = value.erased().as_any().downcast_ref::<M>();
+        found.cloned().ok_or_else(|| ValueError::WrongType {
+            key: key.into(),
+            expected: manifold_name(TypeId::of::<M>()),
+            found: value.typetag_name(),
+        })
+    }
+
+    /// All estimates, in the order in which the variables came.
+    pub fn estimates(&self) -> Values {
+        let mut values = Values::new();
+        for key in self.model.keys() {
+            if let Some(value) = self.estimate(key.as_str()) {
+                values.insert_boxed(key.clone(), value);
+            }
+        }
+        values
+    }
+
+    /// Number of variables, those that are parked or held among them.
+    pub fn variables(&self) -> usize {
+        self.model.variables()
+    }
+
+    /// ½ Σ ρ at the estimate, over all factors that took part where they were last linearized and whose variables are not
+    /// parked. It looks at every factor.
+    pub fn cost(&mut self) -> f64 {
+        let factors: Vec<u32> = self.counted().collect();
+        self.cost_of(&factors).cost
+    }
+
+    /// The factors that count: none of their variables is parked.
+    fn counted(&self) -> impl Iterator<Item = u32> {
+        self.model.all_factors().map(|(f, _)| f).filter(|f| self.model.is_whole(*f))
+    }
+
+    /// Bytes of the factorization.
+    pub fn bytes(&self) -> usize {
+        self.fronts.bytes()
+    }
+
+    fn dim(&self, variable: u32) -> usize {
+        self.model.dim(variable)
+    }
+
+    fn key(&self, variable: u32) -> Key {
+        self.model.key(variable).cloned().unwrap_or_else(|| Key::from(""))
+    }
+
+    /// What is parked, undetermined and inactive, for a report.
+    fn tell(&self, report: &mut Report) {
+        report.parked = self.parked.iter().map(|v| self.key(*v)).collect();
+        let name = |(v, d): &Scalar| Some((self.key(*v), *self.model.place(*v).tangent.get(*d as usize)?));
+        report.undetermined = self.open.iter().filter_map(name).collect();
+        report.inactive = self.inactive.len();
+    }
+}

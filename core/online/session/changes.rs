@@ -1,0 +1,245 @@
+//! Changes of a session: checked when they are asked for, made by the next update, and taken back where that fails.
+use super::Session;
+use crate::error::ChangeError;
+use crate::factor_id::FactorId;
+use crate::model::Model;
+use indexmap::IndexMap;
+use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values, Variable};
+use std::any::TypeId;
+
+/// A change of the model; each has one that takes it back.
+#[derive(Debug, Clone)]
+pub(super) enum Change {
+    Insert { number: u32, entry: FactorEntry, resolved: Resolved, weight: f64 },
+    Remove { number: u32 },
+    Weigh { number: u32, weight: f64 },
+    Hold { variable: u32, held: u32 },
+}
+
+/// What the next update is to do.
+#[derive(Default)]
+pub(super) struct Pending {
+    pub(super) variables: IndexMap<Key, (Box<dyn Variable>, u32)>,
+    pub(super) changes: Vec<Change>,
+    /// Numbers of factors: the next one; and whether those with changes are there, after these.
+    numbers: Option<u32>,
+    is_there: IndexMap<u32, Option<FactorEntry>>,
+}
+
+/// What changes have touched.
+#[derive(Debug, Default)]
+pub(super) struct Touched {
+    /// Variables whose blocks of H have changed.
+    pub(super) variables: Vec<u32>,
+    /// Factors that are to be linearized.
+    pub(super) factors: Vec<u32>,
+    /// Variables that may have lost what determined them, or have gained it.
+    pub(super) doubtful: Vec<u32>,
+    /// Variables of which other directions are held now.
+    pub(super) held: Vec<u32>,
+}
+
+impl Change {
+    /// Makes the change; returns the one that takes it back.
+    pub(super) fn apply(self, model: &mut Model, touched: &mut Touched) -> Option<Self> {
+        match self {
+            Self::Insert { number, entry, resolved, weight } => {
+                model.insert(number, &entry, &resolved, weight);
+                touched.variables.extend(&resolved.variables);
+                touched.factors.push(number);
+                let parked = resolved.variables.iter().filter(|v| model.place(**v).parked);
+                touched.doubtful.extend(parked);
+                Some(Self::Remove { number })
+            }
+            Self::Remove { number } => {
+                let factor = model.remove(number)?;
+                touched.variables.extend(factor.variables());
+                touched.doubtful.extend(factor.variables());
+                touched.factors.retain(|f| *f != number);
+                let resolved = factor.resolved()?;
+                Some(Self::Insert { number, entry: factor.entry, resolved, weight: factor.weight })
+            }
+            Self::Weigh { number, weight } => {
+                let before = model.weigh(number, weight)?;
+                touched.factors.push(number);
+                let variables: Vec<u32> = model.factor(number)?.variables().collect();
+                touched.variables.extend(&variables);
+                touched.doubtful.extend(&variables);
+                Some(Self::Weigh { number, weight: before })
+            }
+            Self::Hold { variable, held } => {
+                let before = model.hold(variable, held);
+                let neighbours: Vec<u32> = model.blocks.coupled(variable).iter().map(|c| c.other).collect();
+                touched.factors.extend(model.blocks.factors(variable));
+                for all in [&mut touched.variables, &mut touched.doubtful] {
+                    all.extend(neighbours.iter().copied().chain([variable]));
+                }
+                touched.held.push(variable);
+                Some(Self::Hold { variable, held: before })
+            }
+        }
+    }
+}
+
+impl Session {
+    /// Adds variables with their first values, and factors between any variables, new or not. What `factors` hold fixed is
+    /// held. Takes effect at the next [`update`](Self::update). Returns the factors' ids, in order.
+    ///
+    /// A variable that nothing determines yet, a point that is seen once, say, is *parked*: it waits with its factors,
+    /// and the report names it.
+    ///
+    /// # Errors
+    /// Where a variable is there already, or factors do not fit: everything that is wrong with them. Nothing is added then.
+    pub fn push(&mut self, factors: &Graph, values: &Values) -> Result<Vec<FactorId>, ChangeError> {
+        let is_known = |key: &Key| {
+            self.model.variable(key.as_str()).is_some() || self.pending.variables.contains_key(key)
+        };
+        if let Some((key, _)) = values.iter().find(|(key, _)| is_known(key)) {
+            return Err(ChangeError::Known { key: key.clone() });
+        }
+        let mut errors = vec![];
+        let known = self.model.variables() + self.pending.variables.len();
+        let find = |key: &str| {
+            let new = values.find(key).map(|(i, value)| (known + i, value.erased().type_id()));
+            new.or_else(|| self.find(key))
+        };
+        let mut resolved = Vec::with_capacity(factors.factors().len());
+        for (i, entry) in factors.factors().iter().enumerate() {
+            resolved.extend(entry.resolve(i, find, &mut errors));
+        }
+        for (key, fixed) in factors.fixed() {
+            let new = values.variable(key.as_str()).map(|value| value.erased().tangent());
+            match new.or_else(|| self.tangent(key.as_str())) {
+                Some(tangent) => fixed.check(key, tangent, &mut errors),
+                None => errors.push(GraphError::MissingFixed { key: key.clone() }),
+            }
+        }
+        let bad = values.iter().filter(|(_, value)| !value.erased().is_finite());
+        errors.extend(bad.map(|(key, _)| GraphError::NotFinite { key: key.clone() }));
+        if !errors.is_empty() {
+            return Err(ChangeError::Graph(errors));
+        }
+        for (key, value) in values.iter() {
+            let held = factors.fixed().get(key).map_or(0, |fixed| fixed.bits(value.erased().tangent()));
+            self.pending.variables.insert(key.clone(), (value.erased().clone_box(), held));
+        }
+        for (key, fixed) in factors.fixed().iter().filter(|(key, _)| !values.contains(key.as_str())) {
+            self.fix(key, fixed)?;
+        }
+        let ids = factors.factors().iter().zip(resolved).map(|(entry, resolved)| {
+            let number = self.pending.numbers.unwrap_or(self.model.factors() as u32);
+            self.pending.numbers = Some(number + 1);
+            self.insert(number, entry.clone(), resolved, 1.0)
+        });
+        Ok(ids.collect())
+    }
+
+    fn insert(&mut self, number: u32, entry: FactorEntry, resolved: Resolved, weight: f64) -> FactorId {
+        self.pending.is_there.insert(number, Some(entry.clone()));
+        self.pending.changes.push(Change::Insert { number, entry, resolved, weight });
+        FactorId(number)
+    }
+
+    /// Takes factors away. Takes effect at the next [`update`](Self::update). A variable that nothing determines any more
+    /// is parked.
+    ///
+    /// # Errors
+    /// Where one of them is not there. None is taken away then.
+    pub fn remove(&mut self, factors: &[FactorId]) -> Result<(), ChangeError> {
+        let mut seen = std::collections::HashSet::new();
+        if let Some(factor) = factors.iter().find(|f| self.entry(**f).is_none() || !seen.insert(**f)) {
+            return Err(ChangeError::NoFactor { factor: *factor });
+        }
+        for FactorId(number) in factors {
+            self.pending.is_there.insert(*number, None);
+            self.pending.changes.push(Change::Remove { number: *number });
+        }
+        Ok(())
+    }
+
+    /// Puts another factor in the place of one: another measurement, noise or loss. It keeps the id and the variables, and
+    /// counts once. Takes effect at the next [`update`](Self::update).
+    ///
+    /// # Errors
+    /// Where there is no such factor, or `entry` does not fit, or is between other variables.
+    pub fn replace(&mut self, factor: FactorId, entry: FactorEntry) -> Result<(), ChangeError> {
+        let before = self.entry(factor).ok_or(ChangeError::NoFactor { factor })?;
+        if before.keys != entry.keys {
+            return Err(ChangeError::Keys { factor, expected: before.keys.clone() });
+        }
+        let mut errors = vec![];
+        let resolved = entry.resolve(0, |key| self.find(key), &mut errors);
+        let resolved = resolved.ok_or(ChangeError::Graph(errors))?;
+        self.pending.changes.push(Change::Remove { number: factor.0 });
+        self.insert(factor.0, entry, resolved, 1.0);
+        Ok(())
+    }
+
+    /// Makes a factor count so many times, on top of its loss; 0 leaves it out. Takes effect at the next
+    /// [`update`](Self::update).
+    ///
+    /// # Errors
+    /// Where there is no such factor, or the weight is negative or not finite.
+    pub fn set_weight(&mut self, factor: FactorId, weight: f64) -> Result<(), ChangeError> {
+        self.entry(factor).ok_or(ChangeError::NoFactor { factor })?;
+        if !(weight >= 0.0 && weight.is_finite()) {
+            return Err(ChangeError::Weight { factor, weight });
+        }
+        self.pending.changes.push(Change::Weigh { number: factor.0, weight });
+        Ok(())
+    }
+
+    /// Holds a variable, or some directions of its tangent space, at the estimate; or frees it, by
+    /// `Fixed::Whole(false)`. Takes effect at the next [`update`](Self::update).
+    ///
+    /// # Errors
+    /// Where there is no such variable, or its tangent space has no such direction.
+    pub fn fix(&mut self, key: &Key, fixed: &Fixed) -> Result<(), ChangeError> {
+        let tangent =
+            self.tangent(key.as_str()).ok_or_else(|| ChangeError::NoVariable { key: key.clone() })?;
+        let mut errors = vec![];
+        fixed.check(key, tangent, &mut errors);
+        if !errors.is_empty() {
+            return Err(ChangeError::Graph(errors));
+        }
+        let held = fixed.bits(tangent);
+        match self.pending.variables.get_mut(key) {
+            Some((_, of_new)) => *of_new = held,
+            None => {
+                let variable = self.model.variable(key.as_str());
+                let changes = variable.map(|variable| Change::Hold { variable, held });
+                self.pending.changes.extend(changes);
+            }
+        }
+        Ok(())
+    }
+
+    /// A factor, as it will be after the next update; `None` where it is not there.
+    pub fn entry(&self, factor: FactorId) -> Option<&FactorEntry> {
+        match self.pending.is_there.get(&factor.0) {
+            Some(pending) => pending.as_ref(),
+            None => self.model.factor(factor.0).map(|factor| &factor.entry),
+        }
+    }
+
+    /// How often a factor counts, as of the last update; `None` where it is not there.
+    pub fn weight(&self, factor: FactorId) -> Option<f64> {
+        self.model.factor(factor.0).map(|factor| factor.weight)
+    }
+
+    /// The number and the type of a variable, of a pending one too.
+    fn find(&self, key: &str) -> Option<(usize, TypeId)> {
+        if let Some(variable) = self.model.variable(key) {
+            return Some((variable as usize, self.model.type_of(variable)?));
+        }
+        let (i, _, (value, _)) = self.pending.variables.get_full(key)?;
+        Some((self.model.variables() + i, value.erased().type_id()))
+    }
+
+    fn tangent(&self, key: &str) -> Option<&'static [&'static str]> {
+        match self.model.variable(key) {
+            Some(variable) => Some(self.model.place(variable).tangent),
+            None => self.pending.variables.get(key).map(|(value, _)| value.erased().tangent()),
+        }
+    }
+}

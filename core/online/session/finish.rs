@@ -1,0 +1,99 @@
+//! The whole of a session as one batch.
+use super::Session;
+use super::changes::Touched;
+use super::parking::Moves;
+use crate::factor_id::FactorId;
+use crate::fronts::Overflow;
+use crate::report::Report;
+use manifactor_graph::{Fixed, Graph, Values};
+use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
+
+/// A session that was solved as one batch.
+#[derive(Debug, Clone)]
+pub struct Finished {
+    /// The estimate of each variable; those that were parked are where they were.
+    pub values: Values,
+    /// What the solver has to tell. Its factors count from 0 in the order of `factors`.
+    pub outcome: Outcome,
+    /// The factors that took part: all, but for those of parked variables.
+    pub factors: Vec<FactorId>,
+}
+
+impl Session {
+    /// The factors that count, as a graph with what is held, and their ids.
+    pub fn graph(&self) -> (Graph, Vec<FactorId>) {
+        let (mut graph, mut ids) = (Graph::new(), vec![]);
+        for f in self.counted() {
+            let Some(factor) = self.model.factor(f) else { continue };
+            graph.push(factor.entry.clone());
+            ids.push(FactorId(f));
+        }
+        for (v, key) in self.model.keys().enumerate() {
+            let place = self.model.place(v as u32);
+            let names = place.tangent.iter().enumerate().filter(|(d, _)| place.held >> d & 1 == 1);
+            match place.is_held() {
+                true => graph.fix(key),
+                false if place.held != 0 && !place.parked => {
+                    let names = names.map(|(_, name)| (*name).to_owned()).collect();
+                    graph.set_fixed(key, Fixed::Directions(names));
+                }
+                false => {}
+            }
+        }
+        (graph, ids)
+    }
+
+    /// Solves all that is there as one batch, from the estimate. The session stays as it is; see
+    /// [`adopt`](Self::adopt).
+    ///
+    /// # Errors
+    /// Where there is nothing to solve for, a setting of the solver is outside its domain, or there is no memory.
+    pub fn finish(
+        &self,
+        optimizer: &dyn Optimizer,
+        observer: &mut dyn Observer,
+    ) -> Result<Finished, CompileError> {
+        optimizer.check()?;
+        let (graph, factors) = self.graph();
+        let mut values = self.estimates();
+        let is_in = |key: &str| {
+            let place = self.model.variable(key).map(|v| self.model.place(v));
+            place.is_some_and(|place| !place.parked)
+        };
+        let mut solved_for = Values::new();
+        for (key, value) in values.iter().filter(|(key, _)| is_in(key.as_str())) {
+            solved_for.insert_boxed(key.clone(), value.erased().clone_box());
+        }
+        let mut problem = Problem::compile_for(&graph, &solved_for, &optimizer.linear())?;
+        let weights = factors.iter().map(|f| self.model.factor(f.0).map_or(1.0, |factor| factor.weight));
+        let weights: Vec<f64> = weights.collect();
+        if weights.iter().any(|weight| *weight != 1.0) {
+            // they were checked when they were set
+            let _ = problem.set_weights(&weights);
+        }
+        let outcome = optimizer.descend(&mut problem, observer);
+        for (key, value) in problem.values().iter() {
+            values.insert_boxed(key.clone(), value.erased().clone_box());
+        }
+        Ok(Finished { values, outcome, factors })
+    }
+
+    /// Goes on from other values, those of [`finish`](Self::finish), say: all is linearized there. Keys that the session
+    /// does not have are left out.
+    pub(super) fn adopt(&mut self, values: &Values) -> Result<(), Overflow> {
+        let mut points = vec![];
+        for (v, key) in self.model.keys().enumerate() {
+            let (v, point) = (v as u32, self.model.point(v as u32));
+            let step = point.zip(values.variable(key.as_str())).and_then(|(p, x)| p.erased().local(x));
+            points.extend(step.map(|step| (v, step)));
+        }
+        let mut held = vec![];
+        for (v, step) in points.into_iter().filter(|(v, _)| !self.model.place(*v).is_held()) {
+            let range = self.model.blocks.range(v);
+            self.delta[range].copy_from_slice(&step);
+            held.push(v);
+        }
+        let all = Touched { variables: held.clone(), held, ..Touched::default() };
+        self.pass(&all, &Moves::default(), false, &mut Report::default())
+    }
+}

@@ -1,0 +1,55 @@
+//! Steps from the factorization, from the root downwards as far as something changes.
+use super::Session;
+use crate::tree::Redone;
+
+impl Session {
+    /// Back-substitutes through the new fronts, and through those below whose rows have changed; returns the number of
+    /// variables.
+    pub(super) fn solve(&mut self, redone: &Redone) -> usize {
+        self.moved.clear();
+        self.before.clear();
+        let mut solved = 0;
+        for f in redone.new.iter().rev() {
+            solved += self.solve_front(*f);
+        }
+        let mut open: Vec<u32> = redone.kept.iter().map(|(kept, _)| *kept).collect();
+        while let Some(f) = open.pop() {
+            let front = &self.tree.fronts[f as usize];
+            if front.rows.iter().any(|row| self.changed[*row as usize] == self.pass) {
+                open.extend_from_slice(&front.children);
+                solved += self.solve_front(f);
+            }
+        }
+        solved
+    }
+
+    fn solve_front(&mut self, f: u32) -> usize {
+        let Self { tree, fronts, model, delta, settings, changed, moved, before, .. } = self;
+        let front = &tree.fronts[f as usize];
+        let mut x = fronts.solve(front, f, &model.blocks, delta);
+        let first = moved.len();
+        for v in &front.blocks {
+            let range = model.blocks.range(*v);
+            let (step, rest) = x.split_at(range.len());
+            x = rest;
+            // compared with what was last passed on, so that small changes add up
+            let old = &mut delta[range];
+            let precision = model.blocks.precision(*v);
+            let mut changes = step.iter().zip(&*old).zip(precision);
+            if changes.any(|((new, old), precision)| (new - old).abs() * precision > settings.deviation) {
+                moved.push((*v, before.len()));
+                before.extend_from_slice(old);
+                old.copy_from_slice(step);
+                changed[*v as usize] = self.pass;
+            }
+        }
+        let solved = front.blocks.len();
+        for i in first..self.moved.len() {
+            let (v, _) = self.moved[i];
+            if !self.is_waiting[v as usize] && self.excess(v) > 1.0 {
+                self.wait(v);
+            }
+        }
+        solved
+    }
+}

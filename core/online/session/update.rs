@@ -1,0 +1,212 @@
+//! One update: changes, the part of the tree that they touch, and the steps that follow from it.
+use super::Session;
+use super::changes::{Change, Touched};
+use super::parking::Moves;
+use crate::error::UpdateError;
+use crate::factor_id::FactorId;
+use crate::fronts::Overflow;
+use crate::report::Report;
+use crate::tree::{Affected, Couplings, Redone};
+
+/// What takes changes back.
+struct Undo {
+    variables: usize,
+    changes: Vec<Change>,
+    moves: Moves,
+}
+
+impl Session {
+    /// Makes the changes since the last update, and brings the estimate up to date.
+    ///
+    /// # Errors
+    /// Where a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last
+    /// update are taken back then, and the session is as that left it; ids of the pushed factors are void.
+    pub fn update(&mut self) -> Result<Report, UpdateError> {
+        let pending = std::mem::take(&mut self.pending);
+        let mut report = Report::default();
+        let mut touched = Touched::default();
+        let variables = self.model.variables();
+        let mut undo = Undo { variables, changes: vec![], moves: Moves::default() };
+        for (key, (value, held)) in pending.variables {
+            self.model.push_variable(key, &*value, held);
+        }
+        touched.doubtful.extend(variables as u32..self.model.variables() as u32);
+        self.resize();
+        for change in pending.changes {
+            undo.changes.extend(change.apply(&mut self.model, &mut touched));
+        }
+        touched.factors.sort_unstable();
+        touched.factors.dedup();
+        let evaluation = self.model.linearize(&touched.factors);
+        if let Some(factor) = evaluation.not_finite {
+            let entry = self.model.factor(factor as u32).map(|factor| &factor.entry);
+            let keys = entry.map_or(vec![], |entry| entry.keys.clone());
+            self.take_back(undo);
+            return Err(UpdateError::NonFinite { factor: FactorId(factor as u32), keys });
+        }
+        self.doubt_inactive(&mut touched);
+        undo.moves = self.park(&mut touched);
+        let is_turn = (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
+        let moves = std::mem::take(&mut undo.moves);
+        if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
+            let key = self.key(overflow.0);
+            undo.moves = moves;
+            self.take_back(undo);
+            return Err(UpdateError::Overflow { key });
+        }
+        self.updates += 1;
+        self.control_step(&mut report);
+        for _ in 0..self.settings.passes {
+            if !self.is_urgent() {
+                break;
+            }
+            // what the changes need has been done: a pass that fails leaves that as it is
+            let none = (Touched::default(), Moves::default());
+            if self.pass(&none.0, &none.1, true, &mut report).is_err() {
+                break;
+            }
+            self.control_step(&mut report);
+        }
+        self.tell(&mut report);
+        Ok(report)
+    }
+
+    /// Room for as many variables as the model has.
+    fn resize(&mut self) {
+        let n = self.model.variables();
+        self.tree.resize(n);
+        self.fronts.resize(n);
+        self.delta.resize(self.model.blocks.scalars(), 0.0);
+        self.changed.resize(n, 0);
+        self.is_waiting.resize(n, false);
+        self.waiting.retain(|v| (*v as usize) < n);
+    }
+
+    /// Takes changes back, the last first.
+    fn take_back(&mut self, undo: Undo) {
+        self.unpark(&undo.moves);
+        let mut touched = Touched::default();
+        for change in undo.changes.into_iter().rev() {
+            change.apply(&mut self.model, &mut touched);
+        }
+        touched.factors.retain(|f| self.model.factor(*f).is_some());
+        touched.factors.sort_unstable();
+        touched.factors.dedup();
+        self.model.linearize(&touched.factors);
+        for f in touched.factors {
+            self.model.count(f, self.model.is_whole(f));
+            self.note_activity(f);
+        }
+        self.inactive.retain(|f| self.model.factor(*f).is_some());
+        self.model.sum_up();
+        self.model.truncate(undo.variables);
+        self.resize();
+    }
+
+    /// Notes which factors take no part; variables that lose one may not be determined any more.
+    pub(super) fn doubt_inactive(&mut self, touched: &mut Touched) {
+        self.inactive.retain(|f| self.model.factor(*f).is_some());
+        for f in &touched.factors {
+            if self.note_activity(*f) {
+                touched.doubtful.extend(self.model.factor(*f).into_iter().flat_map(|f| f.variables()));
+            }
+        }
+    }
+
+    /// Notes whether a factor takes part where it was linearized; whether it has just ceased to.
+    pub(super) fn note_activity(&mut self, factor: u32) -> bool {
+        match self.model.takes_part(factor) {
+            true => {
+                self.inactive.remove(&factor);
+                false
+            }
+            false => self.inactive.insert(factor),
+        }
+    }
+
+    /// Redoes what is touched and what is relinearized, and solves.
+    pub(super) fn pass(
+        &mut self,
+        touched: &Touched,
+        moves: &Moves,
+        is_turn: bool,
+        report: &mut Report,
+    ) -> Result<(), Overflow> {
+        self.pass += 1;
+        report.passes += 1;
+        let mut affected = Affected::default();
+        touched.variables.iter().for_each(|v| self.tree.touch(*v, &mut affected));
+        for v in &moves.leaving {
+            self.touch_around(*v, &mut affected);
+        }
+        let mut last = touched.variables.clone();
+        last.sort_unstable();
+        last.dedup();
+        let chosen = self.choose(&touched.held, is_turn);
+        let relinearized = self.relinearize(chosen);
+        for v in &relinearized.variables {
+            self.touch_around(*v, &mut affected);
+        }
+        self.model.sum_up();
+        let redone = self.redo(&affected, moves, &last);
+        let finite = self.check_finite(&redone);
+        let built = finite.and_then(|()| self.fronts.build(&self.tree, &self.model.blocks, &redone.new));
+        if let Err(overflow) = built {
+            self.tree.drop_new(&affected, &redone);
+            self.take_back_points(relinearized);
+            self.model.sum_up();
+            return Err(overflow);
+        }
+        self.exchange(&affected, &redone, moves);
+        report.relinearized += relinearized.variables.len();
+        self.accept_points(relinearized);
+        for f in &redone.new {
+            let front = &self.tree.fronts[*f as usize];
+            report.operations += front.operations;
+            report.redone += front.blocks.len();
+        }
+        report.solved += self.solve(&redone);
+        Ok(())
+    }
+
+    /// Touches a variable's front and those of its neighbours: all fronts that have it among their rows are above those.
+    fn touch_around(&mut self, variable: u32, affected: &mut Affected) {
+        self.tree.touch(variable, affected);
+        for other in self.model.coupled(variable) {
+            self.tree.touch(other, affected);
+        }
+    }
+
+    fn redo(&mut self, affected: &Affected, moves: &Moves, last: &[u32]) -> Redone {
+        let leaves = |v: u32| moves.leaving.contains(&v);
+        let is_last = |v: u32| last.binary_search(&v).is_ok();
+        self.tree.redo(affected, &moves.entering, leaves, is_last, &self.model)
+    }
+
+    /// H and g of the fronts that are to be built: a number that is not finite would spread.
+    fn check_finite(&self, redone: &Redone) -> Result<(), Overflow> {
+        let blocks = redone.new.iter().flat_map(|f| &self.tree.fronts[*f as usize].blocks);
+        let bad = blocks.copied().find(|v| !self.model.blocks.is_finite(*v));
+        bad.map_or(Ok(()), |v| Err(Overflow(v)))
+    }
+
+    /// Puts the new fronts in the place of the affected ones.
+    fn exchange(&mut self, affected: &Affected, redone: &Redone, moves: &Moves) {
+        for f in &affected.0 {
+            for scalar in self.fronts.open(*f) {
+                self.open.remove(scalar);
+            }
+        }
+        self.tree.swap(affected, redone);
+        self.fronts.drop_all(affected);
+        for f in &redone.new {
+            self.open.extend(self.fronts.open(*f));
+        }
+        for v in &moves.judged {
+            match self.model.place(*v).parked {
+                true => self.parked.insert(*v),
+                false => self.parked.remove(v),
+            };
+        }
+    }
+}

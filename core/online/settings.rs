@@ -1,0 +1,48 @@
+//! How a session trades time for accuracy.
+use manifactor_graph::checked::not_negative;
+use manifactor_solve::SettingError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of a session. The defaults are meant for any graph: thresholds are in units of the estimate's own precision.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Updates from one relinearization to the next. Default: 10.
+    pub relinearize_every: usize,
+    /// Error that a linearization may have, in standard deviations of the factors around. A variable is linearized anew
+    /// where a component of its step δ is larger than √(bend · σ), with σ = 1/√Hᵢᵢ. 0 relinearizes all that moves.
+    /// Default: 0.1.
+    #[serde(deserialize_with = "not_negative")]
+    pub bend: f64,
+    /// Changes of a step δ that are not passed on to other variables, in standard deviations σ = 1/√Hᵢᵢ of the factors around. 0 passes on
+    /// every change. Default: 0.01.
+    #[serde(deserialize_with = "not_negative")]
+    pub deviation: f64,
+    /// Multiples of the threshold for relinearization from which on a variable does not wait for its turn: the update is
+    /// followed by another pass at once. Default: 10.
+    #[serde(deserialize_with = "not_negative")]
+    pub urgent: f64,
+    /// Such passes that one update may take. Default: 1.
+    pub passes: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { relinearize_every: 10, bend: 0.1, deviation: 0.01, urgent: 10.0, passes: 1 }
+    }
+}
+
+impl Settings {
+    /// Whether each setting is within its domain.
+    ///
+    /// # Errors
+    /// Names the one that is not.
+    pub fn check(&self) -> Result<(), SettingError> {
+        let all = [("bend", self.bend), ("deviation", self.deviation), ("urgent", self.urgent)];
+        match all.into_iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
+            Some((setting, got)) => Err(SettingError { setting, expected: "0 or more", got }),
+            None => Ok(()),
+        }
+    }
+}

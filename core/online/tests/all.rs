@@ -1,0 +1,9 @@
+//! Sessions against fresh builds.
+#![allow(missing_docs, clippy::unwrap_used)]
+mod errors;
+mod history;
+mod parking;
+mod steps;
+#[path = "../../solve/tests/toy/mod.rs"]
+mod toy;
+mod world;

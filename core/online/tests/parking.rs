@@ -1,0 +1,72 @@
+//! Variables that nothing determines.
+use crate::toy::{At, Distance, Logarithm, Plane};
+use manifactor_graph::{Graph, Key, Values};
+use manifactor_online::{CovarianceError, Session, Settings};
+
+fn session(priors: &[&str]) -> Session {
+    let mut session = Session::new(Settings::default()).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    for (i, key) in priors.iter().enumerate() {
+        let x = i as f64;
+        values.insert(*key, Plane { x: x + 0.1, y: x * x });
+        graph.add([*key], At { at: [x, x * x] });
+    }
+    session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    session
+}
+
+#[test]
+fn a_point_that_ranges_do_not_determine_waits_for_another() {
+    let mut session = session(&["a", "b", "c"]);
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("point", Plane { x: 3.0, y: 0.5 });
+    graph.add(["a", "point"], Distance { by: 3.0 });
+    session.push(&graph, &values).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!(report.parked, [Key::from("point")]);
+    assert!(report.undetermined.is_empty());
+    assert!(matches!(session.covariance(&["point"]), Err(CovarianceError::Parked { .. })));
+    // its range says nothing of `a`
+    assert!(session.get::<Plane>("a").unwrap().x.abs() < 1e-12);
+    let mut graph = Graph::new();
+    graph.add(["b", "point"], Distance { by: 2.0 });
+    let ids = session.push(&graph, &Values::new()).unwrap();
+    assert!(session.update().unwrap().parked.is_empty());
+    assert!(session.covariance(&["point", "a"]).is_ok());
+    session.remove(&ids).unwrap();
+    assert_eq!(session.update().unwrap().parked, [Key::from("point")]);
+}
+
+#[test]
+fn what_is_tied_to_itself_alone_is_undetermined_and_named() {
+    let mut session = session(&["a"]);
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: 0.0, y: 0.0 });
+    values.insert("q", Plane { x: 0.0, y: 0.0 });
+    graph.add(["p", "q"], crate::toy::Apart { by: [1.0, 2.0] });
+    session.push(&graph, &values).unwrap();
+    let report = session.update().unwrap();
+    assert!(report.parked.is_empty());
+    let names: Vec<&str> = report.undetermined.iter().map(|(_, name)| *name).collect();
+    assert_eq!(names, ["x", "y"]);
+    let (p, q) = (session.get::<Plane>("p").unwrap(), session.get::<Plane>("q").unwrap());
+    assert!((q.x - p.x - 1.0).abs() < 1e-12 && (q.y - p.y - 2.0).abs() < 1e-12);
+    assert!(matches!(session.covariance(&["p"]), Err(CovarianceError::Undetermined { .. })));
+    let mut graph = Graph::new();
+    graph.add(["p"], At { at: [5.0, 5.0] });
+    session.push(&graph, &Values::new()).unwrap();
+    assert!(session.update().unwrap().undetermined.is_empty());
+    assert!((session.get::<Plane>("q").unwrap().y - 7.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_factor_that_is_not_defined_parks_what_hangs_on_it_alone() {
+    let mut session = session(&["a"]);
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: -1.0, y: 0.0 });
+    graph.add(["p"], Logarithm { to: 2.0 });
+    session.push(&graph, &values).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!((report.parked, report.inactive), (vec![Key::from("p")], 1));
+}

@@ -1,0 +1,186 @@
+//! `manifactor replay`: a pose graph through an incremental smoother, as if it came in just now.
+use crate::failure::Failure;
+use crate::input::graph_file::{self, GraphFile};
+use crate::input::solver::SolverArguments;
+use crate::interrupt;
+use crate::output;
+use crate::output::text::{Table, count, keys, seconds};
+use crate::status::Status;
+use clap::Args;
+use manifactor::formats::replay::{Latencies, Replay as Steps};
+use manifactor::online::{Finished, Report, Session, Settings};
+use manifactor::solve::{All, Interrupt, Silent};
+use serde_json::json;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// Replay a pose graph (.g2o, TORO, or a literal graph) pose by pose through an incremental smoother.
+///
+/// Poses are the variables x0, x1, …, in that order; each starts where odometry leads from the estimate of the pose before it, never
+/// from the file. At the end all is solved as one batch.
+#[derive(Debug, Args)]
+pub(crate) struct Replay {
+    /// The graph.
+    graph: PathBuf,
+    #[command(flatten)]
+    solver: SolverArguments,
+    #[command(flatten)]
+    reading: graph_file::Reading,
+    /// Tell of every N-th pose. With --json: a line of JSON for each. The last is always told of.
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
+    every: u64,
+    /// Solve what is known at each pose that is told of as one batch, too, and tell how much more the estimate costs. Not timed.
+    #[arg(long)]
+    gap: bool,
+    /// Write the graph with the estimate at the end here; the extension tells the format.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write over a file that is there already.
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Print lines of JSON: poses, then a summary.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What a replay came to.
+struct Replayed {
+    session: Session,
+    times: Vec<f64>,
+    report: Report,
+    interrupted: bool,
+}
+
+impl Replay {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        if let Some(path) = &self.out {
+            graph_file::check_place(path, &self.graph, self.force)?;
+        }
+        let input = self.reading.open(&self.graph, &self.solver)?;
+        input.notes.iter().for_each(|note| output::note(note));
+        let mut interrupt = interrupt::on_ctrl_c();
+        let mut replayed = self.replay(&input, &interrupt)?;
+        let cost = replayed.session.cost();
+        let clock = Instant::now();
+        let observer = &mut All(vec![&mut interrupt]);
+        let finished = match replayed.interrupted {
+            true => None,
+            false => Some(replayed.session.finish(&*input.optimizer, observer).map_err(Failure::input)?),
+        };
+        let batch = clock.elapsed().as_secs_f64();
+        if let Some(path) = &self.out {
+            let values = finished.as_ref().map_or_else(|| replayed.session.estimates(), |f| f.values.clone());
+            for note in graph_file::write(path, &replayed.session.graph().0, &values)? {
+                output::note(&note);
+            }
+        }
+        self.tell(&replayed, cost, finished.as_ref(), batch);
+        Ok(match finished {
+            Some(finished) => Status::from(&finished.outcome.termination),
+            None => Status::Interrupted,
+        })
+    }
+
+    fn replay(&self, input: &GraphFile, interrupt: &Interrupt) -> Result<Replayed, Failure> {
+        let session = Session::new(Settings::default()).map_err(Failure::input)?;
+        let report = Report::default();
+        let mut replayed = Replayed { session, times: vec![], report, interrupted: false };
+        let mut steps = Steps::of(&input.graph);
+        if steps.is_empty() {
+            return Err(Failure::with_help(
+                format!("{}: there are no poses to replay", self.graph.display()),
+                "poses are the variables x0, x1, …",
+            ));
+        }
+        while let Some(step) = steps.step(|key| replayed.session.estimate(key)).map_err(Failure::input)? {
+            if interrupt.0.load(Ordering::Relaxed) {
+                replayed.interrupted = true;
+                break;
+            }
+            let clock = Instant::now();
+            replayed.session.push(&step.factors, &step.values).map_err(Failure::input)?;
+            replayed.report = replayed.session.update().map_err(Failure::input)?;
+            let _newest =
+                step.values.iter().last().and_then(|(key, _)| replayed.session.estimate(key.as_str()));
+            replayed.times.push(clock.elapsed().as_secs_f64());
+            if (replayed.times.len() as u64).is_multiple_of(self.every) || steps.is_empty() {
+                self.tell_step(&mut replayed, input)?;
+            }
+        }
+        Ok(replayed)
+    }
+
+    /// Tells of the last step: of where it stands.
+    fn tell_step(&self, replayed: &mut Replayed, input: &GraphFile) -> Result<(), Failure> {
+        let Replayed { session, times, report, .. } = replayed;
+        let (poses, last) = (times.len(), times.last().copied().unwrap_or_default());
+        let cost = session.cost();
+        let gap = match self.gap {
+            true => {
+                let batch = session.finish(&*input.optimizer, &mut Silent).map_err(Failure::input)?;
+                Some((cost - batch.outcome.final_cost) / batch.outcome.final_cost.max(1e-9))
+            }
+            false => None,
+        };
+        if self.json {
+            let line = json!({
+                "poses": poses, "variables": session.variables(), "cost": cost, "gap": gap,
+                "seconds": last, "report": report,
+            });
+            output::json_line(&line);
+        } else {
+            let (redone, last) = (count(report.redone, "variable"), seconds(last));
+            let gap = gap.map_or_else(String::new, |gap| format!(", {gap:.1e} above the batch"));
+            output::say(&format!(
+                "{}: cost {cost:.6}{gap}, last update {last} ({redone} redone)",
+                count(poses, "pose")
+            ));
+        }
+        Ok(())
+    }
+
+    fn tell(&self, replayed: &Replayed, cost: f64, finished: Option<&Finished>, batch: f64) {
+        let Replayed { session, times, report, interrupted } = replayed;
+        let latencies = Latencies::of(times);
+        let outcome = finished.map(|finished| &finished.outcome);
+        if self.json {
+            output::json_line(&json!({
+                "graph": self.graph.display().to_string(),
+                "poses": times.len(),
+                "variables": session.variables(),
+                "latencies": latencies,
+                "bytes": session.bytes(),
+                "cost": cost,
+                "parked": report.parked,
+                "undetermined": report.undetermined,
+                "inactive": report.inactive,
+                "final_cost": outcome.map(|o| o.final_cost),
+                "termination": outcome.map(|o| &o.termination),
+                "batch_seconds": finished.map(|_| batch),
+                "interrupted": interrupted,
+            }));
+            return;
+        }
+        let mut table = Table::of_numbers(&["", "total", "p50", "p99", "max"]);
+        let cells = [latencies.total, latencies.p50, latencies.p99, latencies.max].map(seconds);
+        table.row(["updates".to_owned()].into_iter().chain(cells));
+        let mut text =
+            table.text() + "\n" + &format!("cost {cost:.6} after {}\n", count(times.len(), "pose"));
+        if let Some(outcome) = outcome {
+            text += &format!(
+                "cost {:.6} as one batch, {} more: {}\n",
+                outcome.final_cost,
+                seconds(batch),
+                outcome.termination
+            );
+        }
+        if !report.parked.is_empty() {
+            text += &format!("waiting for factors that determine them: {}\n", keys(&report.parked));
+        }
+        for (key, direction) in &report.undetermined {
+            text += &format!("nothing constrains {key}.{direction}\n");
+        }
+        output::print(&text);
+    }
+}

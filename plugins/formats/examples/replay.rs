@@ -1,0 +1,83 @@
+//! Replays pose graphs through a session, pose by pose: latencies, and how far the estimate is from the optimum of what was
+//! known so far.
+//!
+//! `cargo run --release -p manifactor-formats --example replay -- [--gaps N] [--clamp] [--json] GRAPH.g2o…`. Each pose starts from its
+//! odometry, never from the file's vertices. CPU time of one
+//! thread, in milliseconds; the gap is (cost − optimum) / optimum, every N poses.
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+use manifactor_formats::pose_graph::{self, Options, Repair};
+use manifactor_formats::replay::{Latencies, Replay};
+use manifactor_online::{Session, Settings};
+use manifactor_solve::{LevenbergMarquardt, Silent};
+
+/// Of this thread: what others do on the machine has no part in it.
+fn cpu_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let (mut gaps, mut options, mut json, mut files) = (0, Options::default(), false, vec![]);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--gaps" => gaps = arguments.next().ok_or("--gaps takes a number")?.parse()?,
+            "--clamp" => options.repair = Repair::Clamp,
+            "--json" => json = true,
+            _ => files.push(argument),
+        }
+    }
+    if !json {
+        println!(
+            "| graph | steps | total s | p50 | p99 | max | gap, median | gap, max | halved | batches | cost | after finish | MB |"
+        );
+        println!(
+            "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+        );
+    }
+    for path in files {
+        let graph = pose_graph::read(&path, &options)?.graph;
+        let mut session = Session::new(Settings::default())?;
+        let (mut times, mut differences) = (vec![], vec![]);
+        let (mut halved, mut batches) = (0, 0);
+        let mut replay = Replay::of(&graph);
+        while let Some(step) = replay.step(|key| session.estimate(key))? {
+            let begin = cpu_seconds();
+            session.push(&step.factors, &step.values)?;
+            let report = session.update()?;
+            let _newest = step.values.iter().last().and_then(|(key, _)| session.estimate(key.as_str()));
+            times.push(cpu_seconds() - begin);
+            halved += report.halved;
+            batches += usize::from(report.solved_batch);
+            if gaps > 0 && times.len() % gaps == 0 {
+                let best = session.finish(&LevenbergMarquardt::default(), &mut Silent)?.outcome.final_cost;
+                differences.push((session.cost() - best) / best.max(1e-9));
+            }
+        }
+        let name = std::path::Path::new(&path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let cost = session.cost();
+        let finished = session.finish(&LevenbergMarquardt::default(), &mut Silent)?.outcome.final_cost;
+        if json {
+            let latencies = Latencies::of(&times);
+            let told = serde_json::json!({
+                "latencies": latencies, "steps": times.len(), "cost": cost, "finished": finished, "gaps": differences,
+                "halved": halved, "batches": batches, "bytes": session.bytes(),
+            });
+            println!("{told}");
+            continue;
+        }
+        let (table, gap) = (Latencies::of(&times), Latencies::of(&differences));
+        println!(
+            "| {name} | {} | {:.3} | {:.3} | {:.2} | {:.1} | {:.1e} | {:.1e} | {halved} | {batches} | {cost:.6} | {finished:.6} | {:.1} |",
+            times.len(),
+            table.total,
+            1e3 * table.p50,
+            1e3 * table.p99,
+            1e3 * table.max,
+            gap.p50,
+            gap.max,
+            session.bytes() as f64 / 1e6,
+        );
+    }
+    Ok(())
+}

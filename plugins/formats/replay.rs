@@ -1,0 +1,151 @@
+//! A pose graph as a robot would have built it: pose by pose, each with the factors to what was there before it.
+//!
+//! Steps are the variables `x<number>`, by number. A factor belongs to the step of its latest pose; anything else, a landmark
+//! say, comes with the first factor that reaches it from what is known. Factors that nothing known reaches wait.
+use manifactor_geometry::{Tree, spanning_tree};
+use manifactor_graph::{FactorEntry, Graph, Key, ValueError, Values, Variable};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, HashSet, VecDeque};
+
+/// A graph, step by step.
+#[derive(Debug, Clone)]
+pub struct Replay {
+    steps: VecDeque<Vec<FactorEntry>>,
+    /// Factors that nothing known reaches yet.
+    waiting: Vec<FactorEntry>,
+    known: HashSet<Key>,
+    /// What is held, and has not been told yet.
+    fixed: Graph,
+}
+
+/// What one step brings: factors, and the first values of their new variables.
+#[derive(Debug, Clone, Default)]
+pub struct Step {
+    /// New factors; what the whole graph holds of the new variables is held.
+    pub factors: Graph,
+    /// By new variable, where odometry leads from the estimate of what is known.
+    pub values: Values,
+}
+
+/// The number of a pose's key.
+fn number(key: &Key) -> Option<u64> {
+    key.as_str().strip_prefix('x')?.parse().ok()
+}
+
+impl Replay {
+    /// The steps of a graph.
+    pub fn of(graph: &Graph) -> Self {
+        let poses = |entry: &FactorEntry| entry.keys.iter().filter_map(number).collect::<Vec<_>>();
+        let mut steps: BTreeMap<u64, Vec<FactorEntry>> = BTreeMap::new();
+        for entry in graph.factors() {
+            for pose in poses(entry) {
+                steps.entry(pose).or_default();
+            }
+            let latest = poses(entry).into_iter().max().unwrap_or(0);
+            steps.entry(latest).or_default().push(entry.clone());
+        }
+        // the odometry first: a pose starts from the one before it
+        for factors in steps.values_mut() {
+            factors.sort_by_key(|entry| Reverse(poses(entry).into_iter().min()));
+        }
+        let mut fixed = Graph::new();
+        graph.fixed().iter().for_each(|(key, held)| fixed.set_fixed(key, held.clone()));
+        Self { steps: steps.into_values().collect(), waiting: vec![], known: HashSet::new(), fixed }
+    }
+
+    /// Steps that are left.
+    pub fn len(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Whether no step is left.
+    pub fn is_empty(&self) -> bool {
+        self.steps.is_empty()
+    }
+
+    /// The next step, `None` after the last. New variables start from where `estimate` has those that are known.
+    ///
+    /// # Errors
+    /// Where a factor takes a variable for another type than its estimate has.
+    pub fn step(
+        &mut self,
+        estimate: impl Fn(&str) -> Option<Box<dyn Variable>>,
+    ) -> Result<Option<Step>, ValueError> {
+        let Some(new) = self.steps.pop_front() else { return Ok(None) };
+        self.waiting.extend(new);
+        let (factors, keys) = self.reach();
+        let mut values = Values::new();
+        let mut step = Step::default();
+        let mut graph = Graph::new();
+        for entry in factors {
+            graph.push(entry);
+        }
+        for key in graph.factors().iter().flat_map(|entry| &entry.keys) {
+            if !keys.contains(key)
+                && let Some(value) = estimate(key.as_str())
+            {
+                values.insert_boxed(key.clone(), value);
+            }
+        }
+        let placed = spanning_tree(&graph, &values, Tree::Chain)?;
+        for key in keys {
+            if let Some(held) = self.fixed.fixed().get(&key) {
+                graph.set_fixed(&key, held.clone());
+            }
+            if let Some(value) = placed.variable(key.as_str()) {
+                step.values.insert_boxed(key, value.erased().clone_box());
+            }
+        }
+        step.factors = graph;
+        Ok(Some(step))
+    }
+
+    /// Takes out the waiting factors that what is known reaches, one over the other; and the variables that are new with
+    /// them, in order. The very first are reached from nothing.
+    fn reach(&mut self) -> (Vec<FactorEntry>, Vec<Key>) {
+        let (mut factors, mut keys) = (vec![], vec![]);
+        loop {
+            let is_reached = |entry: &FactorEntry| entry.keys.iter().any(|key| self.known.contains(key));
+            let next = match self.known.is_empty() {
+                true => 0,
+                false => self.waiting.iter().position(is_reached).unwrap_or(self.waiting.len()),
+            };
+            if next >= self.waiting.len() {
+                return (factors, keys);
+            }
+            let entry = self.waiting.remove(next);
+            for key in &entry.keys {
+                if self.known.insert(key.clone()) {
+                    keys.push(key.clone());
+                }
+            }
+            factors.push(entry);
+        }
+    }
+}
+
+/// How long steps took, in seconds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct Latencies {
+    /// All of them together.
+    pub total: f64,
+    /// Half of them took at most this.
+    pub p50: f64,
+    /// 99 of 100 took at most this.
+    pub p99: f64,
+    /// The longest.
+    pub max: f64,
+}
+
+impl Latencies {
+    /// Of steps in any order; zeros, where there is none.
+    pub fn of(seconds: &[f64]) -> Self {
+        let mut sorted = seconds.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| {
+            let place = (share * sorted.len().saturating_sub(1) as f64) as usize;
+            sorted.get(place).copied().unwrap_or_default()
+        };
+        Self { total: seconds.iter().sum(), p50: at(0.5), p99: at(0.99), max: at(1.0) }
+    }
+}

@@ -1,0 +1,172 @@
+//! Published pose graphs through a session, pose by pose, beside batch solves.
+use manifactor_formats::pose_graph::{self, Options};
+use manifactor_formats::replay::Replay;
+use manifactor_geometry::{Between, Coordinates, Landmark, LieGroup, Point2, Range, Se2, Se3, So2};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::loss::Cauchy;
+use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
+use manifactor_online::{Report, Session, Settings};
+use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
+use nalgebra::{DMatrix, Vector2, Vector3};
+use std::path::PathBuf;
+
+fn data(path: &str) -> Option<PathBuf> {
+    let file = std::env::var_os("MANIFACTOR_DATA").map(|root| PathBuf::from(root).join(path));
+    let file = file.filter(|file| file.exists());
+    if file.is_none() {
+        eprintln!("skipped: MANIFACTOR_DATA does not name a folder with {path}");
+    }
+    file
+}
+
+/// All steps, and the report of the last.
+fn replay(graph: &Graph, most: usize) -> (Session, Report) {
+    let mut session = Session::new(Settings::default()).unwrap();
+    let (mut steps, mut report) = (Replay::of(graph), Report::default());
+    for _ in 0..most {
+        let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
+        session.push(&step.factors, &step.values).unwrap();
+        report = session.update().unwrap();
+    }
+    (session, report)
+}
+
+#[test]
+fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
+    // share of the optimum that the running estimate may be above it
+    for (name, most, above) in
+        [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 900, 2e-3)]
+    {
+        let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
+        let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+        let (mut session, report) = replay(&graph, most);
+        assert!(report.parked.is_empty() && report.undetermined.is_empty(), "{name}: {report:?}");
+        let finished = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap();
+        let (cost, best) = (session.cost(), finished.outcome.final_cost);
+        assert!(cost <= best * (1.0 + above), "{name}: {cost}, the optimum is {best}");
+        let batch = solve(&session.graph().0, &finished.values, &LevenbergMarquardt::default(), &mut Silent);
+        let batch = batch.unwrap().outcome.final_cost;
+        assert!((best - batch).abs() <= 1e-6 * batch, "{name}: {best}, batch {batch}");
+    }
+}
+
+#[test]
+fn a_covariance_from_the_fronts_is_that_of_a_batch() {
+    let Some(path) = data("g2o/intel.g2o") else { return };
+    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let (session, _) = replay(&graph, 300);
+    let keys = ["x299", "x17"];
+    let mut problem = Problem::compile(&session.graph().0, &session.estimates()).unwrap();
+    let expected = problem.joint_covariance(&keys).unwrap();
+    // linearization points are not quite the estimate
+    let found = session.covariance(&keys).unwrap();
+    assert!((&found - &expected).norm() < 1e-2 * expected.norm(), "{found} {expected}");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let Some(path) = data("g2o/parking-garage.g2o") else { return };
+    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let bits = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let session = pool.install(|| replay(&graph, 250).0);
+        let local = |pose: &Se3| Se3::identity().local(pose).map(f64::to_bits);
+        session.estimates().all::<Se3>().map(|(_, pose)| local(pose)).collect::<Vec<_>>()
+    };
+    let alone = bits(1);
+    assert!(bits(2) == alone && bits(4) == alone);
+}
+
+/// Victoria Park as a graph: poses by their numbers, trees by their ids.
+fn victoria_park(path: PathBuf) -> Graph {
+    let mut graph = Graph::new();
+    for line in std::fs::read_to_string(path).unwrap().lines() {
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        let numbers: Vec<f64> = fields[1..].iter().map(|field| field.parse().unwrap()).collect();
+        let pose = Key::indexed("x", numbers[0]);
+        let n = &numbers[2..];
+        if fields[0] == "ODOMETRY" {
+            let relative = Se2::new(So2::exp(n[2]), Vector2::new(n[0], n[1]));
+            let covariance =
+                DMatrix::from_row_slice(3, 3, &[n[3], n[4], n[5], n[4], n[6], n[7], n[5], n[7], n[8]]);
+            let noise = Noise::covariance(covariance).unwrap();
+            graph.add([pose, Key::indexed("x", numbers[1])], Between { relative }).noise(noise);
+        } else {
+            let covariance = DMatrix::from_row_slice(2, 2, &[n[2], n[3], n[3], n[4]]);
+            let noise = Noise::covariance(covariance).unwrap();
+            let seen = Landmark::<2> { position: Coordinates::new(Vector2::new(n[0], n[1])).unwrap() };
+            graph.add([pose, Key::indexed("l", numbers[1])], seen).noise(noise);
+        }
+    }
+    graph.fix("x0");
+    graph
+}
+
+#[test]
+fn victoria_park_is_mapped_by_the_ids_of_its_trees() {
+    let Some(path) = data("online/landmarks_2d/victoria_park.txt") else { return };
+    let graph = victoria_park(path);
+    let (mut session, report) = replay(&graph, usize::MAX);
+    assert!(report.parked.is_empty() && report.undetermined.is_empty());
+    let trees = session.estimates().iter().filter(|(key, _)| key.as_str().starts_with('l')).count();
+    assert_eq!((trees, session.variables()), (151, 151 + 6969));
+    let best = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap().outcome.final_cost;
+    let cost = session.cost();
+    assert!(cost <= 1.01 * best, "{cost}, the optimum is {best}");
+}
+
+/// The rows of a table of numbers.
+fn rows(path: PathBuf) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    text.lines().map(|line| line.split_whitespace().map(|field| field.parse().unwrap()).collect()).collect()
+}
+
+#[test]
+fn antennas_wait_for_a_second_range() {
+    let (Some(odometry), Some(ranges)) =
+        (data("online/range_only/Plaza2_DR.txt"), data("online/range_only/Plaza2_TD.txt"))
+    else {
+        return;
+    };
+    let (odometry, ranges) = (rows(odometry), rows(ranges));
+    let mut session = Session::new(Settings::default()).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("x0", Se2::identity());
+    graph.fix("x0");
+    session.push(&graph, &values).unwrap();
+    let (mut first, mut waited, mut pose) = (0, 0, Se2::identity());
+    for (i, row) in ranges.iter().take(600).enumerate() {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        let (here, antenna) = (Key::indexed("x", i + 1), Key::indexed("l", row[2]));
+        let mut relative = Se2::identity();
+        while first < odometry.len() && odometry[first][0] <= row[0] {
+            relative = Se2::compose(
+                &relative,
+                &Se2::exp(&Vector3::new(odometry[first][1], 0.0, odometry[first][2])),
+            );
+            first += 1;
+        }
+        pose = Se2::compose(&pose, &relative);
+        values.insert(here.clone(), pose.clone());
+        graph
+            .add([Key::indexed("x", i), here.clone()], Between { relative })
+            .noise(Noise::sigmas(&[0.05, 0.01, 0.02]).unwrap());
+        if session.estimate(antenna.as_str()).is_none() {
+            // somewhere ahead: a range says no more
+            values.insert(antenna.clone(), Point2::new(pose.act(&Vector2::new(row[3], 1.0))));
+        }
+        let range = Range::<Se2, Point2>::new(Positive::new(row[3]).unwrap());
+        graph.add([here.clone(), antenna], range).noise(Noise::sigma(0.5).unwrap()).loss(Cauchy::default());
+        session.push(&graph, &values).unwrap();
+        let report = session.update().unwrap();
+        assert!(report.parked.iter().all(|key| key.as_str().starts_with('l')), "{:?}", report.parked);
+        waited += report.parked.len();
+        pose = session.get(here.as_str()).unwrap();
+    }
+    assert!(waited > 0, "an antenna that is heard once is not known");
+    let (cost, estimates) = (session.cost(), session.estimates());
+    assert!(cost.is_finite() && estimates.iter().all(|(_, value)| value.erased().is_finite()));
+    let best = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap().outcome.final_cost;
+    println!("{cost} {best}");
+    assert!(cost < 1.1 * best, "{cost}, the optimum is {best}");
+}
