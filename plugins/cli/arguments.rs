@@ -1,6 +1,6 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Run, Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Plot, Run, Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
 use crate::output::watch;
@@ -32,6 +32,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Run),
+    Plot(Plot),
     Experiment(Experiment),
     Solve(Solve),
     Check(Check),
@@ -62,6 +63,7 @@ impl Cli {
         check_names(&all()).map_err(Failure::input)?;
         match &self.command {
             Command::Run(command) => command.run(self.verbose),
+            Command::Plot(command) => command.run(),
             Command::Experiment(command) => command.run(),
             Command::Solve(command) => command.run(self.verbose),
             Command::Check(command) => command.run(),
@@ -98,7 +100,7 @@ impl Cli {
             Command::Explain(command) => command.json,
             Command::Graph(command) => command.json,
             Command::Evaluate(command) => command.json,
-            Command::New(_) | Command::Simulate(_) => false,
+            Command::New(_) | Command::Plot(_) | Command::Simulate(_) => false,
             Command::Schema(_) => true,
         }
     }

@@ -1,6 +1,7 @@
 //! What a run has to tell, for scripts and for people.
 use crate::estimate::variance::Components;
 use crate::estimate::{Estimate, Landmark};
+use crate::input::sequence::ObjectId;
 use crate::mapping::{MappedObject, Rejection, Warning};
 use crate::settings::Settings;
 use manifactor_graph::Direction;
@@ -206,6 +207,12 @@ impl SolveReport {
             refinement_seconds: estimate.refinement_seconds,
         }
     }
+}
+
+/// How far each object is from the truth, where that is known.
+pub(super) fn object_errors(estimate: &Estimate) -> Vec<(ObjectId, LandmarkError)> {
+    let errors = landmarks::in_truth_frame(estimate, estimate.landmarks());
+    errors.into_iter().map(|(landmark, error)| (landmark.object.id, error)).collect()
 }
 
 fn objects(estimate: &Estimate, errors: &[(Landmark<'_>, LandmarkError)]) -> Vec<ObjectReport> {
