@@ -74,7 +74,7 @@ impl Axes {
 
 /// How many numbers fit upward.
 fn rows(height: f64) -> usize {
-    (height / 45.0).clamp(2.0, 10.0) as usize
+    (height / 32.0).clamp(3.0, 8.0) as usize
 }
 
 /// A text, cut where it would be wider than this.

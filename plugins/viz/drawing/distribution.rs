@@ -120,10 +120,19 @@ impl FiveNumbers {
                 let arrow = vec![[tip, y], [base, y - 4.0], [base, y + 4.0]];
                 sheet.outline(arrow, Stroke::solid(Ink::Outlier, 1.0), Some((Ink::Outlier, 1.0)));
                 let anchor = if way > 0.0 { Anchor::Start } else { Anchor::End };
-                let text = Text::new(format!("+{}", list.len()), [base + 3.0 * way, y - 3.0], 9.0, Ink::Outlier);
+                let text = Text::new(far(&list), [base + 3.0 * way, y - 3.0], 9.0, Ink::Outlier);
                 sheet.text(text.anchored(anchor));
             }
         }
+    }
+}
+
+/// How many values lie outside, and how far the farthest is.
+fn far(list: &[f64]) -> String {
+    let farthest = list.iter().copied().fold(0.0, |far: f64, x| if x.abs() > far.abs() { x } else { far });
+    match list.len() {
+        1 => format!("{farthest:.3}"),
+        n => format!("{n}, to {farthest:.3}"),
     }
 }
 
@@ -149,7 +158,7 @@ mod tests {
         let groups = vec![("Q".into(), vec![0.1, 0.2, 0.4]), ("Q+O".into(), values), ("none".into(), vec![])];
         let shape = Distribution { title: "shape".into(), x: "shape".into(), groups };
         let svg = shape.sheet(600.0).unwrap().svg("shape", Colors::Of(Theme::Light));
-        assert!(svg.contains(">Q<") && svg.contains(">Q+O<") && svg.contains(">+2<"));
+        assert!(svg.contains(">Q<") && svg.contains(">Q+O<") && svg.contains(">2, to 200000.000<"));
         assert!(!svg.contains("inf") && !svg.contains("none<"));
         assert!(Distribution::default().sheet(600.0).is_none());
     }

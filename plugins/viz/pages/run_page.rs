@@ -86,7 +86,7 @@ const CAPTIONS: [(&str, &str); 8] = [
     ("relative_error", "error of the motion between frames, in metres and in degrees: drift, whatever the alignment."),
     ("xyz", "the camera's position in the frame of the map's picture."),
     ("rpy", "the camera's orientation: turns about x, y and z."),
-    ("residuals", "boxes reach from quartile to quartile, whiskers to the last value within one and a half times that; dots lie beyond, and +n counts what lies outside the picture."),
+    ("residuals", "boxes reach from quartile to quartile, whiskers to the last value within one and a half times that; dots lie beyond, and an arrow says how many lie outside the picture and how far."),
 ];
 
 /// What is told of one variant alone.

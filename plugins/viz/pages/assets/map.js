@@ -138,7 +138,7 @@ class MapView {
     const { ratio } = this.renderer, height = this.canvas.clientHeight, names = [];
     this.parts().forEach((part, i) => {
       const [x, y, width, high] = part, below = [x, height - y - high, width, high].map(v => Math.round(v * ratio));
-      const look = { camera: this.orbit.matrix(width / high), eye: this.orbit.eye, paper: style.paper, dash: 0.05 * this.extent.radius };
+      const look = { camera: this.orbit.matrix(width / high), eye: this.orbit.eye, above: unit(this.orbit.up), paper: style.paper, dash: 0.05 * this.extent.radius };
       const { ellipsoids, segments, gravity } = this.shapes(this.variants[i], style);
       this.renderer.draw(below, look, ellipsoids, segments);
       names.push(...this.names(this.variants[i], part, gravity, style));

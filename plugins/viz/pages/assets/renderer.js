@@ -13,12 +13,14 @@ void main() {
 }`, `#version 300 es
 precision highp float;
 in vec3 normal; in vec3 toEye; in vec4 tint;
+uniform vec3 above;
 out vec4 result;
 void main() {
   vec3 n = normalize(normal), e = normalize(toEye);
-  float lit = 0.35 + 0.65 * abs(dot(n, e));
+  // light from above, and a little from the eye
+  float lit = 0.62 + 0.28 * dot(n, above) + 0.22 * abs(dot(n, e));
   float rim = pow(1.0 - abs(dot(n, e)), 3.0);
-  vec3 shaded = tint.rgb * lit + 0.12 * rim;
+  vec3 shaded = tint.rgb * lit + 0.1 * pow(max(dot(n, normalize(e + above)), 0.0), 24.0);
   // what is picked has a bright rim
   result = vec4(mix(shaded, vec3(1.0), tint.a > 0.5 ? 0.25 + 0.75 * rim : 0.0), 1.0);
 }`];
@@ -119,7 +121,7 @@ class Renderer {
   }
 
   // Draws a part of the canvas: a rectangle in its own pixels, from below.
-  draw([x, y, width, height], { camera, eye, paper, dash }, ellipsoids, segments) {
+  draw([x, y, width, height], { camera, eye, above, paper, dash }, ellipsoids, segments) {
     const gl = this.gl;
     gl.viewport(x, y, width, height);
     gl.scissor(x, y, width, height);
@@ -129,6 +131,7 @@ class Renderer {
     gl.bindVertexArray(this.ellipsoids.array);
     gl.uniformMatrix4fv(this.ellipsoids.uniform("camera"), false, camera);
     gl.uniform3fv(this.ellipsoids.uniform("eye"), eye);
+    gl.uniform3fv(this.ellipsoids.uniform("above"), above);
     let count = this.fill(this.ellipsoids, ellipsoids);
     if (count) gl.drawElementsInstanced(gl.TRIANGLES, this.corners, gl.UNSIGNED_SHORT, 0, count);
     gl.useProgram(this.lines.program);
