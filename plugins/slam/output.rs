@@ -142,11 +142,13 @@ fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> 
     #[derive(Serialize)]
     struct Named<'a> {
         name: &'a str,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        about: Option<&'a str>,
     }
     // names that are not UTF-8 have no other form in a document
     let output = variant_folder(&run.output, &variant.name).display().to_string();
     let folder = absolute(&run.folder).display().to_string();
-    let variants = [Named { name: &variant.name }];
+    let variants = [Named { name: &variant.name, about: variant.about.as_deref() }];
     let title = &run.title;
     to_toml(&Resolved { title, output, folder, settings: &variant.settings, variants })
 }

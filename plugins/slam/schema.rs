@@ -23,6 +23,7 @@ pub fn run_root(definitions: &mut Definitions) -> Value {
             "description": "Ways to do the run, to compare.",
             "items": object(json!({
                 "name": text("Its name, one of its own."),
+                "about": text("What it does, in a sentence that reports repeat."),
                 // a patch: parts of settings, that make sense with those of the document
                 "set": { "type": "object", "description": "Settings of the document that are others here." },
             }), &["name"], "A way to do the run."),
@@ -129,7 +130,7 @@ pub fn experiment_root(definitions: &mut Definitions) -> Value {
     let text = |description: &str| json!({ "type": "string", "description": description });
     let set = |description: &str| json!({ "type": "object", "description": description });
     let option = object(
-        json!({ "name": text("Its name in tables."), "set": set("Settings that are others.") }),
+        json!({ "name": text("Its name in tables."), "about": text("What it does, in a sentence."), "set": set("Settings that are others.") }),
         &["name"],
         "A way to set it.",
     );

@@ -117,7 +117,7 @@ impl VariantRecord {
         let (frames, alignment) = frames::frames(estimate, &settings.evaluation, &drawn);
         Self {
             name: variant.name.clone(),
-            about: None,
+            about: variant.about.clone(),
             folder: slug(&variant.name),
             up: up(estimate, &drawn),
             camera: estimate.sequence.camera,

@@ -38,6 +38,9 @@ pub struct RunReport {
 pub struct VariantReport {
     /// Its name.
     pub name: String,
+    /// What it does, in a sentence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub about: Option<String>,
     /// Of its [settings](Settings::fingerprint), which `config.toml` has, and of the program's version.
     pub fingerprint: String,
     /// How much there is of what.
@@ -145,6 +148,7 @@ impl VariantReport {
         let landmarks = LandmarkReport::new(&before, &after);
         Self {
             name: name.to_owned(),
+            about: None,
             fingerprint: settings.fingerprint(),
             counts: Counts::of(estimate),
             up: mapping.frame.up,

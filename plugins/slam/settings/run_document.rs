@@ -43,6 +43,9 @@ pub struct RunDocument {
 pub struct Variant {
     /// Its name, one of its own.
     pub name: String,
+    /// What it does, in a sentence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub about: Option<String>,
     /// Its settings, complete.
     pub settings: Settings,
 }
@@ -77,6 +80,8 @@ impl RunDocument {
 /// A variant, as it is written.
 pub(crate) struct Declared {
     pub(crate) name: String,
+    /// What it does, in a sentence.
+    pub(crate) about: Option<String>,
     /// Where the name is.
     pub(crate) place: Place,
     /// What it puts over the settings that all variants have in common.
@@ -97,9 +102,10 @@ impl Declared {
     pub(crate) fn read(mut section: Section<'_>) -> Option<Self> {
         let name = section.required::<String>("name");
         let place = section.place_of("name");
+        let about = section.optional("about");
         let set = section.take("set");
         section.finish();
-        Some(Self { name: name?, place, set })
+        Some(Self { name: name?, about, place, set })
     }
 }
 
@@ -147,15 +153,15 @@ fn read_variants(
     folder: &Path,
     errors: &Errors,
 ) -> Option<Vec<Variant>> {
-    let read = |name: String, node: Node| match Settings::read(node, folder) {
-        Ok(settings) => Some(Variant { name, settings }),
+    let read = |name: String, about: Option<String>, node: Node| match Settings::read(node, folder) {
+        Ok(settings) => Some(Variant { name, about, settings }),
         Err(diagnostics) => {
             errors.extend(diagnostics);
             None
         }
     };
     if declared.is_empty() {
-        return Some(vec![read(ONLY.to_owned(), base.clone())?]);
+        return Some(vec![read(ONLY.to_owned(), None, base.clone())?]);
     }
     // all of them are read, so that all errors are told at once
     let variants = declared.into_iter().map(|variant| {
@@ -163,7 +169,7 @@ fn read_variants(
         if let Some(set) = variant.set {
             merge(&mut node, set);
         }
-        read(variant.name, node)
+        read(variant.name, variant.about, node)
     });
     let variants: Vec<Option<Variant>> = variants.collect();
     variants.into_iter().collect()
