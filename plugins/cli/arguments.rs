@@ -1,11 +1,12 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Plot, Run, Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, Completions, Evaluate, Experiment, Explain, List, Man, New, Plot, Run, Schema,
+    ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
 use crate::output::watch;
 use crate::status::Status;
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 use manifactor::graph::catalogue::{all, check_names};
 use manifactor::solve::{Bytes, memory_limit};
 use std::num::NonZero;
@@ -44,6 +45,8 @@ enum Command {
     Evaluate(Evaluate),
     Simulate(Simulate),
     Schema(Schema),
+    Completions(Completions),
+    Man(Man),
 }
 
 impl Cli {
@@ -75,6 +78,8 @@ impl Cli {
             Command::Evaluate(command) => command.run(),
             Command::Simulate(command) => command.run(),
             Command::Schema(command) => command.run(),
+            Command::Completions(command) => Ok(command.run(Self::command())),
+            Command::Man(command) => command.run(Self::command()),
         }
     }
 
@@ -100,7 +105,11 @@ impl Cli {
             Command::Explain(command) => command.json,
             Command::Graph(command) => command.json,
             Command::Evaluate(command) => command.json,
-            Command::New(_) | Command::Plot(_) | Command::Simulate(_) => false,
+            Command::New(_)
+            | Command::Plot(_)
+            | Command::Simulate(_)
+            | Command::Completions(_)
+            | Command::Man(_) => false,
             Command::Schema(_) => true,
         }
     }
@@ -143,7 +152,6 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        use clap::CommandFactory;
         Cli::command().debug_assert();
     }
 

@@ -1,13 +1,13 @@
 //! The commands, a file each: what it takes, and what it does.
 mod check;
 mod check_factor;
+mod completions;
 mod evaluate;
 mod experiment;
 mod explain;
 mod graph;
 mod list;
 mod new;
-mod pictures;
 mod plot;
 mod run;
 mod schema;
@@ -16,6 +16,7 @@ mod solve;
 
 pub(crate) use check::Check;
 pub(crate) use check_factor::CheckFactor;
+pub(crate) use completions::{Completions, Man};
 pub(crate) use evaluate::Evaluate;
 pub(crate) use experiment::Experiment;
 pub(crate) use explain::Explain;

@@ -124,7 +124,10 @@ fn lines(frames: &[FrameRecord]) -> Result<String, WriteError> {
 
 /// JSON on one line.
 fn compact(value: &impl Serialize) -> Result<String, WriteError> {
-    let problem = |error: serde_json::Error| WriteError::Inexpressible { format: Format::Json, message: error.to_string() };
+    let problem = |error: serde_json::Error| WriteError::Inexpressible {
+        format: Format::Json,
+        message: error.to_string(),
+    };
     serde_json::to_string(value).map_err(problem)
 }
 

@@ -19,13 +19,15 @@ pub fn ply(run: &RunRecord, variant: &VariantRecord) -> String {
         let Some(shape) = &object.estimate else { continue };
         let (first, ink) = (vertices.count, palette.ink(&object.class));
         for (ring, sector) in (0..=RINGS).flat_map(|ring| (0..SECTORS).map(move |sector| (ring, sector))) {
-            let (polar, around) = (PI * ring as f64 / RINGS as f64, 2.0 * PI * sector as f64 / SECTORS as f64);
+            let (polar, around) =
+                (PI * ring as f64 / RINGS as f64, 2.0 * PI * sector as f64 / SECTORS as f64);
             let point = Vector3::new(polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos());
             vertices.vertex(&(shape.centroid + shape.axes * point), ink);
         }
         for (ring, sector) in (0..RINGS).flat_map(|ring| (0..SECTORS).map(move |sector| (ring, sector))) {
             let at = |ring: usize, sector: usize| first + ring * SECTORS + sector % SECTORS;
-            let (a, b, c, d) = (at(ring, sector), at(ring + 1, sector), at(ring + 1, sector + 1), at(ring, sector + 1));
+            let (a, b, c, d) =
+                (at(ring, sector), at(ring + 1, sector), at(ring + 1, sector + 1), at(ring, sector + 1));
             faces.line(format_args!("3 {a} {b} {c}"));
             faces.line(format_args!("3 {a} {c} {d}"));
         }

@@ -3,8 +3,8 @@ mod error;
 mod pose;
 mod residual;
 
-use crate::drawing::{Chart, Curve, Palette, Picture, Scene, View, figure, frames_seen, image, map};
 use crate::canvas::Ink;
+use crate::drawing::{Chart, Curve, Palette, Picture, Scene, View, figure, frames_seen, image, map};
 use manifactor_slam::record::{RunRecord, VariantRecord};
 
 pub(crate) use residual::{RESIDUALS, row as residual_row};
@@ -14,7 +14,8 @@ pub(crate) use residual::{RESIDUALS, row as residual_row};
 pub fn run_pictures(run: &RunRecord, variant: &VariantRecord, width: f64) -> Vec<Picture> {
     let palette = Palette::of(run);
     let scene = Scene::of(format!("{}: {}", run.title, variant.name), variant);
-    let mut pictures = vec![map(&scene, View::Top, &palette, width), map(&scene, View::Side, &palette, width)];
+    let mut pictures =
+        vec![map(&scene, View::Top, &palette, width), map(&scene, View::Side, &palette, width)];
     pictures.extend(charts(variant, width));
     let frames = frames_seen(variant, variant.images).into_iter();
     let frames = frames.filter_map(|number| Some((number, variant.frames.get(number)?)));

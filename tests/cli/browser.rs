@@ -112,7 +112,8 @@ impl Browser {
     /// Presses the left button at a point, moves by some way, and lets go.
     pub(crate) fn drag(&mut self, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) {
         let mut mouse = |kind: &str, x: f64, y: f64| {
-            let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1 });
+            let event =
+                json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1 });
             self.call("Input.dispatchMouseEvent", event);
         };
         mouse("mousePressed", x, y);
@@ -125,7 +126,8 @@ impl Browser {
 
     /// Puts two fingers on a point's right and left, and moves them apart.
     pub(crate) fn pinch(&mut self, [x, y]: [f64; 2], from: f64, to: f64) {
-        let fingers = |gap: f64| json!([{ "x": x - gap, "y": y, "id": 0 }, { "x": x + gap, "y": y, "id": 1 }]);
+        let fingers =
+            |gap: f64| json!([{ "x": x - gap, "y": y, "id": 0 }, { "x": x + gap, "y": y, "id": 1 }]);
         for (kind, points) in [
             ("touchStart", fingers(from)),
             ("touchMove", fingers(0.5 * (from + to))),

@@ -28,14 +28,31 @@ fn the_report_of_a_run_needs_no_network() {
     let out = path(&folder, "desk");
     let html = std::fs::read_to_string(desk(&out)).unwrap();
     assert_self_contained(&html);
-    for text in ["simulated desk", "QuadricSLAM", "absolute pose error", "bounding_box", "not mapped because", "[source]"] {
+    for text in [
+        "simulated desk",
+        "QuadricSLAM",
+        "absolute pose error",
+        "bounding_box",
+        "not mapped because",
+        "[source]",
+    ] {
         assert!(html.contains(text), "{text}");
     }
     let pictures = html.matches("<svg").count();
     assert!(pictures > 20);
     assert_eq!(html.matches("viewBox=").count(), pictures);
     assert_eq!(html.matches("role=\"img\"").count(), pictures + 1);
-    for name in ["map_top", "map_side", "error_over_time", "relative_error", "xyz", "rpy", "residuals", "cost", "image_000000"] {
+    for name in [
+        "map_top",
+        "map_side",
+        "error_over_time",
+        "relative_error",
+        "xyz",
+        "rpy",
+        "residuals",
+        "cost",
+        "image_000000",
+    ] {
         let png = std::fs::read(Path::new(&out).join(format!("quadricslam/{name}.png"))).unwrap();
         assert_eq!(png.get(1..4), Some(&b"PNG"[..]), "{name}");
     }
@@ -101,7 +118,8 @@ fn without_webgl_there_is_a_picture() {
     browser.show(&page, 1024, "light");
     browser.until("document.documentElement.dataset.map");
     assert_eq!(browser.value("document.documentElement.dataset.map"), "static");
-    let shown = browser.value("document.querySelector('#static-map svg').getBoundingClientRect().width > 500");
+    let shown =
+        browser.value("document.querySelector('#static-map svg').getBoundingClientRect().width > 500");
     assert_eq!(shown, true);
     assert_eq!(browser.value("getComputedStyle(document.getElementById('map')).display"), "none");
     let caption = browser.value("document.querySelector('#static-map figcaption').textContent");

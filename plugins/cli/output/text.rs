@@ -7,8 +7,8 @@ mod width;
 
 pub(crate) use printable::{json, on_one_line, printable, same_length, shortened};
 pub(crate) use table::Table;
-pub(crate) use width::width;
 use unicode_width::UnicodeWidthStr;
+pub(crate) use width::width;
 
 /// A paragraph, broken into lines as wide as the terminal is.
 pub(crate) fn wrap(paragraph: &str) -> String {

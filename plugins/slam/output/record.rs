@@ -104,7 +104,8 @@ impl RunRecord {
     /// Where there is none, or one of another version.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let path = folder.join(RECORD);
-        let text = std::fs::read_to_string(&path).map_err(|source| RecordError::Io { path: path.clone(), source })?;
+        let text = std::fs::read_to_string(&path)
+            .map_err(|source| RecordError::Io { path: path.clone(), source })?;
         serde_json::from_str(&text).map_err(|source| RecordError::NotARecord { path, source })
     }
 }

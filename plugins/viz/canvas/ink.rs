@@ -82,7 +82,8 @@ impl Ink {
     /// Its parts of red, green and blue.
     pub(crate) fn rgb(self, theme: Theme) -> [u8; 3] {
         let hex = self.hex(theme);
-        [1, 3, 5].map(|at| hex.get(at..at + 2).and_then(|part| u8::from_str_radix(part, 16).ok()).unwrap_or(0))
+        [1, 3, 5]
+            .map(|at| hex.get(at..at + 2).and_then(|part| u8::from_str_radix(part, 16).ok()).unwrap_or(0))
     }
 }
 

@@ -24,7 +24,13 @@ impl Sheet {
                 Item::Path { points, closed, stroke, fill } => {
                     let Some(path) = polygon(points, *closed) else { continue };
                     if let Some((ink, opacity)) = fill {
-                        pixels.fill_path(&path, &paint(*ink, theme, *opacity), FillRule::Winding, transform, None);
+                        pixels.fill_path(
+                            &path,
+                            &paint(*ink, theme, *opacity),
+                            FillRule::Winding,
+                            transform,
+                            None,
+                        );
                     }
                     if let Some(stroke) = stroke {
                         let [dash, gap] = DASHES.map(|x| x as f32);
@@ -42,7 +48,13 @@ impl Sheet {
                 }
                 Item::Text(text) => {
                     if let Some(path) = letters(text) {
-                        pixels.fill_path(&path, &paint(text.ink, theme, 1.0), FillRule::Winding, transform, None);
+                        pixels.fill_path(
+                            &path,
+                            &paint(text.ink, theme, 1.0),
+                            FillRule::Winding,
+                            transform,
+                            None,
+                        );
                     }
                 }
             }

@@ -45,7 +45,11 @@ impl Sheet {
                 Item::Dot { at: [x, y], radius, ink } => {
                     let (x, y, r) = (number(*x), number(*y), number(*radius));
                     // writing to a String does not fail
-                    let _ = writeln!(svg, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{}\"/>", colors.of(*ink));
+                    let _ = writeln!(
+                        svg,
+                        "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{}\"/>",
+                        colors.of(*ink)
+                    );
                 }
                 Item::Text(text) => words(&mut svg, text, colors),
             }
@@ -63,8 +67,8 @@ fn path(
     colors: Colors,
 ) {
     let Some(([x, y], rest)) = points.split_first() else { return };
-    let _ = write!(svg, "<path d=\"M{} {}", number(*x), number(*y));
-    rest.iter().for_each(|[x, y]| _ = write!(svg, "L{} {}", number(*x), number(*y)));
+    let _ = write!(svg, "<path d=\"M{} {}", tenths(*x), tenths(*y));
+    rest.iter().for_each(|[x, y]| _ = write!(svg, "L{} {}", tenths(*x), tenths(*y)));
     *svg += if closed { "Z\"" } else { "\"" };
     let _ = match fill {
         Some((ink, opacity)) if opacity < 1.0 => {
@@ -84,7 +88,12 @@ fn path(
 
 fn words(svg: &mut String, text: &Text, colors: Colors) {
     let [x, y] = text.at.map(number);
-    let _ = write!(svg, "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"", number(text.size), colors.of(text.ink));
+    let _ = write!(
+        svg,
+        "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"",
+        number(text.size),
+        colors.of(text.ink)
+    );
     *svg += match text.anchor {
         Anchor::Start => "",
         Anchor::Middle => " text-anchor=\"middle\"",
@@ -97,6 +106,11 @@ fn words(svg: &mut String, text: &Text, colors: Colors) {
         let _ = write!(svg, " transform=\"rotate(-90 {x} {y})\"");
     }
     let _ = writeln!(svg, ">{}</text>", escape(&text.text));
+}
+
+/// What a corner of a line needs: the PNG has half a pixel for it.
+fn tenths(x: f64) -> String {
+    number((x * 10.0).round() / 10.0)
 }
 
 /// Hundredths of a pixel.

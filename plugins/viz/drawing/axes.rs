@@ -23,7 +23,11 @@ pub(crate) struct Axes {
 impl Axes {
     /// What numbers and a label to the left of the area take.
     pub(crate) fn left(y: &Scale, height: f64) -> f64 {
-        let widest = y.ticks(rows(height)).iter().map(|(_, text)| text_width(text, NUMBERS, false)).fold(0.0, f64::max);
+        let widest = y
+            .ticks(rows(height))
+            .iter()
+            .map(|(_, text)| text_width(text, NUMBERS, false))
+            .fold(0.0, f64::max);
         widest + LABELS + 18.0
     }
 
@@ -60,7 +64,9 @@ impl Axes {
         for (y, text) in self.y.ticks(rows(ymax - ymin)) {
             let at = ymax - self.y.place(y) * (ymax - ymin);
             sheet.line(vec![[xmin, at], [xmax, at]], thin);
-            sheet.text(Text::new(written(text), [xmin - 6.0, at + 4.0], NUMBERS, Ink::Faint).anchored(Anchor::End));
+            sheet.text(
+                Text::new(written(text), [xmin - 6.0, at + 4.0], NUMBERS, Ink::Faint).anchored(Anchor::End),
+            );
         }
         let frame = vec![[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]];
         sheet.outline(frame, Stroke::solid(Ink::Faint, 1.0), None);

@@ -43,7 +43,14 @@ impl Curve {
 
 /// Panels above each other over one axis, under a title. Points that are not finite, or not above zero on an axis of
 /// powers, are left out; `None` where no panel has any point.
-pub(crate) fn figure(text: &str, x: &str, log_x: bool, panels: &[Chart], width: f64, height: f64) -> Option<Sheet> {
+pub(crate) fn figure(
+    text: &str,
+    x: &str,
+    log_x: bool,
+    panels: &[Chart],
+    width: f64,
+    height: f64,
+) -> Option<Sheet> {
     let shown = |panel: &Chart, p: &(f64, f64)| {
         p.0.is_finite() && p.1.is_finite() && !(log_x && p.0 <= 0.0) && !(panel.log_y && p.1 <= 0.0)
     };
@@ -52,7 +59,10 @@ pub(crate) fn figure(text: &str, x: &str, log_x: bool, panels: &[Chart], width: 
         .map(|panel| {
             let mut panel = panel.clone();
             let shown = |p: &(f64, f64)| shown(&panel, p);
-            let keep = |curve: &Curve| Curve { points: curve.points.iter().copied().filter(shown).collect(), ..curve.clone() };
+            let keep = |curve: &Curve| Curve {
+                points: curve.points.iter().copied().filter(shown).collect(),
+                ..curve.clone()
+            };
             panel.curves = panel.curves.iter().map(keep).filter(|curve| !curve.points.is_empty()).collect();
             panel
         })
@@ -113,7 +123,8 @@ fn thinned(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
         let by = |a: &(usize, &[f64; 2]), b: &(usize, &[f64; 2])| a.1[1].total_cmp(&b.1[1]);
         let lowest = column.iter().enumerate().min_by(by).map(|(i, _)| i);
         let highest = column.iter().enumerate().max_by(by).map(|(i, _)| i);
-        let mut places: Vec<usize> = [Some(0), lowest, highest, column.len().checked_sub(1)].into_iter().flatten().collect();
+        let mut places: Vec<usize> =
+            [Some(0), lowest, highest, column.len().checked_sub(1)].into_iter().flatten().collect();
         places.sort_unstable();
         places.dedup();
         kept.extend(places.into_iter().filter_map(|place| column.get(place)));

@@ -68,7 +68,9 @@ fn grid(axes: &Axes, sheet: &mut Sheet, label: &str) {
     let frame = vec![[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]];
     sheet.outline(frame, Stroke::solid(Ink::Faint, 1.0), None);
     let label = fitted(label, LABELS, xmax - xmin);
-    sheet.text(Text::new(label, [0.5 * (xmin + xmax), ymax + 33.0], LABELS, Ink::Text).anchored(Anchor::Middle));
+    sheet.text(
+        Text::new(label, [0.5 * (xmin + xmax), ymax + 33.0], LABELS, Ink::Text).anchored(Anchor::Middle),
+    );
 }
 
 impl FiveNumbers {
@@ -111,7 +113,10 @@ impl FiveNumbers {
         // the ends are what matters; between them one dot in so many
         let each = seen.len().div_ceil(DOTS).max(1);
         let ends = |i: usize| i % each == 0 || i + 1 == seen.len();
-        seen.iter().enumerate().filter(|(i, _)| ends(*i)).for_each(|(_, x)| sheet.dot([at(*x), y], 1.8, Ink::Outlier));
+        seen.iter()
+            .enumerate()
+            .filter(|(i, _)| ends(*i))
+            .for_each(|(_, x)| sheet.dot([at(*x), y], 1.8, Ink::Outlier));
         let (below, above): (Vec<f64>, Vec<f64>) = unseen.iter().partition(|x| **x < self.quartiles[0]);
         let [xmin, _, xmax, _] = axes.area;
         for (list, tip, way) in [(below, xmin, 1.0), (above, xmax, -1.0)] {
@@ -143,7 +148,9 @@ mod tests {
 
     #[test]
     fn whiskers_do_not_end_inside_the_box() {
-        for values in [vec![0.0, 0.0, 0.0, 10.0], vec![1.0, 2.0], vec![-50.0, 1.0, 1.1, 1.2, 1.3, 90.0], vec![3.0]] {
+        for values in
+            [vec![0.0, 0.0, 0.0, 10.0], vec![1.0, 2.0], vec![-50.0, 1.0, 1.1, 1.2, 1.3, 90.0], vec![3.0]]
+        {
             let FiveNumbers { whiskers, quartiles, .. } = FiveNumbers::of(&values).unwrap();
             assert!(whiskers[0] <= quartiles[0] && whiskers[1] >= quartiles[2], "{values:?}");
             assert!(quartiles[0] <= quartiles[1] && quartiles[1] <= quartiles[2]);

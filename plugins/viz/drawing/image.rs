@@ -19,7 +19,13 @@ fn drawn_height([width, height]: [f64; 2], drawn: f64) -> f64 {
 }
 
 /// One image: measured boxes dashed, estimated ellipses and the boxes around them solid, by class. Pixels, y downward.
-pub(crate) fn image(variant: &VariantRecord, number: usize, frame: &FrameRecord, palette: &Palette, width: f64) -> Picture {
+pub(crate) fn image(
+    variant: &VariantRecord,
+    number: usize,
+    frame: &FrameRecord,
+    palette: &Palette,
+    width: f64,
+) -> Picture {
     let size = [variant.camera.width, variant.camera.height].map(f64::from);
     let class = |seen: &SeenBox| {
         let object = variant.objects.iter().find(|object| object.id == seen.object);

@@ -28,7 +28,14 @@ pub(crate) fn map(scene: &Scene, view: View, palette: &Palette, width: f64) -> P
     let tracks: Vec<Vec<Point2<f64>>> = scene
         .tracks
         .iter()
-        .map(|track| track.positions.iter().filter(|p| p.iter().all(|x| x.is_finite())).map(|p| plane.project(p)).collect())
+        .map(|track| {
+            track
+                .positions
+                .iter()
+                .filter(|p| p.iter().all(|x| x.is_finite()))
+                .map(|p| plane.project(p))
+                .collect()
+        })
         .collect();
     let outlines = |of: fn(&Object) -> Option<&Shape>| -> Vec<Outline<'_>> {
         let outline = |o| of(o).and_then(|shape| shape.outline(&plane));
@@ -55,7 +62,8 @@ pub(crate) fn map(scene: &Scene, view: View, palette: &Palette, width: f64) -> P
     sheet.place(entries, [10.0, HEAD]);
     axes.draw(&mut sheet);
 
-    let drawn = |points: &[Point2<f64>]| -> Vec<[f64; 2]> { points.iter().map(|p| axes.point(p.x, p.y)).collect() };
+    let drawn =
+        |points: &[Point2<f64>]| -> Vec<[f64; 2]> { points.iter().map(|p| axes.point(p.x, p.y)).collect() };
     for (class, outline) in &near {
         let ink = palette.ink(class);
         sheet.outline(drawn(outline), Stroke::solid(ink, 1.8), Some((ink, 0.18)));
@@ -68,8 +76,10 @@ pub(crate) fn map(scene: &Scene, view: View, palette: &Palette, width: f64) -> P
     }
     // seen from the side, what stands on one table stands on one line
     if view == View::Top {
-        let label = |(class, outline): &&Outline<'_>| {
-            Label { text: (*class).to_owned(), around: around(&drawn(outline)), ink: palette.ink(class) }
+        let label = |(class, outline): &&Outline<'_>| Label {
+            text: (*class).to_owned(),
+            around: around(&drawn(outline)),
+            ink: palette.ink(class),
         };
         place(&mut sheet, &near.iter().map(label).collect::<Vec<_>>(), area);
     }
@@ -80,7 +90,12 @@ pub(crate) fn map(scene: &Scene, view: View, palette: &Palette, width: f64) -> P
     Picture::new(name, format!("{text}: trajectories and objects {seen}"), sheet)
 }
 
-fn entries(scene: &Scene, palette: &Palette, truths: &[Outline<'_>], estimates: &[Outline<'_>]) -> Vec<Entry> {
+fn entries(
+    scene: &Scene,
+    palette: &Palette,
+    truths: &[Outline<'_>],
+    estimates: &[Outline<'_>],
+) -> Vec<Entry> {
     let mut entries: Vec<_> = scene.tracks.iter().map(|t| Entry::line(&t.name, t.stroke)).collect();
     if !truths.is_empty() {
         entries.push(Entry::line("true object", Stroke::dashed(Ink::Faint, 1.3)));
@@ -99,7 +114,8 @@ fn entries(scene: &Scene, palette: &Palette, truths: &[Outline<'_>], estimates: 
 
 /// The box around points.
 fn around(points: &[[f64; 2]]) -> [f64; 4] {
-    let end = |of: fn(&[f64; 2]) -> f64, pick: fn(f64, f64) -> f64, from| points.iter().map(of).fold(from, pick);
+    let end =
+        |of: fn(&[f64; 2]) -> f64, pick: fn(f64, f64) -> f64, from| points.iter().map(of).fold(from, pick);
     [
         end(|p| p[0], f64::min, f64::INFINITY),
         end(|p| p[1], f64::min, f64::INFINITY),

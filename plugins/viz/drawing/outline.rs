@@ -12,7 +12,7 @@ pub(crate) struct Shape {
 }
 
 /// Corners of the polygon that an ellipse is drawn as.
-const CORNERS: usize = 64;
+const CORNERS: usize = 48;
 
 impl Shape {
     /// The closed outline of its shadow, the ellipse of Σ a_k a_kᵀ, a_k the projected semi-axes. None, where there is

@@ -52,7 +52,11 @@ impl Scale {
 
     /// From 0 at its lower end to 1 at its upper.
     pub(crate) fn place(&self, x: f64) -> f64 {
-        if self.log { (x / self.low).ln() / (self.high / self.low).ln() } else { (x - self.low) / (self.high - self.low) }
+        if self.log {
+            (x / self.low).ln() / (self.high / self.low).ln()
+        } else {
+            (x - self.low) / (self.high - self.low)
+        }
     }
 
     pub(crate) fn holds(&self, x: f64) -> bool {
@@ -75,11 +79,14 @@ impl Scale {
     }
 
     fn powers(&self, most: usize) -> Vec<(f64, String)> {
-        let (first, last) = ((self.low.log10() - 1e-6).ceil() as i32, (self.high.log10() + 1e-6).floor() as i32);
+        let (first, last) =
+            ((self.low.log10() - 1e-6).ceil() as i32, (self.high.log10() + 1e-6).floor() as i32);
         let powers = usize::try_from(last - first + 1).unwrap_or(0);
         let each = powers.div_ceil(most.max(1)).max(1);
         let parts: &[f64] = if 3 * powers <= most { &[1.0, 2.0, 5.0] } else { &[1.0] };
-        let numbers = (first - 1..=last).step_by(each).flat_map(|power| parts.iter().map(move |m| m * 10f64.powi(power)));
+        let numbers = (first - 1..=last)
+            .step_by(each)
+            .flat_map(|power| parts.iter().map(move |m| m * 10f64.powi(power)));
         let inside = |x: &f64| *x >= self.low * 0.999 && *x <= self.high * 1.001;
         numbers.filter(inside).map(|x| (x, written(x, x))).collect()
     }

@@ -8,7 +8,12 @@ use manifactor_slam::experiment::{Experiment, Summary};
 
 /// The pictures of an experiment, one a metric, at this width in pixels: a curve over the column that the summary names, or
 /// distributions.
-pub fn experiment_pictures(experiment: &Experiment, summary: &Summary, trials: &Table, width: f64) -> Vec<Picture> {
+pub fn experiment_pictures(
+    experiment: &Experiment,
+    summary: &Summary,
+    trials: &Table,
+    width: f64,
+) -> Vec<Picture> {
     let picture = |metric: &String| match &experiment.summary.curve {
         Some(x) => {
             let text = format!("{metric} over {x}");

@@ -14,7 +14,8 @@ pub(crate) struct Page {
 
 const STYLE: &str = include_str!("assets/page.css");
 /// What a browser may do with the page: run what is in it, and fetch nothing.
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
 impl Page {
     /// A page with a heading.
@@ -47,7 +48,8 @@ impl Page {
 
     /// Words, each with what it means.
     pub(crate) fn definitions(&mut self, list: &[(&str, &str)]) -> &mut Self {
-        let items = list.iter().map(|(word, text)| format!("<dt>{}</dt><dd>{}</dd>", escape(word), escape(text)));
+        let items =
+            list.iter().map(|(word, text)| format!("<dt>{}</dt><dd>{}</dd>", escape(word), escape(text)));
         let items: String = items.collect();
         if list.is_empty() { self } else { self.push(&format!("<dl>{items}</dl>")) }
     }
@@ -63,7 +65,19 @@ impl Page {
     pub(crate) fn table(&mut self, header: &[String], rows: &[Vec<String>]) -> &mut Self {
         let mut html = String::from("<div class=\"wide\" tabindex=\"0\"><table><thead><tr>");
         // writing to a String does not fail
-        header.iter().for_each(|cell| _ = write!(html, "<th scope=\"col\">{}</th>", escape(cell)));
+        for (column, cell) in header.iter().enumerate() {
+            let cells = || {
+                rows.iter()
+                    .filter_map(|row| row.get(column))
+                    .filter(|cell| !matches!(cell.as_str(), "" | "-"))
+            };
+            let class = if cells().all(|cell| is_number(cell)) && cells().next().is_some() {
+                " class=\"n\""
+            } else {
+                ""
+            };
+            let _ = write!(html, "<th scope=\"col\"{class}>{}</th>", escape(cell));
+        }
         html += "</tr></thead><tbody>\n";
         for row in rows {
             html += "<tr>";
@@ -83,7 +97,10 @@ impl Page {
     }
 
     /// Pictures side by side where there is room, under one caption each.
-    pub(crate) fn pictures<'a>(&mut self, pictures: impl Iterator<Item = (&'a Picture, String)>) -> &mut Self {
+    pub(crate) fn pictures<'a>(
+        &mut self,
+        pictures: impl Iterator<Item = (&'a Picture, String)>,
+    ) -> &mut Self {
         let figures: String = pictures.map(|(picture, caption)| figure(picture, &caption)).collect();
         if figures.is_empty() { self } else { self.push(&format!("<div class=\"figures\">{figures}</div>")) }
     }
@@ -105,7 +122,10 @@ impl Page {
 
     /// Data for scripts, to be found by `id`.
     pub(crate) fn data(&mut self, id: &'static str, value: &serde_json::Value) -> &mut Self {
-        self.push(&format!("<script type=\"application/json\" id=\"{id}\">{}</script>", in_script(&value.to_string())))
+        self.push(&format!(
+            "<script type=\"application/json\" id=\"{id}\">{}</script>",
+            in_script(&value.to_string())
+        ))
     }
 
     fn push(&mut self, html: &str) -> &mut Self {

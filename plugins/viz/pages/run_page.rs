@@ -1,5 +1,5 @@
 //! The page of a run: the map in 3D, its variants side by side, and what was done with each object.
-use super::run_tables::{objects, noise, overview, own_variables, words};
+use super::run_tables::{noise, objects, overview, own_variables, words};
 use super::{page::Page, viewer};
 use crate::drawing::{Palette, Picture, Scene, View, frames_seen, image, map};
 use crate::run::{RESIDUALS, charts, cost, residual_row};
@@ -11,11 +11,20 @@ const WIDTH: f64 = 560.0;
 
 /// What the words of the overview mean.
 const DEFINITIONS: [(&str, &str); 5] = [
-    ("ATE", "absolute trajectory error: the root mean square of the distances between the estimated and the true positions of the camera, after alignment"),
+    (
+        "ATE",
+        "absolute trajectory error: the root mean square of the distances between the estimated and the true positions of the camera, after alignment",
+    ),
     ("position", "the root mean square of the distances between the centres of objects, estimated and true"),
-    ("shape", "the mean Jaccard distance, 1 - IoU, of the axis-aligned boxes around the estimated and the true object when both are centred at the origin: 0 is perfect, 1 is no overlap; size and orientation count, place does not"),
+    (
+        "shape",
+        "the mean Jaccard distance, 1 - IoU, of the axis-aligned boxes around the estimated and the true object when both are centred at the origin: 0 is perfect, 1 is no overlap; size and orientation count, place does not",
+    ),
     ("quality", "the same where the objects stand: place counts as well"),
-    ("cost", "½ Σ ρ(‖r‖²) over all factors, r in standard deviations: comparable between variants of the same factors alone"),
+    (
+        "cost",
+        "½ Σ ρ(‖r‖²) over all factors, r in standard deviations: comparable between variants of the same factors alone",
+    ),
 ];
 
 /// The page. `record` and `report` have the same variants; `configs` are the resolved configs of these.
@@ -46,7 +55,10 @@ fn in_3d(page: &mut Page, record: &RunRecord) {
     let scene = Scene::of(format!("{}: {}", record.title, last.name), last);
     let picture = map(&scene, View::Top, &Palette::of(record), 1.6 * WIDTH);
     page.own("<div id=\"static-map\">", "");
-    page.picture(&picture, "The map from above. Where the browser has WebGL 2, it is a map in 3D that can be turned.");
+    page.picture(
+        &picture,
+        "The map from above. Where the browser has WebGL 2, it is a map in 3D that can be turned.",
+    );
     page.own("</div>", "");
     page.data("run-data", &viewer::data(record)).own(viewer::MARKUP, &viewer::SCRIPTS.concat());
 }
@@ -63,7 +75,8 @@ fn side_by_side(page: &mut Page, record: &RunRecord) {
         .iter()
         .map(|variant| {
             let scene = Scene::of(variant.name.clone(), variant);
-            let mut pictures = vec![map(&scene, View::Top, &palette, WIDTH), map(&scene, View::Side, &palette, WIDTH)];
+            let mut pictures =
+                vec![map(&scene, View::Top, &palette, WIDTH), map(&scene, View::Side, &palette, WIDTH)];
             pictures.extend(charts(variant, WIDTH));
             (variant, pictures)
         })
@@ -79,14 +92,23 @@ fn side_by_side(page: &mut Page, record: &RunRecord) {
 
 /// Pictures by name, each with what it shows.
 const CAPTIONS: [(&str, &str); 8] = [
-    ("cost", "The cost after each accepted step, from where the solve began."),
+    (
+        "cost",
+        "The cost after each accepted step, from where the solve began. Costs compare between variants of the same noise and factors alone.",
+    ),
     ("map_top", "the map from above. True objects and the true path are dashed."),
     ("map_side", "the map from the side, up being up."),
     ("error_over_time", "distance of each position from the true one, after alignment of the whole path."),
-    ("relative_error", "error of the motion between frames, in metres and in degrees: drift, whatever the alignment."),
+    (
+        "relative_error",
+        "error of the motion between frames, in metres and in degrees: drift, whatever the alignment.",
+    ),
     ("xyz", "the camera's position in the frame of the map's picture."),
     ("rpy", "the camera's orientation: turns about x, y and z."),
-    ("residuals", "boxes reach from quartile to quartile, whiskers to the last value within one and a half times that; dots lie beyond, and an arrow says how many lie outside the picture and how far."),
+    (
+        "residuals",
+        "boxes reach from quartile to quartile, whiskers to the last value within one and a half times that; dots lie beyond, and an arrow says how many lie outside the picture and how far.",
+    ),
 ];
 
 /// What is told of one variant alone.
@@ -98,11 +120,14 @@ fn variant(page: &mut Page, report: &VariantReport, record: &VariantRecord, conf
     page.warnings(&report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
     let palette = Palette::new(record.classes().into_iter());
     let frames = frames_seen(record, record.images).into_iter();
-    let images = frames.filter_map(|number| Some(image(record, number, record.frames.get(number)?, &palette, WIDTH)));
+    let images =
+        frames.filter_map(|number| Some(image(record, number, record.frames.get(number)?, &palette, WIDTH)));
     let images: Vec<Picture> = images.collect();
-    let caption = "Boxes as the detector drew them are dashed; outlines of the estimated ellipsoids are filled.";
+    let caption =
+        "Boxes as the detector drew them are dashed; outlines of the estimated ellipsoids are filled.";
     page.pictures(images.iter().map(|picture| (picture, caption.to_owned())));
-    page.subheading("Residuals").paragraph("At the estimate, in standard deviations of their noise, row by row.");
+    page.subheading("Residuals")
+        .paragraph("At the estimate, in standard deviations of their noise, row by row.");
     page.table(&words(RESIDUALS), &record.residuals.iter().map(residual_row).collect::<Vec<_>>());
     noise(page, report);
     own_variables(page, record);

@@ -50,7 +50,8 @@ pub(super) fn noise(page: &mut Page, report: &VariantReport) {
     let Some(noise) = report.variance_components.last() else { return };
     let rounds = report.variance_components.len();
     page.subheading("Noise").paragraph(&format!("As it was estimated, in {rounds} rounds."));
-    let alone = |name: &str, sigma: f64| vec![name.to_owned(), format!("{sigma:.3e}"), String::new(), String::new()];
+    let alone =
+        |name: &str, sigma: f64| vec![name.to_owned(), format!("{sigma:.3e}"), String::new(), String::new()];
     let mut rows = vec![];
     if let Some([turn, shift]) = noise.odometry {
         rows.push(alone("odometry, rotation (rad)", turn));
@@ -69,7 +70,8 @@ pub(super) fn own_variables(page: &mut Page, record: &VariantRecord) {
         return;
     }
     page.subheading("Variables of this run").paragraph("As documents write them, in the frame of the map.");
-    let rows = record.variables.iter().map(|v| vec![v.key.clone(), v.initial.to_string(), v.estimate.to_string()]);
+    let rows =
+        record.variables.iter().map(|v| vec![v.key.clone(), v.initial.to_string(), v.estimate.to_string()]);
     page.table(&words(["variable", "before", "estimate"]), &rows.collect::<Vec<_>>());
 }
 

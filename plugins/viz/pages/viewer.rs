@@ -3,7 +3,7 @@ use crate::canvas::{Ink, Theme};
 use crate::drawing::Palette;
 use manifactor_geometry::Se3;
 use manifactor_quadric::DualQuadric;
-use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, TrackedPose, VariantRecord};
+use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, Solid, TrackedPose, VariantRecord};
 use serde_json::{Value, json};
 
 pub(super) const MARKUP: &str = include_str!("assets/map.html");
@@ -30,7 +30,7 @@ pub(super) fn data(run: &RunRecord) -> Value {
 fn of_variant(variant: &VariantRecord, palette: &Palette) -> Value {
     let start = variant.frames.first().map_or(0.0, |frame| frame.timestamp);
     let camera = &variant.camera;
-    let up = [variant.up.x, variant.up.y, variant.up.z].map(|x| rounded(x, 6));
+    let up = numbers(variant.up.iter(), 6);
     json!({
         "name": variant.name,
         "up": up,
@@ -40,39 +40,43 @@ fn of_variant(variant: &VariantRecord, palette: &Palette) -> Value {
     })
 }
 
-/// `[seconds, true pose, odometry, its error, estimate, its error, boxes]`
+/// `[seconds, true position, position by odometry, its error, estimated pose, its error, boxes]`
 fn of_frame(frame: &FrameRecord, start: f64) -> Value {
-    let tracked = |tracked: &TrackedPose| (pose(&tracked.pose), tracked.error.map(|x| rounded(x, 5)));
-    let ((odometry, odometry_error), (estimate, error)) = (tracked(&frame.odometry), tracked(&frame.estimate));
+    let position = |pose: &Se3| numbers(pose.translation.iter(), 4);
+    let error = |tracked: &TrackedPose| tracked.error.map(|x| number(x, 5));
     let boxes = frame.boxes.iter().map(|seen| {
-        let pixels = |list: &[f64]| list.iter().map(|x| rounded(*x, 1)).collect::<Vec<_>>();
-        json!([seen.object, pixels(&seen.measured.bounds()), seen.ellipse.map(|ellipse| pixels(&ellipse))])
+        let measured = numbers(seen.measured.bounds().iter(), 1);
+        json!([seen.object, measured, seen.ellipse.map(ellipse)])
     });
-    let time = rounded(frame.timestamp - start, 3);
-    let boxes: Vec<Value> = boxes.collect();
-    json!([time, frame.truth.as_ref().map(pose), odometry, odometry_error, estimate, error, boxes])
+    json!([
+        number(frame.timestamp - start, 3),
+        frame.truth.as_ref().map(position),
+        position(&frame.odometry.pose),
+        error(&frame.odometry),
+        pose(&frame.estimate.pose),
+        error(&frame.estimate),
+        boxes.collect::<Vec<Value>>(),
+    ])
 }
 
 fn of_object(object: &ObjectRecord, palette: &Palette) -> Value {
-    let quadric = |q: &DualQuadric| [pose(&q.pose), q.semi_axes.iter().map(|x| rounded(*x, 5)).collect()].concat();
-    let solid = object.truth.as_ref().map(|truth| {
-        [pose(&truth.pose), truth.half_extents.iter().map(|x| rounded(*x, 5)).collect()].concat()
-    });
+    let quadric = |q: &DualQuadric| [pose(&q.pose), numbers(q.semi_axes.iter(), 5)].concat();
+    let solid = |s: &Solid| [pose(&s.pose), numbers(s.half_extents.iter(), 5)].concat();
     let factors = object.factors.iter().map(|factor| {
-        let residual: Vec<f64> = factor.residual.iter().map(|x| rounded(*x, 3)).collect();
+        let residual = numbers(factor.residual.iter(), 3);
         json!({ "factor": factor.factor, "because": factor.because, "with": factor.with, "residual": residual })
     });
-    let error = object.error.map(|e| [e.position, e.shape, e.quality].map(|x| rounded(x, 4)));
+    let error = object.error.map(|e| numbers([e.position, e.shape, e.quality].iter(), 4));
     json!({
         "id": object.id,
         "key": object.key,
         "class": object.class,
         "color": palette.ink(&object.class).hex(Theme::Light),
-        "score": object.score.map(|x| rounded(x, 3)),
+        "score": object.score.map(|x| number(x, 3)),
         "boxes": object.boxes,
-        "box_rms": object.box_rms.map(|x| rounded(x, 3)),
+        "box_rms": object.box_rms.map(|x| number(x, 3)),
         "estimate": object.estimate.as_ref().map(quadric),
-        "truth": solid,
+        "truth": object.truth.as_ref().map(solid),
         "error": error,
         "factors": factors.collect::<Vec<_>>(),
         "left_out": object.left_out,
@@ -80,14 +84,30 @@ fn of_object(object: &ObjectRecord, palette: &Palette) -> Value {
     })
 }
 
-/// Position, then quaternion (x, y, z, w).
-fn pose(pose: &Se3) -> Vec<f64> {
-    pose.translation.iter().chain(&pose.rotation.quaternion_xyzw()).map(|x| rounded(*x, 5)).collect()
+/// The centre to a tenth of a pixel; where the outline is large, its squares to whole ones.
+fn ellipse([x, y, xx, xy, yy]: [f64; 5]) -> Vec<Value> {
+    let digits = if xx.min(yy) > 100.0 { 0 } else { 1 };
+    [numbers([x, y].iter(), 1), numbers([xx, xy, yy].iter(), digits)].concat()
 }
 
-fn rounded(x: f64, digits: i32) -> f64 {
+/// Position, then quaternion (x, y, z, w).
+fn pose(pose: &Se3) -> Vec<Value> {
+    numbers(pose.translation.iter().chain(&pose.rotation.quaternion_xyzw()), 5)
+}
+
+fn numbers<'a>(list: impl Iterator<Item = &'a f64>, digits: i32) -> Vec<Value> {
+    list.map(|x| number(*x, digits)).collect()
+}
+
+/// A number with so many digits behind its point.
+fn number(x: f64, digits: i32) -> Value {
     let unit = 10f64.powi(digits);
     let near = (x * unit).round() / unit;
-    // what is too large to be rounded has no such digits
-    if near.is_finite() { near + 0.0 } else { x }
+    match near {
+        // whole numbers have no point
+        near if near.fract() == 0.0 && near.abs() < 1e9 => Value::from(near as i64),
+        near if near.is_finite() => Value::from(near),
+        // what is too large to be rounded has no such digits
+        _ => Value::from(x),
+    }
 }

@@ -76,7 +76,8 @@ mod tests {
 
     #[test]
     fn a_whole_turn_is_no_jump() {
-        let angles = unwrapped(vec![[170.0, 0.0, 0.0], [-170.0, 1.0, 0.0], [-150.0, 2.0, 0.0], [170.0, 0.0, 0.0]]);
+        let angles =
+            unwrapped(vec![[170.0, 0.0, 0.0], [-170.0, 1.0, 0.0], [-150.0, 2.0, 0.0], [170.0, 0.0, 0.0]]);
         assert_eq!(angles.iter().map(|a| a[0]).collect::<Vec<_>>(), [170.0, 190.0, 210.0, 170.0]);
     }
 }

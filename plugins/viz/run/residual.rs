@@ -12,7 +12,8 @@ pub(super) fn residuals(variant: &VariantRecord, width: f64) -> Option<Picture> 
 }
 
 /// What [`row`] has.
-pub(crate) const RESIDUALS: [&str; 7] = ["factor", "count", "inactive", "RMS", "median", "largest", "mean weight"];
+pub(crate) const RESIDUALS: [&str; 7] =
+    ["factor", "count", "inactive", "RMS", "median", "largest", "mean weight"];
 
 /// One type of factor in numbers.
 pub(crate) fn row(of: &FactorResiduals) -> Vec<String> {

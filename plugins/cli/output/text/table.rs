@@ -20,7 +20,9 @@ pub(crate) struct Table {
 
 enum Kind {
     /// Columns but the first, in the order in which they are kept.
-    Numbers { kept_first: Vec<usize> },
+    Numbers {
+        kept_first: Vec<usize>,
+    },
     Words,
 }
 
@@ -40,7 +42,9 @@ impl Table {
     /// The same, with columns that are kept before all others, in this order.
     pub(crate) fn keeping(mut self, names: &[&str]) -> Self {
         if let Kind::Numbers { kept_first } = &mut self.kind {
-            let rank = |column: &usize| names.iter().position(|name| self.header.get(*column).is_some_and(|h| h == name));
+            let rank = |column: &usize| {
+                names.iter().position(|name| self.header.get(*column).is_some_and(|h| h == name))
+            };
             kept_first.sort_by_key(|column| rank(column).unwrap_or(names.len()));
         }
         self
@@ -74,13 +78,16 @@ impl Table {
     /// The lines of a column's header: its unit below its name.
     fn head(&self, column: usize) -> [&str; 2] {
         let name = Self::cell(&self.header, column);
-        name.split_once(" (").map_or([name, ""], |(before, _)| [before, name.get(before.len() + 1..).unwrap_or_default()])
+        name.split_once(" (")
+            .map_or([name, ""], |(before, _)| [before, name.get(before.len() + 1..).unwrap_or_default()])
     }
 
     fn column_width(&self, column: usize) -> usize {
         let cells = self.rows.iter().map(|row| Self::cell(row, column).width());
         let head = match self.kind {
-            Kind::Numbers { .. } => self.head(column).map(UnicodeWidthStr::width).into_iter().max().unwrap_or(0),
+            Kind::Numbers { .. } => {
+                self.head(column).map(UnicodeWidthStr::width).into_iter().max().unwrap_or(0)
+            }
             Kind::Words => Self::cell(&self.header, column).width(),
         };
         cells.max().unwrap_or(0).max(head)

@@ -133,7 +133,8 @@ fn boxes(estimate: &Estimate) -> BTreeMap<usize, Vec<SeenBox>> {
         for view in &object.views {
             let camera: Option<&Se3> = estimate.solution.values.get(pose_key(view.frame)).ok();
             let ellipsoid = camera.zip(quadrics.get(&object.id)).map(|(c, q)| Ellipsoid::seen(c, q));
-            let ellipse = ellipsoid.filter(Ellipsoid::is_in_front).map(|e| e.outline(&estimate.sequence.camera));
+            let ellipse =
+                ellipsoid.filter(Ellipsoid::is_in_front).map(|e| e.outline(&estimate.sequence.camera));
             boxes.entry(view.frame).or_default().push(SeenBox {
                 object: object.id,
                 measured: view.bounding_box,

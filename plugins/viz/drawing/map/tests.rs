@@ -90,10 +90,9 @@ fn what_is_not_finite_is_left_out() {
 
 #[test]
 fn an_empty_scene_is_an_empty_picture() {
-    for tracks in [
-        vec![],
-        vec![Track { name: "one".into(), stroke: TRACKS[0].1, positions: vec![Vector3::zeros()] }],
-    ] {
+    for tracks in
+        [vec![], vec![Track { name: "one".into(), stroke: TRACKS[0].1, positions: vec![Vector3::zeros()] }]]
+    {
         let svg = svg(&Scene { tracks, ..Scene::default() }, View::Top);
         assert!(svg.contains("</svg>"));
     }

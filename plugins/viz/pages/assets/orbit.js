@@ -1,7 +1,7 @@
 // A camera that turns around a point, moved by mouse, fingers and keys.
 class Orbit {
   constructor(canvas, up, { middle, radius }, changed, tapped, pressed) {
-    Object.assign(this, { canvas, up, home: { target: middle, distance: 2.1 * radius, azimuth: -0.9, height: 0.65 }, changed, tapped });
+    Object.assign(this, { canvas, up, home: { target: middle, distance: 2.35 * radius, azimuth: -0.9, height: 0.65 }, changed, tapped });
     this.reach = radius;
     this.pointers = new Map();
     this.reset();

@@ -85,7 +85,7 @@ function ground(segments, up, { middle, radius, floor }, color) {
     segments.add(at(a0 + k * step, b0 - n * step), at(a0 + k * step, b0 + n * step), color, 1);
     segments.add(at(a0 - n * step, b0 + k * step), at(a0 + n * step, b0 + k * step), color, 1);
   }
-  const top = add(at(dot(middle, right) - 0.8 * radius, dot(middle, ahead) - 0.6 * radius), scaled(up, 0.45 * radius));
+  const top = add(at(dot(middle, right) - 0.3 * radius, dot(middle, ahead) + 0.9 * radius), scaled(up, 0.45 * radius));
   const tip = add(top, scaled(up, -0.35 * radius));
   const gravity = rgb("#d6455d");
   segments.add(top, tip, gravity, 3);

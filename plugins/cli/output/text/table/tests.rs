@@ -1,17 +1,45 @@
 use super::*;
 
 fn run() -> Table {
-    let header = ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
-    let mut table = Table::of_numbers(&header).keeping(&["ATE (m)", "position (m)", "shape", "quality", "cost"]);
+    let header =
+        ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
+    let mut table =
+        Table::of_numbers(&header).keeping(&["ATE (m)", "position (m)", "shape", "quality", "cost"]);
     table.row(["before the solve", "0.02893", "0.04518", "0.5099", "0.5992", "18", "3280", "-", "-", "-"]);
-    table.row(["QuadricSLAM", "0.01465", "0.02502", "0.4232", "0.4722", "18", "3280", "1722.22", "13", "772.5 ms"]);
-    table.row(["with orientation factors", "0.01436", "0.02471", "0.4283", "0.4713", "18", "3280", "1777.94", "57", "3.92 s"]);
+    table.row([
+        "QuadricSLAM",
+        "0.01465",
+        "0.02502",
+        "0.4232",
+        "0.4722",
+        "18",
+        "3280",
+        "1722.22",
+        "13",
+        "772.5 ms",
+    ]);
+    table.row([
+        "with orientation factors",
+        "0.01436",
+        "0.02471",
+        "0.4283",
+        "0.4713",
+        "18",
+        "3280",
+        "1777.94",
+        "57",
+        "3.92 s",
+    ]);
     table
 }
 
 fn fields() -> Table {
     let mut table = Table::of_words(&["field", "default", "what it is"]);
-    table.row(["min_views", "3", "Objects that are seen in fewer frames than this are not mapped: their place is not known."]);
+    table.row([
+        "min_views",
+        "3",
+        "Objects that are seen in fewer frames than this are not mapped: their place is not known.",
+    ]);
     table.row(["initialiser", "{ type = \"svd\" }", "Where objects begin."]);
     table
 }

@@ -33,12 +33,12 @@ impl Default for Look {
 
 impl Look {
     /// Pixels of the SVG.
-    pub(super) fn width(self) -> f64 {
+    pub(crate) fn width(self) -> f64 {
         self.size.into()
     }
 
     /// Writes pictures into a folder, each as SVG and as PNG.
-    pub(super) fn write(self, folder: &Path, pictures: &[Picture]) -> Result<(), Failure> {
+    pub(crate) fn write(self, folder: &Path, pictures: &[Picture]) -> Result<(), Failure> {
         let theme = match self.theme {
             Shade::Light => Theme::Light,
             Shade::Dark => Theme::Dark,
