@@ -1,12 +1,12 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, Evaluate, Experiment, Explain, List, New, Replay, Run, Schema, ShowGraph, Simulate,
-    Solve,
+    Check, CheckFactor, Completions, Evaluate, Experiment, Explain, List, Man, New, Plot, Replay, Run,
+    Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
 use crate::output::watch;
 use crate::status::Status;
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 use manifactor::graph::catalogue::{all, check_names};
 use manifactor::solve::{Bytes, memory_limit};
 use std::num::NonZero;
@@ -33,6 +33,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Run),
+    Plot(Plot),
     Experiment(Experiment),
     Solve(Solve),
     Replay(Replay),
@@ -45,6 +46,8 @@ enum Command {
     Evaluate(Evaluate),
     Simulate(Simulate),
     Schema(Schema),
+    Completions(Completions),
+    Man(Man),
 }
 
 impl Cli {
@@ -64,6 +67,7 @@ impl Cli {
         check_names(&all()).map_err(Failure::input)?;
         match &self.command {
             Command::Run(command) => command.run(self.verbose),
+            Command::Plot(command) => command.run(),
             Command::Experiment(command) => command.run(),
             Command::Solve(command) => command.run(self.verbose),
             Command::Replay(command) => command.run(),
@@ -76,6 +80,8 @@ impl Cli {
             Command::Evaluate(command) => command.run(),
             Command::Simulate(command) => command.run(),
             Command::Schema(command) => command.run(),
+            Command::Completions(command) => Ok(command.run(Self::command())),
+            Command::Man(command) => command.run(Self::command()),
         }
     }
 
@@ -102,7 +108,11 @@ impl Cli {
             Command::Explain(command) => command.json,
             Command::Graph(command) => command.json,
             Command::Evaluate(command) => command.json,
-            Command::New(_) | Command::Simulate(_) => false,
+            Command::New(_)
+            | Command::Plot(_)
+            | Command::Simulate(_)
+            | Command::Completions(_)
+            | Command::Man(_) => false,
             Command::Schema(_) => true,
         }
     }
@@ -145,7 +155,6 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        use clap::CommandFactory;
         Cli::command().debug_assert();
     }
 

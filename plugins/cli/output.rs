@@ -1,6 +1,7 @@
 //! Output: results on standard output, all else on standard error.
 //!
 //! Nothing else in this crate writes to the two: `print!` and `eprintln!` panic where they cannot write.
+pub(crate) mod pictures;
 pub(crate) mod report;
 #[allow(clippy::indexing_slicing, reason = "cells that it has made")]
 pub(crate) mod summary_table;
@@ -24,6 +25,12 @@ pub(crate) fn is_lost() -> bool {
 pub(crate) fn print(text: &str) {
     let mut out = io::stdout().lock();
     printed(out.write_all(text::printable(text).as_bytes()).and_then(|()| out.flush()));
+}
+
+/// Prints a text of the program's own as it is, byte for byte.
+pub(crate) fn print_as_is(text: &[u8]) {
+    let mut out = io::stdout().lock();
+    printed(out.write_all(text).and_then(|()| out.flush()));
 }
 
 /// Keeps in mind that something could not be printed, and says so.

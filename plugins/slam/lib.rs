@@ -19,5 +19,5 @@ pub mod settings;
 pub use estimate::{refine, variance};
 pub use input::{class, recording, sequence, simulator, source};
 pub use mapping::measurements;
-pub use output::report;
+pub use output::{record, report};
 pub use settings::run_document;

@@ -1,10 +1,11 @@
 //! The files that a run leaves.
 //!
-//! `report.json` for the run as a whole, and a folder for each variant with `config.toml` (all settings, ready to be
-//! run again), `trajectory.txt` (TUM's format), `objects.json`, `graph.json` (the literal graph at the estimate),
-//! `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
+//! `report.json` and `record.json` (all that there is to draw) for the run as a whole, and a folder for each variant with
+//! `config.toml` (all settings, ready to be run again), `trajectory.txt` (TUM's format), `objects.json`, `frames.jsonl` (poses
+//! and boxes, a frame a line), `graph.json` (the literal graph at the estimate), `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
 //! into an [`OutputFolder`].
 use crate::estimate::Estimate;
+use crate::output::record::{FrameRecord, RECORD, RunRecord, VariantRecord};
 use crate::output::report::{RunReport, VariantReport};
 use crate::settings::run_document::{RunDocument, Variant, absolute, slug};
 use manifactor_config::{Format, WriteError, to_json, to_toml, write_graph};
@@ -18,6 +19,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 mod folder;
+pub mod record;
 pub mod report;
 
 pub use folder::{FolderError, OutputFolder};
@@ -72,11 +74,12 @@ pub fn write_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputE
     whole::write_whole(path, content.as_ref()).map_err(fail)
 }
 
-/// Writes the report of a run.
+/// Writes the report and the record of a run.
 ///
 /// # Errors
-/// Where it cannot be written.
-pub fn write_report(output: &Path, report: &RunReport) -> Result<(), OutputError> {
+/// Where one cannot be written.
+pub fn write_report(output: &Path, report: &RunReport, record: &RunRecord) -> Result<(), OutputError> {
+    write_document(&output.join(RECORD), compact(record))?;
     write_document(&output.join("report.json"), to_json(report))
 }
 
@@ -89,12 +92,14 @@ pub fn write_variant(
     variant: &Variant,
     estimate: &Estimate,
     report: &VariantReport,
+    record: &VariantRecord,
 ) -> Result<PathBuf, OutputError> {
     let folder = variant_folder(&run.output, &variant.name);
     let file = |name: &str| folder.join(name);
     write_document(&file("config.toml"), resolved(run, variant))?;
     write_whole(&file("trajectory.txt"), tum::format(&estimate.trajectory()))?;
     write_document(&file("objects.json"), to_json(&report.objects))?;
+    write_document(&file("frames.jsonl"), lines(&record.frames))?;
     let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);
     write_document(&file("graph.json"), graph)?;
     write_whole(&file("iterations.csv"), iterations(&estimate.solution.outcome.history))?;
@@ -112,6 +117,20 @@ pub(crate) fn write_document(path: &Path, text: Result<String, WriteError>) -> R
     write_whole(path, &text)
 }
 
+/// Each on a line.
+fn lines(frames: &[FrameRecord]) -> Result<String, WriteError> {
+    frames.iter().map(|frame| Ok(compact(frame)? + "\n")).collect()
+}
+
+/// JSON on one line.
+fn compact(value: &impl Serialize) -> Result<String, WriteError> {
+    let problem = |error: serde_json::Error| WriteError::Inexpressible {
+        format: Format::Json,
+        message: error.to_string(),
+    };
+    serde_json::to_string(value).map_err(problem)
+}
+
 /// The settings of one variant as a document of its own.
 fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> {
     #[derive(Serialize)]
@@ -126,11 +145,13 @@ fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> 
     #[derive(Serialize)]
     struct Named<'a> {
         name: &'a str,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        about: Option<&'a str>,
     }
     // names that are not UTF-8 have no other form in a document
     let output = variant_folder(&run.output, &variant.name).display().to_string();
     let folder = absolute(&run.folder).display().to_string();
-    let variants = [Named { name: &variant.name }];
+    let variants = [Named { name: &variant.name, about: variant.about.as_deref() }];
     let title = &run.title;
     to_toml(&Resolved { title, output, folder, settings: &variant.settings, variants })
 }

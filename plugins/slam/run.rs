@@ -91,6 +91,7 @@ impl<'a> Run<'a> {
         let clock = Instant::now();
         let sequence = self.sequence(variant)?;
         let (estimate, mut report) = estimate(&variant.name, sequence, &variant.settings, observer)?;
+        report.about.clone_from(&variant.about);
         report.seconds = clock.elapsed().as_secs_f64();
         self.reports.push(report.clone());
         Ok((estimate, report))

@@ -1,17 +1,23 @@
 //! Pictures: what is drawn, and how.
+mod axes;
 mod chart;
-mod color;
+mod distribution;
 mod image;
+mod labels;
+mod legend;
+mod map;
 pub(crate) mod outline;
-pub(crate) mod picture;
-mod plot;
-pub(crate) mod scene;
+mod picture;
+mod scale;
+mod scene;
 mod view;
 
-pub use chart::{Chart, Distribution};
-pub use image::{frames_seen, image};
-pub use outline::Shape;
+pub(crate) use chart::{Chart, Curve, figure};
+pub(crate) use distribution::Distribution;
+pub(crate) use image::{frames_seen, image};
+pub(crate) use map::map;
 pub use picture::{NotDrawn, Picture};
-pub use plot::plot;
-pub use scene::{Object, Scene, Track, TrackKind};
-pub use view::View;
+#[cfg(test)]
+pub(crate) use scene::{Object, Track};
+pub(crate) use scene::{Palette, Scene};
+pub(crate) use view::View;

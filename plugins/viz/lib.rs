@@ -1,12 +1,17 @@
-//! Pictures of a run: trajectories and objects from above and from the side, images with their boxes, charts; as SVG and PNG.
+//! Pictures and pages of a run: trajectories and objects from above and from the side, images with their boxes, charts, as
+//! SVG and PNG; and one page with all of it and the map in 3D.
 //!
-//! A [`Scene`] says what there is to see, of an estimate or of anything else; [`plot`] draws it from a [`View`].
+//! All of it is drawn from the [record](manifactor_slam::record) of a run, so that it can be drawn again.
+mod canvas;
 mod drawing;
 mod pages;
+mod ply;
 mod run;
 mod xml;
 
-pub use drawing::{Chart, Distribution, NotDrawn, Object, Picture, Scene, Shape, Track, TrackKind, View};
-pub use drawing::{frames_seen, image, plot};
-pub use pages::{Page, RunPage, experiment_page, experiment_pictures, run_pictures};
+pub use canvas::Theme;
+pub use drawing::{NotDrawn, Picture};
+pub use pages::{experiment_page, experiment_pictures, run_page};
+pub use ply::ply;
+pub use run::run_pictures;
 pub use xml::escape;

@@ -1,86 +1,60 @@
-//! The scene of an estimate.
-use crate::drawing::outline::Shape;
-use crate::drawing::scene::{Object, Scene, Track, TrackKind};
-use manifactor_formats::tum::StampedPose;
-use manifactor_graph::Direction;
-use manifactor_quadric::DualQuadric;
-use manifactor_slam::estimate::Estimate;
-use manifactor_slam::metrics::{Alignment, Similarity, align, associate};
-use manifactor_slam::sequence::TrueObject;
-use nalgebra::{Matrix3, Vector3};
+//! The pictures of a run, of its record.
+mod error;
+mod pose;
+mod residual;
 
-impl Scene {
-    /// What there is to see of an estimate.
-    ///
-    /// Drawn in the frame of the truth, where there is one: simulated trajectories as they stand, as their landmarks
-    /// are measured; recorded ones each aligned to the truth by SE(3), poses within `max_time_difference` seconds.
-    /// Else in the frame of the map.
-    pub fn of_estimate(title: impl Into<String>, estimate: &Estimate, max_time_difference: f64) -> Self {
-        let (odometry, trajectory) = (estimate.odometry(), estimate.trajectory());
-        let truth = estimate.sequence.ground_truth.as_ref();
-        let to_truth = |poses: &[StampedPose]| -> Similarity {
-            let frame = &estimate.mapping.frame;
-            match truth {
-                None => identity(),
-                Some(truth) if !truth.objects.is_empty() => {
-                    Similarity::rigid(frame.map_from_odometry.inverse())
-                }
-                Some(truth) => associate(&truth.trajectory, poses, max_time_difference)
-                    .and_then(|pairs| align(&pairs, Alignment::Se3))
-                    .map_or_else(|_| identity(), |(similarity, _)| similarity),
-            }
-        };
-        let (odometry_frame, frame) = (to_truth(&odometry), to_truth(&trajectory));
-        let mut tracks = Vec::new();
-        if let Some(truth) = truth {
-            tracks.push(track(TrackKind::Truth, "true", &truth.trajectory, &identity()));
-        }
-        tracks.push(track(TrackKind::Odometry, "odometry", &odometry, &odometry_frame));
-        tracks.push(track(TrackKind::Estimate, "estimated", &trajectory, &frame));
-        let up = up(estimate, &frame);
-        Self { title: title.into(), up, tracks, objects: objects(estimate, &frame) }
-    }
+use crate::canvas::Ink;
+use crate::drawing::{Chart, Curve, Palette, Picture, Scene, View, figure, frames_seen, image, map};
+use manifactor_slam::record::{RunRecord, VariantRecord};
+
+pub(crate) use residual::{RESIDUALS, row as residual_row};
+
+/// All pictures of a variant, at this width in pixels: the map from above and from the side, errors, trajectories, residuals,
+/// cost, and some images.
+pub fn run_pictures(run: &RunRecord, variant: &VariantRecord, width: f64) -> Vec<Picture> {
+    let palette = Palette::of(run);
+    let scene = Scene::of(format!("{}: {}", run.title, variant.name), variant);
+    let mut pictures =
+        vec![map(&scene, View::Top, &palette, width), map(&scene, View::Side, &palette, width)];
+    pictures.extend(charts(variant, width));
+    let frames = frames_seen(variant, variant.images).into_iter();
+    let frames = frames.filter_map(|number| Some((number, variant.frames.get(number)?)));
+    pictures.extend(frames.map(|(number, frame)| image(variant, number, frame, &palette, width)));
+    pictures
 }
 
-fn identity() -> Similarity {
-    Similarity::rigid(manifactor_geometry::Se3::identity())
+/// The pictures that are charts.
+pub(crate) fn charts(variant: &VariantRecord, width: f64) -> Vec<Picture> {
+    let charts = [
+        error::absolute(variant, width),
+        error::relative(variant, width),
+        pose::positions(variant, width),
+        pose::angles(variant, width),
+        residual::residuals(variant, width),
+        cost(std::slice::from_ref(variant), width),
+    ];
+    charts.into_iter().flatten().collect()
 }
 
-fn track(kind: TrackKind, name: &str, poses: &[StampedPose], frame: &Similarity) -> Track {
-    let positions = poses.iter().map(|p| frame.act(&p.pose.translation)).collect();
-    Track { kind, name: name.into(), positions }
+/// The cost by iteration, a curve for each variant.
+pub(crate) fn cost(variants: &[VariantRecord], width: f64) -> Option<Picture> {
+    let curve = |(i, variant): (usize, &VariantRecord)| {
+        let points = variant.cost.iter().enumerate().map(|(step, cost)| (step as f64, *cost)).collect();
+        Curve::new(&variant.name, Ink::Series(i), points).with_dots()
+    };
+    let curves: Vec<Curve> = variants.iter().enumerate().map(curve).collect();
+    let costs = || curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
+    let log_y = costs().fold(0.0, f64::max) > 10.0 * costs().fold(f64::INFINITY, f64::min);
+    let panel = Chart { y: "cost, ½ Σ ρ".into(), log_y, from_zero: false, curves };
+    let text = "cost by accepted step";
+    let sheet = figure(text, "accepted steps", false, &[panel], width, 0.5 * width)?;
+    Some(Picture::new("cost", text, sheet))
 }
 
-/// Up in the frame of the picture. If it is unknown, up in the first image is the best guess.
-fn up(estimate: &Estimate, frame: &Similarity) -> Direction {
-    let image_up = || estimate.trajectory().first().map(|p| p.pose.rotation.act(&-Vector3::y()));
-    let known = estimate.mapping.frame.up.map(|up| *up);
-    let up = known.or_else(image_up).and_then(|up| Direction::new(frame.rotation.act(&up)).ok());
-    up.unwrap_or_default()
+/// Seconds since the first frame.
+fn clock(variant: &VariantRecord) -> impl Fn(f64) -> f64 {
+    let start = variant.frames.first().map_or(0.0, |frame| frame.timestamp);
+    move |timestamp| timestamp - start
 }
 
-fn objects(estimate: &Estimate, frame: &Similarity) -> Vec<Object> {
-    let landmarks = estimate.landmarks();
-    let known = landmarks.iter().map(|landmark| Object {
-        class: landmark.object.class.as_ref().map_or("unknown", |class| class.name.as_str()).into(),
-        truth: landmark.truth.map(solid),
-        estimate: Some(ellipsoid(landmark.quadric, frame)),
-    });
-    // what is there and was not mapped is worth seeing too
-    let truths = estimate.sequence.ground_truth.iter().flat_map(|truth| &truth.objects);
-    let missed = truths.filter(|truth| !landmarks.iter().any(|l| l.object.id == truth.id));
-    let missed = missed.map(|t| Object { class: t.class.clone(), truth: Some(solid(t)), estimate: None });
-    known.chain(missed).collect()
-}
-
-fn ellipsoid(quadric: &DualQuadric, frame: &Similarity) -> Shape {
-    let pose = frame.act_on_pose(&quadric.pose);
-    let axes = pose.rotation.matrix() * Matrix3::from_diagonal(&(quadric.semi_axes * frame.scale));
-    Shape { centroid: pose.translation, axes }
-}
-
-/// The ellipsoid that fills the cuboid of a solid.
-fn solid(truth: &TrueObject) -> Shape {
-    let axes = truth.world_from_object.rotation.matrix() * Matrix3::from_diagonal(&truth.half_extents);
-    Shape { centroid: truth.world_from_object.translation, axes }
-}
+const TIME: &str = "time (s)";

@@ -1,6 +1,7 @@
 //! The command line, end to end: the binary, its files and its exit codes.
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 mod book;
+mod browser;
 mod check_factor;
 mod disk;
 mod documents;

@@ -1,6 +1,7 @@
 //! `manifactor experiment`: a sweep from its document to its tables.
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::output::pictures::Look;
 use crate::output::text::{count, on_one_line};
 use crate::output::{self, summary_table};
 use crate::status::Status;
@@ -67,8 +68,9 @@ impl Experiment {
         drop(bar);
         let summary = experiment::write(&sweep, &journal)?;
         let trials = experiment::trials_table(&sweep, &journal);
-        let pictures = experiment_pictures(&sweep, &summary, &trials);
-        super::pictures::write(&sweep.output, &pictures)?;
+        let look = Look::default();
+        let pictures = experiment_pictures(&sweep, &summary, &trials, look.width());
+        look.write(&sweep.output, &pictures)?;
         let page = experiment_page(&sweep, &summary, &trials, &pictures, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);

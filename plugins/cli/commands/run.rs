@@ -2,21 +2,25 @@
 use crate::failure::Failure;
 use crate::input::run_file::RunArguments;
 use crate::interrupt;
+use crate::output::pictures::Look;
 use crate::output::watch::Watch;
 use crate::output::{self, table};
 use crate::status::Status;
 use clap::Args;
-use manifactor::slam::output::{OutputFolder, variant_folder, write_report, write_variant, write_whole};
+use manifactor::slam::output::{OutputFolder, write_report, write_variant, write_whole};
+use manifactor::slam::record::{RunRecord, VariantRecord};
 use manifactor::slam::run::Run as Running;
 use manifactor::solve::All;
-use manifactor::viz::{RunPage, run_pictures};
+use manifactor::viz::{ply, run_page, run_pictures};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 /// Build, solve, evaluate and write what a document describes.
 ///
-/// Each variant of the run gets a folder with its settings, trajectory, objects, graph, iterations, metrics and
-/// pictures, as SVG and PNG (the map from above and from the side, errors over time, residuals, images); report.html shows all of it, and needs no network.
+/// Each variant of the run gets a folder with its settings, trajectory, objects, frames, graph, iterations, metrics, the
+/// map as PLY, and pictures as SVG and PNG (the map from above and from the side, errors and poses over time, residuals,
+/// cost, images). report.html shows all of it, with the map in 3D, and needs no network. `manifactor plot` makes the
+/// pictures again.
 #[derive(Debug, Args)]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -41,7 +45,7 @@ impl Run {
         // held to the end
         let _claimed = OutputFolder::claim(&document.output, "run", &self.run.config, self.force)?;
         let mut interrupt = interrupt::on_ctrl_c();
-        let mut page = RunPage::default();
+        let (mut records, mut configs) = (vec![], vec![]);
         let mut run = Running::new(&document, self.run.data());
         for variant in &document.variants {
             tracing::info!("variant {}", variant.name);
@@ -49,26 +53,30 @@ impl Run {
             let mut observer = All(vec![&mut watch, &mut interrupt]);
             let (estimate, report) = run.variant(variant, &mut observer)?;
             drop(watch);
-            let folder = write_variant(&document, variant, &estimate, &report)?;
-            let title = format!("{}: {}", document.title, variant.name);
-            let pictures = run_pictures(&title, &estimate, &variant.settings);
-            super::pictures::write(&folder, &pictures)?;
-            let config = std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?;
-            page.variant(&estimate, &report, &pictures, &config);
+            let record = VariantRecord::new(variant, &estimate);
+            let folder = write_variant(&document, variant, &estimate, &report, &record)?;
+            configs.push(std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?);
+            records.push(record);
             if interrupt.0.load(Ordering::Relaxed) {
                 break;
             }
         }
         let report = run.finish();
-        write_report(&document.output, &report)?;
-        write_whole(&document.output.join("report.html"), page.html(&report))?;
+        let record = RunRecord::new(&document.title, records);
+        write_report(&document.output, &report, &record)?;
+        write_whole(&document.output.join("report.html"), run_page(&report, &record, &configs))?;
+        let look = Look::default();
+        for variant in &record.variants {
+            let folder = document.output.join(&variant.folder);
+            look.write(&folder, &run_pictures(&record, variant, look.width()))?;
+            write_whole(&folder.join("map.ply"), ply(&record, variant))?;
+        }
         if self.json {
             output::json(&report);
         } else {
             output::print(&table::of_run(&report));
-            let folder = document.variants.first().map(|v| variant_folder(&document.output, &v.name));
-            let picture = folder.map(|f| f.join("map_top.svg").display().to_string()).unwrap_or_default();
-            output::print(&format!("\nWritten to {}; a picture is {picture}.\n", document.output.display()));
+            let out = document.output.display();
+            output::print(&format!("\nWritten to {out}; open {out}/report.html in a browser.\n"));
         }
         Ok(Status::from(&report))
     }

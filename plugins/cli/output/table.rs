@@ -6,7 +6,7 @@ use manifactor::slam::report::{RunReport, VariantReport};
 pub(crate) fn of_run(report: &RunReport) -> String {
     let header =
         ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
-    let mut table = Table::of_numbers(&header);
+    let mut table = Table::of_numbers(&header).keeping(&KEPT);
     if let Some(first) = report.variants.first() {
         table.row(before(first));
     }
@@ -18,8 +18,16 @@ pub(crate) fn of_run(report: &RunReport) -> String {
         out += &format!("ATE: RMSE of the camera's positions, aligned by {alignment}.\n");
     }
     if report.variants.iter().any(|v| v.landmarks.is_some()) {
-        out += "Position, shape, quality of the objects against the truth: RMSE of the centres; mean Jaccard distance \
-                of\nthe boxes around them, centred and where they stand: 0 is perfect, 1 is no overlap.\n";
+        out += &(text::wrap(LANDMARKS) + "\n");
+    }
+    for variant in &report.variants {
+        if let Some(about) = &variant.about {
+            let about = format!("{}: {}", on_one_line(&variant.name), on_one_line(about));
+            out += &(text::wrap(&about) + "\n");
+        }
+    }
+    if report.variants.iter().any(|v| !v.row().converged) {
+        out += "!: ended without converging; a warning below says how.\n";
     }
     for variant in &report.variants {
         out += &diagnosis(variant);
@@ -27,11 +35,18 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     for variant in &report.variants {
         for warning in &variant.warnings {
             let (name, warning) = (on_one_line(&variant.name), warning.to_string());
-            out += &format!("warning: {name}: {}\n", on_one_line(&warning));
+            out += &(text::wrap(&format!("warning: {name}: {}", on_one_line(&warning))) + "\n");
         }
     }
     out
 }
+
+/// What the columns about objects mean.
+const LANDMARKS: &str = "Position, shape, quality of the objects against the truth: RMSE of the centres; mean Jaccard distance \
+                         of the boxes around them, centred and where they stand: 0 is perfect, 1 is no overlap.";
+
+/// Columns that a narrow terminal keeps, before all others.
+const KEPT: [&str; 7] = ["ATE (m)", "position (m)", "shape", "quality", "cost", "iterations", "objects"];
 
 /// A line: the condition, what is rejected, and the factor that costs the most. The report has the whole table.
 fn diagnosis(variant: &VariantReport) -> String {
@@ -48,7 +63,7 @@ fn diagnosis(variant: &VariantReport) -> String {
         let (name, keys) = (worst.name, text::keys(&worst.keys));
         line += &format!(", costs the most: factor {} {name} ({keys}) with {:.3}", worst.factor, worst.cost);
     }
-    line + "\n"
+    text::wrap(&line) + "\n"
 }
 
 /// What came in: odometry, and objects as they were initialised.

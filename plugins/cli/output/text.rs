@@ -3,28 +3,33 @@ use manifactor::graph::Key;
 
 mod printable;
 mod table;
+mod width;
 
 pub(crate) use manifactor::formats::words::{count, list};
 pub(crate) use printable::{json, on_one_line, printable, same_length, shortened};
 pub(crate) use table::Table;
+use unicode_width::UnicodeWidthStr;
+pub(crate) use width::width;
 
-/// Columns if the width of the terminal is unknown.
-const WIDTH: u16 = 110;
-
-/// A paragraph, broken into lines.
+/// A paragraph, broken into lines as wide as the terminal is.
 pub(crate) fn wrap(paragraph: &str) -> String {
+    wrapped(paragraph, width()).join("\n")
+}
+
+/// Lines of at most this width, broken between words; a word that is longer has a line of its own.
+pub(crate) fn wrapped(paragraph: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in paragraph.split_whitespace() {
         let Some(line) = lines.last_mut() else { break };
         if line.is_empty() {
             *line += word;
-        } else if line.chars().count() + word.chars().count() < WIDTH.into() {
+        } else if line.width() + 1 + word.width() <= width {
             *line = format!("{line} {word}");
         } else {
             lines.push(word.to_owned());
         }
     }
-    lines.join("\n")
+    lines
 }
 
 /// `x0, x1`.
@@ -54,8 +59,10 @@ mod tests {
 
     #[test]
     fn paragraphs_are_broken_between_words() {
-        let text = wrap(&"word ".repeat(50));
-        assert!(text.lines().all(|l| l.chars().count() <= 110) && text.lines().count() == 3);
+        let lines = wrapped(&"word ".repeat(50), 80);
+        assert!(lines.iter().all(|l| l.width() <= 80) && lines.len() == 4);
+        assert_eq!(wrapped("一二 三", 5), ["一二", "三"]);
+        assert_eq!(wrapped("", 80), [""]);
     }
 
     #[test]

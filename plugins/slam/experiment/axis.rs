@@ -89,7 +89,7 @@ impl Axis {
 
     /// One column, each option with a name.
     pub(super) fn of_options(column: Column, options: Vec<Declared>) -> Self {
-        let choice = |Declared { name: Placed { place, value: name }, set }| Choice {
+        let choice = |Declared { name: Placed { place, value: name }, set, .. }| Choice {
             labels: vec![name],
             sets: vec![set.unwrap_or_else(|| Node::new(place.clone(), Value::Table(Table::default())))],
             place,

@@ -49,8 +49,16 @@ pub fn relative_error(
         needed: delta.max(1).saturating_add(1),
         found: pairs.len(),
     };
+    let errors = relative_errors(pairs, delta, pairing);
+    let (translation, rotation): (Vec<f64>, Vec<f64>) = errors.into_iter().unzip();
+    let both = Statistics::of(&translation).zip(Statistics::of(&rotation));
+    both.map(|(translation, rotation)| RelativeError { translation, rotation }).ok_or(too_few)
+}
+
+/// The relative pose errors of which [`relative_error`] is the summary, in order: metres, radians.
+pub fn relative_errors(pairs: &[PosePair], delta: usize, pairing: Pairing) -> Vec<(f64, f64)> {
     if delta == 0 {
-        return Err(too_few);
+        return vec![];
     }
     let step = if pairing == Pairing::All { 1 } else { delta };
     let ends = pairs.iter().zip(pairs.iter().skip(delta)).step_by(step);
@@ -59,7 +67,5 @@ pub fn relative_error(
         let error = truth.between(&estimate);
         (error.translation.norm(), error.rotation.log().norm())
     });
-    let (translation, rotation): (Vec<f64>, Vec<f64>) = errors.unzip();
-    let both = Statistics::of(&translation).zip(Statistics::of(&rotation));
-    both.map(|(translation, rotation)| RelativeError { translation, rotation }).ok_or(too_few)
+    errors.collect()
 }

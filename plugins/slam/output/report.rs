@@ -1,6 +1,7 @@
 //! What a run has to tell, for scripts and for people.
 use crate::estimate::variance::Components;
 use crate::estimate::{Estimate, Landmark};
+use crate::input::sequence::ObjectId;
 use crate::mapping::{MappedObject, Rejection, Warning};
 use crate::settings::Settings;
 use manifactor_graph::Direction;
@@ -37,6 +38,9 @@ pub struct RunReport {
 pub struct VariantReport {
     /// Its name.
     pub name: String,
+    /// What it does, in a sentence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub about: Option<String>,
     /// Of its [settings](Settings::fingerprint), which `config.toml` has, and of the program's version.
     pub fingerprint: String,
     /// How much there is of what.
@@ -144,6 +148,7 @@ impl VariantReport {
         let landmarks = LandmarkReport::new(&before, &after);
         Self {
             name: name.to_owned(),
+            about: None,
             fingerprint: settings.fingerprint(),
             counts: Counts::of(estimate),
             up: mapping.frame.up,
@@ -206,6 +211,12 @@ impl SolveReport {
             refinement_seconds: estimate.refinement_seconds,
         }
     }
+}
+
+/// How far each object is from the truth, where that is known.
+pub(super) fn object_errors(estimate: &Estimate) -> Vec<(ObjectId, LandmarkError)> {
+    let errors = landmarks::in_truth_frame(estimate, estimate.landmarks());
+    errors.into_iter().map(|(landmark, error)| (landmark.object.id, error)).collect()
 }
 
 fn objects(estimate: &Estimate, errors: &[(Landmark<'_>, LandmarkError)]) -> Vec<ObjectReport> {

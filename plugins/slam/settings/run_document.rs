@@ -45,6 +45,9 @@ pub struct RunDocument {
 pub struct Variant {
     /// Its name, one of its own.
     pub name: String,
+    /// What it does, in a sentence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub about: Option<String>,
     /// Its settings, complete.
     pub settings: Settings,
 }
@@ -108,6 +111,8 @@ pub(crate) struct Declared {
     /// Its name, one of its own.
     #[schemars(with = "String")]
     pub(crate) name: Placed<String>,
+    /// What it does, in a sentence that reports repeat.
+    pub(crate) about: Option<String>,
     /// Settings of the document that are others here.
     #[schemars(with = "Option<Map<String, serde_json::Value>>")]
     pub(crate) set: Option<Node>,
@@ -143,15 +148,15 @@ fn read_variants(
     folder: &Path,
     errors: &Errors,
 ) -> Option<Vec<Variant>> {
-    let read = |name: String, node: Node| match Settings::read(node, folder) {
-        Ok(settings) => Some(Variant { name, settings }),
+    let read = |name: String, about: Option<String>, node: Node| match Settings::read(node, folder) {
+        Ok(settings) => Some(Variant { name, about, settings }),
         Err(diagnostics) => {
             errors.extend(diagnostics);
             None
         }
     };
     if declared.is_empty() {
-        return Some(vec![read(ONLY.to_owned(), base.clone())?]);
+        return Some(vec![read(ONLY.to_owned(), None, base.clone())?]);
     }
     // all of them are read, so that all errors are told at once
     let variants = declared.into_iter().map(|variant| {
@@ -159,7 +164,7 @@ fn read_variants(
         if let Some(set) = variant.set {
             merge(&mut node, set);
         }
-        read(variant.name.value, node)
+        read(variant.name.value, variant.about, node)
     });
     let variants: Vec<Option<Variant>> = variants.collect();
     variants.into_iter().collect()

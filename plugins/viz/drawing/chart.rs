@@ -1,120 +1,166 @@
-//! Charts of numbers: curves, and how values are distributed.
-use crate::drawing::picture::{Picture, plain};
-use kuva::plot::{BoxPlot, LinePlot};
-use kuva::render::layout::Layout;
-use kuva::render::plots::Plot;
+//! Curves over a common axis, in one panel or in several above each other.
+use super::axes::{Axes, HEAD, title};
+use super::legend::{Entry, legend};
+use super::scale::Scale;
+use crate::canvas::{Ink, Sheet, Stroke};
 
 /// Curves over a common axis.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Chart {
-    /// Written over it.
-    pub title: String,
-    /// What is to the right, with its unit.
-    pub x: String,
+pub(crate) struct Chart {
     /// What is upward, with its unit.
-    pub y: String,
-    /// Whether x goes by powers of ten.
-    pub log_x: bool,
-    /// The curves, each with its name.
-    pub curves: Vec<(String, Vec<(f64, f64)>)>,
+    pub(crate) y: String,
+    /// Whether y goes by powers of ten.
+    pub(crate) log_y: bool,
+    /// Whether y begins at zero.
+    pub(crate) from_zero: bool,
+    pub(crate) curves: Vec<Curve>,
 }
 
-/// Groups of values, side by side.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Distribution {
-    /// Written over it.
-    pub title: String,
-    /// What the values are, with their unit.
-    pub y: String,
-    /// The groups, each with its name.
-    pub groups: Vec<(String, Vec<f64>)>,
+/// A curve, with its name.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Curve {
+    pub(crate) name: String,
+    pub(crate) stroke: Stroke,
+    /// Whether each point has a dot.
+    pub(crate) dots: bool,
+    pub(crate) points: Vec<(f64, f64)>,
 }
 
-/// Pixels.
-const SIZE: (f64, f64) = (760.0, 420.0);
-/// Told apart on white and by those who see no red: Okabe and Ito.
-const COLORS: [&str; 8] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#444444", "#b8a900"];
+impl Curve {
+    pub(crate) fn new(name: &str, ink: Ink, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.to_owned(), stroke: Stroke::solid(ink, 1.8), dots: false, points }
+    }
 
-impl Chart {
-    /// The picture, by the name of its file. Points that are not finite, or not above zero on an axis of powers, are left
-    /// out; a chart without any point is `None`.
-    pub fn picture(&self, name: &str) -> Option<Picture> {
-        let shown = |p: &&(f64, f64)| p.0.is_finite() && p.1.is_finite() && !(self.log_x && p.0 <= 0.0);
-        let curves = self.curves.iter().zip(COLORS.iter().cycle()).filter_map(|((name, points), color)| {
-            let points: Vec<(f64, f64)> = points.iter().filter(shown).copied().collect();
-            let line = LinePlot::new().with_data(points.iter().copied()).with_color(*color);
-            (!points.is_empty()).then(|| Plot::from(line.with_stroke_width(1.6).with_legend(plain(name))))
-        });
-        let plots: Vec<Plot> = curves.collect();
-        if plots.is_empty() {
-            return None;
-        }
-        let layout = layout(&plots, &self.title, &self.y).with_x_label(plain(&self.x));
-        let layout = if self.log_x { layout.with_log_x() } else { layout };
-        Some(Picture::new(name, plots, layout))
+    pub(crate) fn dashed(mut self) -> Self {
+        self.stroke = Stroke::dashed(self.stroke.ink, 1.6);
+        self
+    }
+
+    pub(crate) fn with_dots(self) -> Self {
+        Self { dots: true, ..self }
     }
 }
 
-impl Distribution {
-    /// The picture, by the name of its file: a box from quartile to quartile with the median in it, for each group.
-    /// Values that are not finite are left out; `None` where nothing is left.
-    pub fn picture(&self, name: &str) -> Option<Picture> {
-        let mut plot = BoxPlot::new().with_color(COLORS[0]);
-        let mut any = false;
-        for (name, values) in &self.groups {
-            let values: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
-            if !values.is_empty() {
-                any = true;
-                plot = plot.with_group(plain(name), values);
-            }
-        }
-        let plots = vec![Plot::Box(plot)];
-        any.then(|| {
-            let layout = layout(&plots, &self.title, &self.y);
-            let layout = if self.groups.len() > 5 { layout.with_x_tick_rotate(-30.0) } else { layout };
-            Picture::new(name, plots, layout)
+/// Panels above each other over one axis, under a title. Points that are not finite, or not above zero on an axis of
+/// powers, are left out; `None` where no panel has any point.
+pub(crate) fn figure(
+    text: &str,
+    x: &str,
+    log_x: bool,
+    panels: &[Chart],
+    width: f64,
+    height: f64,
+) -> Option<Sheet> {
+    let shown = |panel: &Chart, p: &(f64, f64)| {
+        p.0.is_finite() && p.1.is_finite() && !(log_x && p.0 <= 0.0) && !(panel.log_y && p.1 <= 0.0)
+    };
+    let panels: Vec<Chart> = panels
+        .iter()
+        .map(|panel| {
+            let mut panel = panel.clone();
+            let shown = |p: &(f64, f64)| shown(&panel, p);
+            let keep = |curve: &Curve| Curve {
+                points: curve.points.iter().copied().filter(shown).collect(),
+                ..curve.clone()
+            };
+            panel.curves = panel.curves.iter().map(keep).filter(|curve| !curve.points.is_empty()).collect();
+            panel
         })
+        .filter(|panel| !panel.curves.is_empty())
+        .collect();
+    let along = panels.iter().flat_map(|panel| &panel.curves).flat_map(|curve| &curve.points).map(|p| p.0);
+    let along = Scale::over(along, log_x)?;
+
+    let mut entries: Vec<Entry> = vec![];
+    for curve in panels.iter().flat_map(|panel| &panel.curves) {
+        if !entries.iter().any(|entry| entry.name == curve.name) {
+            entries.push(Entry::line(&curve.name, curve.stroke));
+        }
     }
+    let entries = legend(&entries, width - 20.0);
+    let top = HEAD + entries.height + 8.0;
+    let each = (height - top - Axes::below(x)) / panels.len() as f64;
+    // room above each panel but the first for the numbers of the one before
+    let each = each.max(70.0);
+    let scales: Vec<Scale> = panels.iter().filter_map(upward).collect();
+    let left = scales.iter().map(|y| Axes::left(y, each - 22.0)).fold(0.0, f64::max);
+
+    let mut sheet = Sheet::new(width, top + each * panels.len() as f64 + Axes::below(x) - 20.0);
+    title(&mut sheet, text);
+    sheet.place(entries, [10.0, HEAD]);
+    let last = panels.len() - 1;
+    for (i, (panel, y)) in panels.iter().zip(scales).enumerate() {
+        let ymin = top + i as f64 * each;
+        let x_label = if i == last { x.to_owned() } else { String::new() };
+        let area = [10.0 + left, ymin, width - 18.0, ymin + each - 22.0];
+        let axes = Axes { area, x: along, y, x_label, y_label: panel.y.clone() };
+        axes.draw(&mut sheet);
+        for Curve { stroke, points, dots, .. } in &panel.curves {
+            let points: Vec<[f64; 2]> = thinned(points.iter().map(|p| axes.point(p.0, p.1)).collect());
+            if *dots {
+                points.iter().for_each(|p| sheet.dot(*p, 2.6, stroke.ink));
+            }
+            sheet.line(points, *stroke);
+        }
+    }
+    Some(sheet)
 }
 
-fn layout(plots: &[Plot], title: &str, y: &str) -> Layout {
-    Layout::auto_from_plots(plots)
-        .with_width(SIZE.0)
-        .with_height(SIZE.1)
-        .with_title(plain(title))
-        .with_title_size(15)
-        .with_y_label(plain(y))
+fn upward(panel: &Chart) -> Option<Scale> {
+    let numbers = panel.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
+    let scale = Scale::over(numbers, panel.log_y)?;
+    Some(if panel.from_zero { scale.from_zero() } else { scale }.with_margin(0.05))
+}
+
+/// A line of no more points than can be told apart: of those that share a pixel to the right, the first, the lowest,
+/// the highest and the last.
+fn thinned(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    if points.len() < 1500 {
+        return points;
+    }
+    let mut kept: Vec<[f64; 2]> = vec![];
+    for column in points.chunk_by(|a, b| a[0].round() == b[0].round()) {
+        let by = |a: &(usize, &[f64; 2]), b: &(usize, &[f64; 2])| a.1[1].total_cmp(&b.1[1]);
+        let lowest = column.iter().enumerate().min_by(by).map(|(i, _)| i);
+        let highest = column.iter().enumerate().max_by(by).map(|(i, _)| i);
+        let mut places: Vec<usize> =
+            [Some(0), lowest, highest, column.len().checked_sub(1)].into_iter().flatten().collect();
+        places.sort_unstable();
+        places.dedup();
+        kept.extend(places.into_iter().filter_map(|place| column.get(place)));
+    }
+    kept
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::canvas::{Colors, Theme};
 
     #[test]
     fn curves_have_their_names_and_their_axes() {
         let curve = (0..9).map(|i| (10f64.powi(i - 6), 0.02 + f64::from(i) * 1e-3)).collect();
-        let chart = Chart {
-            title: "ATE over σ".into(),
-            x: "σ".into(),
-            y: "ATE (m)".into(),
-            log_x: true,
-            curves: vec![("fr1/desk & more".into(), curve), ("nothing".into(), vec![(f64::NAN, 1.0)])],
-        };
-        let svg = chart.picture("ate").unwrap().svg();
-        for text in ["ATE over σ", "ATE (m)", "fr1/desk &amp; more"] {
+        let curves = vec![
+            Curve::new("fr1/desk & more", Ink::Series(0), curve),
+            Curve::new("nothing", Ink::Series(1), vec![(f64::NAN, 1.0)]),
+        ];
+        let panel = Chart { y: "ATE (m)".into(), curves, ..Chart::default() };
+        let sheet = figure("ATE over σ", "σ", true, &[panel], 700.0, 400.0).unwrap();
+        let svg = sheet.svg("ATE", Colors::Of(Theme::Light));
+        for text in ["ATE over σ", "ATE (m)", "fr1/desk &amp; more", "viewBox"] {
             assert!(svg.contains(text), "{text}");
         }
         assert!(!svg.contains("NaN") && !svg.contains("nothing"));
-        assert!(Chart::default().picture("none").is_none());
+        assert_eq!(sheet.png(Theme::Dark).unwrap().get(..4), Some(&b"\x89PNG"[..]));
+        assert!(figure("", "", false, &[Chart::default()], 700.0, 400.0).is_none());
     }
 
     #[test]
-    fn each_group_has_its_box() {
-        let groups = vec![("Q".into(), vec![0.1, 0.2, 0.4]), ("Q+O".into(), vec![0.1, f64::INFINITY])];
-        let shape = Distribution { title: "shape".into(), y: "shape".into(), groups };
-        let svg = shape.picture("shape").unwrap().svg();
-        assert!(svg.contains(">Q<") && svg.contains(">Q+O<") && !svg.contains("inf"));
-        assert!(Distribution::default().picture("none").is_none());
+    fn thinning_keeps_peaks_and_ends() {
+        let mut points: Vec<[f64; 2]> = (0..20_000).map(|i| [f64::from(i) / 40.0, 1.0]).collect();
+        points[777][1] = 9.0;
+        let thin = thinned(points.clone());
+        assert!(thin.len() < 2100 && thin.contains(&points[777]));
+        assert_eq!((thin.first(), thin.last()), (points.first(), points.last()));
     }
 }

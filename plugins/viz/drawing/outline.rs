@@ -4,15 +4,15 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Vector3};
 
 /// An ellipsoid: what objects are drawn as.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shape {
+pub(crate) struct Shape {
     /// Where it is, metres.
-    pub centroid: Vector3<f64>,
+    pub(crate) centroid: Vector3<f64>,
     /// A semi-axis in each column, metres: R diag(s).
-    pub axes: Matrix3<f64>,
+    pub(crate) axes: Matrix3<f64>,
 }
 
 /// Corners of the polygon that an ellipse is drawn as.
-const CORNERS: usize = 64;
+const CORNERS: usize = 48;
 
 impl Shape {
     /// The closed outline of its shadow, the ellipse of Σ a_k a_kᵀ, a_k the projected semi-axes. None, where there is

@@ -1,50 +1,113 @@
-//! What there is to see in a run.
-use crate::drawing::outline::Shape;
+//! What there is to see of a variant.
+use super::outline::Shape;
+use crate::canvas::{Ink, Stroke};
 use manifactor_graph::Direction;
-use nalgebra::Vector3;
+use manifactor_quadric::DualQuadric;
+use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, Solid, VariantRecord};
+use nalgebra::{Matrix3, Vector3};
 
 /// Trajectories and objects in one frame, in metres.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Scene {
+pub(crate) struct Scene {
     /// Written over the picture.
-    pub title: String,
+    pub(crate) title: String,
     /// Up, in the frame of the scene.
-    pub up: Direction,
+    pub(crate) up: Direction,
     /// Trajectories, drawn in this order.
-    pub tracks: Vec<Track>,
+    pub(crate) tracks: Vec<Track>,
     /// Objects.
-    pub objects: Vec<Object>,
+    pub(crate) objects: Vec<Object>,
 }
 
 /// A trajectory.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Track {
-    /// What it is; decides how it is drawn.
-    pub kind: TrackKind,
+pub(crate) struct Track {
     /// Its name in the legend.
-    pub name: String,
+    pub(crate) name: String,
+    /// How it is drawn.
+    pub(crate) stroke: Stroke,
     /// Where the camera was, in order of time.
-    pub positions: Vec<Vector3<f64>>,
-}
-
-/// What a trajectory is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TrackKind {
-    /// Where the camera was.
-    Truth,
-    /// Where odometry alone puts it.
-    Odometry,
-    /// Where the solver puts it.
-    Estimate,
+    pub(crate) positions: Vec<Vector3<f64>>,
 }
 
 /// An object: where it is, where it is estimated to be, or both.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Object {
-    /// Its class, which decides its colour.
-    pub class: String,
+pub(crate) struct Object {
+    /// Its class.
+    pub(crate) class: String,
     /// What it is.
-    pub truth: Option<Shape>,
+    pub(crate) truth: Option<Shape>,
     /// What the solver makes of it.
-    pub estimate: Option<Shape>,
+    pub(crate) estimate: Option<Shape>,
+}
+
+/// A colour for each class of a run: the same in all of its pictures.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Palette(Vec<String>);
+
+impl Palette {
+    /// In alphabetical order over all variants.
+    pub(crate) fn of(run: &RunRecord) -> Self {
+        Self::new(run.variants.iter().flat_map(VariantRecord::classes))
+    }
+
+    pub(crate) fn new<'a>(classes: impl Iterator<Item = &'a str>) -> Self {
+        let mut names: Vec<String> = classes.map(str::to_owned).collect();
+        names.sort_unstable();
+        names.dedup();
+        Self(names)
+    }
+
+    pub(crate) fn ink(&self, class: &str) -> Ink {
+        self.0.binary_search_by(|own| own.as_str().cmp(class)).map_or(Ink::Text, Ink::Class)
+    }
+
+    pub(crate) fn names(&self) -> &[String] {
+        &self.0
+    }
+}
+
+/// The three trajectories of a run, each with how it is drawn in all pictures.
+pub(crate) const TRACKS: [(&str, Stroke); 3] = [
+    ("true", Stroke { ink: Ink::Truth, width: 1.6, dashed: true }),
+    ("odometry", Stroke { ink: Ink::Odometry, width: 1.6, dashed: false }),
+    ("estimated", Stroke { ink: Ink::Estimate, width: 2.0, dashed: false }),
+];
+
+impl Scene {
+    /// Of a variant.
+    pub(crate) fn of(title: impl Into<String>, variant: &VariantRecord) -> Self {
+        let positions: [fn(&FrameRecord) -> Option<Vector3<f64>>; 3] = [
+            |f| f.truth.map(|pose| pose.translation),
+            |f| Some(f.odometry.pose.translation),
+            |f| Some(f.estimate.pose.translation),
+        ];
+        let tracks = TRACKS.iter().zip(positions).map(|((name, stroke), of)| Track {
+            name: (*name).to_owned(),
+            stroke: *stroke,
+            positions: variant.frames.iter().filter_map(of).collect(),
+        });
+        let object = |object: &ObjectRecord| Object {
+            class: object.class.clone(),
+            truth: object.truth.as_ref().map(solid),
+            estimate: object.estimate.as_ref().map(ellipsoid),
+        };
+        Self {
+            title: title.into(),
+            up: variant.up,
+            tracks: tracks.filter(|track| !track.positions.is_empty()).collect(),
+            objects: variant.objects.iter().map(object).collect(),
+        }
+    }
+}
+
+fn ellipsoid(quadric: &DualQuadric) -> Shape {
+    let axes = quadric.pose.rotation.matrix() * Matrix3::from_diagonal(&quadric.semi_axes);
+    Shape { centroid: quadric.pose.translation, axes }
+}
+
+/// The ellipsoid that fills the cuboid of a solid.
+fn solid(truth: &Solid) -> Shape {
+    let axes = truth.pose.rotation.matrix() * Matrix3::from_diagonal(&Vector3::from(truth.half_extents));
+    Shape { centroid: truth.pose.translation, axes }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Point2, Vector3};
 
 /// Where a picture is taken from: always from far away, without perspective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum View {
+pub(crate) enum View {
     /// From above.
     Top,
     /// From the side, up being up.

@@ -1,16 +1,32 @@
 //! The page of an experiment: means, comparisons, distributions, curves, and every trial.
-use crate::drawing::picture::Picture;
-use crate::drawing::{Chart, Distribution};
+use crate::canvas::Ink;
+use crate::drawing::{Chart, Curve, Distribution, Picture, figure};
 use crate::pages::page::Page;
 use crate::pages::run_page::version;
 use manifactor_formats::table::{Column, Table};
 use manifactor_slam::experiment::{Experiment, Summary};
 
-/// The pictures of an experiment, one a metric: a curve over the column that the summary names, or distributions.
-pub fn experiment_pictures(experiment: &Experiment, summary: &Summary, trials: &Table) -> Vec<Picture> {
+/// The pictures of an experiment, one a metric, at this width in pixels: a curve over the column that the summary names, or
+/// distributions.
+pub fn experiment_pictures(
+    experiment: &Experiment,
+    summary: &Summary,
+    trials: &Table,
+    width: f64,
+) -> Vec<Picture> {
     let picture = |metric: &String| match &experiment.summary.curve {
-        Some(x) => curve(summary, x, metric).picture(&format!("{metric}_over_{x}")),
-        None => distribution(summary, trials, metric).picture(metric),
+        Some(x) => {
+            let text = format!("{metric} over {x}");
+            let curves = curves(summary, x, metric);
+            let log_x = curves.iter().flat_map(|curve| &curve.points).all(|(x, _)| *x > 0.0);
+            let panel = Chart { y: metric.clone(), curves, ..Chart::default() };
+            let sheet = figure(&text, x, log_x, &[panel], width, 0.55 * width)?;
+            Some(Picture::new(&format!("{metric}_over_{x}"), text, sheet))
+        }
+        None => {
+            let sheet = distribution(summary, trials, metric).sheet(width)?;
+            Some(Picture::new(metric, format!("how {metric} is distributed over trials"), sheet))
+        }
     };
     summary.metrics.iter().filter_map(picture).collect()
 }
@@ -36,7 +52,13 @@ pub fn experiment_page(
         Some(x) => page.heading(&format!("Over {x}")),
         None => page.heading("Distributions"),
     };
-    pictures.iter().for_each(|picture| _ = page.picture(picture));
+    let caption = match &experiment.summary.curve {
+        Some(_) => "Means over trials.",
+        None => {
+            "Over trials: boxes reach from quartile to quartile, whiskers to the last value within one and a half times that."
+        }
+    };
+    page.pictures(pictures.iter().map(|picture| (picture, caption.to_owned())));
     page.heading("Trials");
     let header: Vec<String> = trials.columns.iter().map(|(name, _)| name.clone()).collect();
     let rows = trials.rows().unwrap_or_default();
@@ -75,30 +97,27 @@ fn distribution(summary: &Summary, trials: &Table, metric: &str) -> Distribution
     };
     Distribution {
         title: metric.to_owned(),
-        y: metric.to_owned(),
+        x: metric.to_owned(),
         groups: summary.groups.iter().map(group).collect(),
     }
 }
 
 /// Means of a metric over a column of numbers: a curve for each combination of the others.
-fn curve(summary: &Summary, x: &str, metric: &str) -> Chart {
+fn curves(summary: &Summary, x: &str, metric: &str) -> Vec<Curve> {
     let place = summary.columns.iter().position(|column| column == x);
-    let mut curves: Vec<(String, Vec<(f64, f64)>)> = vec![];
+    let mut curves: Vec<Curve> = vec![];
     for group in &summary.groups {
         let number = place.and_then(|place| group.labels.get(place)?.parse().ok());
         let (Some(number), Some(mean)) = (number, group.means.get(metric)) else { continue };
         let others = group.labels.iter().enumerate().filter(|(i, _)| Some(*i) != place);
         let name = others.map(|(_, label)| label.as_str()).collect::<Vec<_>>().join(", ");
-        match curves.iter_mut().find(|(own, _)| *own == name) {
-            Some((_, points)) => points.push((number, mean.mean)),
-            None => curves.push((name, vec![(number, mean.mean)])),
+        match curves.iter_mut().find(|curve| curve.name == name) {
+            Some(curve) => curve.points.push((number, mean.mean)),
+            None => {
+                let ink = Ink::Series(curves.len());
+                curves.push(Curve::new(&name, ink, vec![(number, mean.mean)]).with_dots());
+            }
         }
     }
-    Chart {
-        title: format!("{metric} over {x}"),
-        x: x.to_owned(),
-        y: metric.to_owned(),
-        log_x: curves.iter().flat_map(|(_, points)| points).all(|(x, _)| *x > 0.0),
-        curves,
-    }
+    curves
 }

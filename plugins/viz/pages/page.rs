@@ -1,60 +1,83 @@
 //! A page of HTML with everything in it: it opens without a network, and fetches nothing.
-use crate::drawing::picture::{Picture, numbered};
+use crate::canvas::{Theme, style_sheet};
+use crate::drawing::Picture;
 use crate::xml::escape;
 use std::fmt::Write as _;
 
 /// A page that grows from top to bottom.
-#[derive(Debug, Clone)]
-pub struct Page {
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Page {
     title: String,
     body: String,
+    scripts: String,
 }
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1100px;margin:2em auto;padding:0 1em;color:#222}\
-h1{font-size:1.6em}h2{margin-top:2em;border-bottom:1px solid #ccc}table{border-collapse:collapse;margin:1em 0;font-size:14px}\
-th,td{padding:.25em .7em;border-bottom:1px solid #e5e5e5;text-align:left;vertical-align:top}\
-td.n{text-align:right;font-variant-numeric:tabular-nums}div.wide{overflow-x:auto}svg{max-width:100%;height:auto}\
-pre{background:#f6f6f6;padding:1em;overflow-x:auto;font-size:13px}details{margin:1em 0}p.note{color:#555}\
-li.warning{color:#9a3b00}";
+const STYLE: &str = include_str!("assets/page.css");
+/// What a browser may do with the page: run what is in it, and fetch nothing.
+const POLICY: &str =
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
 impl Page {
     /// A page with a heading.
-    pub fn new(title: &str) -> Self {
-        Self { title: title.to_owned(), body: format!("<h1>{}</h1>\n", escape(title)) }
+    pub(crate) fn new(title: &str) -> Self {
+        let body = format!("<h1>{}</h1>\n", escape(title));
+        Self { title: title.to_owned(), body, scripts: String::new() }
     }
 
-    /// A part without a heading, to be [appended](Self::append) to another.
-    pub(crate) fn part() -> Self {
-        Self { title: String::new(), body: String::new() }
-    }
-
-    /// Adds another page's body.
-    pub(crate) fn append(&mut self, part: &Page) -> &mut Self {
-        self.push(&part.body)
-    }
-
-    /// A heading.
-    pub fn heading(&mut self, text: &str) -> &mut Self {
+    /// A heading, with a name that links lead to.
+    pub(crate) fn heading(&mut self, text: &str) -> &mut Self {
         self.push(&format!("<h2>{}</h2>", escape(text)))
     }
 
+    /// A heading within a part.
+    pub(crate) fn subheading(&mut self, text: &str) -> &mut Self {
+        self.push(&format!("<h3>{}</h3>", escape(text)))
+    }
+
     /// A paragraph.
-    pub fn paragraph(&mut self, text: &str) -> &mut Self {
+    pub(crate) fn paragraph(&mut self, text: &str) -> &mut Self {
         self.push(&format!("<p class=\"note\">{}</p>", escape(text)))
     }
 
     /// A list of warnings; nothing for none.
-    pub fn warnings(&mut self, texts: &[String]) -> &mut Self {
+    pub(crate) fn warnings(&mut self, texts: &[String]) -> &mut Self {
         let items: String =
             texts.iter().map(|text| format!("<li class=\"warning\">{}</li>", escape(text))).collect();
         if texts.is_empty() { self } else { self.push(&format!("<ul>{items}</ul>")) }
     }
 
+    /// Words, each with what it means.
+    pub(crate) fn definitions(&mut self, list: &[(&str, &str)]) -> &mut Self {
+        let items =
+            list.iter().map(|(word, text)| format!("<dt>{}</dt><dd>{}</dd>", escape(word), escape(text)));
+        let items: String = items.collect();
+        if list.is_empty() { self } else { self.push(&format!("<dl>{items}</dl>")) }
+    }
+
+    /// Links to files that lie beside the page, by their paths from its folder.
+    pub(crate) fn files(&mut self, paths: &[String]) -> &mut Self {
+        let links = paths.iter().map(|path| format!("<li><a href=\"{0}\">{0}</a></li>", escape(path)));
+        let links: String = links.collect();
+        self.push(&format!("<ul class=\"files\">{links}</ul>"))
+    }
+
     /// A table; cells that are numbers stand to the right.
-    pub fn table(&mut self, header: &[String], rows: &[Vec<String>]) -> &mut Self {
-        let mut html = String::from("<div class=\"wide\"><table><thead><tr>");
+    pub(crate) fn table(&mut self, header: &[String], rows: &[Vec<String>]) -> &mut Self {
+        let mut html = String::from("<div class=\"wide\" tabindex=\"0\"><table><thead><tr>");
         // writing to a String does not fail
-        header.iter().for_each(|cell| _ = write!(html, "<th>{}</th>", escape(cell)));
+        for (column, cell) in header.iter().enumerate() {
+            let cells = || {
+                rows.iter()
+                    .filter_map(|row| row.get(column))
+                    .filter(|cell| !matches!(cell.as_str(), "" | "-"))
+            };
+            let class = if cells().all(|cell| is_number(cell)) && cells().next().is_some() {
+                " class=\"n\""
+            } else {
+                ""
+            };
+            let _ = write!(html, "<th scope=\"col\"{class}>{}</th>", escape(cell));
+        }
         html += "</tr></thead><tbody>\n";
         for row in rows {
             html += "<tr>";
@@ -67,23 +90,41 @@ impl Page {
         self.push(&(html + "</tbody></table></div>"))
     }
 
-    /// A picture.
-    pub fn picture(&mut self, picture: &Picture) -> &mut Self {
-        self.svg(&picture.part())
+    /// A picture with what it shows, in words.
+    pub(crate) fn picture(&mut self, picture: &Picture, caption: &str) -> &mut Self {
+        let html = figure(picture, caption);
+        self.push(&html)
     }
 
-    fn svg(&mut self, svg: &str) -> &mut Self {
-        // a prolog belongs to files, and not into a page
-        let start = svg.find("<svg").unwrap_or(0);
-        self.push(&format!("<div class=\"wide\">{}</div>", svg.get(start..).unwrap_or_default()))
+    /// Pictures side by side where there is room, under one caption each.
+    pub(crate) fn pictures<'a>(
+        &mut self,
+        pictures: impl Iterator<Item = (&'a Picture, String)>,
+    ) -> &mut Self {
+        let figures: String = pictures.map(|(picture, caption)| figure(picture, &caption)).collect();
+        if figures.is_empty() { self } else { self.push(&format!("<div class=\"figures\">{figures}</div>")) }
     }
 
     /// A text as it is, such as a config, behind a line that opens it.
-    pub fn folded(&mut self, summary: &str, text: &str) -> &mut Self {
+    pub(crate) fn folded(&mut self, summary: &str, text: &str) -> &mut Self {
         self.push(&format!(
             "<details><summary>{}</summary><pre>{}</pre></details>",
             escape(summary),
             escape(text)
+        ))
+    }
+
+    /// Markup and scripts of the program's own: never what others wrote.
+    pub(crate) fn own(&mut self, html: &str, scripts: &str) -> &mut Self {
+        self.scripts += scripts;
+        self.push(html)
+    }
+
+    /// Data for scripts, to be found by `id`.
+    pub(crate) fn data(&mut self, id: &'static str, value: &serde_json::Value) -> &mut Self {
+        self.push(&format!(
+            "<script type=\"application/json\" id=\"{id}\">{}</script>",
+            in_script(&value.to_string())
         ))
     }
 
@@ -94,13 +135,45 @@ impl Page {
     }
 
     /// The page.
-    pub fn html(&self) -> String {
-        let (title, body) = (escape(&self.title), numbered(&self.body));
+    pub(crate) fn html(&self) -> String {
+        let (title, body) = (escape(&self.title), &self.body);
+        let (light, dark) = (style_sheet(Theme::Light), style_sheet(Theme::Dark));
+        let theme = format!(":root{{{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n");
+        let scripts = match self.scripts.as_str() {
+            "" => String::new(),
+            scripts => format!("<script>\n{scripts}</script>\n"),
+        };
         format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
-             <style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n<title>{title}</title>\n\
+             <style>\n{theme}{STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n{scripts}</body>\n</html>\n"
         )
     }
+}
+
+fn figure(picture: &Picture, caption: &str) -> String {
+    format!(
+        "<figure><div class=\"wide\">{}</div><figcaption>{}</figcaption></figure>",
+        picture.part(),
+        escape(caption)
+    )
+}
+
+/// JSON that ends no script, opens no comment, and holds no character that a page may not: all of these occur in its texts
+/// alone, where JSON has another way to write them.
+fn in_script(json: &str) -> String {
+    let mut out = String::with_capacity(json.len());
+    for c in json.chars() {
+        match c {
+            '<' | '>' | '&' | '\u{7f}'..='\u{9f}' | '\u{2028}' | '\u{2029}' | '\u{fffe}' | '\u{ffff}' => {
+                _ = write!(out, "\\u{:04x}", u32::from(c));
+            }
+            c => out.push(c),
+        }
+    }
+    out
 }
 
 fn is_number(cell: &str) -> bool {
@@ -111,15 +184,24 @@ fn is_number(cell: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::{Value, json};
 
     #[test]
     fn what_is_written_is_shown_and_not_obeyed() {
         let mut page = Page::new("a < b");
         page.heading("<script>").table(&["x & y".into()], &[vec!["0.125".into(), "cup".into()]]);
-        page.svg("<?xml version=\"1.0\"?><svg></svg>").folded("config", "a = \"<b>\"");
+        page.folded("config", "a = \"<b>\"").files(&["\"><b>/a.svg".into()]);
         let html = page.html();
         assert!(html.contains("<title>a &lt; b</title>") && !html.contains("<script>"));
         assert!(html.contains("<td class=\"n\">0.125</td><td>cup</td>") && html.contains("x &amp; y"));
-        assert!(!html.contains("<?xml") && html.contains("<svg></svg>"));
+        assert!(!html.contains("<b>"));
+    }
+
+    #[test]
+    fn data_do_not_end_their_script_and_are_read_as_they_were() {
+        let nasty = json!({ "</script><b>": "<!-- \u{2028}\u{9b}2J\u{0}\u{ffff} & Tasse ☕" });
+        let text = in_script(&nasty.to_string());
+        assert!(!text.contains(['<', '>', '&', '\u{9b}', '\u{2028}', '\u{ffff}']), "{text}");
+        assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), nasty);
     }
 }

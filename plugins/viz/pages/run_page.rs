@@ -1,235 +1,156 @@
-//! The page of a run: what came in, what came out, and what was done with each object.
-use crate::drawing::picture::Picture;
-use crate::drawing::{Chart, Distribution};
-use crate::pages::page::Page;
-use crate::{Scene, View, frames_seen, image, plot};
-use indexmap::IndexMap;
-use manifactor_formats::tum::StampedPose;
-use manifactor_graph::Key;
-use manifactor_slam::estimate::Estimate;
-use manifactor_slam::mapping::MappedObject;
-use manifactor_slam::metrics::{Alignment, align, associate};
-use manifactor_slam::report::{ObjectReport, RunReport, VariantReport};
-use manifactor_slam::settings::{EvaluationSettings, Settings};
+//! The page of a run: the map in 3D, its variants side by side, and what was done with each object.
+use super::run_tables::{noise, objects, overview, own_variables, words};
+use super::{page::Page, viewer};
+use crate::drawing::{Palette, Picture, Scene, View, frames_seen, image, map};
+use crate::run::{RESIDUALS, charts, cost, residual_row};
+use manifactor_slam::record::{RunRecord, VariantRecord};
+use manifactor_slam::report::{RunReport, VariantReport};
 
-/// The page of a run, made variant by variant.
-#[derive(Debug, Clone)]
-pub struct RunPage {
-    variants: Page,
+/// Pixels of pictures, narrow enough to be read on a phone.
+const WIDTH: f64 = 560.0;
+
+/// What the words of the overview mean.
+const DEFINITIONS: [(&str, &str); 5] = [
+    (
+        "ATE",
+        "absolute trajectory error: the root mean square of the distances between the estimated and the true positions of the camera, after alignment",
+    ),
+    ("position", "the root mean square of the distances between the centres of objects, estimated and true"),
+    (
+        "shape",
+        "the mean Jaccard distance, 1 - IoU, of the axis-aligned boxes around the estimated and the true object when both are centred at the origin: 0 is perfect, 1 is no overlap; size and orientation count, place does not",
+    ),
+    ("quality", "the same where the objects stand: place counts as well"),
+    (
+        "cost",
+        "½ Σ ρ(‖r‖²) over all factors, r in standard deviations: comparable between variants of the same factors alone",
+    ),
+];
+
+/// The page. `record` and `report` have the same variants; `configs` are the resolved configs of these.
+pub fn run_page(report: &RunReport, record: &RunRecord, configs: &[String]) -> String {
+    let mut page = Page::new(&report.title);
+    let (header, rows) = overview(report);
+    page.table(&header, &rows);
+    page.definitions(&about(record));
+    page.definitions(&DEFINITIONS);
+    in_3d(&mut page, record);
+    side_by_side(&mut page, record);
+    let reports = report.variants.iter().zip(&record.variants).zip(configs);
+    for ((report, record), config) in reports {
+        variant(&mut page, report, record, config);
+    }
+    page.heading("Files").files(&["report.json".to_owned(), "record.json".to_owned()]);
+    page.paragraph(&version());
+    page.html()
 }
 
-/// All pictures of an estimate: the map from above and from the side, errors over time, residuals, and some images.
-pub fn run_pictures(title: &str, estimate: &Estimate, settings: &Settings) -> Vec<Picture> {
-    let evaluation = &settings.evaluation;
-    let scene = Scene::of_estimate(title, estimate, evaluation.max_time_difference);
-    let mut pictures = vec![plot(&scene, View::Top), plot(&scene, View::Side)];
-    pictures.extend(error_over_time(estimate, evaluation).picture("error_over_time"));
-    pictures.extend(residuals(estimate).picture("residuals"));
-    pictures.extend(
-        frames_seen(estimate, settings.report.images).into_iter().map(|frame| image(estimate, frame)),
+fn about(record: &RunRecord) -> Vec<(&str, &str)> {
+    record.variants.iter().filter_map(|v| Some((v.name.as_str(), v.about.as_deref()?))).collect()
+}
+
+fn in_3d(page: &mut Page, record: &RunRecord) {
+    let Some(last) = record.variants.last() else { return };
+    page.heading("Map");
+    let scene = Scene::of(format!("{}: {}", record.title, last.name), last);
+    let picture = map(&scene, View::Top, &Palette::of(record), 1.6 * WIDTH);
+    page.own("<div id=\"static-map\">", "");
+    page.picture(
+        &picture,
+        "The map from above. Where the browser has WebGL 2, it is a map in 3D that can be turned.",
     );
-    pictures
+    page.own("</div>", "");
+    page.data("run-data", &viewer::data(record)).own(viewer::MARKUP, &viewer::SCRIPTS.concat());
 }
 
-impl Default for RunPage {
-    fn default() -> Self {
-        Self { variants: Page::part() }
+/// Each kind of picture once, the variants beside each other.
+fn side_by_side(page: &mut Page, record: &RunRecord) {
+    page.heading("Variants side by side");
+    let palette = Palette::of(record);
+    if let Some(picture) = cost(&record.variants, WIDTH) {
+        page.pictures([(&picture, CAPTIONS[0].1.to_owned())].into_iter());
+    }
+    let all: Vec<(&VariantRecord, Vec<Picture>)> = record
+        .variants
+        .iter()
+        .map(|variant| {
+            let scene = Scene::of(variant.name.clone(), variant);
+            let mut pictures =
+                vec![map(&scene, View::Top, &palette, WIDTH), map(&scene, View::Side, &palette, WIDTH)];
+            pictures.extend(charts(variant, WIDTH));
+            (variant, pictures)
+        })
+        .collect();
+    for (name, caption) in CAPTIONS.iter().skip(1) {
+        let of_name = all.iter().filter_map(|(variant, pictures)| {
+            let picture = pictures.iter().find(|picture| picture.name == *name)?;
+            Some((picture, format!("{}: {caption}", variant.name)))
+        });
+        page.pictures(of_name);
     }
 }
 
-impl RunPage {
-    /// Adds a variant: its [pictures](run_pictures), residuals, objects, and the config that makes it again.
-    pub fn variant(
-        &mut self,
-        estimate: &Estimate,
-        report: &VariantReport,
-        pictures: &[Picture],
-        config: &str,
-    ) -> &mut Self {
-        let page = &mut self.variants;
-        page.heading(&report.name);
-        page.warnings(&report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
-        pictures.iter().for_each(|picture| _ = page.picture(picture));
-        page.paragraph("Residuals at the estimate, in standard deviations of their noise, row by row.");
-        page.table(&words(RESIDUALS), &residual_rows(estimate));
-        if let Some(noise) = report.variance_components.last() {
-            page.paragraph(&format!(
-                "Noise as it was estimated, in {} rounds.",
-                report.variance_components.len()
-            ));
-            let mut rows = vec![];
-            if let Some([turn, shift]) = noise.odometry {
-                rows.push(vec![
-                    "odometry, rotation (rad)".into(),
-                    format!("{turn:.3e}"),
-                    String::new(),
-                    String::new(),
-                ]);
-                rows.push(vec![
-                    "odometry, translation (m)".into(),
-                    format!("{shift:.3e}"),
-                    String::new(),
-                    String::new(),
-                ]);
-            }
-            rows.extend(noise.boxes.iter().map(|(name, c)| {
-                let numbers = [c.sigma_px, c.correlation_time, c.effective_px].map(|x| format!("{x:.2}"));
-                std::iter::once(format!("boxes: {name} (px)")).chain(numbers).collect()
-            }));
-            page.table(&words(["noise", "σ", "correlation time", "σ in the graph"]), &rows);
-        }
-        page.paragraph("Objects, and what was applied to each.");
-        page.table(&words(OBJECTS), &report.objects.iter().map(object_row).collect::<Vec<_>>());
-        page.folded("Config of this variant", config);
-        self
-    }
+/// Pictures by name, each with what it shows.
+const CAPTIONS: [(&str, &str); 8] = [
+    (
+        "cost",
+        "The cost after each accepted step, from where the solve began. Costs compare between variants of the same noise and factors alone.",
+    ),
+    ("map_top", "the map from above. True objects and the true path are dashed."),
+    ("map_side", "the map from the side, up being up."),
+    ("error_over_time", "distance of each position from the true one, after alignment of the whole path."),
+    (
+        "relative_error",
+        "error of the motion between frames, in metres and in degrees: drift, whatever the alignment.",
+    ),
+    ("xyz", "the camera's position in the frame of the map's picture."),
+    ("rpy", "the camera's orientation: turns about x, y and z."),
+    (
+        "residuals",
+        "boxes reach from quartile to quartile, whiskers to the last value within one and a half times that; dots lie beyond, and an arrow says how many lie outside the picture and how far.",
+    ),
+];
 
-    /// The page, with the table of all variants above them.
-    pub fn html(&self, report: &RunReport) -> String {
-        let mut page = Page::new(&report.title);
-        let header = [
-            "variant",
-            "odometry ATE (m)",
-            "ATE (m)",
-            "position (m)",
-            "shape",
-            "quality",
-            "objects",
-            "boxes",
-            "factors",
-            "cost",
-            "iterations",
-            "converged",
-        ];
-        let number = |x: Option<f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.5}"));
-        let row = |row: manifactor_slam::report::Row| {
-            vec![
-                row.variant,
-                number(row.odometry_ate),
-                number(row.ate),
-                number(row.position),
-                number(row.shape),
-                number(row.quality),
-                row.objects.to_string(),
-                row.boxes.to_string(),
-                row.semantic_factors.to_string(),
-                format!("{:.3}", row.final_cost),
-                row.iterations.to_string(),
-                if row.converged { "yes" } else { "no" }.into(),
-            ]
-        };
-        page.table(&words(header), &report.table().into_iter().map(row).collect::<Vec<_>>());
-        page.paragraph(&version());
-        page.append(&self.variants);
-        page.html()
+/// What is told of one variant alone.
+fn variant(page: &mut Page, report: &VariantReport, record: &VariantRecord, config: &str) {
+    page.heading(&report.name);
+    if let Some(about) = &record.about {
+        page.paragraph(about);
     }
+    page.warnings(&report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
+    let palette = Palette::new(record.classes().into_iter());
+    let frames = frames_seen(record, record.images).into_iter();
+    let images =
+        frames.filter_map(|number| Some(image(record, number, record.frames.get(number)?, &palette, WIDTH)));
+    let images: Vec<Picture> = images.collect();
+    let caption =
+        "Boxes as the detector drew them are dashed; outlines of the estimated ellipsoids are filled.";
+    page.pictures(images.iter().map(|picture| (picture, caption.to_owned())));
+    page.subheading("Residuals")
+        .paragraph("At the estimate, in standard deviations of their noise, row by row.");
+    page.table(&words(RESIDUALS), &record.residuals.iter().map(residual_row).collect::<Vec<_>>());
+    noise(page, report);
+    own_variables(page, record);
+    objects(page, report);
+    page.subheading("Files of this variant").files(&files(record));
+    page.folded("Config of this variant", config);
+}
+
+fn files(record: &VariantRecord) -> Vec<String> {
+    const NAMES: [&str; 8] = [
+        "config.toml",
+        "trajectory.txt",
+        "objects.json",
+        "frames.jsonl",
+        "map.ply",
+        "graph.json",
+        "iterations.csv",
+        "metrics.json",
+    ];
+    NAMES.iter().map(|name| format!("{}/{name}", record.folder)).collect()
 }
 
 /// What made a page.
 pub(crate) fn version() -> String {
     format!("Made by manifactor {}.", env!("CARGO_PKG_VERSION"))
-}
-
-fn words<const N: usize>(words: [&str; N]) -> Vec<String> {
-    words.map(str::to_owned).into()
-}
-
-const RESIDUALS: [&str; 7] = ["factor", "count", "inactive", "RMS", "median", "largest", "mean weight"];
-const OBJECTS: [&str; 9] = [
-    "object",
-    "class",
-    "score",
-    "detections",
-    "boxes",
-    "applied",
-    "semi-axes (m)",
-    "position error (m)",
-    "not mapped because",
-];
-
-fn object_row(report: &ObjectReport) -> Vec<String> {
-    let object = &report.object;
-    let axes = |q: &manifactor_quadric::DualQuadric| {
-        q.semi_axes.iter().map(|s| format!("{s:.3}")).collect::<Vec<_>>().join(" × ")
-    };
-    vec![
-        object.key.to_string(),
-        object.class.as_ref().map_or("-".into(), |class| class.name.clone()),
-        object.class.as_ref().map_or("-".into(), |class| format!("{:.2}", class.score)),
-        object.detections.to_string(),
-        object.boxes.to_string(),
-        applied(object),
-        report.estimate.as_ref().map_or(String::new(), axes),
-        report.error.as_ref().map_or(String::new(), |error| format!("{:.4}", error.position)),
-        report.rejected_because.clone().unwrap_or_default(),
-    ]
-}
-
-/// Each semantic factor with its reason, then what might have been one, and why it is none.
-fn applied(object: &MappedObject) -> String {
-    let own = |key: &&Key| **key != object.key;
-    let applied = object.semantic_factors.iter().map(|a| {
-        let others: Vec<_> = a.keys.iter().filter(own).map(|key| format!(" with {key}")).collect();
-        format!("{}{}: {}", a.factor, others.concat(), a.because)
-    });
-    let left_out = object.left_out.iter().map(|l| format!("not {}: {}", l.factor, l.because));
-    applied.chain(left_out).collect::<Vec<_>>().join("; ")
-}
-
-/// Whitened residuals by type of factor.
-fn whitened(estimate: &Estimate) -> IndexMap<&'static str, (Vec<f64>, Vec<f64>, usize)> {
-    let mut all: IndexMap<&'static str, (Vec<f64>, Vec<f64>, usize)> = IndexMap::new();
-    for state in &estimate.solution.factors {
-        let Some(entry) = estimate.mapping.graph.factors().get(state.entry) else { continue };
-        let (rows, weights, inactive) = all.entry(entry.factor.typetag_name()).or_default();
-        if state.defined {
-            rows.extend(&state.whitened);
-            weights.push(state.weight);
-        } else {
-            *inactive += 1;
-        }
-    }
-    all
-}
-
-fn residuals(estimate: &Estimate) -> Distribution {
-    let groups = whitened(estimate).into_iter().map(|(name, (rows, _, _))| (name.to_owned(), rows)).collect();
-    Distribution { title: "whitened residuals".into(), y: "standard deviations".into(), groups }
-}
-
-fn residual_rows(estimate: &Estimate) -> Vec<Vec<String>> {
-    let row = |(name, (rows, weights, inactive)): (&str, (Vec<f64>, Vec<f64>, usize))| {
-        let mut sizes: Vec<f64> = rows.iter().map(|x| x.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let n = sizes.len().max(1) as f64;
-        let rms = (sizes.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
-        let median = sizes.get(sizes.len() / 2).copied().unwrap_or_default();
-        let largest = sizes.last().copied().unwrap_or_default();
-        let weight = weights.iter().sum::<f64>() / weights.len().max(1) as f64;
-        let counts = [weights.len() + inactive, inactive].map(|n| n.to_string());
-        let numbers = [rms, median, largest, weight].map(|x| format!("{x:.4}"));
-        std::iter::once(name.to_owned()).chain(counts).chain(numbers).collect()
-    };
-    whitened(estimate).into_iter().map(row).collect()
-}
-
-fn error_over_time(estimate: &Estimate, evaluation: &EvaluationSettings) -> Chart {
-    let truth = estimate.sequence.ground_truth.as_ref();
-    let curve = |name: &str, poses: &[StampedPose]| {
-        let pairs = associate(&truth?.trajectory, poses, evaluation.max_time_difference).ok()?;
-        let (_, aligned) = align(&pairs, Alignment::Se3).ok()?;
-        let start = aligned.first()?.timestamp;
-        let point = |p: &manifactor_slam::metrics::PosePair| {
-            (p.timestamp - start, (p.truth.translation - p.estimate.translation).norm())
-        };
-        Some((name.to_owned(), aligned.iter().map(point).collect()))
-    };
-    let curves = [curve("odometry", &estimate.odometry()), curve("estimated", &estimate.trajectory())];
-    Chart {
-        title: "error of position over time".into(),
-        x: "time (s)".into(),
-        y: "error (m), aligned by SE(3)".into(),
-        log_x: false,
-        curves: curves.into_iter().flatten().collect(),
-    }
 }

@@ -1,4 +1,8 @@
-use crate::{Object, Scene, Shape, Track, TrackKind, View, plot};
+use super::map;
+use crate::canvas::Theme;
+use crate::drawing::outline::Shape;
+use crate::drawing::scene::TRACKS;
+use crate::drawing::{Object, Palette, Scene, Track, View};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 fn ellipsoid(centroid: [f64; 3], semi_axes: [f64; 3], yaw: f64) -> Shape {
@@ -16,7 +20,7 @@ fn desk() -> Scene {
         };
         (0..100).map(point).collect()
     };
-    let track = |kind, name: &str, positions| Track { kind, name: name.into(), positions };
+    let track = |(name, stroke): (&str, _), positions| Track { name: name.into(), stroke, positions };
     let places = [
         ("cup", [0.4, 0.3]),
         ("keyboard", [-0.2, -0.4]),
@@ -31,25 +35,27 @@ fn desk() -> Scene {
     Scene {
         title: "desk".into(),
         tracks: vec![
-            track(TrackKind::Truth, "true", circle(1.5, 0.0)),
-            track(TrackKind::Odometry, "odometry", circle(1.5, 0.004)),
-            track(TrackKind::Estimate, "estimated", circle(1.5, 0.0005)),
+            track(TRACKS[0], circle(1.5, 0.0)),
+            track(TRACKS[1], circle(1.5, 0.004)),
+            track(TRACKS[2], circle(1.5, 0.0005)),
         ],
         objects: places.into_iter().enumerate().map(object).collect(),
         ..Scene::default()
     }
 }
 
+fn svg(scene: &Scene, view: View) -> String {
+    let palette = Palette::new(scene.objects.iter().map(|object| object.class.as_str()));
+    map(scene, view, &palette, 900.0).svg(Theme::Light)
+}
+
 #[test]
 fn every_class_and_trajectory_is_in_the_legend() {
     for view in [View::Top, View::Side] {
-        let svg = plot(&desk(), view).svg();
+        let svg = svg(&desk(), view);
         assert!(svg.starts_with("<svg") || svg.starts_with("<?xml"), "{}", &svg[..40]);
         for text in ["true", "odometry", "estimated", "cup", "keyboard", "bottle", "tv &amp; book", "(m)"] {
             assert!(svg.contains(text), "{text} is missing");
-        }
-        if let Ok(folder) = std::env::var("MANIFACTOR_PLOTS") {
-            std::fs::write(format!("{folder}/desk_{view:?}.svg"), svg).unwrap();
         }
     }
 }
@@ -60,7 +66,7 @@ fn a_legend_of_many_classes_ends() {
     let object = scene.objects[0].clone();
     scene.objects = (0..5000).map(|i| Object { class: format!("class {i:04}"), ..object.clone() }).collect();
     scene.objects.iter_mut().skip(1).for_each(|object| (object.truth, object.estimate) = (None, None));
-    let svg = plot(&scene, View::Side).svg();
+    let svg = svg(&scene, View::Side);
     assert!(svg.contains("class 0059") && !svg.contains("class 0060") && svg.contains("and 4940 more"));
 }
 
@@ -68,7 +74,7 @@ fn a_legend_of_many_classes_ends() {
 fn an_estimate_far_away_does_not_shrink_the_rest() {
     let mut scene = desk();
     scene.objects[0].estimate = Some(ellipsoid([1e5, 0.0, 0.0], [1.0, 1.0, 1.0], 0.0));
-    let svg = plot(&scene, View::Top).svg();
+    let svg = svg(&scene, View::Top);
     assert!(svg.contains("1 of 4 objects outside the picture"));
     // the ticks are those of a frame of three metres
     assert!(svg.contains(">0.5<") && !svg.contains(">100000<"));
@@ -79,16 +85,15 @@ fn what_is_not_finite_is_left_out() {
     let mut scene = desk();
     scene.tracks[2].positions[3] = Vector3::new(f64::NAN, 0.0, f64::INFINITY);
     scene.objects[1].estimate = Some(ellipsoid([f64::NAN; 3], [1.0; 3], 0.0));
-    assert!(!plot(&scene, View::Top).svg().contains("NaN"));
+    assert!(!svg(&scene, View::Top).contains("NaN"));
 }
 
 #[test]
 fn an_empty_scene_is_an_empty_picture() {
-    for tracks in [
-        vec![],
-        vec![Track { kind: TrackKind::Truth, name: "one".into(), positions: vec![Vector3::zeros()] }],
-    ] {
-        let svg = plot(&Scene { tracks, ..Scene::default() }, View::Top).svg();
+    for tracks in
+        [vec![], vec![Track { name: "one".into(), stroke: TRACKS[0].1, positions: vec![Vector3::zeros()] }]]
+    {
+        let svg = svg(&Scene { tracks, ..Scene::default() }, View::Top);
         assert!(svg.contains("</svg>"));
     }
 }

@@ -1,0 +1,52 @@
+//! `manifactor plot`: the pictures of a run, made again.
+use crate::failure::Failure;
+use crate::output;
+use crate::output::pictures::Look;
+use crate::output::text::count;
+use crate::status::Status;
+use clap::Args;
+use manifactor::slam::output::write_whole;
+use manifactor::slam::record::{RecordError, RunRecord};
+use manifactor::viz::{ply, run_pictures};
+use std::path::PathBuf;
+
+/// Make the pictures of a run again, from its folder: at another size, with another theme.
+///
+/// Everything is drawn from record.json; nothing is solved. The pictures go where those of the run are, or into --out.
+#[derive(Debug, Args)]
+pub(crate) struct Plot {
+    /// The folder of a run, with record.json in it.
+    folder: PathBuf,
+    #[command(flatten)]
+    look: Look,
+    /// The folder for the pictures. Default: that of the run.
+    #[arg(long, short, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Plot {
+    pub(crate) fn run(&self) -> Result<Status, Failure> {
+        let record = RunRecord::read(&self.folder)?;
+        let out = self.out.as_ref().unwrap_or(&self.folder);
+        let mut written = 0;
+        for variant in &record.variants {
+            let pictures = run_pictures(&record, variant, self.look.width());
+            let folder = out.join(&variant.folder);
+            self.look.write(&folder, &pictures)?;
+            write_whole(&folder.join("map.ply"), ply(&record, variant))?;
+            written += pictures.len();
+        }
+        output::print(&format!("{} written to {}.\n", count(written, "picture"), out.display()));
+        Ok(Status::Done)
+    }
+}
+
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        let help = "a folder that `manifactor run` has written has it";
+        match error {
+            RecordError::Io { path, source } => Self::File { path, source },
+            other => Self::with_help(other, help),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Colours by what they mean: the same in all pictures of a run and in its page.
+
+/// What is drawn: decides the colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ink {
+    /// What it is drawn on.
+    Paper,
+    /// Titles and labels.
+    Text,
+    /// What has to step back: axes and their numbers.
+    Faint,
+    /// Lines behind the data.
+    Grid,
+    /// The true trajectory.
+    Truth,
+    /// The trajectory by odometry alone.
+    Odometry,
+    /// The estimated trajectory.
+    Estimate,
+    /// Values that stand out.
+    Outlier,
+    /// A class of objects, by its place among all classes.
+    Class(usize),
+    /// A curve of a chart, by its place.
+    Series(usize),
+}
+
+/// Dark lines on white, or light ones on black.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Theme {
+    /// For paper.
+    #[default]
+    Light,
+    /// For dark slides.
+    Dark,
+}
+
+/// Of classes: neither so light nor so dark that they are lost on white or on black.
+const CLASSES: [&str; 24] = [
+    "#7b61d9", "#d6455d", "#2b9e55", "#1a9fc0", "#b8479e", "#c08a0e", "#1f9c8c", "#a06c3a", "#859528",
+    "#4c78d6", "#dc6a3c", "#7d8590", "#5fa548", "#a55a80", "#e0559b", "#0d9a72", "#9a78e0", "#c4785a",
+    "#4c8a8c", "#b04a40", "#5b7ff0", "#a5973a", "#d58724", "#7f8236",
+];
+
+/// Of curves, told apart by those who see no red: after Okabe and Ito.
+const SERIES: [&str; 8] =
+    ["#1f83c4", "#dd6b20", "#1b9e77", "#c76aa3", "#d19a08", "#4fa9dc", "#8a8f98", "#a09a10"];
+
+/// The inks that differ between themes, with their names in style sheets, on light and on dark.
+const THEMED: [(Ink, &str, [&str; 2]); 5] = [
+    (Ink::Paper, "paper", ["#ffffff", "#14171c"]),
+    (Ink::Text, "text", ["#1d2129", "#e6e9ee"]),
+    (Ink::Faint, "faint", ["#5a6472", "#a3adba"]),
+    (Ink::Grid, "grid", ["#e3e6ea", "#2c323b"]),
+    (Ink::Truth, "truth", ["#1d2129", "#e6e9ee"]),
+];
+
+impl Ink {
+    /// Its name as a variable of a style sheet, if it depends on the theme.
+    pub(crate) fn variable(self) -> Option<&'static str> {
+        THEMED.iter().find(|(ink, ..)| *ink == self).map(|(_, name, _)| *name)
+    }
+
+    /// Its colour.
+    pub(crate) fn hex(self, theme: Theme) -> &'static str {
+        let of = |list: &'static [&'static str], place: usize| list.get(place % list.len()).copied();
+        let fixed = match self {
+            Self::Odometry => Some("#e07b30"),
+            Self::Estimate => Some("#2a85d8"),
+            Self::Outlier => Some("#d6455d"),
+            Self::Class(place) => of(&CLASSES, place),
+            Self::Series(place) => of(&SERIES, place),
+            _ => None,
+        };
+        let themed = || {
+            let colors = THEMED.iter().find(|(ink, ..)| *ink == self).map(|(_, _, colors)| colors);
+            colors.map_or("#808080", |[light, dark]| if theme == Theme::Light { light } else { dark })
+        };
+        fixed.unwrap_or_else(themed)
+    }
+
+    /// Its parts of red, green and blue.
+    pub(crate) fn rgb(self, theme: Theme) -> [u8; 3] {
+        let hex = self.hex(theme);
+        [1, 3, 5]
+            .map(|at| hex.get(at..at + 2).and_then(|part| u8::from_str_radix(part, 16).ok()).unwrap_or(0))
+    }
+}
+
+/// The variables of all inks that depend on the theme, for a page.
+pub(crate) fn style_sheet(theme: Theme) -> String {
+    THEMED.iter().map(|(ink, name, _)| format!("--{name}:{};", ink.hex(theme))).collect()
+}

@@ -1,0 +1,121 @@
+//! A sheet as SVG.
+use super::{Anchor, DASHES, Ink, Item, Sheet, Stroke, Text, Theme};
+use crate::xml::escape;
+use std::fmt::Write as _;
+
+/// Where colours come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Colors {
+    /// A theme, for a file.
+    Of(Theme),
+    /// The variables of the page that it is a part of, which follow the reader's choice.
+    OfPage,
+}
+
+impl Colors {
+    fn of(self, ink: Ink) -> String {
+        match (self, ink.variable()) {
+            (Self::OfPage, Some(name)) => format!("var(--{name})"),
+            (Self::OfPage, None) => ink.hex(Theme::Light).to_owned(),
+            (Self::Of(theme), _) => ink.hex(theme).to_owned(),
+        }
+    }
+}
+
+/// As DejaVu Sans is wide; widths were measured with it.
+const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
+
+impl Sheet {
+    /// A document, or a part of a page; `title` is read aloud in place of it.
+    pub(crate) fn svg(&self, title: &str, colors: Colors) -> String {
+        let (width, height) = (number(self.width), number(self.height));
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
+             role=\"img\" font-family=\"{FONT}\" stroke-linejoin=\"round\" stroke-linecap=\"butt\">\n<title>{}</title>\n",
+            escape(title)
+        );
+        if let Colors::Of(_) = colors {
+            svg += &format!("<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n", colors.of(Ink::Paper));
+        }
+        for item in &self.items {
+            match item {
+                Item::Path { points, closed, stroke, fill } => {
+                    path(&mut svg, points, *closed, *stroke, *fill, colors);
+                }
+                Item::Dot { at: [x, y], radius, ink } => {
+                    let (x, y, r) = (number(*x), number(*y), number(*radius));
+                    // writing to a String does not fail
+                    let _ = writeln!(
+                        svg,
+                        "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{}\"/>",
+                        colors.of(*ink)
+                    );
+                }
+                Item::Text(text) => words(&mut svg, text, colors),
+            }
+        }
+        svg + "</svg>\n"
+    }
+}
+
+fn path(
+    svg: &mut String,
+    points: &[[f64; 2]],
+    closed: bool,
+    stroke: Option<Stroke>,
+    fill: Option<(Ink, f64)>,
+    colors: Colors,
+) {
+    let Some(([x, y], rest)) = points.split_first() else { return };
+    let _ = write!(svg, "<path d=\"M{} {}", tenths(*x), tenths(*y));
+    rest.iter().for_each(|[x, y]| _ = write!(svg, "L{} {}", tenths(*x), tenths(*y)));
+    *svg += if closed { "Z\"" } else { "\"" };
+    let _ = match fill {
+        Some((ink, opacity)) if opacity < 1.0 => {
+            write!(svg, " fill=\"{}\" fill-opacity=\"{}\"", colors.of(ink), number(opacity))
+        }
+        Some((ink, _)) => write!(svg, " fill=\"{}\"", colors.of(ink)),
+        None => write!(svg, " fill=\"none\""),
+    };
+    if let Some(Stroke { ink, width, dashed }) = stroke {
+        let _ = write!(svg, " stroke=\"{}\" stroke-width=\"{}\"", colors.of(ink), number(width));
+        if dashed {
+            let _ = write!(svg, " stroke-dasharray=\"{} {}\"", number(DASHES[0]), number(DASHES[1]));
+        }
+    }
+    *svg += "/>\n";
+}
+
+fn words(svg: &mut String, text: &Text, colors: Colors) {
+    let [x, y] = text.at.map(number);
+    let _ = write!(
+        svg,
+        "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"",
+        number(text.size),
+        colors.of(text.ink)
+    );
+    *svg += match text.anchor {
+        Anchor::Start => "",
+        Anchor::Middle => " text-anchor=\"middle\"",
+        Anchor::End => " text-anchor=\"end\"",
+    };
+    if text.bold {
+        *svg += " font-weight=\"bold\"";
+    }
+    if text.upward {
+        let _ = write!(svg, " transform=\"rotate(-90 {x} {y})\"");
+    }
+    let _ = writeln!(svg, ">{}</text>", escape(&text.text));
+}
+
+/// What a corner of a line needs: the PNG has half a pixel for it.
+fn tenths(x: f64) -> String {
+    number((x * 10.0).round() / 10.0)
+}
+
+/// Hundredths of a pixel.
+fn number(x: f64) -> String {
+    let text = format!("{x:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}

@@ -1,0 +1,188 @@
+//! The map, from above or from the side.
+use super::axes::{Axes, HEAD, title};
+use super::labels::{Label, place};
+use super::legend::{Entry, legend};
+use super::outline::Shape;
+use super::picture::Picture;
+use super::scale::Scale;
+use super::scene::{Object, Palette, Scene};
+use super::view::View;
+use crate::canvas::{Ink, Sheet, Stroke};
+use nalgebra::{Point2, Vector2};
+
+/// Classes in the legend.
+const CLASSES: usize = 60;
+/// The least and the largest height of the area as a share of the width.
+const SHARES: [f64; 2] = [0.3, 0.9];
+
+/// A class, and the outline of an object of it.
+type Outline<'a> = (&'a str, Vec<Point2<f64>>);
+
+/// Draws a scene, in metres, both axes to the same scale.
+///
+/// What is true is dashed, what is estimated solid and filled; objects have the colour of their class. The picture shows
+/// all trajectories and true objects whole; an estimate far away from them is left outside, and the title says how many
+/// are. Coordinates that are not finite are left out.
+pub(crate) fn map(scene: &Scene, view: View, palette: &Palette, width: f64) -> Picture {
+    let plane = view.plane(&scene.up);
+    let tracks: Vec<Vec<Point2<f64>>> = scene
+        .tracks
+        .iter()
+        .map(|track| {
+            track
+                .positions
+                .iter()
+                .filter(|p| p.iter().all(|x| x.is_finite()))
+                .map(|p| plane.project(p))
+                .collect()
+        })
+        .collect();
+    let outlines = |of: fn(&Object) -> Option<&Shape>| -> Vec<Outline<'_>> {
+        let outline = |o| of(o).and_then(|shape| shape.outline(&plane));
+        scene.objects.iter().filter_map(|o| Some((o.class.as_str(), outline(o)?))).collect()
+    };
+    let (truths, estimates) = (outlines(|o| o.truth.as_ref()), outlines(|o| o.estimate.as_ref()));
+    let mut frame = Frame::default();
+    tracks.iter().flatten().for_each(|p| frame.include(p));
+    truths.iter().flat_map(|(_, outline)| outline).for_each(|p| frame.include(p));
+    let (near, outside) = frame.include_near(&estimates);
+
+    let entries = legend(&entries(scene, palette, &truths, &estimates), width - 20.0);
+    let top = HEAD + entries.height + 8.0;
+    let Plot { x, y, area: [left, _, right, height] } = frame.on(width);
+    let area = [left, top, right, top + height];
+    let [x_label, y_label] = plane.labels.map(|label| format!("{label} (m)"));
+    let axes = Axes { area, x, y, y_label, x_label };
+    let mut sheet = Sheet::new(width, top + height + Axes::below("x") + 2.0);
+    let text = match outside {
+        0 => scene.title.clone(),
+        n => format!("{} ({n} of {} objects outside the picture)", scene.title, scene.objects.len()),
+    };
+    title(&mut sheet, &text);
+    sheet.place(entries, [10.0, HEAD]);
+    axes.draw(&mut sheet);
+
+    let drawn =
+        |points: &[Point2<f64>]| -> Vec<[f64; 2]> { points.iter().map(|p| axes.point(p.x, p.y)).collect() };
+    for (class, outline) in &near {
+        let ink = palette.ink(class);
+        sheet.outline(drawn(outline), Stroke::solid(ink, 1.8), Some((ink, 0.18)));
+    }
+    for (class, outline) in &truths {
+        sheet.outline(drawn(outline), Stroke::dashed(palette.ink(class), 1.3), None);
+    }
+    for (track, points) in scene.tracks.iter().zip(&tracks) {
+        sheet.line(drawn(points), track.stroke);
+    }
+    // seen from the side, what stands on one table stands on one line
+    if view == View::Top {
+        let label = |(class, outline): &&Outline<'_>| Label {
+            text: (*class).to_owned(),
+            around: around(&drawn(outline)),
+            ink: palette.ink(class),
+        };
+        place(&mut sheet, &near.iter().map(label).collect::<Vec<_>>(), area);
+    }
+    let (name, seen) = match view {
+        View::Top => ("map_top", "seen from above"),
+        View::Side => ("map_side", "seen from the side"),
+    };
+    Picture::new(name, format!("{text}: trajectories and objects {seen}"), sheet)
+}
+
+fn entries(
+    scene: &Scene,
+    palette: &Palette,
+    truths: &[Outline<'_>],
+    estimates: &[Outline<'_>],
+) -> Vec<Entry> {
+    let mut entries: Vec<_> = scene.tracks.iter().map(|t| Entry::line(&t.name, t.stroke)).collect();
+    if !truths.is_empty() {
+        entries.push(Entry::line("true object", Stroke::dashed(Ink::Faint, 1.3)));
+    }
+    if !estimates.is_empty() {
+        entries.push(Entry::line("estimated object", Stroke::solid(Ink::Faint, 1.8)));
+    }
+    let here = |name: &&String| scene.objects.iter().any(|object| object.class == **name);
+    let classes: Vec<&String> = palette.names().iter().filter(here).collect();
+    entries.extend(classes.iter().take(CLASSES).map(|name| Entry::patch(name, palette.ink(name))));
+    if classes.len() > CLASSES {
+        entries.push(Entry::patch(&format!("and {} more", classes.len() - CLASSES), Ink::Text));
+    }
+    entries
+}
+
+/// The box around points.
+fn around(points: &[[f64; 2]]) -> [f64; 4] {
+    let end =
+        |of: fn(&[f64; 2]) -> f64, pick: fn(f64, f64) -> f64, from| points.iter().map(of).fold(from, pick);
+    [
+        end(|p| p[0], f64::min, f64::INFINITY),
+        end(|p| p[1], f64::min, f64::INFINITY),
+        end(|p| p[0], f64::max, f64::NEG_INFINITY),
+        end(|p| p[1], f64::max, f64::NEG_INFINITY),
+    ]
+}
+
+/// The part of the plane that is shown.
+#[derive(Debug, Default)]
+struct Frame(Option<(Point2<f64>, Point2<f64>)>);
+
+impl Frame {
+    fn include(&mut self, p: &Point2<f64>) {
+        let (low, high) = self.0.unwrap_or((*p, *p));
+        self.0 = Some((low.inf(p), high.sup(p)));
+    }
+
+    fn contains(&self, p: &Point2<f64>) -> bool {
+        self.0.is_some_and(|(low, high)| low <= *p && *p <= high)
+    }
+
+    /// Includes the outlines that lie within half the frame's size around it, and returns them; how many do not.
+    fn include_near<'a>(&mut self, outlines: &'a [Outline<'a>]) -> (Vec<&'a Outline<'a>>, usize) {
+        let margin = Vector2::repeat(0.5 * self.size());
+        let around = self.0.map(|(low, high)| Frame(Some((low - margin, high + margin))));
+        let is_near = |o: &&Outline<'_>| around.as_ref().is_none_or(|a| o.1.iter().all(|p| a.contains(p)));
+        let near: Vec<_> = outlines.iter().filter(is_near).collect();
+        near.iter().flat_map(|(_, outline)| outline).for_each(|p| self.include(p));
+        let outside = outlines.len() - near.len();
+        (near, outside)
+    }
+
+    /// The longer side.
+    fn size(&self) -> f64 {
+        self.0.map_or(0.0, |(low, high)| (high - low).max())
+    }
+
+    /// Where it is shown on a sheet of this width.
+    fn on(&self, width: f64) -> Plot {
+        let (low, high) = self.0.unwrap_or((Point2::new(-1.0, -1.0), Point2::new(1.0, 1.0)));
+        // one point alone, or points so far out that a margin drowns in rounding
+        let margin = (0.03 * self.size()).max(1e-9 * low.coords.amax().max(high.coords.amax()));
+        let margin = Vector2::repeat(if margin > 0.0 { margin } else { 1.0 });
+        let (middle, mut half) = (nalgebra::center(&low, &high), 0.5 * (high - low) + margin);
+        // numbers and labels take at most that much; what they leave shows a little more to the right and left
+        let across = width - 100.0;
+        let height = (across * half.y / half.x).clamp(SHARES[0] * width, SHARES[1] * width);
+        let metres = (half.x / across).max(half.y / height);
+        half.y = metres * height;
+        let y = Scale::new(middle.y - half.y, middle.y + half.y);
+        let left = 10.0 + Axes::left(&y, height);
+        half.x = metres * (width - RIGHT - left);
+        let x = Scale::new(middle.x - half.x, middle.x + half.x);
+        Plot { x, y, area: [left, 0.0, width - RIGHT, height] }
+    }
+}
+
+/// What is left free to the right, in pixels.
+const RIGHT: f64 = 18.0;
+
+/// Scales that are alike on both axes, and the area that they ask for, below 0.
+struct Plot {
+    x: Scale,
+    y: Scale,
+    area: [f64; 4],
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,132 @@
+//! An axis: which numbers it spans, and which of them are written.
+
+/// What an axis spans, from where the data begin to where they end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scale {
+    low: f64,
+    high: f64,
+    log: bool,
+}
+
+impl Scale {
+    /// From one number to another.
+    pub(crate) fn new(low: f64, high: f64) -> Self {
+        Self { low, high, log: false }.with_extent()
+    }
+
+    /// Over numbers that are finite; above zero, if the axis goes by powers of ten. `None` for none.
+    pub(crate) fn over(numbers: impl Iterator<Item = f64>, log: bool) -> Option<Self> {
+        let shown = numbers.filter(|x| x.is_finite() && (!log || *x > 0.0));
+        let ends = shown.fold(None, |ends: Option<(f64, f64)>, x| {
+            Some(ends.map_or((x, x), |(low, high)| (low.min(x), high.max(x))))
+        });
+        let (low, high) = ends?;
+        Some(Self { low, high, log }.with_extent())
+    }
+
+    /// A scale that is as wide as it can be drawn: one number alone, or several that rounding makes one, get room.
+    fn with_extent(self) -> Self {
+        let Self { low, high, log } = self;
+        if log {
+            return if high > low * 1.0001 { self } else { Self { low: low / 1.5, high: high * 1.5, log } };
+        }
+        let least = 1e-9 * low.abs().max(high.abs());
+        if high - low > least { self } else { Self { low: low - 0.5 - least, high: high + 0.5 + least, log } }
+    }
+
+    /// From zero, where all numbers are above it.
+    pub(crate) fn from_zero(self) -> Self {
+        if self.log || self.low < 0.0 { self } else { Self { low: 0.0, ..self } }
+    }
+
+    /// With a share of its extent above, and below if it does not begin at zero.
+    pub(crate) fn with_margin(self, share: f64) -> Self {
+        let Self { low, high, log } = self;
+        if log {
+            let factor = (high / low).powf(share);
+            return Self { low: low / factor, high: high * factor, log };
+        }
+        let margin = share * (high - low);
+        Self { low: if low == 0.0 { 0.0 } else { low - margin }, high: high + margin, log }
+    }
+
+    /// From 0 at its lower end to 1 at its upper.
+    pub(crate) fn place(&self, x: f64) -> f64 {
+        if self.log {
+            (x / self.low).ln() / (self.high / self.low).ln()
+        } else {
+            (x - self.low) / (self.high - self.low)
+        }
+    }
+
+    pub(crate) fn holds(&self, x: f64) -> bool {
+        x.is_finite() && x >= self.low && x <= self.high
+    }
+
+    /// The numbers to write, about as many as asked for, each as it is written.
+    pub(crate) fn ticks(&self, most: usize) -> Vec<(f64, String)> {
+        if self.log && self.high > 10.0 * self.low { self.powers(most) } else { self.round_numbers(most) }
+    }
+
+    fn round_numbers(&self, most: usize) -> Vec<(f64, String)> {
+        let rough = (self.high - self.low) / most.max(1) as f64;
+        let power = 10f64.powf(rough.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= rough * 0.999);
+        let step = step.unwrap_or(power * 10.0);
+        let (first, last) = ((self.low / step - 1e-6).ceil(), (self.high / step + 1e-6).floor());
+        let numbers = (0..).map(|k| first + f64::from(k)).take_while(|k| *k <= last).take(100);
+        numbers.map(|k| (k * step, written(k * step, step))).collect()
+    }
+
+    fn powers(&self, most: usize) -> Vec<(f64, String)> {
+        let (first, last) =
+            ((self.low.log10() - 1e-6).ceil() as i32, (self.high.log10() + 1e-6).floor() as i32);
+        let powers = usize::try_from(last - first + 1).unwrap_or(0);
+        let each = powers.div_ceil(most.max(1)).max(1);
+        let parts: &[f64] = if 3 * powers <= most { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let numbers = (first - 1..=last)
+            .step_by(each)
+            .flat_map(|power| parts.iter().map(move |m| m * 10f64.powi(power)));
+        let inside = |x: &f64| *x >= self.low * 0.999 && *x <= self.high * 1.001;
+        numbers.filter(inside).map(|x| (x, written(x, x))).collect()
+    }
+}
+
+/// A number, with the digits that tell it from its neighbours a step away.
+fn written(x: f64, step: f64) -> String {
+    let size = x.abs().max(step.abs());
+    if size >= 1e6 || step.abs() < 1e-4 {
+        return format!("{x:.0e}").replace("e0", "");
+    }
+    // a step of 0.2 takes one digit, as 0.5 does and 0.1
+    let digits = (-(step * 1.0001).log10().floor()).clamp(0.0, 6.0) as usize;
+    let text = format!("{x:.digits$}");
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ticks(numbers: &[f64], log: bool) -> Vec<String> {
+        let scale = Scale::over(numbers.iter().copied(), log).unwrap();
+        scale.ticks(5).into_iter().map(|(_, text)| text).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_and_within_the_data() {
+        assert_eq!(ticks(&[0.13, 1.02], false), ["0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(ticks(&[-0.02, 0.05], false), ["-0.02", "0", "0.02", "0.04"]);
+        assert_eq!(ticks(&[3.0, 3.0, f64::NAN], false), ["2.6", "2.8", "3.0", "3.2", "3.4"]);
+        assert_eq!(ticks(&[1e-6, 1e-2], true), ["1e-6", "1e-5", "1e-4", "0.001", "0.01"]);
+    }
+
+    #[test]
+    fn an_axis_begins_where_the_data_do() {
+        let scale = Scale::over([2.5, 7.5].into_iter(), false).unwrap();
+        assert_eq!((scale.place(2.5), scale.place(7.5), scale.place(5.0)), (0.0, 1.0, 0.5));
+        assert_eq!(scale.from_zero().place(0.0), 0.0);
+        assert!(Scale::over([f64::INFINITY].into_iter(), false).is_none());
+        assert!(Scale::over([-1.0].into_iter(), true).is_none());
+    }
+}

@@ -1,0 +1,231 @@
+// The map: variants side by side under one camera, a frame of the recording, and a picked object.
+class MapView {
+  constructor(run) {
+    this.run = run;
+    this.find = id => document.getElementById(id);
+    this.canvas = this.find("canvas");
+    this.renderer = new Renderer(this.canvas);
+    this.extent = extent(run.variants);
+    this.state = { frame: 0, selected: null, show: {}, active: this.first() };
+    this.orbit = new Orbit(this.canvas, run.variants[0].up, this.extent, () => this.redraw(), (x, y) => this.tap(x, y), e => this.pressed(e));
+    this.controls();
+    document.documentElement.classList.add("webgl");
+    new ResizeObserver(() => this.redraw()).observe(this.canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
+    this.panels();
+  }
+
+  // On a wide screen the first variant and the last; else the last alone.
+  first() {
+    const last = this.run.variants.length - 1;
+    return last > 0 && window.innerWidth > 900 ? [0, last] : [last];
+  }
+
+  get variants() {
+    return this.state.active.map(i => this.run.variants[i]);
+  }
+
+  get frames() {
+    return Math.max(...this.variants.map(v => v.frames.length), 1);
+  }
+
+  controls() {
+    const { state } = this, bar = this.find("variants"), time = this.find("time");
+    this.run.variants.forEach((variant, i) => {
+      const button = element("button", variant.name, { "aria-pressed": state.active.includes(i) });
+      button.addEventListener("click", () => {
+        const others = state.active.filter(k => k !== i);
+        if (state.active.includes(i) && !others.length) return;
+        state.active = state.active.includes(i) ? others : [...others, i].sort((a, b) => a - b);
+        button.setAttribute("aria-pressed", state.active.includes(i));
+        this.panels();
+      });
+      bar.append(button);
+    });
+    for (const box of document.querySelectorAll("[data-show]")) {
+      const set = () => { state.show[box.dataset.show] = box.checked; };
+      box.addEventListener("change", () => { set(); this.redraw(); });
+      set();
+    }
+    time.addEventListener("input", () => this.goTo(+time.value));
+    this.find("play").addEventListener("click", () => this.play());
+    this.find("reset").addEventListener("click", () => this.orbit.reset());
+  }
+
+  // Variants or the window have changed: the panels below are made anew.
+  panels() {
+    this.find("time").max = this.frames - 1;
+    this.find("images").replaceChildren(...this.variants.map(() => element("canvas")));
+    this.goTo(Math.min(this.state.frame, this.frames - 1));
+  }
+
+  goTo(frame) {
+    this.state.frame = Math.min(Math.max(frame, 0), this.frames - 1);
+    this.find("time").value = this.state.frame;
+    const seconds = this.variants[0].frames[this.state.frame]?.[0];
+    this.find("clock").textContent = `frame ${this.state.frame}${seconds == null ? "" : `, ${seconds.toFixed(2)} s`}`;
+    this.redraw();
+  }
+
+  play() {
+    const button = this.find("play"), begun = performance.now(), from = this.state.frame >= this.frames - 1 ? 0 : this.state.frame;
+    this.playing = !this.playing;
+    button.textContent = this.playing ? "⏸ pause" : "▶ replay";
+    // all of it in at most half a minute
+    const rate = Math.max(15, this.frames / 30);
+    const step = now => {
+      if (!this.playing) return;
+      this.goTo(from + Math.floor((now - begun) / 1000 * rate));
+      if (this.state.frame < this.frames - 1) requestAnimationFrame(step);
+      else this.play();
+    };
+    if (this.playing) requestAnimationFrame(step);
+  }
+
+  select(id) {
+    this.state.selected = id;
+    this.redraw();
+  }
+
+  pressed({ key }) {
+    const ids = [...new Set(this.variants.flatMap(v => v.objects.filter(o => o.estimate).map(o => o.id)))];
+    const next = step => ids.length && this.select(ids[(ids.indexOf(this.state.selected) + step + ids.length + (step < 0 && this.state.selected === null ? 1 : 0)) % ids.length]);
+    if (key === "n") next(1);
+    else if (key === "p") next(-1);
+    else if (key === ".") this.goTo(this.state.frame + 1);
+    else if (key === ",") this.goTo(this.state.frame - 1);
+    else if (key === " ") this.play();
+    else if (key === "Escape") this.select(null);
+    else return false;
+    return true;
+  }
+
+  // Rectangles of the variants on the canvas, in CSS pixels from its upper left corner: side by side, or below each other.
+  parts() {
+    const { clientWidth: width, clientHeight: height } = this.canvas, n = this.state.active.length;
+    const beside = width / n >= 0.7 * height / 1.2 || n === 1;
+    return this.state.active.map((_, i) => beside
+      ? [Math.round(i * width / n), 0, Math.round((i + 1) * width / n) - Math.round(i * width / n) - (i < n - 1 ? 1 : 0), height]
+      : [0, Math.round(i * height / n), width, Math.round((i + 1) * height / n) - Math.round(i * height / n) - (i < n - 1 ? 1 : 0)]);
+  }
+
+  // Where a point is seen in a part: x and y in CSS pixels of the canvas; null where it is behind.
+  project(point, [x, y, width, height]) {
+    const m = this.orbit.matrix(width / height), at = i => m[i] * point[0] + m[i + 4] * point[1] + m[i + 8] * point[2] + m[i + 12];
+    return at(3) <= 0 ? null : [x + (at(0) / at(3) + 1) / 2 * width, y + (1 - at(1) / at(3)) / 2 * height];
+  }
+
+  tap(x, y) {
+    const i = this.parts().findIndex(([left, top, width, height]) => x >= left && y >= top && x <= left + width && y <= top + height);
+    if (i < 0) return;
+    const [left, top, width, height] = this.parts()[i], { eye, target, up } = this.orbit, m = this.orbit.matrix(width / height);
+    const ahead = unit(sub(target, eye)), right = unit(cross(ahead, up)), above = cross(right, ahead);
+    // the field of view, from the matrix: its first numbers are those of the perspective times unit vectors
+    const wide = 1 / Math.hypot(m[0], m[4], m[8]), high = 1 / Math.hypot(m[1], m[5], m[9]);
+    const direction = add(ahead, add(scaled(right, (2 * (x - left) / width - 1) * wide), scaled(above, (1 - 2 * (y - top) / height) * high)));
+    const hits = this.variants[i].objects.filter(o => o.estimate).map(o => [meets(o.estimate, eye, direction), o.id]).sort((a, b) => a[0] - b[0]);
+    this.select(hits.length && hits[0][0] < Infinity ? hits[0][1] : null);
+  }
+
+  redraw() {
+    this.pending ??= requestAnimationFrame(() => { this.pending = null; this.draw(); });
+  }
+
+  draw() {
+    const variable = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+    const style = { paper: rgb(variable("paper")), text: variable("text"), grid: rgb(variable("grid")), faint: variable("faint") };
+    this.renderer.resize();
+    const { ratio } = this.renderer, height = this.canvas.clientHeight, names = [];
+    this.parts().forEach((part, i) => {
+      const [x, y, width, high] = part, below = [x, height - y - high, width, high].map(v => Math.round(v * ratio));
+      const look = { camera: this.orbit.matrix(width / high), eye: this.orbit.eye, above: unit(this.orbit.up), paper: style.paper, dash: 0.05 * this.extent.radius };
+      const { ellipsoids, segments, gravity } = this.shapes(this.variants[i], style);
+      this.renderer.draw(below, look, ellipsoids, segments);
+      names.push(...this.names(this.variants[i], part, gravity, style));
+    });
+    this.find("names").replaceChildren(...names);
+    this.key(style);
+    [...this.find("images").children].forEach((canvas, i) => {
+      const variant = this.variants[i];
+      if (variant.frames[this.state.frame]) drawImage(canvas, variant, this.state.frame, this.state.selected, style);
+    });
+    describe(this.find("object"), this.variants, this.state.selected, this.state.frame);
+    Object.assign(this.canvas.dataset, { selected: this.state.selected ?? "", frame: this.state.frame, drawn: +(this.canvas.dataset.drawn ?? 0) + 1 });
+  }
+
+  shapes(variant, style) {
+    const { show, frame, selected } = this.state, { frames, camera } = variant, segments = new Segments();
+    const [odometry, estimate, truth] = [this.run.colors.odometry, this.run.colors.estimate, style.text].map(rgb);
+    const depth = 0.09 * this.extent.radius, gravity = show.grid ? ground(segments, variant.up, this.extent, style.grid).gravity : null;
+    if (show.truth) segments.path(frames.map(f => f[1]), 2, () => truth, true);
+    if (show.odometry) segments.path(frames.map(f => f[2]), 2, () => odometry);
+    const most = this.mostError();
+    segments.path(frames.map(f => f[4]), show.error ? 5 : 3, i => show.error && frames[i][5] != null ? ramp(frames[i][5] / most) : estimate);
+    const each = Math.max(1, Math.round(frames.length / 16));
+    if (show.frusta) frames.forEach((f, i) => { if (i % each === 0) segments.frustum(f[4], camera, 0.6 * depth, estimate.map(c => 0.5 * c + 0.5 * style.paper[0]), 1); });
+    const now = frames[frame];
+    if (now) segments.frustum(now[4], camera, 1.6 * depth, estimate, 2.5);
+    const ellipsoids = [];
+    for (const object of variant.objects) {
+      const color = rgb(object.color);
+      if (object.estimate) ellipsoids.push(...axes(object.estimate).flat(), ...object.estimate.slice(0, 3), ...color, object.id === selected ? 1 : 0);
+      if (object.truth && show.truth) segments.cuboid(object.truth, object.id === selected ? truth : color, object.id === selected ? 2 : 1.3);
+      if (object.estimate && now && (selected === null || selected === object.id) && now[6].some(box => box[0] === object.id))
+        segments.add(now[4], object.estimate, color.map((c, i) => 0.6 * c + 0.4 * style.paper[i]), 1, { dashed: true });
+    }
+    return { ellipsoids, segments: segments.numbers, gravity };
+  }
+
+  mostError() {
+    return Math.max(...this.run.variants.flatMap(v => v.frames).map(f => f[5] ?? 0), 1e-9);
+  }
+
+  // The names of objects that have room, nearest first, and the variant's own.
+  names(variant, part, gravity, style) {
+    const [left, top, width, height] = part, taken = [], spans = [];
+    const put = (text, [x, y], color, kind = "") => {
+      const box = [x, y - 8, x + 7 * text.length, y + 8];
+      const free = !taken.some(t => box[0] < t[2] && t[0] < box[2] && box[1] < t[3] && t[1] < box[3]);
+      if (!free || box[0] < left || box[2] > left + width || box[1] < top || box[3] > top + height) return;
+      taken.push(box);
+      const span = element("span", text, { class: kind });
+      Object.assign(span.style, { transform: `translate(${x}px, ${y - 9}px)`, color });
+      spans.push(span);
+    };
+    put(variant.name.slice(0, Math.floor(width / 8)), [left + 10, top + 16], style.text, "title");
+    const { eye } = this.orbit, away = o => norm(sub(o.estimate, eye));
+    const mapped = variant.objects.filter(o => o.estimate).sort((a, b) => (b.id === this.state.selected) - (a.id === this.state.selected) || away(a) - away(b));
+    if (this.state.show.names) for (const object of mapped) {
+      const at = this.project(object.estimate, part);
+      if (at) put(object.class, [at[0] - 3.5 * object.class.length, at[1]], style.text);
+    }
+    const at = gravity && this.project(gravity, part);
+    if (at) put("gravity", [at[0] + 6, at[1]], "#d6455d");
+    return spans;
+  }
+
+  key(style) {
+    const { show } = this.state, known = this.run.variants.some(v => v.frames.some(f => f[1]));
+    const entry = (text, color, kind = "") => {
+      const span = element("span"), mark = element("i", "", { class: kind });
+      mark.style.borderColor = color;
+      span.append(mark, text);
+      return span;
+    };
+    const list = [];
+    if (known && show.truth) list.push(entry("true path; cuboids are true objects", style.text, "dashed"));
+    if (show.odometry) list.push(entry("odometry", this.run.colors.odometry));
+    if (show.error && known) list.push(entry(`error of the estimated path, 0 to ${this.mostError().toPrecision(3)} m`, "", "ramp"));
+    else list.push(entry("estimated", this.run.colors.estimate));
+    this.find("key").replaceChildren(...list);
+  }
+}
+
+// Where there is no WebGL 2, the picture from above stays in its place, and says so.
+try {
+  window.mapView = new MapView(JSON.parse(document.getElementById("run-data").textContent));
+} catch (error) {
+  document.documentElement.dataset.map = "static";
+  document.querySelector("#static-map figcaption")?.append(` (${error.message})`);
+}
+document.documentElement.dataset.map ??= "webgl";

@@ -1,0 +1,95 @@
+// What is drawn of a variant: lists of numbers for the renderer.
+
+// The triangles of a sphere of radius 1.
+function sphere(rings = 20, sectors = 32) {
+  const points = [], triangles = [];
+  for (let i = 0; i <= rings; i++)
+    for (let j = 0; j <= sectors; j++) {
+      const polar = Math.PI * i / rings, around = 2 * Math.PI * j / sectors;
+      points.push(Math.sin(polar) * Math.cos(around), Math.sin(polar) * Math.sin(around), Math.cos(polar));
+    }
+  for (let i = 0; i < rings; i++)
+    for (let j = 0; j < sectors; j++) {
+      const a = i * (sectors + 1) + j, b = a + sectors + 1;
+      triangles.push(a, b, a + 1, a + 1, b, b + 1);
+    }
+  return { points, triangles };
+}
+
+// Segments, 15 numbers each: two ends, two colours, length along the line so far, width in pixels, whether dashed.
+class Segments {
+  constructor() {
+    this.numbers = [];
+  }
+  add(a, b, color, width, { to = color, along = 0, dashed = false } = {}) {
+    this.numbers.push(...a.slice(0, 3), ...b.slice(0, 3), ...color, ...to, along, width, dashed ? 1 : 0);
+  }
+  path(points, width, color, dashed = false) {
+    let along = 0;
+    for (let i = 1; i < points.length; i++) {
+      const [a, b] = [points[i - 1], points[i]];
+      if (!a || !b) continue;
+      this.add(a, b, color(i - 1), width, { to: color(i), along, dashed });
+      along += norm(sub(b, a));
+    }
+  }
+  // A camera: its centre, and the corners of its image at a depth.
+  frustum(pose, [fx, fy, cx, cy, width, height], depth, color, thick) {
+    const corners = [[0, 0], [width, 0], [width, height], [0, height]]
+      .map(([u, v]) => act(pose, [(u - cx) / fx * depth, (v - cy) / fy * depth, depth]));
+    corners.forEach((corner, i) => {
+      this.add(pose, corner, color, thick);
+      this.add(corner, corners[(i + 1) % 4], color, thick);
+    });
+  }
+  // The edges of a cuboid.
+  cuboid(shape, color, thick) {
+    const corner = bits => act(shape, [0, 1, 2].map(i => (bits >> i & 1 ? 1 : -1) * shape[7 + i]));
+    for (let bits = 0; bits < 8; bits++)
+      for (let i = 0; i < 3; i++)
+        if (!(bits >> i & 1)) this.add(corner(bits), corner(bits | 1 << i), color, thick, { dashed: false });
+  }
+}
+
+// Two directions at right angles to up and to each other.
+function level(up) {
+  const right = unit(cross(Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0], up));
+  return [right, cross(up, right)];
+}
+
+// The middle of what there is to see, its radius, and the height of its lowest object along up.
+function extent(variants) {
+  const shapes = variants.flatMap(v => v.objects).flatMap(o => [o.truth, o.estimate]).filter(Boolean);
+  const cameras = variants.flatMap(v => v.frames).map(f => f[4]);
+  const all = [...cameras, ...shapes].filter(p => p.slice(0, 3).every(Number.isFinite));
+  // the odd object far away is not what the map is about
+  const middle = [0, 1, 2].map(i => {
+    const sorted = all.map(p => p[i]).sort((a, b) => a - b);
+    return sorted.length ? (sorted[Math.floor(sorted.length * 0.02)] + sorted[Math.floor((sorted.length - 1) * 0.98)]) / 2 : 0;
+  });
+  const distances = all.map(p => norm(sub(p, middle))).sort((a, b) => a - b);
+  const radius = Math.max(distances[Math.floor((distances.length - 1) * 0.98)] || 1, 1e-3);
+  const up = variants[0].up, near = shapes.filter(s => norm(sub(s, middle)) <= 1.5 * radius);
+  const low = near.map(s => dot(s, up) - Math.hypot(...axes(s).map(a => dot(a, up)))).sort((a, b) => a - b);
+  return { middle, radius, floor: low.length ? low[Math.floor(low.length * 0.1)] : dot(middle, up) - radius };
+}
+
+// A grid on the floor, with round spacing, and an arrow along gravity.
+function ground(segments, up, { middle, radius, floor }, color) {
+  const [right, ahead] = level(up);
+  const rough = radius / 5, power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map(m => m * power).find(s => s >= rough);
+  const at = (a, b) => add(add(scaled(right, a), scaled(ahead, b)), scaled(up, floor));
+  const [a0, b0] = [right, ahead].map(d => Math.round(dot(middle, d) / step) * step), n = Math.ceil(1.3 * radius / step);
+  for (let k = -n; k <= n; k++) {
+    segments.add(at(a0 + k * step, b0 - n * step), at(a0 + k * step, b0 + n * step), color, 1);
+    segments.add(at(a0 - n * step, b0 + k * step), at(a0 + n * step, b0 + k * step), color, 1);
+  }
+  const top = add(at(dot(middle, right) - 0.3 * radius, dot(middle, ahead) + 0.9 * radius), scaled(up, 0.45 * radius));
+  const tip = add(top, scaled(up, -0.35 * radius));
+  const gravity = rgb("#d6455d");
+  segments.add(top, tip, gravity, 3);
+  for (const side of [right, scaled(right, -1), ahead, scaled(ahead, -1)])
+    segments.add(tip, add(tip, add(scaled(up, 0.08 * radius), scaled(side, 0.04 * radius))), gravity, 3);
+  return { step, gravity: top };
+}

@@ -1,0 +1,123 @@
+//! The tables of a run's page.
+use super::page::Page;
+use manifactor_graph::Key;
+use manifactor_slam::mapping::MappedObject;
+use manifactor_slam::record::VariantRecord;
+use manifactor_slam::report::{ObjectReport, Row, RunReport, VariantReport};
+
+pub(super) fn words<const N: usize>(words: [&str; N]) -> Vec<String> {
+    words.map(str::to_owned).into()
+}
+
+/// All variants in a table: its header and its rows.
+pub(super) fn overview(report: &RunReport) -> (Vec<String>, Vec<Vec<String>>) {
+    let header = [
+        "variant",
+        "odometry ATE (m)",
+        "ATE (m)",
+        "position (m)",
+        "shape",
+        "quality",
+        "objects",
+        "boxes",
+        "factors",
+        "cost",
+        "iterations",
+        "converged",
+    ];
+    let number = |x: Option<f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.5}"));
+    let row = |row: Row| {
+        vec![
+            row.variant,
+            number(row.odometry_ate),
+            number(row.ate),
+            number(row.position),
+            number(row.shape),
+            number(row.quality),
+            row.objects.to_string(),
+            row.boxes.to_string(),
+            row.semantic_factors.to_string(),
+            format!("{:.3}", row.final_cost),
+            row.iterations.to_string(),
+            if row.converged { "yes" } else { "no" }.into(),
+        ]
+    };
+    (words(header), report.table().into_iter().map(row).collect())
+}
+
+/// The noise, where it was estimated.
+pub(super) fn noise(page: &mut Page, report: &VariantReport) {
+    let Some(noise) = report.variance_components.last() else { return };
+    let rounds = report.variance_components.len();
+    page.subheading("Noise").paragraph(&format!("As it was estimated, in {rounds} rounds."));
+    let alone =
+        |name: &str, sigma: f64| vec![name.to_owned(), format!("{sigma:.3e}"), String::new(), String::new()];
+    let mut rows = vec![];
+    if let Some([turn, shift]) = noise.odometry {
+        rows.push(alone("odometry, rotation (rad)", turn));
+        rows.push(alone("odometry, translation (m)", shift));
+    }
+    rows.extend(noise.boxes.iter().map(|(name, c)| {
+        let numbers = [c.sigma_px, c.correlation_time, c.effective_px].map(|x| format!("{x:.2}"));
+        std::iter::once(format!("boxes: {name} (px)")).chain(numbers).collect()
+    }));
+    page.table(&words(["noise", "σ", "correlation time", "σ in the graph"]), &rows);
+}
+
+/// The variables that the run's document has added.
+pub(super) fn own_variables(page: &mut Page, record: &VariantRecord) {
+    if record.variables.is_empty() {
+        return;
+    }
+    page.subheading("Variables of this run").paragraph("As documents write them, in the frame of the map.");
+    let rows =
+        record.variables.iter().map(|v| vec![v.key.clone(), v.initial.to_string(), v.estimate.to_string()]);
+    page.table(&words(["variable", "before", "estimate"]), &rows.collect::<Vec<_>>());
+}
+
+/// Each object, and what was done with it.
+pub(super) fn objects(page: &mut Page, report: &VariantReport) {
+    page.subheading("Objects").paragraph("What was applied to each, and why.");
+    page.table(&words(OBJECTS), &report.objects.iter().map(object_row).collect::<Vec<_>>());
+}
+
+const OBJECTS: [&str; 9] = [
+    "object",
+    "class",
+    "score",
+    "detections",
+    "boxes",
+    "applied",
+    "semi-axes (m)",
+    "position error (m)",
+    "not mapped because",
+];
+
+fn object_row(report: &ObjectReport) -> Vec<String> {
+    let object = &report.object;
+    let axes = |q: &manifactor_quadric::DualQuadric| {
+        q.semi_axes.iter().map(|s| format!("{s:.3}")).collect::<Vec<_>>().join(" × ")
+    };
+    vec![
+        object.key.to_string(),
+        object.class.as_ref().map_or("-".into(), |class| class.name.clone()),
+        object.class.as_ref().map_or("-".into(), |class| format!("{:.2}", class.score)),
+        object.detections.to_string(),
+        object.boxes.to_string(),
+        applied(object),
+        report.estimate.as_ref().map_or(String::new(), axes),
+        report.error.as_ref().map_or(String::new(), |error| format!("{:.4}", error.position)),
+        report.rejected_because.clone().unwrap_or_default(),
+    ]
+}
+
+/// Each semantic factor with its reason, then what might have been one, and why it is none.
+fn applied(object: &MappedObject) -> String {
+    let own = |key: &&Key| **key != object.key;
+    let applied = object.semantic_factors.iter().map(|a| {
+        let others: Vec<_> = a.keys.iter().filter(own).map(|key| format!(" with {key}")).collect();
+        format!("{}{}: {}", a.factor, others.concat(), a.because)
+    });
+    let left_out = object.left_out.iter().map(|l| format!("not {}: {}", l.factor, l.because));
+    applied.chain(left_out).collect::<Vec<_>>().join("; ")
+}

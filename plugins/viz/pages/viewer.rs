@@ -1,0 +1,113 @@
+//! The map in 3D: the data that the page's own script draws, and the markup that it fills.
+use crate::canvas::{Ink, Theme};
+use crate::drawing::Palette;
+use manifactor_geometry::Se3;
+use manifactor_quadric::DualQuadric;
+use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, Solid, TrackedPose, VariantRecord};
+use serde_json::{Value, json};
+
+pub(super) const MARKUP: &str = include_str!("assets/map.html");
+/// In the order in which they use each other.
+pub(super) const SCRIPTS: [&str; 6] = [
+    include_str!("assets/algebra.js"),
+    include_str!("assets/shapes.js"),
+    include_str!("assets/renderer.js"),
+    include_str!("assets/orbit.js"),
+    include_str!("assets/panels.js"),
+    include_str!("assets/map.js"),
+];
+
+/// All that the script draws. Metres to a hundredth of a millimetre and pixels to a tenth: no more is seen.
+pub(super) fn data(run: &RunRecord) -> Value {
+    let palette = Palette::of(run);
+    let color = |ink: Ink| ink.hex(Theme::Light);
+    json!({
+        "colors": { "odometry": color(Ink::Odometry), "estimate": color(Ink::Estimate) },
+        "variants": run.variants.iter().map(|variant| of_variant(variant, &palette)).collect::<Vec<_>>(),
+    })
+}
+
+fn of_variant(variant: &VariantRecord, palette: &Palette) -> Value {
+    let start = variant.frames.first().map_or(0.0, |frame| frame.timestamp);
+    let camera = &variant.camera;
+    let up = numbers(variant.up.iter(), 6);
+    json!({
+        "name": variant.name,
+        "up": up,
+        "camera": [camera.fx, camera.fy, camera.cx, camera.cy, f64::from(camera.width), f64::from(camera.height)],
+        "frames": variant.frames.iter().map(|frame| of_frame(frame, start)).collect::<Vec<_>>(),
+        "objects": variant.objects.iter().map(|object| of_object(object, palette)).collect::<Vec<_>>(),
+    })
+}
+
+/// `[seconds, true position, position by odometry, its error, estimated pose, its error, boxes]`
+fn of_frame(frame: &FrameRecord, start: f64) -> Value {
+    let position = |pose: &Se3| numbers(pose.translation.iter(), 4);
+    let error = |tracked: &TrackedPose| tracked.error.map(|x| number(x, 5));
+    let boxes = frame.boxes.iter().map(|seen| {
+        let measured = numbers(seen.measured.bounds().iter(), 1);
+        json!([seen.object, measured, seen.ellipse.map(ellipse)])
+    });
+    json!([
+        number(frame.timestamp - start, 3),
+        frame.truth.as_ref().map(position),
+        position(&frame.odometry.pose),
+        error(&frame.odometry),
+        pose(&frame.estimate.pose),
+        error(&frame.estimate),
+        boxes.collect::<Vec<Value>>(),
+    ])
+}
+
+fn of_object(object: &ObjectRecord, palette: &Palette) -> Value {
+    let quadric = |q: &DualQuadric| [pose(&q.pose), numbers(q.semi_axes.iter(), 5)].concat();
+    let solid = |s: &Solid| [pose(&s.pose), numbers(s.half_extents.iter(), 5)].concat();
+    let factors = object.factors.iter().map(|factor| {
+        let residual = numbers(factor.residual.iter(), 3);
+        json!({ "factor": factor.factor, "because": factor.because, "with": factor.with, "residual": residual })
+    });
+    let error = object.error.map(|e| numbers([e.position, e.shape, e.quality].iter(), 4));
+    json!({
+        "id": object.id,
+        "key": object.key,
+        "class": object.class,
+        "color": palette.ink(&object.class).hex(Theme::Light),
+        "score": object.score.map(|x| number(x, 3)),
+        "boxes": object.boxes,
+        "box_rms": object.box_rms.map(|x| number(x, 3)),
+        "estimate": object.estimate.as_ref().map(quadric),
+        "truth": object.truth.as_ref().map(solid),
+        "error": error,
+        "factors": factors.collect::<Vec<_>>(),
+        "left_out": object.left_out,
+        "rejected": object.rejected,
+    })
+}
+
+/// The centre to a tenth of a pixel; where the outline is large, its squares to whole ones.
+fn ellipse([x, y, xx, xy, yy]: [f64; 5]) -> Vec<Value> {
+    let digits = if xx.min(yy) > 100.0 { 0 } else { 1 };
+    [numbers([x, y].iter(), 1), numbers([xx, xy, yy].iter(), digits)].concat()
+}
+
+/// Position, then quaternion (x, y, z, w).
+fn pose(pose: &Se3) -> Vec<Value> {
+    numbers(pose.translation.iter().chain(&pose.rotation.quaternion_xyzw()), 5)
+}
+
+fn numbers<'a>(list: impl Iterator<Item = &'a f64>, digits: i32) -> Vec<Value> {
+    list.map(|x| number(*x, digits)).collect()
+}
+
+/// A number with so many digits behind its point.
+fn number(x: f64, digits: i32) -> Value {
+    let unit = 10f64.powi(digits);
+    let near = (x * unit).round() / unit;
+    match near {
+        // whole numbers have no point
+        near if near.fract() == 0.0 && near.abs() < 1e9 => Value::from(near as i64),
+        near if near.is_finite() => Value::from(near),
+        // what is too large to be rounded has no such digits
+        _ => Value::from(x),
+    }
+}
