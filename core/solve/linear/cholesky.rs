@@ -239,22 +239,8 @@ impl WithSimd for Factorize<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) -> Self::Output {
-        let Matrix { structure, h, added } = self.of;
-        let (panels, panels_at) = self.panels;
-        let Workspace { updates, base, open, memory } = self.workspace;
-        open.clear();
-        let fill = |node: &Node, panels: &mut [f64]| {
-            let panel = &mut panels[node.panel - panels_at..][..node.height() * node.width];
-            panel.fill(0.0);
-            for (at, h) in structure.scatter[node.entries.clone()].iter().zip(&h[node.entries.clone()]) {
-                panel[*at as usize] = *h;
-            }
-            if let Some(added) = added {
-                for c in 0..node.width {
-                    panel[c * (node.height() + 1)] += added[node.first + c];
-                }
-            }
-        };
+        let structure = self.of.structure;
+        self.workspace.open.clear();
         let mut parts = self.parts.iter().peekable();
         let mut early = structure.early.iter().peekable();
         let mut n = self.nodes.start;
@@ -262,75 +248,111 @@ impl WithSimd for Factorize<'_> {
             let part = parts.next_if(|part| part.nodes.start == n);
             // fronts that have to be there before their first descendant; those of a part are its own matter
             while let Some((begin, front)) = early.next_if(|(begin, _)| *begin as usize <= n) {
-                let is_inside = (*front as usize) < self.nodes.end;
-                if *begin as usize == n && is_inside && part.is_none_or(|p| *front as usize >= p.nodes.end) {
-                    let front = &structure.nodes[*front as usize];
-                    fill(front, panels);
-                    let level = front.level as usize % 2;
-                    updates[level][front.update - base[level]..][..front.below.pow(2)].fill(0.0);
+                let front = *front as usize;
+                let is_of_part = part.is_some_and(|part| front < part.nodes.end);
+                if *begin as usize == n && front < self.nodes.end && !is_of_part {
+                    self.begin_early(&structure.nodes[front]);
                 }
             }
-            let node = match part {
-                Some(part) => {
-                    n = part.nodes.end - 1;
-                    &structure.nodes[n]
-                }
-                None => &structure.nodes[n],
-            };
-            let level = node.level as usize % 2;
-            let [even, odd] = &mut *updates;
-            let (own, theirs) = if level == 0 { (even, odd) } else { (odd, even) };
-            let update = match part {
-                Some(part) => part.update(node),
-                None => {
-                    if !node.early {
-                        fill(node, panels);
-                    }
-                    let panel = &mut panels[node.panel - panels_at..][..node.height() * node.width];
-                    let update = &mut own[node.update - base[level]..][..node.below.pow(2)];
-                    let of_child = |n: usize| {
-                        let child = &structure.nodes[n];
-                        let part = self.parts.binary_search_by_key(&(n + 1), |part| part.nodes.end);
-                        let update = match part {
-                            Ok(part) => self.parts[part].update(child),
-                            Err(_) => &theirs[child.update - base[1 - level]..][..child.below.pow(2)],
-                        };
-                        (update, child.rows(&structure.places))
-                    };
-                    let children = if node.early { open.len() } else { open.len() - node.children };
-                    for child in &open[children..] {
-                        let (from, places) = of_child(*child);
-                        kernel::assemble_panel(from, places, panel, node.width);
-                    }
-                    let eliminated = match node.early {
-                        true => kernel::eliminate::<S, false>(simd, panel, update, node.width, memory),
-                        false => kernel::eliminate::<S, true>(simd, panel, update, node.width, memory),
-                    };
-                    eliminated.map_err(|_| NotPositiveDefinite)?;
-                    if let Some((x, below)) = &mut self.right {
-                        solve_lower(node, structure, panel, x, below);
-                    }
-                    for child in open.drain(children..) {
-                        let (from, places) = of_child(child);
-                        kernel::assemble_update(from, places, update, node.below, node.width);
-                    }
-                    &*update
-                }
-            };
-            let parent = node.parent as usize;
-            match structure.nodes.get(parent).filter(|front| front.early && parent < self.nodes.end) {
-                None => open.push(n),
-                Some(front) => {
-                    let places = node.rows(&structure.places);
-                    let panel = &mut panels[front.panel - panels_at..][..front.height() * front.width];
-                    kernel::assemble_panel(update, places, panel, front.width);
-                    let to = &mut theirs[front.update - base[1 - level]..][..front.below.pow(2)];
-                    kernel::assemble_update(update, places, to, front.below, front.width);
-                }
+            match part {
+                Some(part) => n = part.nodes.end - 1,
+                None => self.eliminate(simd, &structure.nodes[n])?,
             }
+            self.hand_on(n, part);
             n += 1;
         }
         Ok(())
+    }
+}
+
+impl Factorize<'_> {
+    /// The entries of H in the columns of a front, with what is added to its diagonal.
+    #[inline(always)]
+    fn fill(&mut self, node: &Node) {
+        let Matrix { structure, h, added } = self.of;
+        let panel = &mut self.panels.0[node.panel - self.panels.1..][..node.height() * node.width];
+        panel.fill(0.0);
+        for (at, h) in structure.scatter[node.entries.clone()].iter().zip(&h[node.entries.clone()]) {
+            panel[*at as usize] = *h;
+        }
+        if let Some(added) = added {
+            for c in 0..node.width {
+                panel[c * (node.height() + 1)] += added[node.first + c];
+            }
+        }
+    }
+
+    /// Makes a front that takes each child's update as it comes.
+    #[inline(always)]
+    fn begin_early(&mut self, front: &Node) {
+        self.fill(front);
+        let Workspace { updates, base, .. } = &mut *self.workspace;
+        let level = front.level as usize % 2;
+        updates[level][front.update - base[level]..][..front.below.pow(2)].fill(0.0);
+    }
+
+    /// Eliminates a front: children's updates into its panel, then L, then the rest of the updates into its own.
+    #[inline(always)]
+    fn eliminate<S: Simd>(&mut self, simd: S, node: &Node) -> Result<(), NotPositiveDefinite> {
+        if !node.early {
+            self.fill(node);
+        }
+        let structure = self.of.structure;
+        let Workspace { updates: [even, odd], base, open, memory } = &mut *self.workspace;
+        let level = node.level as usize % 2;
+        let (own, theirs) = if level == 0 { (even, odd) } else { (odd, even) };
+        let panel = &mut self.panels.0[node.panel - self.panels.1..][..node.height() * node.width];
+        let update = &mut own[node.update - base[level]..][..node.below.pow(2)];
+        let of_child = |n: usize| {
+            let child = &structure.nodes[n];
+            let update = match self.parts.binary_search_by_key(&(n + 1), |part| part.nodes.end) {
+                Ok(part) => self.parts[part].update(child),
+                Err(_) => &theirs[child.update - base[1 - level]..][..child.below.pow(2)],
+            };
+            (update, child.rows(&structure.places))
+        };
+        // an early front has had its children's updates
+        let children = if node.early { open.len() } else { open.len() - node.children };
+        for child in &open[children..] {
+            let (from, places) = of_child(*child);
+            kernel::assemble_panel(from, places, panel, node.width);
+        }
+        let eliminated = match node.early {
+            true => kernel::eliminate::<S, false>(simd, panel, update, node.width, memory),
+            false => kernel::eliminate::<S, true>(simd, panel, update, node.width, memory),
+        };
+        eliminated.map_err(|_| NotPositiveDefinite)?;
+        if let Some((x, below)) = &mut self.right {
+            solve_lower(node, structure, panel, x, below);
+        }
+        for child in open.drain(children..) {
+            let (from, places) = of_child(child);
+            kernel::assemble_update(from, places, update, node.below, node.width);
+        }
+        Ok(())
+    }
+
+    /// Adds the update of front `n`, which `part` may have, to its parent's where that is early; else it waits for it.
+    #[inline(always)]
+    fn hand_on(&mut self, n: usize, part: Option<&Part>) {
+        let structure = self.of.structure;
+        let Workspace { updates: [even, odd], base, open, .. } = &mut *self.workspace;
+        let (node, parent) = (&structure.nodes[n], structure.nodes[n].parent as usize);
+        let Some(front) = structure.nodes.get(parent).filter(|front| front.early && parent < self.nodes.end)
+        else {
+            return open.push(n);
+        };
+        let level = node.level as usize % 2;
+        let (own, theirs) = if level == 0 { (even, odd) } else { (odd, even) };
+        let update = match part {
+            Some(part) => part.update(node),
+            None => &own[node.update - base[level]..][..node.below.pow(2)],
+        };
+        let places = node.rows(&structure.places);
+        let panel = &mut self.panels.0[front.panel - self.panels.1..][..front.height() * front.width];
+        kernel::assemble_panel(update, places, panel, front.width);
+        let sum = &mut theirs[front.update - base[1 - level]..][..front.below.pow(2)];
+        kernel::assemble_update(update, places, sum, front.below, front.width);
     }
 }
 
