@@ -1,10 +1,10 @@
 //! A document that was read from a file or a text.
 use crate::format::{Format, MAX_BYTES};
 use crate::overrides::apply;
+use manifactor_tree::Fault;
 use manifactor_tree::Node;
-use manifactor_tree::Problem;
 use manifactor_tree::Section;
-use manifactor_tree::Source;
+use manifactor_tree::SourceText;
 use manifactor_tree::merge;
 use manifactor_tree::{Diagnostic, Diagnostics, Errors};
 use std::io::Read;
@@ -13,7 +13,7 @@ use std::path::Path;
 /// A document: what its text says, with the place of everything.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Document {
-    source: Source,
+    source: SourceText,
     root: Node,
 }
 
@@ -25,9 +25,10 @@ impl Document {
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Diagnostics> {
         let path = path.as_ref();
         let name = path.display().to_string();
-        let fail = |problem| Diagnostics::from(Diagnostic::new(Source::new(&name, "").place(0..0), problem));
-        let format = Format::of_path(path).ok_or_else(|| fail(Problem::UnknownFormat))?;
-        let unreadable = |error: std::io::Error| fail(Problem::Unreadable(error.to_string()));
+        let fail =
+            |problem| Diagnostics::from(Diagnostic::new(SourceText::new(&name, "").place(0..0), problem));
+        let format = Format::of_path(path).ok_or_else(|| fail(Fault::UnknownFormat))?;
+        let unreadable = |error: std::io::Error| fail(Fault::Unreadable(error.to_string()));
         let mut bytes = Vec::new();
         let file = std::fs::File::open(path).map_err(unreadable)?;
         // one byte more than allowed, so that too long a file is told from the longest one
@@ -36,8 +37,8 @@ impl Document {
         let text = String::from_utf8(bytes).map_err(|error| {
             let at = error.utf8_error().valid_up_to();
             let text = error.as_bytes().get(..at).map(String::from_utf8_lossy).unwrap_or_default();
-            let problem = Problem::invalid("cannot be read: the text is not UTF-8 from here on");
-            Diagnostics::from(Diagnostic::new(Source::new(&name, text).place(at..at), problem))
+            let problem = Fault::invalid("cannot be read: the text is not UTF-8 from here on");
+            Diagnostics::from(Diagnostic::new(SourceText::new(&name, text).place(at..at), problem))
         })?;
         Document::parse(name, text, format)
     }
@@ -53,13 +54,13 @@ impl Document {
     ) -> Result<Self, Diagnostics> {
         let text = text.into();
         // editors on Windows put a byte order mark first
-        let source = Source::new(name, text.strip_prefix('\u{feff}').unwrap_or(&text));
+        let source = SourceText::new(name, text.strip_prefix('\u{feff}').unwrap_or(&text));
         let root = format.parse(&source)?;
         Ok(Document { source, root })
     }
 
     /// The text.
-    pub fn source(&self) -> &Source {
+    pub fn source(&self) -> &SourceText {
         &self.source
     }
 

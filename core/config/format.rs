@@ -3,10 +3,10 @@ mod json;
 pub(crate) mod toml;
 mod yaml;
 
-use manifactor_tree::Problem;
+use manifactor_tree::Fault;
 use manifactor_tree::{Diagnostic, Diagnostics};
 use manifactor_tree::{MAX_DEPTH, Node};
-use manifactor_tree::{Place, Source};
+use manifactor_tree::{Place, SourceText};
 use std::fmt;
 use std::path::Path;
 
@@ -49,10 +49,10 @@ impl Format {
     }
 
     /// The text as a tree; errors if it is not of this format.
-    pub fn parse(self, source: &Source) -> Result<Node, Diagnostics> {
+    pub fn parse(self, source: &SourceText) -> Result<Node, Diagnostics> {
         let bytes = source.text().len() as u64;
         if bytes > MAX_BYTES {
-            let problem = Problem::TooLarge { bytes, limit: MAX_BYTES };
+            let problem = Fault::TooLarge { bytes, limit: MAX_BYTES };
             return Err(Diagnostic::new(source.place(0..0), problem).into());
         }
         match self {
@@ -71,7 +71,7 @@ impl fmt::Display for Format {
 
 /// Reports a node nested deeper than [`MAX_DEPTH`].
 pub(crate) fn too_deep(place: Place) -> Diagnostic {
-    Diagnostic::new(place, Problem::TooDeep { limit: MAX_DEPTH })
+    Diagnostic::new(place, Fault::TooDeep { limit: MAX_DEPTH })
 }
 
 #[cfg(test)]

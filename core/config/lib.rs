@@ -17,8 +17,8 @@ pub use document::Document;
 pub use format::{Format, MAX_BYTES};
 pub use graph_document::{read_graph, read_graph_section, write_graph};
 pub use manifactor_tree::{
-    Diagnostic, Diagnostics, Errors, Field, MAX_DEPTH, Node, Place, Placed, Problem, ReadError, Reader,
-    Section, Source, Table, Value, deserialize_with, merge, nearest, quoted_list,
+    Diagnostic, Diagnostics, Errors, Fault, Field, MAX_DEPTH, Node, Place, Placed, ReadError, Reader,
+    Section, SourceText, Table, Value, deserialize_with, merge, nearest, quoted_list,
 };
 pub use schema::{Definitions, graph_root, graph_schema};
 pub use write::{WriteError, to_json, to_toml, to_yaml};

@@ -2,9 +2,9 @@
 use crate::format::toml::parse_value;
 use crate::format::too_deep;
 use manifactor_tree::Errors;
-use manifactor_tree::Problem;
+use manifactor_tree::Fault;
 use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
-use manifactor_tree::{Place, Source};
+use manifactor_tree::{Place, SourceText};
 use std::ops::Range;
 
 /// One step into a document.
@@ -16,7 +16,7 @@ enum Step {
 
 /// Applies `path=value` to a document; what is wrong with it is reported at the override.
 pub(crate) fn apply(root: &mut Node, text: &str, errors: &Errors) {
-    let source = Source::argument("--set", text);
+    let source = SourceText::argument("--set", text);
     match split(text) {
         Ok((steps, _)) if steps.len() > MAX_DEPTH => errors.push(too_deep(source.place(0..text.len()))),
         Ok((steps, value)) => {
@@ -27,13 +27,13 @@ pub(crate) fn apply(root: &mut Node, text: &str, errors: &Errors) {
         }
         Err((at, message)) => {
             let help = "write it as `solver.max_iterations=50` or `factors[2].noise.sigma=0.1`";
-            errors.report(source.place(at..at), Problem::with_help(message, help));
+            errors.report(source.place(at..at), Fault::with_help(message, help));
         }
     }
 }
 
 /// The value as TOML, or as the text that it is.
-fn read(source: &Source, span: Range<usize>, errors: &Errors) -> Option<Node> {
+fn read(source: &SourceText, span: Range<usize>, errors: &Errors) -> Option<Node> {
     let text = source.text().get(span.clone()).unwrap_or_default();
     match parse_value(source, span.clone()) {
         Some(Ok(node)) => Some(node),
@@ -92,7 +92,7 @@ fn split(text: &str) -> Result<(Vec<Step>, Range<usize>), (usize, String)> {
 }
 
 /// Walks to the last step and puts the value there.
-fn put(root: &mut Node, steps: &[Step], value: Node, source: &Source) -> Result<(), (Place, Problem)> {
+fn put(root: &mut Node, steps: &[Step], value: Node, source: &SourceText) -> Result<(), (Place, Fault)> {
     let mut node = root;
     let mut done = 0;
     for step in steps {
@@ -105,7 +105,7 @@ fn put(root: &mut Node, steps: &[Step], value: Node, source: &Source) -> Result<
                 let path = source.text().get(..done).unwrap_or_default();
                 let words = node.in_words();
                 let Value::Table(table) = &mut node.value else {
-                    return Err((place, Problem::invalid(format!("`{path}` is not a table but {words}"))));
+                    return Err((place, Fault::invalid(format!("`{path}` is not a table but {words}"))));
                 };
                 let empty = || Field { key: place.clone(), node: Node::new(place.clone(), Value::Null) };
                 done = span.end;
@@ -116,14 +116,14 @@ fn put(root: &mut Node, steps: &[Step], value: Node, source: &Source) -> Result<
                 let path = source.text().get(..done).unwrap_or_default();
                 let words = node.in_words();
                 let Value::Array(items) = &mut node.value else {
-                    return Err((place, Problem::invalid(format!("`{path}` is not an array but {words}"))));
+                    return Err((place, Fault::invalid(format!("`{path}` is not an array but {words}"))));
                 };
                 let length = items.len();
                 done = span.end;
                 items.get_mut(*index).ok_or_else(|| {
                     let message =
                         format!("`{path}` has {length} elements, counted from 0: there is no {index}");
-                    (place, Problem::invalid(message))
+                    (place, Fault::invalid(message))
                 })?
             }
         };

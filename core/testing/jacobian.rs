@@ -45,14 +45,14 @@ pub struct Examined {
     /// The residual and the Jacobian in use.
     pub linearization: Linearization,
     /// The entry that differs most from differences; `None` where there was nothing to compare.
-    pub worst: Option<Entry>,
+    pub worst: Option<JacobianEntry>,
     /// Entries that have no derivative here.
     pub kinks: Vec<Kink>,
 }
 
 /// An entry of a Jacobian, by two ways.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Entry {
+pub struct JacobianEntry {
     /// The variable's position, from 0.
     pub variable: usize,
     /// The tangent direction, from 0.
@@ -118,12 +118,12 @@ impl JacobianLaw {
         let entries = compare(&automatic, |v, c, r| numeric[v][c].as_ref().map(|column| column[r].value));
         let (entries, kinks) = if self.kinks {
             // near a pole the steps are too long for their own good, and know it
-            let inexact = |e: &Entry| {
+            let inexact = |e: &JacobianEntry| {
                 numeric[e.variable][e.column].as_ref().is_some_and(|c| {
                     10.0 * c[e.row].error > (e.found - e.expected).abs() && c[e.row].error.is_finite()
                 })
             };
-            let told = |e: &Entry| e.error <= self.numeric || !inexact(e);
+            let told = |e: &JacobianEntry| e.error <= self.numeric || !inexact(e);
             self.set_aside(&at, entries.into_iter().filter(told).collect())
         } else {
             (entries, vec![])
@@ -133,7 +133,7 @@ impl JacobianLaw {
     }
 
     /// Takes out the entries that differ because there is no derivative: kinks and jumps.
-    fn set_aside(&self, at: &At<'_>, entries: Vec<Entry>) -> (Vec<Entry>, Vec<Kink>) {
+    fn set_aside(&self, at: &At<'_>, entries: Vec<JacobianEntry>) -> (Vec<JacobianEntry>, Vec<Kink>) {
         let rows = entries.iter().map(|e| e.row + 1).max().unwrap_or(0);
         let mut kinks = vec![];
         let kept = entries.into_iter().filter(|entry| {
@@ -164,7 +164,7 @@ impl At<'_> {
 
     /// The same entry at points around, as the automatic Jacobian has it: where three pieces of a residual meet, they say
     /// more than the two sides along one direction.
-    fn nearby(&self, entry: &Entry) -> Vec<f64> {
+    fn nearby(&self, entry: &JacobianEntry) -> Vec<f64> {
         let at = |round: usize| {
             let moved = self.variables.iter().enumerate().map(|(v, x)| {
                 // any spread over directions will do
@@ -186,12 +186,12 @@ impl At<'_> {
     fn require(
         &self,
         law: &'static str,
-        entries: &[Entry],
+        entries: &[JacobianEntry],
         tolerance: f64,
-    ) -> Result<Option<Entry>, LawError> {
+    ) -> Result<Option<JacobianEntry>, LawError> {
         let worst = entries.iter().max_by(|a, b| a.error.total_cmp(&b.error)).copied();
         match worst {
-            Some(Entry { variable, column, row, found, expected, error }) if error > tolerance => {
+            Some(JacobianEntry { variable, column, row, found, expected, error }) if error > tolerance => {
                 let of = self.variables[variable];
                 Err(LawError::Jacobian {
                     law,
@@ -211,7 +211,10 @@ impl At<'_> {
 }
 
 /// Each entry beside `expected(variable, column, row)`; one that cannot be had is left out.
-fn compare(found: &Linearization, expected: impl Fn(usize, usize, usize) -> Option<f64>) -> Vec<Entry> {
+fn compare(
+    found: &Linearization,
+    expected: impl Fn(usize, usize, usize) -> Option<f64>,
+) -> Vec<JacobianEntry> {
     let mut entries = vec![];
     for (variable, block) in found.jacobians.iter().enumerate() {
         let scale = block.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
@@ -222,7 +225,7 @@ fn compare(found: &Linearization, expected: impl Fn(usize, usize, usize) -> Opti
                 let error = (found - expected).abs() / scale;
                 // so written that NaN is the worst of all
                 let error = if error.is_nan() { f64::INFINITY } else { error };
-                entries.push(Entry { variable, column, row, found, expected, error });
+                entries.push(JacobianEntry { variable, column, row, found, expected, error });
             }
         }
     }

@@ -34,7 +34,7 @@ pub use factor_check::{
 pub use freedom::{Free, Freedom, freedom};
 pub use invariance::invariance_law;
 pub use jacobian::Kink;
-pub use jacobian::{Entry, Examined, JacobianLaw, jacobian_law};
+pub use jacobian::{Examined, JacobianEntry, JacobianLaw, jacobian_law};
 pub use manifold::manifold_laws;
 
 #[doc(hidden)]

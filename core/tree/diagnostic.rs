@@ -1,6 +1,6 @@
 //! Errors with a place, and lists of them.
-use crate::problem::Problem;
-use crate::source::{Place, Source};
+use crate::fault::Fault;
+use crate::source::{Place, SourceText};
 use std::cell::RefCell;
 use std::fmt;
 
@@ -10,22 +10,22 @@ pub struct Diagnostic {
     /// Where: at most one line.
     pub place: Place,
     /// What.
-    pub problem: Problem,
+    pub fault: Fault,
     /// A second place that belongs to it, and what is there: `first given here`.
     pub related: Option<(Place, String)>,
 }
 
 impl Diagnostic {
-    /// A problem at a place, of which the first line is kept.
-    pub fn new(place: Place, problem: Problem) -> Self {
-        Diagnostic { place: place.first_line(), problem, related: None }
+    /// A fault at a place, of which the first line is kept.
+    pub fn new(place: Place, fault: Fault) -> Self {
+        Diagnostic { place: place.first_line(), fault, related: None }
     }
 
     /// The second of two things of one name, of which there may be one only.
     pub fn duplicate(what: &str, name: &str, second: Place, first: Place) -> Self {
-        let problem = Problem::Duplicate { what: what.into(), name: name.into() };
+        let fault = Fault::Duplicate { what: what.into(), name: name.into() };
         let related = Some((first, "first given here".into()));
-        Diagnostic { related, ..Diagnostic::new(second, problem) }
+        Diagnostic { related, ..Diagnostic::new(second, fault) }
     }
 
     /// The line, from 1.
@@ -40,12 +40,12 @@ impl Diagnostic {
 
     /// What is wrong, without the place.
     pub fn message(&self) -> String {
-        self.problem.to_string()
+        self.fault.to_string()
     }
 
     /// What to do about it.
     pub fn help(&self) -> Option<String> {
-        self.problem.help()
+        self.fault.help()
     }
 
     fn order(&self) -> (&str, usize, usize) {
@@ -55,7 +55,7 @@ impl Diagnostic {
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.place, self.problem)?;
+        write!(f, "{}: {}", self.place, self.fault)?;
         if let Some((place, label)) = &self.related {
             write!(f, "; {label}: {place}")?;
         }
@@ -154,8 +154,8 @@ impl Errors {
     }
 
     /// Adds a problem at a place.
-    pub fn report(&self, place: Place, problem: Problem) {
-        self.push(Diagnostic::new(place, problem));
+    pub fn report(&self, place: Place, fault: Fault) {
+        self.push(Diagnostic::new(place, fault));
     }
 
     /// Adds all of a list.
@@ -179,8 +179,8 @@ impl Errors {
             (None, Some(value)) => Ok(value),
             (Some(errors), _) => Err(errors),
             (None, None) => {
-                let nowhere = Source::new("document", "").place(0..0);
-                Err(Diagnostic::new(nowhere, Problem::invalid("incomplete")).into())
+                let nowhere = SourceText::new("document", "").place(0..0);
+                Err(Diagnostic::new(nowhere, Fault::invalid("incomplete")).into())
             }
         }
     }
@@ -192,12 +192,12 @@ mod tests {
 
     #[test]
     fn a_list_is_sorted_and_says_each_thing_once() {
-        let source = Source::new("a.toml", "x = 1\ny = 2\n");
+        let source = SourceText::new("a.toml", "x = 1\ny = 2\n");
         let errors = Errors::new();
-        errors.report(source.place(6..7), Problem::MissingField { field: "z".into() });
+        errors.report(source.place(6..7), Fault::MissingField { field: "z".into() });
         errors.push(Diagnostic::duplicate("key", "x", source.place(6..7), source.place(0..1)));
-        errors.report(source.place(0..1), Problem::invalid("odd"));
-        errors.report(source.place(0..1), Problem::invalid("odd"));
+        errors.report(source.place(0..1), Fault::invalid("odd"));
+        errors.report(source.place(0..1), Fault::invalid("odd"));
         let list = errors.finish(Some(())).unwrap_err();
         assert_eq!(
             list.to_string(),
@@ -210,8 +210,8 @@ mod tests {
 
     #[test]
     fn a_long_list_is_cut_and_counted() {
-        let source = Source::new("a", "x".repeat(300));
-        let at = |i| Diagnostic::new(source.place(i..i + 1), Problem::invalid("odd"));
+        let source = SourceText::new("a", "x".repeat(300));
+        let at = |i| Diagnostic::new(source.place(i..i + 1), Fault::invalid("odd"));
         let list = Diagnostics::from_list((0..300).map(at).collect()).unwrap();
         assert_eq!((list.len(), list.omitted()), (200, 100));
         assert!(list.to_string().ends_with("a:1:200: odd\nand 100 more"));

@@ -1,7 +1,7 @@
 //! Reads a serde type out of a node, with every error at its exact place.
 use crate::diagnostic::{Diagnostic, Errors};
+use crate::fault::Fault;
 use crate::node::{Node, Value};
-use crate::problem::Problem;
 use crate::read_error::ReadError;
 use crate::reader::Reader;
 use crate::source::Place;
@@ -31,16 +31,16 @@ impl Node {
         let mut rest = Rest { node: self.clone(), cut: Vec::new(), meant: Vec::new() };
         loop {
             let place = failure.place().unwrap_or(&self.place).clone();
-            let mut problem = failure.problem();
-            if let (Problem::UnknownField { field, known }, Value::Table(table)) = (&mut problem, &self.value)
+            let mut fault = failure.fault();
+            if let (Fault::UnknownField { field, known }, Value::Table(table)) = (&mut fault, &self.value)
                 && table.get(field).is_some_and(|found| found.key == place)
             {
                 known.extend_from_slice(others);
             }
-            let is_told = rest.explains(&place, &problem);
-            let goes_on = rest.cut(&place, &problem, failure.is_unread_field());
+            let is_told = rest.explains(&place, &fault);
+            let goes_on = rest.cut(&place, &fault, failure.is_unread_field());
             if !is_told {
-                errors.report(place, problem);
+                errors.report(place, fault);
             }
             failure = match goes_on.then(|| rest.node.try_read::<T>()) {
                 Some(Err(next)) => next,
@@ -73,7 +73,7 @@ impl Node {
             "" => value.to_string(),
             text => text.to_owned(),
         };
-        Diagnostic::new(self.place.clone(), Problem::NotFinite { text })
+        Diagnostic::new(self.place.clone(), Fault::NotFinite { text })
     }
 }
 
@@ -88,19 +88,19 @@ struct Rest {
 
 impl Rest {
     /// Whether an error only says that something is missing which was taken out, or was called otherwise.
-    fn explains(&self, place: &Place, problem: &Problem) -> bool {
+    fn explains(&self, place: &Place, fault: &Fault) -> bool {
         let is_cut =
             |by: &str| self.cut.iter().any(|(at, field)| at == place && (by.is_empty() || by == field));
-        match problem {
-            Problem::MissingField { field } => self.meant.contains(field) || is_cut(field),
-            Problem::UnknownField { .. } => false,
+        match fault {
+            Fault::MissingField { field } => self.meant.contains(field) || is_cut(field),
+            Fault::UnknownField { .. } => false,
             _ => is_cut(""),
         }
     }
 
     /// Takes out the field that an error is of; whether there is one. `unread`: its name is there, and nothing reads it.
-    fn cut(&mut self, place: &Place, problem: &Problem, unread: bool) -> bool {
-        let Problem::UnknownField { field, known } = problem else {
+    fn cut(&mut self, place: &Place, fault: &Fault, unread: bool) -> bool {
+        let Fault::UnknownField { field, known } = fault else {
             return cut_around(&mut self.node, place, &mut self.cut) == Cut::Done;
         };
         self.meant.extend(nearest(field, known.iter().map(String::as_str)).map(str::to_owned));

@@ -1,6 +1,6 @@
-//! What serde says of a node, as a problem at a place, in words of documents rather than of Rust.
+//! What serde says of a node, as a fault at a place, in words of documents rather than of Rust.
+use crate::fault::Fault;
 use crate::node::{Node, Value};
-use crate::problem::Problem;
 use crate::source::Place;
 use crate::text_error::TextError;
 use serde::de::{Error, Expected, Unexpected};
@@ -16,7 +16,7 @@ enum Inner {
     Unplaced(What),
     Placed {
         place: Place,
-        problem: Problem,
+        fault: Fault,
         unread: bool,
     },
 }
@@ -34,16 +34,16 @@ enum What {
 }
 
 impl ReadError {
-    /// A problem at a place.
-    pub fn new(place: Place, problem: Problem) -> Self {
-        Self(Box::new(Inner::Placed { place, problem, unread: false }))
+    /// A fault at a place.
+    pub fn new(place: Place, fault: Fault) -> Self {
+        Self(Box::new(Inner::Placed { place, fault, unread: false }))
     }
 
     /// What is wrong.
-    pub fn problem(&self) -> Problem {
+    pub fn fault(&self) -> Fault {
         match &*self.0 {
-            Inner::Unplaced(what) => what.problem(None),
-            Inner::Placed { problem, .. } => problem.clone(),
+            Inner::Unplaced(what) => what.fault(None),
+            Inner::Placed { fault, .. } => fault.clone(),
         }
     }
 
@@ -65,7 +65,7 @@ impl ReadError {
     pub fn at(self, node: &Node) -> Self {
         let Inner::Unplaced(what) = &*self.0 else { return self };
         let unread = matches!(what, What::Field { .. });
-        Self(Box::new(Inner::Placed { place: what.place(node), problem: what.problem(Some(node)), unread }))
+        Self(Box::new(Inner::Placed { place: what.place(node), fault: what.fault(Some(node)), unread }))
     }
 
     fn unplaced(what: What) -> Self {
@@ -86,33 +86,33 @@ impl What {
         found.unwrap_or_else(|| node.place.clone())
     }
 
-    fn problem(&self, node: Option<&Node>) -> Problem {
+    fn fault(&self, node: Option<&Node>) -> Fault {
         let is_table = node.is_some_and(|node| matches!(node.value, Value::Table(_)));
         match self.clone() {
             Self::Type { expected, found } => {
                 let found = node.map_or(found, Node::in_words);
-                Problem::WrongType { expected: in_words(&expected), found }
+                Fault::WrongType { expected: in_words(&expected), found }
             }
             Self::Length { expected, found } => {
                 let found = if found == 1 { "1 element".to_owned() } else { format!("{found} elements") };
-                Problem::WrongType { expected: in_words(&expected), found }
+                Fault::WrongType { expected: in_words(&expected), found }
             }
             // { sigma = 1 } names its variant as a field
-            Self::Variant { name, known } if is_table => Problem::UnknownField { field: name, known },
-            Self::Variant { name, known } => Problem::UnknownName { what: "value".into(), name, known },
-            Self::Field { name, known } => Problem::UnknownField { field: name, known },
-            Self::Missing { name } => Problem::MissingField { field: name },
-            Self::Text(error) => Problem::Invalid { message: error.message, help: error.help },
+            Self::Variant { name, known } if is_table => Fault::UnknownField { field: name, known },
+            Self::Variant { name, known } => Fault::UnknownName { what: "value".into(), name, known },
+            Self::Field { name, known } => Fault::UnknownField { field: name, known },
+            Self::Missing { name } => Fault::MissingField { field: name },
+            Self::Text(error) => Fault::Invalid { message: error.message, help: error.help },
             Self::Message(message) if message.starts_with("data did not match any variant of untagged") => {
                 let found = node.map_or_else(|| "something else".to_owned(), Node::in_words);
-                Problem::invalid(format!("{found} has none of the forms that are possible here"))
+                Fault::invalid(format!("{found} has none of the forms that are possible here"))
             }
             // of a type with several forms, which cannot say itself what it found
             Self::Message(message) => match (message.strip_prefix("expected "), node) {
                 (Some(expected), Some(node)) if !message.contains(" got ") => {
-                    Problem::WrongType { expected: expected.to_owned(), found: node.in_words() }
+                    Fault::WrongType { expected: expected.to_owned(), found: node.in_words() }
                 }
-                _ => Problem::invalid(message),
+                _ => Fault::invalid(message),
             },
         }
     }
@@ -155,9 +155,9 @@ impl Error for ReadError {
 
 impl fmt::Display for ReadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let problem = self.problem();
-        write!(f, "{problem}")?;
-        problem.help().map_or(Ok(()), |help| write!(f, " ({help})"))
+        let fault = self.fault();
+        write!(f, "{fault}")?;
+        fault.help().map_or(Ok(()), |help| write!(f, " ({help})"))
     }
 }
 
@@ -207,19 +207,19 @@ mod tests {
 
     #[test]
     fn fields_and_their_neighbours_are_told() {
-        let problem = ReadError::unknown_field("sigam", &["sigma", "loss"]).problem();
-        assert_eq!(problem.to_string(), "unknown field `sigam`");
-        assert_eq!(problem.help().unwrap(), "did you mean `sigma`? there are `sigma` and `loss`");
-        let problem = ReadError::unknown_field("x", &[]).problem();
-        assert_eq!(problem.help().unwrap(), "there are no fields here");
+        let fault = ReadError::unknown_field("sigam", &["sigma", "loss"]).fault();
+        assert_eq!(fault.to_string(), "unknown field `sigam`");
+        assert_eq!(fault.help().unwrap(), "did you mean `sigma`? there are `sigma` and `loss`");
+        let fault = ReadError::unknown_field("x", &[]).fault();
+        assert_eq!(fault.help().unwrap(), "there are no fields here");
     }
 
     #[test]
     fn types_are_said_in_words() {
-        let wrong = |expected| ReadError::invalid_type(Unexpected::Map, &expected).problem().to_string();
+        let wrong = |expected| ReadError::invalid_type(Unexpected::Map, &expected).fault().to_string();
         assert_eq!(wrong("f64"), "expected a number, found map");
         assert_eq!(wrong("a tuple of size 4"), "expected an array of 4, found map");
-        let short = ReadError::invalid_length(2, &"an array of length 3").problem();
+        let short = ReadError::invalid_length(2, &"an array of length 3").fault();
         assert_eq!(short.to_string(), "expected an array of 3, found 2 elements");
         assert_eq!(ReadError::custom("sigma has to be positive\n\n").to_string(), "sigma has to be positive");
     }

@@ -1,7 +1,7 @@
 //! Reading a table field by field, so that everything that is wrong with it is found.
 use crate::diagnostic::Errors;
+use crate::fault::Fault;
 use crate::node::{Field, Node, Value};
-use crate::problem::Problem;
 use crate::source::Place;
 use crate::suggest::nearest;
 use serde::de::DeserializeOwned;
@@ -23,7 +23,7 @@ impl<'e> Section<'e> {
     /// A table to be read; anything else is an error. Nothing at all, as an empty YAML file is, is an empty table.
     pub fn new(node: &'e Node, errors: &'e Errors) -> Option<Self> {
         if !matches!(node.value, Value::Table(_) | Value::Null) {
-            errors.report(node.place.clone(), Problem::wrong_type("a table", node.in_words()));
+            errors.report(node.place.clone(), Fault::wrong_type("a table", node.in_words()));
             return None;
         }
         Some(Section { errors, node, asked: Vec::new(), missing: Vec::new() })
@@ -50,7 +50,7 @@ impl<'e> Section<'e> {
     }
 
     /// Reports a problem with a field, or with the table, if the field is not there.
-    pub fn report(&self, field: &str, problem: Problem) {
+    pub fn report(&self, field: &str, problem: Fault) {
         self.errors.report(self.place_of(field), problem);
     }
 
@@ -114,7 +114,7 @@ impl<'e> Section<'e> {
             None => &[],
             Some(Node { value: Value::Array(items), .. }) => items,
             Some(other) => {
-                let problem = Problem::wrong_type("an array", other.in_words());
+                let problem = Fault::wrong_type("an array", other.in_words());
                 self.errors.report(other.place.clone(), problem);
                 &[]
             }
@@ -136,7 +136,7 @@ impl<'e> Section<'e> {
             // what is misspelled is not missing as well
             let meant = nearest(field, self.asked.iter().map(String::as_str));
             self.missing.retain(|missing| Some(missing.as_str()) != meant);
-            let problem = Problem::UnknownField { field: field.clone(), known: self.asked.clone() };
+            let problem = Fault::UnknownField { field: field.clone(), known: self.asked.clone() };
             self.errors.report(value.key.clone(), problem);
         }
     }
@@ -158,7 +158,7 @@ impl<'e> Section<'e> {
 impl Drop for Section<'_> {
     fn drop(&mut self) {
         for field in self.missing.drain(..) {
-            self.errors.report(self.node.place.clone(), Problem::MissingField { field });
+            self.errors.report(self.node.place.clone(), Fault::MissingField { field });
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 /// A text that was read, and where it came from. Cloning shares it.
 #[derive(Clone)]
-pub struct Source(Arc<Text>);
+pub struct SourceText(Arc<Text>);
 
 struct Text {
     name: String,
@@ -16,18 +16,18 @@ struct Text {
     lines: OnceLock<Vec<usize>>,
 }
 
-impl Source {
+impl SourceText {
     /// `name`, the path of a file, is shown before every place.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         let (name, text) = (name.into(), text.into());
-        Source(Arc::new(Text { name, text, argument: false, lines: OnceLock::new() }))
+        SourceText(Arc::new(Text { name, text, argument: false, lines: OnceLock::new() }))
     }
 
     /// The argument of a command line option, as in `--set a=1`. Shown whole in place of a line.
     pub fn argument(option: &str, text: impl Into<String>) -> Self {
         let text = text.into();
         let name = format!("{option} {text}");
-        Source(Arc::new(Text { name, text, argument: true, lines: OnceLock::new() }))
+        SourceText(Arc::new(Text { name, text, argument: true, lines: OnceLock::new() }))
     }
 
     /// The path of the file, or what else stands for it.
@@ -60,15 +60,15 @@ impl Source {
     }
 }
 
-impl PartialEq for Source {
+impl PartialEq for SourceText {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0) || (self.name() == other.name() && self.text() == other.text())
     }
 }
 
-impl fmt::Debug for Source {
+impl fmt::Debug for SourceText {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Source").field(&self.name()).finish()
+        f.debug_tuple("SourceText").field(&self.name()).finish()
     }
 }
 
@@ -76,7 +76,7 @@ impl fmt::Debug for Source {
 #[derive(Clone, PartialEq)]
 pub struct Place {
     /// The text.
-    pub source: Source,
+    pub source: SourceText,
     start: u32,
     end: u32,
 }
@@ -84,8 +84,8 @@ pub struct Place {
 impl Place {
     /// For what was not read from a text.
     pub fn nowhere() -> Self {
-        static NOWHERE: OnceLock<Source> = OnceLock::new();
-        NOWHERE.get_or_init(|| Source::new("document", "")).place(0..0)
+        static NOWHERE: OnceLock<SourceText> = OnceLock::new();
+        NOWHERE.get_or_init(|| SourceText::new("document", "")).place(0..0)
     }
 
     /// The bytes.
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn columns_count_characters() {
-        let source = Source::new("a.toml", "α = 1\nβγ = x\n");
+        let source = SourceText::new("a.toml", "α = 1\nβγ = x\n");
         let at = source.text().find('x').unwrap();
         assert_eq!(source.place(at..at + 1).to_string(), "a.toml:2:6");
         assert_eq!(source.place(at..at + 1).text(), "x");
@@ -156,9 +156,9 @@ mod tests {
 
     #[test]
     fn places_past_the_end_are_cut() {
-        let source = Source::new("a.toml", "a\n");
+        let source = SourceText::new("a.toml", "a\n");
         assert_eq!(source.place(9..12).to_string(), "a.toml:2:1");
         assert_eq!(source.place(9..12).text(), "");
-        assert_eq!(Source::new("b", "").place(0..0).to_string(), "b:1:1");
+        assert_eq!(SourceText::new("b", "").place(0..0).to_string(), "b:1:1");
     }
 }

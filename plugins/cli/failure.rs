@@ -1,6 +1,6 @@
 //! What keeps a command from doing what it was asked to do, and how it is shown.
 use crate::output::{self, text};
-use manifactor::config::{Diagnostic, Diagnostics, Problem, Source};
+use manifactor::config::{Diagnostic, Diagnostics, Fault, SourceText};
 use manifactor::formats::{FormatError, Malformed};
 use manifactor::slam::experiment::JournalError;
 use manifactor::slam::output::{FolderError, OutputError};
@@ -70,7 +70,7 @@ impl Failure {
 
     /// 2 for bad input, 3 for files that are not there or cannot be read or written, whoever names them.
     pub fn exit_code(&self) -> ExitCode {
-        let unreadable = |one: &Diagnostic| matches!(one.problem, Problem::Unreadable(_));
+        let unreadable = |one: &Diagnostic| matches!(one.fault, Fault::Unreadable(_));
         match self {
             Self::Documents(list) if list.iter().all(unreadable) => Self::files(),
             Self::Documents(_) | Self::Input { .. } => Self::usage(),
@@ -180,7 +180,7 @@ impl From<FormatError> for Failure {
 /// The lines of a file that are wrong, with what is written there.
 fn places(mut malformed: Malformed) -> Diagnostics {
     let text = std::mem::take(&mut malformed.text);
-    let source = Source::new(malformed.path.display().to_string(), text);
+    let source = SourceText::new(malformed.path.display().to_string(), text);
     let text = source.text();
     let mut list: Vec<_> = malformed
         .problems
@@ -192,14 +192,14 @@ fn places(mut malformed: Malformed) -> Diagnostics {
             let indent = rest.len() - rest.trim_start_matches([' ', '\t']).len();
             let word = rest.split_whitespace().next().unwrap_or_default().len();
             let place = source.place(before + indent..before + indent + word);
-            Diagnostic::new(place, Problem::invalid(problem.mistake.to_string()))
+            Diagnostic::new(place, Fault::invalid(problem.mistake.to_string()))
         })
         .collect();
     if malformed.more > 0 {
         let more = format!("and {} more lines are wrong", malformed.more);
-        list.push(Diagnostic::new(source.place(text.len()..text.len()), Problem::invalid(more)));
+        list.push(Diagnostic::new(source.place(text.len()..text.len()), Fault::invalid(more)));
     }
-    let nothing = || Diagnostic::new(source.place(0..0), Problem::invalid(malformed.to_string()));
+    let nothing = || Diagnostic::new(source.place(0..0), Fault::invalid(malformed.to_string()));
     Diagnostics::from_list(list).unwrap_or_else(|| nothing().into())
 }
 

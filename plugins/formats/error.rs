@@ -32,7 +32,7 @@ pub struct Malformed {
     /// The file.
     pub path: PathBuf,
     /// By line, at most twenty.
-    pub problems: Vec<Problem>,
+    pub problems: Vec<BadLine>,
     /// How many more there are.
     pub more: usize,
     /// What was read: a pipe cannot be read again to show its lines.
@@ -41,7 +41,7 @@ pub struct Malformed {
 
 /// One thing that is wrong.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Problem {
+pub struct BadLine {
     /// The line, from 1; 0 where it is the file as a whole.
     pub line: usize,
     /// What is wrong with it.
@@ -186,7 +186,7 @@ impl std::error::Error for Malformed {}
 pub(crate) struct Problems<'a> {
     path: &'a Path,
     text: &'a str,
-    list: Vec<Problem>,
+    list: Vec<BadLine>,
     more: usize,
 }
 
@@ -197,7 +197,7 @@ impl<'a> Problems<'a> {
     }
     pub(crate) fn push(&mut self, line: usize, mistake: impl Into<Mistake>) {
         if self.list.len() < TOLD {
-            self.list.push(Problem { line, mistake: mistake.into() });
+            self.list.push(BadLine { line, mistake: mistake.into() });
         } else {
             self.more += 1;
         }

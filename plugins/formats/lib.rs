@@ -20,7 +20,7 @@ pub mod tum;
 pub mod whole;
 pub mod words;
 
-pub use error::{FormatError, Malformed, Mistake, Problem};
+pub use error::{BadLine, FormatError, Malformed, Mistake};
 pub use graph_format::{GraphFormat, GraphRead, Reading, Repair};
 pub use pose_graph::g2o;
 pub use text::read_text;

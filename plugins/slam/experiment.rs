@@ -48,4 +48,4 @@ pub use runner::{Progress, run};
 pub use summary::{Comparison, Group, Summary};
 pub use summary_settings::SummarySettings;
 pub use table::{times_table, trials_table};
-pub use trial::{Outcome, Record, Trial};
+pub use trial::{Trial, TrialOutcome, TrialRecord};

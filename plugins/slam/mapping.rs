@@ -6,7 +6,7 @@
 use crate::fusion::FusedClass;
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::sequence::{ObjectId, Sequence};
-use crate::mapping::measurements::{Measured, Measurements, View};
+use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
 use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, unmatched};
 use crate::settings::{DetectionSettings, Settings};
 use manifactor_geometry::{Between, Prior, Se3};
@@ -198,7 +198,12 @@ fn candidate(measured: &Measured, start: &Result<DualQuadric, Rejection>) -> Opt
     Some(Candidate { key: object_key(measured.id), class: measured.class.clone(), start })
 }
 
-fn box_entry(view: &View, object: Key, sequence: &Sequence, settings: &DetectionSettings) -> FactorEntry {
+fn box_entry(
+    view: &ObjectBox,
+    object: Key,
+    sequence: &Sequence,
+    settings: &DetectionSettings,
+) -> FactorEntry {
     let (bounding_box, camera, model) = (view.bounding_box, sequence.camera, settings.model);
     FactorEntry {
         keys: vec![pose_key(view.frame), object],

@@ -10,7 +10,7 @@ pub(crate) mod outline;
 mod picture;
 mod scale;
 mod scene;
-mod view;
+mod viewpoint;
 
 pub(crate) use chart::{Chart, Curve, figure};
 pub(crate) use distribution::Distribution;
@@ -20,4 +20,4 @@ pub use picture::{NotDrawn, Picture};
 #[cfg(test)]
 pub(crate) use scene::{Object, Track};
 pub(crate) use scene::{Palette, Scene};
-pub(crate) use view::View;
+pub(crate) use viewpoint::Viewpoint;

@@ -4,7 +4,7 @@ mod pose;
 mod residual;
 
 use crate::canvas::Ink;
-use crate::drawing::{Chart, Curve, Palette, Picture, Scene, View, figure, frames_seen, image, map};
+use crate::drawing::{Chart, Curve, Palette, Picture, Scene, Viewpoint, figure, frames_seen, image, map};
 use manifactor_slam::record::{RunRecord, VariantRecord};
 
 pub(crate) use residual::{RESIDUALS, row as residual_row};
@@ -15,7 +15,7 @@ pub fn run_pictures(run: &RunRecord, variant: &VariantRecord, width: f64) -> Vec
     let palette = Palette::of(run);
     let scene = Scene::of(format!("{}: {}", run.title, variant.name), variant);
     let mut pictures =
-        vec![map(&scene, View::Top, &palette, width), map(&scene, View::Side, &palette, width)];
+        vec![map(&scene, Viewpoint::Top, &palette, width), map(&scene, Viewpoint::Side, &palette, width)];
     pictures.extend(charts(variant, width));
     let frames = frames_seen(variant, variant.images).into_iter();
     let frames = frames.filter_map(|number| Some((number, variant.frames.get(number)?)));

@@ -4,13 +4,13 @@ use indexmap::map::Entry;
 use jsonc_parser::ast::{Object, Value as Ast};
 use jsonc_parser::common::{Range, Ranged};
 use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
-use manifactor_tree::Problem;
+use manifactor_tree::Fault;
 use manifactor_tree::{Diagnostic, Diagnostics};
 use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
-use manifactor_tree::{Place, Source};
+use manifactor_tree::{Place, SourceText};
 
 /// Parses a document.
-pub(crate) fn parse(source: &Source) -> Result<Node, Diagnostics> {
+pub(crate) fn parse(source: &SourceText) -> Result<Node, Diagnostics> {
     let text = source.text();
     let strict = ParseOptions {
         allow_comments: false,
@@ -40,7 +40,7 @@ pub(crate) fn parse(source: &Source) -> Result<Node, Diagnostics> {
 }
 
 /// The parser lets a few things through that JSON does not, such as line breaks within strings.
-fn refuse_what_else_is_not_json(source: &Source) -> Result<(), Diagnostics> {
+fn refuse_what_else_is_not_json(source: &SourceText) -> Result<(), Diagnostics> {
     let Err(error) = serde_json::from_str::<serde::de::IgnoredAny>(source.text()) else { return Ok(()) };
     let lines = source.text().split_inclusive('\n').take(error.line().saturating_sub(1));
     let at = lines.map(str::len).sum::<usize>() + error.column().saturating_sub(1);
@@ -50,7 +50,7 @@ fn refuse_what_else_is_not_json(source: &Source) -> Result<(), Diagnostics> {
 }
 
 struct Reader<'a> {
-    source: &'a Source,
+    source: &'a SourceText,
     errors: Vec<Diagnostic>,
 }
 
@@ -109,5 +109,5 @@ fn number_of(text: &str) -> Value {
 fn syntax(place: Place, message: &str) -> Diagnostic {
     let message =
         message.chars().take(1).flat_map(char::to_lowercase).chain(message.chars().skip(1)).collect();
-    Diagnostic::new(place, Problem::Syntax { format: "JSON", message })
+    Diagnostic::new(place, Fault::Syntax { format: "JSON", message })
 }

@@ -2,17 +2,17 @@
 use crate::format::too_deep;
 use ::toml::Spanned;
 use ::toml::de::{DeInteger, DeTable, DeValue};
-use manifactor_tree::Problem;
+use manifactor_tree::Fault;
 use manifactor_tree::{Diagnostic, Diagnostics};
 use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
-use manifactor_tree::{Place, Source};
+use manifactor_tree::{Place, SourceText};
 use std::ops::Range;
 
 /// One bracket that is missing makes a dozen errors: no more than these are told.
 const MAX_ERRORS: usize = 5;
 
 /// Parses a document.
-pub(crate) fn parse(source: &Source) -> Result<Node, Diagnostics> {
+pub(crate) fn parse(source: &SourceText) -> Result<Node, Diagnostics> {
     let (document, errors) = DeTable::parse_recoverable(source.text());
     let mut reader = Reader { source, errors: Vec::new() };
     let root = reader.table(document.get_ref(), 0);
@@ -33,7 +33,7 @@ pub(crate) fn parse(source: &Source) -> Result<Node, Diagnostics> {
 }
 
 /// Parses a single value, as in `key=value` of an override.
-pub(crate) fn parse_value(source: &Source, span: Range<usize>) -> Option<Result<Node, Diagnostics>> {
+pub(crate) fn parse_value(source: &SourceText, span: Range<usize>) -> Option<Result<Node, Diagnostics>> {
     let text = source.text().get(span.clone())?;
     let value = DeValue::parse(text).ok()?;
     let mut reader = Reader { source, errors: Vec::new() };
@@ -46,7 +46,7 @@ pub(crate) fn parse_value(source: &Source, span: Range<usize>) -> Option<Result<
 }
 
 struct Reader<'a> {
-    source: &'a Source,
+    source: &'a SourceText,
     errors: Vec<Diagnostic>,
 }
 
@@ -96,7 +96,7 @@ impl Reader<'_> {
 }
 
 fn syntax(place: Place, message: &str) -> Diagnostic {
-    Diagnostic::new(place, Problem::Syntax { format: "TOML", message: message.to_owned() })
+    Diagnostic::new(place, Fault::Syntax { format: "TOML", message: message.to_owned() })
 }
 
 fn bare(key: &str) -> &str {
@@ -105,7 +105,7 @@ fn bare(key: &str) -> &str {
 
 /// Where the key that is written again at `second` was written first: the last key of its name before it, in a table
 /// that could still go on.
-fn first_of_two(source: &Source, table: &DeTable<'_>, second: &Range<usize>) -> Option<Place> {
+fn first_of_two(source: &SourceText, table: &DeTable<'_>, second: &Range<usize>) -> Option<Place> {
     let name = bare(source.text().get(second.clone())?);
     let mut found: Option<Range<usize>> = None;
     let mut open = vec![table];
@@ -142,7 +142,7 @@ fn tables<'a, 'i>(value: &'a Spanned<DeValue<'i>>) -> Vec<(Range<usize>, &'a DeT
 }
 
 /// Moves the places of a value that was parsed out of the middle of a text.
-fn shift(node: &mut Node, source: &Source, by: usize) {
+fn shift(node: &mut Node, source: &SourceText, by: usize) {
     let moved = |place: &Place| source.place(place.span().start + by..place.span().end + by);
     node.place = moved(&node.place);
     match &mut node.value {

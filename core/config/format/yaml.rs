@@ -4,10 +4,10 @@
 //! file and keys that are not scalars are refused.
 use crate::format::too_deep;
 use indexmap::map::Entry;
-use manifactor_tree::Problem;
+use manifactor_tree::Fault;
 use manifactor_tree::{Diagnostic, Diagnostics};
 use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
-use manifactor_tree::{Place, Source};
+use manifactor_tree::{Place, SourceText};
 use saphyr_parser::{Event, Parser, ScalarStyle, Span, Tag};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -16,7 +16,7 @@ use std::collections::HashMap;
 const MAX_ALIASED: usize = 1_000_000;
 
 /// Parses a document.
-pub(crate) fn parse(source: &Source) -> Result<Node, Diagnostics> {
+pub(crate) fn parse(source: &SourceText) -> Result<Node, Diagnostics> {
     let text = source.text();
     if let Some(at) = text.find('\0') {
         // the scanner takes it for the end of the text
@@ -54,7 +54,7 @@ enum Kind {
 }
 
 struct Builder<'a> {
-    source: &'a Source,
+    source: &'a SourceText,
     /// Byte offset of each character; empty where the text is ASCII and they are the same.
     bytes: Vec<usize>,
     open: Vec<Open>,
@@ -66,7 +66,7 @@ struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    fn new(source: &'a Source) -> Self {
+    fn new(source: &'a SourceText) -> Self {
         let text = source.text();
         let bytes = if text.is_ascii() { Vec::new() } else { text.char_indices().map(|(i, _)| i).collect() };
         Builder {
@@ -171,7 +171,7 @@ impl<'a> Builder<'a> {
     fn charge(&mut self, size: usize, place: &Place) -> Result<(), Diagnostics> {
         self.aliased = self.aliased.saturating_add(size);
         if self.aliased > MAX_ALIASED {
-            return Err(Diagnostic::new(place.clone(), Problem::TooManyAliases { limit: MAX_ALIASED }).into());
+            return Err(Diagnostic::new(place.clone(), Fault::TooManyAliases { limit: MAX_ALIASED }).into());
         }
         Ok(())
     }
@@ -275,5 +275,5 @@ fn depth(node: &Node) -> usize {
 }
 
 fn syntax(place: Place, message: &str) -> Diagnostic {
-    Diagnostic::new(place, Problem::Syntax { format: "YAML", message: message.to_owned() })
+    Diagnostic::new(place, Fault::Syntax { format: "YAML", message: message.to_owned() })
 }

@@ -1,7 +1,7 @@
 //! What is wrong between the factors and the variables of a document, at its place.
 use super::read::Read;
 use manifactor_graph::{GraphError, Key};
-use manifactor_tree::{Diagnostic, Errors, Node, Place, Problem, Value, nearest, quoted_list};
+use manifactor_tree::{Diagnostic, Errors, Fault, Node, Place, Value, nearest, quoted_list};
 
 /// Up to this many variables are listed for a key that is none of them.
 const LISTED: usize = 12;
@@ -26,14 +26,14 @@ pub(super) fn check(read: &Read<'_>, root: &Place, errors: &Errors) {
     }
 }
 
-fn missing(read: &Read<'_>, key: &str, search: bool) -> Problem {
+fn missing(read: &Read<'_>, key: &str, search: bool) -> Fault {
     let names = || read.variables.keys().map(Key::as_str);
     let known = match read.variables.len() {
         0..=LISTED => names().map(str::to_owned).collect(),
         _ if search => nearest(key, names()).map(str::to_owned).into_iter().collect(),
         _ => Vec::new(),
     };
-    Problem::UnknownName { what: "variable".into(), name: key.to_owned(), known }
+    Fault::UnknownName { what: "variable".into(), name: key.to_owned(), known }
 }
 
 /// Which variables a factor could have taken.
@@ -63,35 +63,35 @@ fn place(read: &Read<'_>, error: &GraphError, root: &Place) -> Option<Diagnostic
                 0 => format!("`{name}` connects variables, and no key is given"),
                 _ => format!("`{name}` connects {expected} variables, found {found} {keys}"),
             };
-            Diagnostic::new(place, Problem::invalid(message))
+            Diagnostic::new(place, Fault::invalid(message))
         }
         GraphError::WrongType { factor: of, name, position, key, expected, found } => {
             let message =
                 format!("`{name}` takes a variable of type `{expected}` here, `{key}` is of type `{found}`");
-            let problem = Problem::with_help(message, of_type(read, expected));
+            let problem = Fault::with_help(message, of_type(read, expected));
             let related = Some((at_variable(key), "it is declared here".into()));
             Diagnostic { related, ..Diagnostic::new(at_key(of, *position), problem) }
         }
         GraphError::RepeatedVariable { factor: of, name, position, key } => {
             let message = format!("`{name}` connects `{key}` to itself");
             let help = "a factor's variables have to be different ones";
-            Diagnostic::new(at_key(of, *position), Problem::with_help(message, help))
+            Diagnostic::new(at_key(of, *position), Fault::with_help(message, help))
         }
         GraphError::Noise { factor: of, source, .. } => {
             let place = at(factor(of).and_then(|f| f.field("noise").or_else(|| f.field("factor"))));
-            Diagnostic::new(place, Problem::invalid(source.to_string()))
+            Diagnostic::new(place, Fault::invalid(source.to_string()))
         }
         GraphError::UnknownDirection { key, direction, tangent } => {
             let names = variable(key).map(|variable| variable.items("fixed")).unwrap_or_default();
             let is_it = |node: &&Node| matches!(&node.value, Value::String(name) if name == direction);
             let place = names.iter().find(is_it).map(|node| node.place.clone());
             let known = tangent.iter().map(|name| (*name).to_owned()).collect();
-            let problem = Problem::UnknownName { what: "direction".into(), name: direction.clone(), known };
+            let problem = Fault::UnknownName { what: "direction".into(), name: direction.clone(), known };
             Diagnostic::new(place.unwrap_or_else(|| at_variable(key)), problem)
         }
         GraphError::MissingFixed { key } | GraphError::NotFinite { key } => {
-            Diagnostic::new(at_variable(key), Problem::invalid(error.to_string()))
+            Diagnostic::new(at_variable(key), Fault::invalid(error.to_string()))
         }
-        _ => Diagnostic::new(root.clone(), Problem::invalid(error.to_string())),
+        _ => Diagnostic::new(root.clone(), Fault::invalid(error.to_string())),
     })
 }

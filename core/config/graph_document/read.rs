@@ -4,7 +4,7 @@ use crate::document::Document;
 use indexmap::IndexMap;
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Noise, Values, Variable};
-use manifactor_tree::{Diagnostic, Diagnostics, Errors, Node, Problem, Section, Value};
+use manifactor_tree::{Diagnostic, Diagnostics, Errors, Fault, Node, Section, Value};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;
@@ -107,7 +107,7 @@ impl<'a> Read<'a> {
         };
         let place = &node.field("key").unwrap_or(node).place;
         if key.as_str().is_empty() {
-            let problem = Problem::invalid("a key needs at least one character");
+            let problem = Fault::invalid("a key needs at least one character");
             errors.push(Diagnostic::new(place.clone(), problem));
             return;
         }

@@ -1,6 +1,6 @@
 //! What is said of documents that are well formed and wrong, in full.
 
-use manifactor_config::{Document, Errors, Format, Problem, Section};
+use manifactor_config::{Document, Errors, Fault, Format, Section};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -254,7 +254,7 @@ fn callers_report_at_a_field_that_they_took() {
         let mut camera = section.section("camera")?;
         let width = camera.required::<u32>("width")?;
         if width == 0 {
-            camera.report("width", Problem::with_help("an image has pixels", "give its width"));
+            camera.report("width", Fault::with_help("an image has pixels", "give its width"));
         }
         camera.finish();
         Some(width)

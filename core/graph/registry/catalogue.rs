@@ -4,7 +4,7 @@
 //! enters an implementation. The catalogue takes a type's summary, explanation and example from its
 //! doc comment, which travels in its JSON Schema: the first paragraph is the summary, the first
 //! `toml` block the example.
-use manifactor_tree::{Node, Problem, ReadError, Reader};
+use manifactor_tree::{Fault, Node, ReadError, Reader};
 use schemars::Schema;
 use serde_json::Value;
 use std::any::{Any, TypeId};
@@ -61,7 +61,7 @@ impl Entry {
         let any = (self.read_boxed)(Reader::without(fields, TAG)).map_err(|error| error.at(fields))?;
         any.downcast::<Box<K>>().map(|boxed| *boxed).map_err(|_| {
             let text = format!("`{}` is a {}, not a {}", self.name, self.kind, K::NAME);
-            ReadError::new(fields.place.clone(), Problem::invalid(text))
+            ReadError::new(fields.place.clone(), Fault::invalid(text))
         })
     }
 

@@ -1,6 +1,6 @@
 //! Trait objects that a document chooses by name: `solver = { type = "gauss_newton", max_iterations = 20 }`.
 use crate::registry::catalogue::{Entry, Kind, TAG, all, entries, find};
-use manifactor_tree::{Field, Node, Place, Problem, ReadError, Value, advice, nearest};
+use manifactor_tree::{Fault, Field, Node, Place, ReadError, Value, advice, nearest};
 
 /// Reads a table as the registered type of kind `K` that its `type` names.
 ///
@@ -21,7 +21,7 @@ pub fn read<K: Kind + ?Sized>(node: &Node) -> Result<Box<K>, ReadError> {
 }
 
 /// The entry that a tag names.
-fn entry_of(tag: &Node, kind: &str) -> Result<&'static Entry, Problem> {
+fn entry_of(tag: &Node, kind: &str) -> Result<&'static Entry, Fault> {
     let a = article(kind);
     Err(match &tag.value {
         Value::String(name) => match find(kind, name) {
@@ -30,48 +30,48 @@ fn entry_of(tag: &Node, kind: &str) -> Result<&'static Entry, Problem> {
                 Some(other) => {
                     let (b, other) = (article(other.kind), other.kind);
                     let message = format!("`{name}` is {b} {other}, not {a} {kind}");
-                    Problem::Invalid { message, help: advice("", &known(kind)) }
+                    Fault::Invalid { message, help: advice("", &known(kind)) }
                 }
                 None => unknown(kind, name),
             },
         },
-        _ => Problem::wrong_type(format!("the name of {a} {kind}"), tag.in_words()),
+        _ => Fault::wrong_type(format!("the name of {a} {kind}"), tag.in_words()),
     })
 }
 
 /// A name that nothing has: misspelt, or of a plugin that is not there.
-fn unknown(kind: &str, name: &str) -> Problem {
+fn unknown(kind: &str, name: &str) -> Fault {
     let known = known(kind);
     if nearest(name, known.iter().map(String::as_str)).is_some() {
-        return Problem::UnknownName { what: kind.to_owned(), name: name.to_owned(), known };
+        return Fault::UnknownName { what: kind.to_owned(), name: name.to_owned(), known };
     }
     let link =
         "if a plugin brings it, the binary has to link the plugin: `use the_plugin as _;` beside its `main`";
     let help = advice(name, &known).map_or_else(|| link.to_owned(), |known| format!("{known}; {link}"));
-    Problem::with_help(format!("unknown {kind} `{name}`"), help)
+    Fault::with_help(format!("unknown {kind} `{name}`"), help)
 }
 
 /// What is wrong where there is no `type`.
-fn untagged(node: &Node, kind: &str) -> (Place, Problem) {
+fn untagged(node: &Node, kind: &str) -> (Place, Fault) {
     let a = article(kind);
     let (place, problem) = match &node.value {
         Value::Table(table) => match table.iter().find(|(name, _)| nearest(name, [TAG]).is_some()) {
             Some((name, field)) => {
-                let problem = Problem::UnknownField { field: name.clone(), known: vec![TAG.to_owned()] };
+                let problem = Fault::UnknownField { field: name.clone(), known: vec![TAG.to_owned()] };
                 (&field.key, problem)
             }
             None => {
                 let message = format!("missing field `type`, the name of {a} {kind}");
-                (&node.place, Problem::Invalid { message, help: advice("", &known(kind)) })
+                (&node.place, Fault::Invalid { message, help: advice("", &known(kind)) })
             }
         },
         value => {
             let expected = format!("a table with the `type` of {a} {kind}");
-            let problem = Problem::wrong_type(expected, node.in_words());
+            let problem = Fault::wrong_type(expected, node.in_words());
             match value {
                 Value::String(name) if find(kind, name).is_some() => {
                     let help = format!("write {{ type = {name:?} }}");
-                    (&node.place, Problem::with_help(problem.to_string(), help))
+                    (&node.place, Fault::with_help(problem.to_string(), help))
                 }
                 _ => (&node.place, problem),
             }

@@ -2,7 +2,7 @@
 use super::Subject;
 use crate::error::LawError;
 use crate::freedom::Freedom;
-use crate::jacobian::Entry;
+use crate::jacobian::JacobianEntry;
 use crate::jacobian::Kink;
 use crate::points::Drawn;
 use manifactor_graph::Linearization;
@@ -141,8 +141,8 @@ impl Gathered {
     }
 
     /// Keeps an entry, if it is the worst so far.
-    pub(super) fn entry(&mut self, subject: &Subject, entry: Option<Entry>, drawn: &Drawn) {
-        let Some(Entry { variable, column, row, found, expected, error }) = entry else { return };
+    pub(super) fn entry(&mut self, subject: &Subject, entry: Option<JacobianEntry>, drawn: &Drawn) {
+        let Some(JacobianEntry { variable, column, row, found, expected, error }) = entry else { return };
         if self.worst.as_ref().is_none_or(|worst| error > worst.error) {
             let direction = subject.direction(variable, column);
             let at = subject.graph(&drawn.variables);

@@ -1,6 +1,6 @@
 //! Places where a residual has no derivative: kinks, where the two sides have different ones, and jumps.
 use crate::differences::{Derivative, differentiate_from, jumps};
-use crate::jacobian::Entry;
+use crate::jacobian::JacobianEntry;
 
 /// How far the derivatives of the two sides are apart, relative to their size, to make a kink.
 const APART: f64 = 1e-3;
@@ -49,8 +49,8 @@ pub(crate) fn sides(rows: usize, step: f64, f: impl Fn(f64) -> Option<Vec<f64>>)
 impl Sides {
     /// The kink or jump that excuses an entry for having no derivative. At a kink the entry is to be that of one of
     /// the sides, or between them.
-    pub(crate) fn kink(&self, entry: &Entry) -> Option<Kink> {
-        let &Entry { variable, column, row, found, .. } = entry;
+    pub(crate) fn kink(&self, entry: &JacobianEntry) -> Option<Kink> {
+        let &JacobianEntry { variable, column, row, found, .. } = entry;
         let (before, after, jump) = (self.before[row].value, self.after[row].value, self.jumps[row]);
         let kink = Kink { variable, column, row, before, after, jump };
         if jump > 0.0 {
@@ -64,8 +64,8 @@ impl Sides {
 
 /// The kink that excuses an entry which is among those that it has nearby, where those differ: a generalized gradient in
 /// Clarke's sense.
-pub(crate) fn hull(nearby: &[f64], entry: &Entry) -> Option<Kink> {
-    let &Entry { variable, column, row, found, .. } = entry;
+pub(crate) fn hull(nearby: &[f64], entry: &JacobianEntry) -> Option<Kink> {
+    let &JacobianEntry { variable, column, row, found, .. } = entry;
     let before = nearby.iter().copied().reduce(f64::min)?;
     let after = nearby.iter().copied().reduce(f64::max)?;
     let kink = Kink { variable, column, row, before, after, jump: 0.0 };
@@ -78,8 +78,8 @@ pub(crate) fn hull(nearby: &[f64], entry: &Entry) -> Option<Kink> {
 mod tests {
     use super::*;
 
-    fn entry(found: f64) -> Entry {
-        Entry { variable: 0, column: 0, row: 0, found, expected: 0.0, error: 1.0 }
+    fn entry(found: f64) -> JacobianEntry {
+        JacobianEntry { variable: 0, column: 0, row: 0, found, expected: 0.0, error: 1.0 }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::output;
 use crate::output::text::count;
 use crate::status::Status;
 use clap::Args;
-use manifactor::config::{Diagnostic, Problem, Source};
+use manifactor::config::{Diagnostic, Fault, SourceText};
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::recording;
 use manifactor::slam::run::Run as Running;
@@ -30,8 +30,8 @@ impl Simulate {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         let document = self.run.open()?;
         let Some(variant) = document.variants.first() else {
-            let source = Source::new(self.run.config.display().to_string(), "");
-            let problem = Problem::invalid("there is no variant to simulate");
+            let source = SourceText::new(self.run.config.display().to_string(), "");
+            let problem = Fault::invalid("there is no variant to simulate");
             return Err(Failure::Documents(Diagnostic::new(source.place(0..0), problem).into()));
         };
         // held to the end

@@ -1,5 +1,5 @@
 //! A registered type that the document names, or the command line does.
-use manifactor::config::{Field, Node, Section, Source, Table, Value};
+use manifactor::config::{Field, Node, Section, SourceText, Table, Value};
 use serde::de::DeserializeOwned;
 
 /// Takes `field` out of a document's table: what `argument` names, such as `--solver`, with the document's
@@ -9,7 +9,7 @@ pub(crate) fn choose<K: ?Sized>(
     field: &str,
     (argument, name): (&str, Option<&str>),
     default: &str,
-    document: &Source,
+    document: &SourceText,
 ) -> Option<Box<K>>
 where
     Box<K>: DeserializeOwned,
@@ -19,7 +19,7 @@ where
         Some(node) if name.is_none() && has_type(node) => node.clone(),
         Some(node) => chosen(node.clone()),
         None => {
-            let nothing = Source::argument(argument, name.unwrap_or(default));
+            let nothing = SourceText::argument(argument, name.unwrap_or(default));
             chosen(Node::new(nothing.place(0..0), Value::Table(Table::default())))
         }
     };
@@ -31,13 +31,13 @@ fn has_type(node: &Node) -> bool {
 }
 
 /// The same settings for the type `name`. Those of another type, in the document, are left behind.
-pub(crate) fn named(argument: &str, name: &str, mut node: Node, document: &Source) -> Node {
+pub(crate) fn named(argument: &str, name: &str, mut node: Node, document: &SourceText) -> Node {
     let Value::Table(table) = &mut node.value else { return node };
     let is = |field: &Field| matches!(&field.node.value, Value::String(text) if text == name);
     if !table.get("type").is_none_or(is) {
         table.retain(|_, field| field.key.source != *document);
     }
-    let source = Source::argument(argument, name);
+    let source = SourceText::argument(argument, name);
     let place = source.place(0..name.len());
     let tag = Field { key: place.clone(), node: Node::new(place, Value::String(name.to_owned())) };
     table.insert("type".to_owned(), tag);

@@ -2,7 +2,7 @@
 use crate::failure::Failure;
 use crate::input::choice::choose;
 use clap::Args;
-use manifactor::config::{Document, Section, Source};
+use manifactor::config::{Document, Section, SourceText};
 use manifactor::solve::{Optimizer, Start};
 
 /// `--solver`, `--start` and `--set`.
@@ -31,13 +31,21 @@ impl SolverArguments {
     }
 
     /// Takes the field `solver` out of a document's table: default: `auto`.
-    pub(crate) fn take(&self, section: &mut Section<'_>, document: &Source) -> Option<Box<dyn Optimizer>> {
+    pub(crate) fn take(
+        &self,
+        section: &mut Section<'_>,
+        document: &SourceText,
+    ) -> Option<Box<dyn Optimizer>> {
         let argument = ("--solver", self.solver.as_deref());
         choose(section, "solver", argument, "auto", document)
     }
 
     /// Takes the field `start`. Default: the values as they are.
-    pub(crate) fn take_start(&self, section: &mut Section<'_>, document: &Source) -> Option<Box<dyn Start>> {
+    pub(crate) fn take_start(
+        &self,
+        section: &mut Section<'_>,
+        document: &SourceText,
+    ) -> Option<Box<dyn Start>> {
         choose(section, "start", ("--start", self.start.as_deref()), "given", document)
     }
 }

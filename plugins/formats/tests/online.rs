@@ -1,7 +1,7 @@
 //! Published pose graphs through a session, pose by pose, beside batch solves.
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_formats::replay::Replay;
-use manifactor_geometry::{Between, Coordinates, Landmark, LieGroup, Point2, Range, Se2, Se3, So2};
+use manifactor_geometry::{Between, Coordinates, Landmark, Point2, Range, Se2, Se3, So2};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};

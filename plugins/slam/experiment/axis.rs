@@ -1,6 +1,6 @@
 //! What an experiment varies.
 use crate::settings::run_document::Declared;
-use manifactor_config::{Errors, Field, Node, Place, Placed, Problem, Table, Value, deserialize_with};
+use manifactor_config::{Errors, Fault, Field, Node, Place, Placed, Table, Value, deserialize_with};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
@@ -82,7 +82,7 @@ impl Axis {
             }
         };
         if axis.options.is_empty() {
-            errors.report(place, Problem::invalid("an axis without options leaves nothing to run"));
+            errors.report(place, Fault::invalid("an axis without options leaves nothing to run"));
         }
         Some(axis)
     }
@@ -99,7 +99,7 @@ impl Axis {
 
     fn of_rows(Rows { columns, rows }: Rows, errors: &Errors) -> Option<Self> {
         let Value::Table(columns) = columns.value else {
-            let problem = Problem::wrong_type("a table of columns and what they set", columns.in_words());
+            let problem = Fault::wrong_type("a table of columns and what they set", columns.in_words());
             errors.report(columns.place, problem);
             return None;
         };
@@ -124,7 +124,7 @@ fn choice(row: Node, paths: &[String], errors: &Errors) -> Option<Choice> {
     };
     if values.len() != paths.len() {
         let (expected, found) = (paths.len(), values.len());
-        let problem = Problem::wrong_type(format!("{expected} values, one a column"), format!("{found}"));
+        let problem = Fault::wrong_type(format!("{expected} values, one a column"), format!("{found}"));
         errors.report(place, problem);
         return None;
     }

@@ -3,7 +3,7 @@ use super::axis::{Axis, Choice, Column};
 use super::measures::measure_names;
 use crate::metrics::Alignment;
 use indexmap::IndexMap;
-use manifactor_config::{Diagnostic, Errors, Node, Place, Problem, Value};
+use manifactor_config::{Diagnostic, Errors, Fault, Node, Place, Value};
 use std::collections::{HashMap, HashSet};
 
 /// Columns that the tables have besides the axes and the measures.
@@ -39,7 +39,7 @@ fn columns(axes: &[Axis], errors: &Errors) {
     for Column { name, place } in axes.iter().flat_map(|axis| &axis.columns) {
         if OWN.contains(&name.as_str()) || measures.contains(name) {
             let message = format!("the tables have a column `{name}` of their own");
-            errors.report(place.clone(), Problem::with_help(message, "give this one another name"));
+            errors.report(place.clone(), Fault::with_help(message, "give this one another name"));
         }
         if let Some(first) = first.insert(name, place) {
             errors.push(Diagnostic::duplicate("column", name, place.clone(), first.clone()));
@@ -57,7 +57,7 @@ fn repeated(axis: &Axis, errors: &Errors) {
             let message = format!("`{}` sets the same as `{}`", words(choice), words(first));
             let help = "leave one of them out: their trials would be the same, and not independent";
             let related = Some((first.place.clone(), "first given here".to_owned()));
-            let problem = Problem::with_help(message, help);
+            let problem = Fault::with_help(message, help);
             errors.push(Diagnostic { related, ..Diagnostic::new(choice.place.clone(), problem) });
         } else if let Some(first) = labels.insert(&choice.labels, choice) {
             let (name, place) = (choice.labels.join(", "), choice.place.clone());
@@ -123,7 +123,7 @@ fn overlapping(axes: &[Axis], errors: &Errors) {
                     let message = format!(
                         "`{path}` is set by `{first}` and by `{second}`: there `{first}` has no effect"
                     );
-                    let problem = Problem::with_help(message, "vary it in one column only");
+                    let problem = Fault::with_help(message, "vary it in one column only");
                     let related = Some((before.clone(), "first set here".to_owned()));
                     errors.push(Diagnostic { related, ..Diagnostic::new(place.clone(), problem) });
                 }

@@ -4,7 +4,7 @@ use super::names::Names;
 use super::{SummarySettings, Trial, check};
 use crate::settings::Settings;
 use crate::settings::run_document::{absolute, split, stem};
-use manifactor_config::{Diagnostics, Document, Errors, Node, Problem, merge};
+use manifactor_config::{Diagnostics, Document, Errors, Fault, Node, merge};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
@@ -143,7 +143,7 @@ fn trials(base: &Node, axes: &[Axis], folder: &Path, errors: &Errors) -> Option<
     let count = axes.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.options.len()));
     if count.is_none_or(|count| count > MOST) {
         let message = format!("the axes make more than {MOST} trials");
-        errors.report(base.place.clone(), Problem::invalid(message));
+        errors.report(base.place.clone(), Fault::invalid(message));
         return None;
     }
     let mut trials = vec![];

@@ -4,7 +4,7 @@
 //! A file that is no such log is refused and not touched. Of several lines for one trial the last counts, as a trial that
 //! failed may be run again, and lines of trials that the experiment does not have any more are passed over, so that a
 //! changed experiment runs what is new and keeps what is not.
-use super::{Record, Trial};
+use super::{Trial, TrialRecord};
 use crate::output::OutputFolder;
 use manifactor_formats::whole::open_regular;
 use std::collections::HashMap;
@@ -44,7 +44,7 @@ pub enum JournalError {
 }
 
 /// By labels and fingerprint of the trial.
-type Records = HashMap<(Vec<String>, String), Record>;
+type Records = HashMap<(Vec<String>, String), TrialRecord>;
 
 /// A log that is open for writing, in a folder that this process alone writes into.
 #[derive(Debug)]
@@ -75,7 +75,7 @@ impl Journal {
     }
 
     /// What a trial came to, if it is done.
-    pub fn find(&self, trial: &Trial) -> Option<&Record> {
+    pub fn find(&self, trial: &Trial) -> Option<&TrialRecord> {
         self.records.get(&(trial.labels.clone(), trial.fingerprint()))
     }
 
@@ -88,7 +88,7 @@ impl Journal {
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub fn append(&mut self, record: Record) -> Result<(), JournalError> {
+    pub fn append(&mut self, record: TrialRecord) -> Result<(), JournalError> {
         let io = |source| JournalError::Io { path: self.path.clone(), source };
         let mut line = serde_json::to_vec(&record).map_err(|error| io(error.into()))?;
         line.push(b'\n');
@@ -112,7 +112,7 @@ fn read(bytes: &[u8], path: &Path) -> Result<(Records, usize), JournalError> {
         };
         whole += line.len() + 1;
         if !line.is_empty() {
-            let record: Record =
+            let record: TrialRecord =
                 serde_json::from_slice(line).map_err(|error| mistake(i + 1, error.to_string()))?;
             records.insert((record.labels.clone(), record.fingerprint.clone()), record);
         }
@@ -123,17 +123,17 @@ fn read(bytes: &[u8], path: &Path) -> Result<(Records, usize), JournalError> {
 /// Whether a line is one of ours, cut short.
 fn is_torn(line: &[u8]) -> bool {
     let begins = line.starts_with(BEGINNING) || BEGINNING.starts_with(line);
-    begins && serde_json::from_slice::<Record>(line).err().is_none_or(|error| error.is_eof())
+    begins && serde_json::from_slice::<TrialRecord>(line).err().is_none_or(|error| error.is_eof())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Outcome;
+    use super::super::TrialOutcome;
     use super::*;
 
-    fn record(label: &str, reason: &str) -> Record {
-        let outcome = Outcome::Failed { reason: reason.into() };
-        Record { labels: vec![label.into()], fingerprint: "0".into(), outcome, seconds: 0.1 }
+    fn record(label: &str, reason: &str) -> TrialRecord {
+        let outcome = TrialOutcome::Failed { reason: reason.into() };
+        TrialRecord { labels: vec![label.into()], fingerprint: "0".into(), outcome, seconds: 0.1 }
     }
 
     fn open(folder: &Path) -> Result<Journal, JournalError> {

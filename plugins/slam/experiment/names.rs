@@ -4,7 +4,7 @@ use super::measures::{measure_names, measure_names_in_words};
 use super::{SummarySettings, Trial};
 use crate::metrics::Alignment;
 use crate::output::report::alignment_name;
-use manifactor_config::{Errors, Node, Place, Problem, Value, nearest, quoted_list};
+use manifactor_config::{Errors, Fault, Node, Place, Value, nearest, quoted_list};
 use std::collections::HashSet;
 
 /// The names in a `[summary]`.
@@ -47,7 +47,7 @@ impl Names<'_> {
             let meant = nearest(name, known.iter().map(String::as_str));
             let meant = meant.map_or_else(String::new, |meant| format!("did you mean `{meant}`? "));
             let help = format!("{meant}there are {}", measure_names_in_words());
-            let problem = Problem::with_help(format!("unknown metric `{name}`"), help);
+            let problem = Fault::with_help(format!("unknown metric `{name}`"), help);
             self.errors.report(self.place_of("metrics", name), problem);
         }
     }
@@ -64,7 +64,7 @@ impl Names<'_> {
             }
         }
         if self.settings.baseline.len() > 1 {
-            let problem = Problem::invalid("`baseline` is one column and one of its values");
+            let problem = Fault::invalid("`baseline` is one column and one of its values");
             self.errors.report(self.place_of("baseline", ""), problem);
         }
     }
@@ -72,7 +72,7 @@ impl Names<'_> {
     fn twice(&self, field: &str, what: &str, names: &[String]) {
         let mut met = HashSet::new();
         for name in names.iter().filter(|name| !met.insert(*name)) {
-            let problem = Problem::Duplicate { what: what.to_owned(), name: name.clone() };
+            let problem = Fault::Duplicate { what: what.to_owned(), name: name.clone() };
             self.errors.report(self.place_of(field, name), problem);
         }
     }
@@ -90,14 +90,14 @@ impl Names<'_> {
             let used = if used.is_empty() { "none".to_owned() } else { used };
             let message =
                 format!("no trial has the metric `{name}`: of `evaluation.alignments` there is {used}");
-            let problem = Problem::with_help(message, "add its alignment to those of the run");
+            let problem = Fault::with_help(message, "add its alignment to those of the run");
             self.errors.report(self.place_of("metrics", name), problem);
         }
     }
 
     fn unknown(&self, field: &str, what: &str, name: &str, known: &[String]) {
         let (what, name, known) = (what.to_owned(), name.to_owned(), known.to_vec());
-        self.errors.report(self.place_of(field, &name), Problem::UnknownName { what, name, known });
+        self.errors.report(self.place_of(field, &name), Fault::UnknownName { what, name, known });
     }
 
     /// Where a field of the summary names something; last, where it does so twice.

@@ -1,5 +1,5 @@
 //! Trials on all cores, each on one thread.
-use super::{Experiment, Journal, JournalError, Outcome, Record, Trial};
+use super::{Experiment, Journal, JournalError, Trial, TrialOutcome, TrialRecord};
 use crate::input::source::Folders;
 use manifactor_solve::Interrupt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -62,11 +62,11 @@ pub fn run(
 }
 
 /// A trial on one thread: its solver has a pool of one.
-fn alone(trial: &Trial, folders: &Folders, interrupt: &Interrupt) -> Option<Record> {
-    let failed = |reason: String| Record {
+fn alone(trial: &Trial, folders: &Folders, interrupt: &Interrupt) -> Option<TrialRecord> {
+    let failed = |reason: String| TrialRecord {
         labels: trial.labels.clone(),
         fingerprint: trial.fingerprint(),
-        outcome: Outcome::Failed { reason },
+        outcome: TrialOutcome::Failed { reason },
         seconds: 0.0,
     };
     let pool = match rayon::ThreadPoolBuilder::new().num_threads(1).build() {

@@ -1,6 +1,6 @@
 //! Means over trials, and how far variants are apart.
 use super::table::records;
-use super::{Experiment, Interval, Journal, Record, bootstrap};
+use super::{Experiment, Interval, Journal, TrialRecord, bootstrap};
 use indexmap::{IndexMap, IndexSet};
 use serde::Serialize;
 
@@ -58,7 +58,7 @@ impl Summary {
     /// Over the trials that are done.
     pub fn new(experiment: &Experiment, journal: &Journal) -> Self {
         let settings = &experiment.summary;
-        let records: Vec<&Record> = records(experiment, journal).collect();
+        let records: Vec<&TrialRecord> = records(experiment, journal).collect();
         let place = |name: &String| experiment.columns.iter().position(|column| column == name);
         let compared =
             settings.compared().and_then(|(column, value)| Some((place(&column.to_owned())?, value)));
@@ -79,12 +79,12 @@ impl Summary {
 }
 
 /// Labels in some of the columns.
-fn labels<'a>(record: &'a Record, columns: &[usize]) -> Vec<&'a str> {
+fn labels<'a>(record: &'a TrialRecord, columns: &[usize]) -> Vec<&'a str> {
     columns.iter().map(|i| record.labels.get(*i).map_or("", String::as_str)).collect()
 }
 
 struct Over<'a> {
-    records: &'a [&'a Record],
+    records: &'a [&'a TrialRecord],
     by: &'a [usize],
     /// The column that is compared, and the value of the baseline.
     compared: Option<(usize, &'a str)>,
@@ -94,7 +94,7 @@ struct Over<'a> {
 
 impl<'a> Over<'a> {
     fn group(&self, key: &[&str]) -> Group {
-        let members: Vec<&Record> =
+        let members: Vec<&TrialRecord> =
             self.records.iter().copied().filter(|record| labels(record, self.by) == key).collect();
         let count = |status: fn(&str) -> bool| members.iter().filter(|r| status(r.outcome.status())).count();
         let is_baseline = self.compared.is_none_or(|(column, value)| {
@@ -113,20 +113,20 @@ impl<'a> Over<'a> {
         }
     }
 
-    fn mean(&self, members: &[&'a Record], metric: &str) -> Option<Interval> {
+    fn mean(&self, members: &[&'a TrialRecord], metric: &str) -> Option<Interval> {
         let values = members.iter().filter_map(|record| Some((*record, record.outcome.measure(metric)?)));
         self.interval(values)
     }
 
-    fn compare(&self, members: &[&'a Record], metric: &str) -> Option<Comparison> {
+    fn compare(&self, members: &[&'a TrialRecord], metric: &str) -> Option<Comparison> {
         let (column, value) = self.compared?;
-        let key = |record: &'a Record, label: &'a str| -> Vec<&'a str> {
+        let key = |record: &'a TrialRecord, label: &'a str| -> Vec<&'a str> {
             let labels = record.labels.iter().enumerate();
             labels.map(|(i, own)| if i == column { label } else { own.as_str() }).collect()
         };
-        let all: IndexMap<Vec<&str>, &Record> =
+        let all: IndexMap<Vec<&str>, &TrialRecord> =
             self.records.iter().map(|record| (labels(record, &every(record)), *record)).collect();
-        let pairs: Vec<(&Record, f64, f64)> = members
+        let pairs: Vec<(&TrialRecord, f64, f64)> = members
             .iter()
             .filter_map(|record| {
                 let baseline = all.get(&key(record, value))?.outcome.measure(metric)?;
@@ -139,7 +139,7 @@ impl<'a> Over<'a> {
         Some(Comparison { pairs: pairs.len(), difference, baseline })
     }
 
-    fn interval(&self, values: impl Iterator<Item = (&'a Record, f64)>) -> Option<Interval> {
+    fn interval(&self, values: impl Iterator<Item = (&'a TrialRecord, f64)>) -> Option<Interval> {
         let mut clusters: IndexMap<Vec<&str>, Vec<f64>> = IndexMap::new();
         for (record, value) in values {
             let key = if self.clusters.is_empty() {
@@ -154,6 +154,6 @@ impl<'a> Over<'a> {
     }
 }
 
-fn every(record: &Record) -> Vec<usize> {
+fn every(record: &TrialRecord) -> Vec<usize> {
     (0..record.labels.len()).collect()
 }

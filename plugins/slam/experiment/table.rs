@@ -1,5 +1,5 @@
 //! All trials that are done, in the order of the experiment.
-use super::{Experiment, Journal, Outcome, Record};
+use super::{Experiment, Journal, TrialOutcome, TrialRecord};
 use indexmap::IndexSet;
 use manifactor_formats::table::{Column, Table};
 
@@ -9,15 +9,15 @@ use manifactor_formats::table::{Column, Table};
 /// The order is that of the experiment, and no time is in it: it is the same however often the experiment was
 /// interrupted, and whatever number of threads it ran on.
 pub fn trials_table(experiment: &Experiment, journal: &Journal) -> Table {
-    let records: Vec<&Record> = records(experiment, journal).collect();
+    let records: Vec<&TrialRecord> = records(experiment, journal).collect();
     let measures: IndexSet<&str> =
         records.iter().flat_map(|r| r.outcome.measures()).map(|(name, _)| name).collect();
     let mut columns = labels(experiment, &records);
-    let text = |of: fn(&Outcome) -> &str| {
+    let text = |of: fn(&TrialOutcome) -> &str| {
         Column::Text(records.iter().map(|record| of(&record.outcome).to_owned()).collect())
     };
-    columns.push(("status".to_owned(), text(Outcome::status)));
-    columns.push(("reason".to_owned(), text(Outcome::reason)));
+    columns.push(("status".to_owned(), text(TrialOutcome::status)));
+    columns.push(("reason".to_owned(), text(TrialOutcome::reason)));
     for measure in measures {
         let cells = records.iter().map(|record| record.outcome.measure(measure)).collect();
         columns.push((measure.to_owned(), Column::Number(cells)));
@@ -27,7 +27,7 @@ pub fn trials_table(experiment: &Experiment, journal: &Journal) -> Table {
 
 /// How long each trial took, in seconds.
 pub fn times_table(experiment: &Experiment, journal: &Journal) -> Table {
-    let records: Vec<&Record> = records(experiment, journal).collect();
+    let records: Vec<&TrialRecord> = records(experiment, journal).collect();
     let mut columns = labels(experiment, &records);
     let seconds = records.iter().map(|record| Some(record.seconds)).collect();
     columns.push(("seconds".to_owned(), Column::Number(seconds)));
@@ -38,18 +38,18 @@ pub fn times_table(experiment: &Experiment, journal: &Journal) -> Table {
 pub(super) fn records<'a>(
     experiment: &'a Experiment,
     journal: &'a Journal,
-) -> impl Iterator<Item = &'a Record> {
+) -> impl Iterator<Item = &'a TrialRecord> {
     experiment.trials.iter().filter_map(|trial| journal.find(trial))
 }
 
-fn labels(experiment: &Experiment, records: &[&Record]) -> Vec<(String, Column)> {
+fn labels(experiment: &Experiment, records: &[&TrialRecord]) -> Vec<(String, Column)> {
     let label =
         |i: usize| records.iter().map(|record| record.labels.get(i).cloned().unwrap_or_default()).collect();
     let columns = experiment.columns.iter().enumerate();
     columns.map(|(i, name)| (name.clone(), Column::Text(label(i)))).collect()
 }
 
-impl Outcome {
+impl TrialOutcome {
     /// `failed`, or how the solve ended.
     pub fn status(&self) -> &str {
         match self {

@@ -21,7 +21,7 @@ pub struct Trial {
 /// What a trial came to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
-pub enum Outcome {
+pub enum TrialOutcome {
     /// It was solved, to a minimum or not: see `termination`.
     Solved {
         /// How the solve ended: `converged`, `stalled`, `max_iterations` and so on.
@@ -38,13 +38,13 @@ pub enum Outcome {
 
 /// A trial that is done: a line of the journal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct TrialRecord {
     /// By column of the experiment.
     pub labels: Vec<String>,
     /// Of the settings; other settings are another trial.
     pub fingerprint: String,
     /// What it came to.
-    pub outcome: Outcome,
+    pub outcome: TrialOutcome,
     /// How long it took. No two runs agree in it, so it is in no table of results.
     pub seconds: f64,
 }
@@ -56,17 +56,21 @@ impl Trial {
     }
 
     /// Runs it; `None` where the observer stopped it. Whatever goes wrong is an outcome.
-    pub fn run(&self, folders: &Folders, observer: &mut dyn Observer) -> Option<Record> {
+    pub fn run(&self, folders: &Folders, observer: &mut dyn Observer) -> Option<TrialRecord> {
         let clock = Instant::now();
         let outcome = match self.solve(folders, observer) {
             Ok(outcome) => outcome?,
-            Err(error) => Outcome::Failed { reason: error.to_string() },
+            Err(error) => TrialOutcome::Failed { reason: error.to_string() },
         };
         let (labels, fingerprint) = (self.labels.clone(), self.fingerprint());
-        Some(Record { labels, fingerprint, outcome, seconds: clock.elapsed().as_secs_f64() })
+        Some(TrialRecord { labels, fingerprint, outcome, seconds: clock.elapsed().as_secs_f64() })
     }
 
-    fn solve(&self, folders: &Folders, observer: &mut dyn Observer) -> Result<Option<Outcome>, RunError> {
+    fn solve(
+        &self,
+        folders: &Folders,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<TrialOutcome>, RunError> {
         let sequence = Arc::new(self.settings.source.load(folders)?);
         let (estimate, report) = estimate("trial", sequence, &self.settings, observer)?;
         let termination = &report.solve.termination;
@@ -74,7 +78,7 @@ impl Trial {
             return Ok(None);
         }
         let measures = measures(&estimate, &report);
-        Ok(Some(Outcome::Solved { termination: status(termination), measures }))
+        Ok(Some(TrialOutcome::Solved { termination: status(termination), measures }))
     }
 }
 

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 /// One box of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
+pub struct ObjectBox {
     /// Place in the sequence's frames.
     pub frame: usize,
     /// The box, in pixels.
@@ -30,7 +30,7 @@ pub struct Measured {
     /// Detections that are associated with it.
     pub detections: usize,
     /// Its boxes that are left, one a frame at most, in order of frames.
-    pub views: Vec<View>,
+    pub views: Vec<ObjectBox>,
 }
 
 /// Which boxes a sequence has of which objects.
@@ -52,7 +52,7 @@ pub struct Measurements {
 struct Gathered {
     fusion: Fusion,
     detections: usize,
-    views: BTreeMap<usize, View>,
+    views: BTreeMap<usize, ObjectBox>,
 }
 
 impl Measurements {
@@ -78,7 +78,7 @@ impl Measurements {
                 all.cut += 1;
                 continue;
             }
-            let view = View { frame: detection.frame, bounding_box, inside };
+            let view = ObjectBox { frame: detection.frame, bounding_box, inside };
             all.duplicates += usize::from(object.views.insert(view.frame, view).is_some());
         }
         all.objects = objects.into_iter().map(|(id, object)| object.measured(id)).collect();

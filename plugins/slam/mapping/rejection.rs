@@ -84,7 +84,7 @@ pub(super) fn start(
     started.map_err(|error| Rejection::Initialisation { message: error.to_string() })
 }
 
-fn seen(view: &crate::mapping::measurements::View, poses: &[Se3], sequence: &Sequence) -> Option<View> {
+fn seen(view: &crate::mapping::measurements::ObjectBox, poses: &[Se3], sequence: &Sequence) -> Option<View> {
     let pose = *poses.get(view.frame)?;
     Some(View { observed: view.inside, ..View::new(pose, sequence.camera, view.bounding_box) })
 }

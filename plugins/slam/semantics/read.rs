@@ -1,6 +1,6 @@
 //! `semantics = "table_one"`, `semantics = "my_rules.toml"`, or `[[semantics]]` rule by rule.
 use super::{Rule, SHIPPED, shipped};
-use manifactor_config::{Diagnostics, Document, Errors, Format, Node, Problem, Value, nearest, quoted_list};
+use manifactor_config::{Diagnostics, Document, Errors, Fault, Format, Node, Value, nearest, quoted_list};
 use manifactor_graph::Values;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -42,7 +42,7 @@ pub(crate) fn read_semantics(
                 let meant = nearest(name, SHIPPED).map_or(String::new(), |n| format!("did you mean `{n}`? "));
                 let help =
                     format!("{meant}there is {}, or give the path of a .toml file", quoted_list(&known));
-                errors.report(place.clone(), Problem::with_help(format!("unknown semantics `{name}`"), help));
+                errors.report(place.clone(), Fault::with_help(format!("unknown semantics `{name}`"), help));
                 Vec::new()
             }
             Err(Unread::Wrong(diagnostics)) => {
@@ -53,7 +53,7 @@ pub(crate) fn read_semantics(
         Some(Node { value: Value::Array(items), .. }) => rules(items, own, errors),
         Some(other) => {
             let expected = "an array of rules, or the name of a file with rules";
-            errors.report(other.place.clone(), Problem::wrong_type(expected, other.in_words()));
+            errors.report(other.place.clone(), Fault::wrong_type(expected, other.in_words()));
             Vec::new()
         }
     }
@@ -76,13 +76,13 @@ impl Rule {
         self.factor.check(self.with.iter().zip(written.items("with")), &place, own, errors)?;
         if let Some(Err(error)) = self.factor.rows.map(|rows| self.noise.whitener(rows)) {
             let place = written.field("noise").unwrap_or(written).place.clone();
-            errors.report(place, Problem::invalid(error.to_string()));
+            errors.report(place, Fault::invalid(error.to_string()));
         }
         if self.factor.partners() > 0 && self.near.is_none() {
             let message =
                 format!("`{}` connects objects, and the rule does not say which", self.factor.name());
             let help = "say where the other one is: near = { classes = [\"tv monitor\"], within_m = 0.5 }";
-            errors.report(place, Problem::with_help(message, help));
+            errors.report(place, Fault::with_help(message, help));
             return None;
         }
         Some(())

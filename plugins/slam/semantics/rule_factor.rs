@@ -1,5 +1,5 @@
 //! The factor of a semantic rule.
-use manifactor_config::{Errors, Node, Place, Problem, ReadError, deserialize_with};
+use manifactor_config::{Errors, Fault, Node, Place, ReadError, deserialize_with};
 use manifactor_graph::manifold_name;
 use manifactor_graph::{Direction, Factor, Key, Values};
 use manifactor_quadric::DualQuadric;
@@ -60,7 +60,7 @@ impl RuleFactor {
             let message = format!("`{name}` connects {}", names.join(" and "));
             let help = "a semantic rule adds a factor of one dual_quadric, such as `vertical_orientation`, or of several, such \
                         as `beside`";
-            return Err(ReadError::new(node.place.clone(), Problem::with_help(message, help)));
+            return Err(ReadError::new(node.place.clone(), Fault::with_help(message, help)));
         }
         // numbers that are not finite were refused before
         let document = node.to_json().unwrap_or_default();
@@ -108,7 +108,7 @@ impl RuleFactor {
                 format!("besides objects `{}` connects {types}, found {} in `with`", self.name(), with.len());
             let help =
                 "declare such variables as `[[variables]]` and name them in their order: with = [\"table\"]";
-            errors.report(place.clone(), Problem::with_help(message, help));
+            errors.report(place.clone(), Fault::with_help(message, help));
             return None;
         }
         for ((key, Node { place, .. }), id) in with.zip(wanted) {
@@ -120,13 +120,13 @@ impl RuleFactor {
                     let message = format!(
                         "`{name}` takes a variable of type `{expected}` here, `{key}` is of type `{found}`"
                     );
-                    errors.report(place.clone(), Problem::invalid(message));
+                    errors.report(place.clone(), Fault::invalid(message));
                     return None;
                 }
                 None => {
                     let known = own.iter().map(|(key, _)| key.to_string()).collect();
                     let (what, name) = ("variable".to_owned(), key.to_string());
-                    errors.report(place.clone(), Problem::UnknownName { what, name, known });
+                    errors.report(place.clone(), Fault::UnknownName { what, name, known });
                     return None;
                 }
             }

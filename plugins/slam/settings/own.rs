@@ -1,4 +1,4 @@
-use manifactor_config::{Problem, Section, read_graph_section};
+use manifactor_config::{Fault, Section, read_graph_section};
 use manifactor_graph::{FactorEntry, Fixed, Graph, Values, Variable};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -24,7 +24,7 @@ impl OwnGraph {
         for (key, _) in values.iter().filter(|(key, _)| is_of_the_map(key.as_str())) {
             let message = format!("`{key}` is the key of a pose or an object");
             let help = "x0, x1, … are the poses and q0, q1, … the objects of a run: choose another name";
-            section.report("variables", Problem::with_help(message, help));
+            section.report("variables", Fault::with_help(message, help));
         }
         Self { graph, values }
     }

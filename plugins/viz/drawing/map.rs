@@ -6,7 +6,7 @@ use super::outline::Shape;
 use super::picture::Picture;
 use super::scale::Scale;
 use super::scene::{Object, Palette, Scene};
-use super::view::View;
+use super::viewpoint::Viewpoint;
 use crate::canvas::{Ink, Sheet, Stroke};
 use nalgebra::{Point2, Vector2};
 
@@ -23,7 +23,7 @@ type Outline<'a> = (&'a str, Vec<Point2<f64>>);
 /// What is true is dashed, what is estimated solid and filled; objects have the colour of their class. The picture shows
 /// all trajectories and true objects whole; an estimate far away from them is left outside, and the title says how many
 /// are. Coordinates that are not finite are left out.
-pub(crate) fn map(scene: &Scene, view: View, palette: &Palette, width: f64) -> Picture {
+pub(crate) fn map(scene: &Scene, view: Viewpoint, palette: &Palette, width: f64) -> Picture {
     let plane = view.plane(&scene.up);
     let tracks: Vec<Vec<Point2<f64>>> = scene
         .tracks
@@ -75,7 +75,7 @@ pub(crate) fn map(scene: &Scene, view: View, palette: &Palette, width: f64) -> P
         sheet.line(drawn(points), track.stroke);
     }
     // seen from the side, what stands on one table stands on one line
-    if view == View::Top {
+    if view == Viewpoint::Top {
         let label = |(class, outline): &&Outline<'_>| Label {
             text: (*class).to_owned(),
             around: around(&drawn(outline)),
@@ -84,8 +84,8 @@ pub(crate) fn map(scene: &Scene, view: View, palette: &Palette, width: f64) -> P
         place(&mut sheet, &near.iter().map(label).collect::<Vec<_>>(), area);
     }
     let (name, seen) = match view {
-        View::Top => ("map_top", "seen from above"),
-        View::Side => ("map_side", "seen from the side"),
+        Viewpoint::Top => ("map_top", "seen from above"),
+        Viewpoint::Side => ("map_side", "seen from the side"),
     };
     Picture::new(name, format!("{text}: trajectories and objects {seen}"), sheet)
 }

@@ -1,5 +1,5 @@
 //! Outlines of ellipsoids, seen from far away.
-use crate::drawing::view::Plane;
+use crate::drawing::viewpoint::Plane;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Vector3};
 
 /// An ellipsoid: what objects are drawn as.
@@ -42,11 +42,11 @@ pub(crate) fn ellipse(centre: &Point2<f64>, shape: &Matrix2<f64>) -> Option<Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drawing::view::View;
+    use crate::drawing::viewpoint::Viewpoint;
     use manifactor_graph::Direction;
 
     fn top() -> Plane {
-        View::Top.plane(&Direction::Z)
+        Viewpoint::Top.plane(&Direction::Z)
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The page of a run: the map in 3D, its variants side by side, and what was done with each object.
 use super::run_tables::{noise, objects, overview, own_variables, words};
 use super::{page::Page, viewer};
-use crate::drawing::{Palette, Picture, Scene, View, frames_seen, image, map};
+use crate::drawing::{Palette, Picture, Scene, Viewpoint, frames_seen, image, map};
 use crate::run::{RESIDUALS, charts, cost, residual_row};
 use manifactor_slam::record::{RunRecord, VariantRecord};
 use manifactor_slam::report::{RunReport, VariantReport};
@@ -53,7 +53,7 @@ fn in_3d(page: &mut Page, record: &RunRecord) {
     let Some(last) = record.variants.last() else { return };
     page.heading("Map");
     let scene = Scene::of(format!("{}: {}", record.title, last.name), last);
-    let picture = map(&scene, View::Top, &Palette::of(record), 1.6 * WIDTH);
+    let picture = map(&scene, Viewpoint::Top, &Palette::of(record), 1.6 * WIDTH);
     page.own("<div id=\"static-map\">", "");
     page.picture(
         &picture,
@@ -75,8 +75,10 @@ fn side_by_side(page: &mut Page, record: &RunRecord) {
         .iter()
         .map(|variant| {
             let scene = Scene::of(variant.name.clone(), variant);
-            let mut pictures =
-                vec![map(&scene, View::Top, &palette, WIDTH), map(&scene, View::Side, &palette, WIDTH)];
+            let mut pictures = vec![
+                map(&scene, Viewpoint::Top, &palette, WIDTH),
+                map(&scene, Viewpoint::Side, &palette, WIDTH),
+            ];
             pictures.extend(charts(variant, WIDTH));
             (variant, pictures)
         })

@@ -2,7 +2,7 @@ use super::map;
 use crate::canvas::Theme;
 use crate::drawing::outline::Shape;
 use crate::drawing::scene::TRACKS;
-use crate::drawing::{Object, Palette, Scene, Track, View};
+use crate::drawing::{Object, Palette, Scene, Track, Viewpoint};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 fn ellipsoid(centroid: [f64; 3], semi_axes: [f64; 3], yaw: f64) -> Shape {
@@ -44,14 +44,14 @@ fn desk() -> Scene {
     }
 }
 
-fn svg(scene: &Scene, view: View) -> String {
+fn svg(scene: &Scene, view: Viewpoint) -> String {
     let palette = Palette::new(scene.objects.iter().map(|object| object.class.as_str()));
     map(scene, view, &palette, 900.0).svg(Theme::Light)
 }
 
 #[test]
 fn every_class_and_trajectory_is_in_the_legend() {
-    for view in [View::Top, View::Side] {
+    for view in [Viewpoint::Top, Viewpoint::Side] {
         let svg = svg(&desk(), view);
         assert!(svg.starts_with("<svg") || svg.starts_with("<?xml"), "{}", &svg[..40]);
         for text in ["true", "odometry", "estimated", "cup", "keyboard", "bottle", "tv &amp; book", "(m)"] {
@@ -66,7 +66,7 @@ fn a_legend_of_many_classes_ends() {
     let object = scene.objects[0].clone();
     scene.objects = (0..5000).map(|i| Object { class: format!("class {i:04}"), ..object.clone() }).collect();
     scene.objects.iter_mut().skip(1).for_each(|object| (object.truth, object.estimate) = (None, None));
-    let svg = svg(&scene, View::Side);
+    let svg = svg(&scene, Viewpoint::Side);
     assert!(svg.contains("class 0059") && !svg.contains("class 0060") && svg.contains("and 4940 more"));
 }
 
@@ -74,7 +74,7 @@ fn a_legend_of_many_classes_ends() {
 fn an_estimate_far_away_does_not_shrink_the_rest() {
     let mut scene = desk();
     scene.objects[0].estimate = Some(ellipsoid([1e5, 0.0, 0.0], [1.0, 1.0, 1.0], 0.0));
-    let svg = svg(&scene, View::Top);
+    let svg = svg(&scene, Viewpoint::Top);
     assert!(svg.contains("1 of 4 objects outside the picture"));
     // the ticks are those of a frame of three metres
     assert!(svg.contains(">0.5<") && !svg.contains(">100000<"));
@@ -85,7 +85,7 @@ fn what_is_not_finite_is_left_out() {
     let mut scene = desk();
     scene.tracks[2].positions[3] = Vector3::new(f64::NAN, 0.0, f64::INFINITY);
     scene.objects[1].estimate = Some(ellipsoid([f64::NAN; 3], [1.0; 3], 0.0));
-    assert!(!svg(&scene, View::Top).contains("NaN"));
+    assert!(!svg(&scene, Viewpoint::Top).contains("NaN"));
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn an_empty_scene_is_an_empty_picture() {
     for tracks in
         [vec![], vec![Track { name: "one".into(), stroke: TRACKS[0].1, positions: vec![Vector3::zeros()] }]]
     {
-        let svg = svg(&Scene { tracks, ..Scene::default() }, View::Top);
+        let svg = svg(&Scene { tracks, ..Scene::default() }, Viewpoint::Top);
         assert!(svg.contains("</svg>"));
     }
 }

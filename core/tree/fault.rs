@@ -1,10 +1,10 @@
 //! What can be wrong with a document, and what to do about it.
 use crate::suggest::{advice, list};
 
-/// What is wrong at a place. Its text says what and what was expected; [`help`](Problem::help) says what to do.
+/// What is wrong at a place. Its text says what and what was expected; [`help`](Fault::help) says what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Problem {
+pub enum Fault {
     /// The text is not of its format.
     #[error("not valid {format}: {message}")]
     Syntax {
@@ -95,34 +95,32 @@ pub enum Problem {
     },
 }
 
-impl Problem {
+impl Fault {
     /// A problem in the caller's own words.
     pub fn invalid(message: impl Into<String>) -> Self {
-        Problem::Invalid { message: message.into(), help: None }
+        Fault::Invalid { message: message.into(), help: None }
     }
 
     /// A problem in the caller's own words, and what to do about it.
     pub fn with_help(message: impl Into<String>, help: impl Into<String>) -> Self {
-        Problem::Invalid { message: message.into(), help: Some(help.into()) }
+        Fault::Invalid { message: message.into(), help: Some(help.into()) }
     }
 
     /// A value of another type than the one expected.
     pub fn wrong_type(expected: impl Into<String>, found: impl Into<String>) -> Self {
-        Problem::WrongType { expected: expected.into(), found: found.into() }
+        Fault::WrongType { expected: expected.into(), found: found.into() }
     }
 
     /// What to do about it, where that can be said.
     pub fn help(&self) -> Option<String> {
         match self {
-            Problem::UnknownFormat => Some("use .toml, .json, .yaml or .yml".into()),
-            Problem::UnknownField { known, .. } if known.is_empty() => {
-                Some("there are no fields here".into())
-            }
-            Problem::UnknownField { field: name, known } | Problem::UnknownName { name, known, .. } => {
+            Fault::UnknownFormat => Some("use .toml, .json, .yaml or .yml".into()),
+            Fault::UnknownField { known, .. } if known.is_empty() => Some("there are no fields here".into()),
+            Fault::UnknownField { field: name, known } | Fault::UnknownName { name, known, .. } => {
                 advice(name, known)
             }
-            Problem::Duplicate { .. } => Some("remove or rename one of them".into()),
-            Problem::Invalid { help, .. } => help.clone(),
+            Fault::Duplicate { .. } => Some("remove or rename one of them".into()),
+            Fault::Invalid { help, .. } => help.clone(),
             _ => None,
         }
     }

@@ -4,7 +4,7 @@ use nalgebra::{Point2, Vector3};
 
 /// Where a picture is taken from: always from far away, without perspective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum View {
+pub(crate) enum Viewpoint {
     /// From above.
     Top,
     /// From the side, up being up.
@@ -20,7 +20,7 @@ pub(crate) struct Plane {
     pub(crate) labels: [&'static str; 2],
 }
 
-impl View {
+impl Viewpoint {
     /// The plane of the picture where `up` is up. With z up, a top view shows x to the right and y upward.
     pub(crate) fn plane(self, up: &Direction) -> Plane {
         let up: Vector3<f64> = **up;
@@ -32,8 +32,8 @@ impl View {
         let right = (right - up * right.dot(&up)).normalize();
         let ahead = up.cross(&right);
         match self {
-            View::Top => Plane { right, upward: ahead, labels: [name(&right), name(&ahead)] },
-            View::Side => Plane { right, upward: up, labels: [name(&right), "up"] },
+            Viewpoint::Top => Plane { right, upward: ahead, labels: [name(&right), name(&ahead)] },
+            Viewpoint::Side => Plane { right, upward: up, labels: [name(&right), "up"] },
         }
     }
 }
@@ -58,17 +58,17 @@ mod tests {
 
     #[test]
     fn with_z_up_x_points_right_and_y_upward() {
-        let plane = View::Top.plane(&Direction::Z);
+        let plane = Viewpoint::Top.plane(&Direction::Z);
         assert_eq!(plane.project(&Vector3::new(1.0, 2.0, 3.0)), Point2::new(1.0, 2.0));
         assert_eq!(plane.labels, ["x", "y"]);
-        let side = View::Side.plane(&Direction::Z);
+        let side = Viewpoint::Side.plane(&Direction::Z);
         assert_eq!(side.project(&Vector3::new(1.0, 2.0, 3.0)), Point2::new(1.0, 3.0));
     }
 
     #[test]
     fn in_a_camera_frame_depth_is_upward() {
         let up = Direction::new(Vector3::new(0.0, -1.0, 0.0)).unwrap();
-        let plane = View::Top.plane(&up);
+        let plane = Viewpoint::Top.plane(&up);
         assert_eq!(plane.project(&Vector3::new(1.0, 2.0, 3.0)), Point2::new(1.0, 3.0));
         assert_eq!(plane.labels, ["x", "z"]);
     }
@@ -77,7 +77,7 @@ mod tests {
     fn any_up_gives_a_right_angle() {
         for up in [[1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1e-12], [-1.0, 0.3, 0.0]] {
             let up = Direction::new(up.into()).unwrap();
-            for view in [View::Top, View::Side] {
+            for view in [Viewpoint::Top, Viewpoint::Side] {
                 let plane = view.plane(&up);
                 assert!(plane.right.dot(&plane.upward).abs() < 1e-12);
                 assert!(
