@@ -16,6 +16,7 @@ mod names;
 mod new;
 mod overwriting;
 mod repeated;
+mod replay;
 mod reports;
 mod run;
 mod schema;
