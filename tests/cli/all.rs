@@ -17,6 +17,7 @@ mod names;
 mod new;
 mod overwriting;
 mod repeated;
+mod replay;
 mod reports;
 mod run;
 mod schema;

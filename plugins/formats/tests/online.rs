@@ -35,7 +35,7 @@ fn replay(graph: &Graph, most: usize) -> (Session, Report) {
 fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
     // share of the optimum that the running estimate may be above it
     for (name, most, above) in
-        [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 900, 2e-3)]
+        [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 600, 2e-3)]
     {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
         let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
@@ -106,10 +106,10 @@ fn victoria_park(path: PathBuf) -> Graph {
 fn victoria_park_is_mapped_by_the_ids_of_its_trees() {
     let Some(path) = data("online/landmarks_2d/victoria_park.txt") else { return };
     let graph = victoria_park(path);
-    let (mut session, report) = replay(&graph, usize::MAX);
+    let (mut session, report) = replay(&graph, 3000);
     assert!(report.parked.is_empty() && report.undetermined.is_empty());
     let trees = session.estimates().iter().filter(|(key, _)| key.as_str().starts_with('l')).count();
-    assert_eq!((trees, session.variables()), (151, 151 + 6969));
+    assert_eq!(session.variables(), trees + 3000);
     let best = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap().outcome.final_cost;
     let cost = session.cost();
     assert!(cost <= 1.01 * best, "{cost}, the optimum is {best}");
@@ -167,6 +167,5 @@ fn antennas_wait_for_a_second_range() {
     let (cost, estimates) = (session.cost(), session.estimates());
     assert!(cost.is_finite() && estimates.iter().all(|(_, value)| value.erased().is_finite()));
     let best = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap().outcome.final_cost;
-    println!("{cost} {best}");
     assert!(cost < 1.1 * best, "{cost}, the optimum is {best}");
 }

@@ -1,0 +1,57 @@
+use crate::{folder, manifactor, path};
+use serde_json::Value;
+
+/// A square that is walked twice, with closures; edges out of order, and no vertices.
+fn square() -> String {
+    let mut edges: Vec<String> = (0..15)
+        .map(|i| {
+            let turn = if i % 2 == 1 { 1.5708 } else { 0.0 };
+            format!("EDGE_SE2 {i} {} 1.0{i} 0.0{i} {turn} 100 0 0 100 0 400", i + 1)
+        })
+        .collect();
+    edges.extend((8..16).map(|i| format!("EDGE_SE2 {} {i} 0 0 0.01 100 0 0 100 0 400", i - 8)));
+    edges.reverse();
+    edges.join("\n") + "\n"
+}
+
+fn lines(stdout: &str) -> Vec<Value> {
+    stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+#[test]
+fn a_pose_graph_is_replayed_pose_by_pose() {
+    let folder = folder(&[("square.g2o", &square())]);
+    let (graph, out) = (path(&folder, "square.g2o"), path(&folder, "out.g2o"));
+    let ran = manifactor(&format!("replay {graph} --json --every 4 --gap --out {out}")).ended(0);
+    let lines = lines(&ran.stdout);
+    let (summary, told) = lines.split_last().unwrap();
+    let poses: Vec<u64> = told.iter().map(|line| line["poses"].as_u64().unwrap()).collect();
+    assert_eq!(poses, [4, 8, 12, 16]);
+    assert!(told.iter().all(|line| line["gap"].as_f64().unwrap() < 0.01), "{}", ran.stdout);
+    assert_eq!(summary["variables"], 16);
+    assert_eq!(summary["termination"]["status"], "converged");
+    assert!(summary["latencies"]["max"].as_f64().unwrap() >= summary["latencies"]["p50"].as_f64().unwrap());
+    // the same minimum as a batch solve has
+    let batch = manifactor(&format!("solve {graph} --json")).ended(0).json();
+    let (found, expected) = (summary["final_cost"].as_f64().unwrap(), batch["final_cost"].as_f64().unwrap());
+    assert!((found - expected).abs() <= 1e-6 * expected, "{found} {expected}");
+    let again = manifactor(&format!("solve {out} --json")).ended(0).json();
+    assert!((again["initial_cost"].as_f64().unwrap() - expected).abs() <= 1e-3 * expected);
+}
+
+#[test]
+fn a_replay_without_json_ends_in_a_table() {
+    let folder = folder(&[("square.g2o", &square())]);
+    let ran = manifactor(&format!("replay {}", path(&folder, "square.g2o"))).ended(0);
+    assert!(ran.stdout.contains("p99") && ran.stdout.contains("as one batch"), "{}", ran.stdout);
+    ran.complains("16 poses: cost");
+}
+
+#[test]
+fn a_graph_without_poses_is_refused() {
+    let graph = "[[variables]]\nkey = \"p\"\nvalue = { type = \"point1\", position = [0.0] }\n\n[[factors]]\nkeys = [\"p\"]\nfactor = { type = \"prior_point1\", value = { position = [0.0] } }\n";
+    let folder = folder(&[("graph.toml", graph)]);
+    manifactor(&format!("replay {}", path(&folder, "graph.toml")))
+        .ended(2)
+        .complains("there are no poses to replay");
+}
