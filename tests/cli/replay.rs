@@ -5,7 +5,7 @@ use serde_json::Value;
 fn square() -> String {
     let mut edges: Vec<String> = (0..15)
         .map(|i| {
-            let turn = if i % 2 == 1 { 1.5708 } else { 0.0 };
+            let turn = if i % 2 == 1 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
             format!("EDGE_SE2 {i} {} 1.0{i} 0.0{i} {turn} 100 0 0 100 0 400", i + 1)
         })
         .collect();

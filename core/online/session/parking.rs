@@ -103,8 +103,7 @@ fn has_full_rank(h: &mut [f64], d: usize) -> bool {
     }
     for c in 0..d {
         let pivot = h[c * d + c];
-        // not a number is not larger either
-        if !(pivot > RANK) {
+        if pivot.is_nan() || pivot <= RANK {
             return false;
         }
         for k in c + 1..d {

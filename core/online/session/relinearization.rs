@@ -71,12 +71,12 @@ impl Session {
             }
             share *= 0.5;
         }
-        self.take_back_points(Relinearized { variables, factors, saved });
+        self.take_back_points(&Relinearized { variables, factors, saved });
         Relinearized::default()
     }
 
     /// Goes back to the old linearization points.
-    pub(super) fn take_back_points(&mut self, relinearized: Relinearized) {
+    pub(super) fn take_back_points(&mut self, relinearized: &Relinearized) {
         for v in &relinearized.variables {
             self.model.reset_trial(*v);
             self.wait(*v);

@@ -94,6 +94,7 @@ impl Session {
 }
 
 fn rises(before: &Evaluation, after: &Evaluation) -> bool {
+    let is_lower = after.cost <= before.cost * (1.0 + RISE);
     // not a number is not lower either
-    after.left > before.left || !(after.cost <= before.cost * (1.0 + RISE))
+    after.left > before.left || !is_lower
 }

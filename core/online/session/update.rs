@@ -153,7 +153,7 @@ impl Session {
         let built = finite.and_then(|()| self.fronts.build(&self.tree, &self.model.blocks, &redone.new));
         if let Err(overflow) = built {
             self.tree.drop_new(&affected, &redone);
-            self.take_back_points(relinearized);
+            self.take_back_points(&relinearized);
             self.model.sum_up();
             return Err(overflow);
         }

@@ -147,7 +147,7 @@ fn antennas_wait_for_a_second_range() {
             first += 1;
         }
         pose = Se2::compose(&pose, &relative);
-        values.insert(here.clone(), pose.clone());
+        values.insert(here.clone(), pose);
         graph
             .add([Key::indexed("x", i), here.clone()], Between { relative })
             .noise(Noise::sigmas(&[0.05, 0.01, 0.02]).unwrap());
