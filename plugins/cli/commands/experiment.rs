@@ -1,7 +1,7 @@
 //! `manifactor experiment`: a sweep from its document to its tables.
 use crate::failure::Failure;
+use crate::input::pictures::Look;
 use crate::interrupt;
-use crate::output::pictures::Look;
 use crate::output::text::{count, on_one_line};
 use crate::output::{self, summary_table};
 use crate::status::Status;
