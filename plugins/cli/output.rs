@@ -1,7 +1,6 @@
 //! Output: results on standard output, all else on standard error.
 //!
 //! Nothing else in this crate writes to the two: `print!` and `eprintln!` panic where they cannot write.
-pub(crate) mod pictures;
 pub(crate) mod report;
 #[allow(clippy::indexing_slicing, reason = "cells that it has made")]
 pub(crate) mod summary_table;

@@ -26,7 +26,7 @@ fn every_mistake_is_shown_with_its_line() {
 #[test]
 fn the_examples_have_no_mistakes() {
     let ran = manifactor("check examples/desk/desk.toml --load").ended(0);
-    assert!(ran.stdout.contains("nothing wrong") && ran.stdout.contains("2 variants"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("nothing wrong") && ran.stdout.contains("3 variants"), "{}", ran.stdout);
     let tum = crate::root().join("examples/tum");
     let files = std::fs::read_dir(&tum).unwrap().map(|file| file.unwrap().path());
     let configs: Vec<_> = files.filter(|path| path.extension().is_some_and(|e| e == "toml")).collect();

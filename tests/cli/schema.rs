@@ -70,3 +70,15 @@ fn tables_of_type<'a>(value: &'a Value, name: &str) -> Vec<&'a Value> {
         _ => vec![],
     }
 }
+
+#[test]
+fn completions_and_the_manual_know_every_command() {
+    for shell in ["bash", "zsh", "fish"] {
+        let script = manifactor(&format!("completions {shell}")).ended(0).stdout;
+        assert!(script.contains("check-factor") && script.contains("experiment"), "{shell}");
+    }
+    let page = manifactor("man").ended(0).stdout;
+    assert!(page.starts_with(".ie") && page.contains("check\\-factor"), "{page}");
+    assert!(manifactor("man plot").ended(0).stdout.contains("record.json"));
+    manifactor("man plto").ended(2).complains("there is no command");
+}

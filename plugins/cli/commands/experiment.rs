@@ -1,7 +1,7 @@
 //! `manifactor experiment`: a sweep from its document to its tables.
 use crate::failure::Failure;
+use crate::input::pictures::Look;
 use crate::interrupt;
-use crate::output::pictures::Look;
 use crate::output::text::{count, on_one_line};
 use crate::output::{self, summary_table};
 use crate::status::Status;
@@ -71,7 +71,7 @@ impl Experiment {
         let look = Look::default();
         let pictures = experiment_pictures(&sweep, &summary, &trials, look.width());
         look.write(&sweep.output, &pictures)?;
-        let page = experiment_page(&sweep, &summary, &trials, &pictures, document.source().text());
+        let page = experiment_page(&sweep, &summary, &trials, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);
         Ok(if complete { Status::Done } else { Status::Interrupted })

@@ -1,7 +1,7 @@
 //! `manifactor plot`: the pictures of a run, made again.
 use crate::failure::Failure;
+use crate::input::pictures::Look;
 use crate::output;
-use crate::output::pictures::Look;
 use crate::output::text::count;
 use crate::status::Status;
 use clap::Args;

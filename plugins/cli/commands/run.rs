@@ -1,8 +1,8 @@
 //! `manifactor run`: a run from its document to its files.
 use crate::failure::Failure;
+use crate::input::pictures::Look;
 use crate::input::run_file::RunArguments;
 use crate::interrupt;
-use crate::output::pictures::Look;
 use crate::output::watch::Watch;
 use crate::output::{self, table};
 use crate::status::Status;

@@ -1,5 +1,5 @@
 //! The table that an experiment prints.
-use crate::output::text::{Table, on_one_line};
+use crate::output::text::{Table, on_one_line, wrap};
 use manifactor::slam::experiment::Summary;
 
 /// Means group by group, and under each that is compared, how far it is from the baseline.
@@ -13,7 +13,7 @@ pub(crate) fn of(summary: &Summary) -> String {
         .collect();
     let labels: Vec<&str> = header.iter().take(summary.columns.len()).copied().collect();
     let kept: Vec<&str> = labels.iter().copied().chain(summary.metrics.iter().map(String::as_str)).collect();
-    let mut table = Table::of_numbers(&header).keeping(&kept);
+    let mut table = Table::of_numbers(&header).keeping(&kept).naming(labels.len());
     for group in &summary.groups {
         let mean = |metric| group.means.get(metric).map_or("-".into(), |mean| format!("{:.5}", mean.mean));
         let counts = [group.trials.to_string(), group.failed.to_string()];
@@ -27,7 +27,7 @@ pub(crate) fn of(summary: &Summary) -> String {
             table.row(row.into_iter().chain(summary.metrics.iter().map(compared)));
         }
     }
-    format!("{}\n{}\n{NOTE}", on_one_line(&summary.title), table.text())
+    format!("{}\n{}\n{}\n", on_one_line(&summary.title), table.text(), wrap(NOTE))
 }
 
-const NOTE: &str = "Means over trials; differences of pairs of trials, with the bootstrap's 95 % interval.\n";
+const NOTE: &str = "Means over trials; differences of pairs of trials, with the bootstrap's 95 % interval.";

@@ -2,7 +2,7 @@
 use crate::canvas::Ink;
 use crate::drawing::{Chart, Curve, Distribution, Picture, figure};
 use crate::pages::page::Page;
-use crate::pages::run_page::version;
+use crate::pages::run_page::{WIDTH, version};
 use manifactor_formats::table::{Column, Table};
 use manifactor_slam::experiment::{Experiment, Summary};
 
@@ -32,13 +32,7 @@ pub fn experiment_pictures(
 }
 
 /// The page of an experiment. `trials` is the table of trials, `config` what was read.
-pub fn experiment_page(
-    experiment: &Experiment,
-    summary: &Summary,
-    trials: &Table,
-    pictures: &[Picture],
-    config: &str,
-) -> String {
+pub fn experiment_page(experiment: &Experiment, summary: &Summary, trials: &Table, config: &str) -> String {
     let mut page = Page::new(&experiment.title);
     let done = experiment.trials.len() - summary.open;
     page.paragraph(&format!("{done} of {} trials. {}", experiment.trials.len(), version()));
@@ -58,6 +52,7 @@ pub fn experiment_page(
             "Over trials: boxes reach from quartile to quartile, whiskers to the last value within one and a half times that."
         }
     };
+    let pictures = experiment_pictures(experiment, summary, trials, WIDTH);
     page.pictures(pictures.iter().map(|picture| (picture, caption.to_owned())));
     page.heading("Trials");
     let header: Vec<String> = trials.columns.iter().map(|(name, _)| name.clone()).collect();

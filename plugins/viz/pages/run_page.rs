@@ -7,7 +7,7 @@ use manifactor_slam::record::{RunRecord, VariantRecord};
 use manifactor_slam::report::{RunReport, VariantReport};
 
 /// Pixels of pictures, narrow enough to be read on a phone.
-const WIDTH: f64 = 560.0;
+pub(super) const WIDTH: f64 = 560.0;
 
 /// What the words of the overview mean.
 const DEFINITIONS: [(&str, &str); 5] = [

@@ -19,9 +19,10 @@ pub(crate) struct Table {
 }
 
 enum Kind {
-    /// Columns but the first, in the order in which they are kept.
+    /// Columns but the first, in the order in which they are kept; how many have names, and stand to the left.
     Numbers {
         kept_first: Vec<usize>,
+        names: usize,
     },
     Words,
 }
@@ -30,7 +31,7 @@ impl Table {
     /// Numbers to the right: all columns but the first, which has names. The first are kept where there is no room for all.
     pub(crate) fn of_numbers(header: &[&str]) -> Self {
         let kept_first = (1..header.len()).collect();
-        Self { kind: Kind::Numbers { kept_first }, ..Self::of_words(header) }
+        Self { kind: Kind::Numbers { kept_first, names: 1 }, ..Self::of_words(header) }
     }
 
     /// Words, all to the left; the last column has sentences.
@@ -41,11 +42,19 @@ impl Table {
 
     /// The same, with columns that are kept before all others, in this order.
     pub(crate) fn keeping(mut self, names: &[&str]) -> Self {
-        if let Kind::Numbers { kept_first } = &mut self.kind {
+        if let Kind::Numbers { kept_first, .. } = &mut self.kind {
             let rank = |column: &usize| {
                 names.iter().position(|name| self.header.get(*column).is_some_and(|h| h == name))
             };
             kept_first.sort_by_key(|column| rank(column).unwrap_or(names.len()));
+        }
+        self
+    }
+
+    /// The same, where the first so many columns have names.
+    pub(crate) fn naming(mut self, columns: usize) -> Self {
+        if let Kind::Numbers { names, .. } = &mut self.kind {
+            *names = columns;
         }
         self
     }
@@ -64,7 +73,7 @@ impl Table {
     /// The table at a width, without blanks at the ends of its lines.
     pub(crate) fn at(&self, width: usize) -> String {
         let lines = match &self.kind {
-            Kind::Numbers { kept_first } => self.numbers(kept_first, width),
+            Kind::Numbers { kept_first, names } => self.numbers(kept_first, *names, width),
             Kind::Words => self.words(width),
         };
         let lines = lines.unwrap_or_else(|| self.turned(width));
@@ -94,7 +103,7 @@ impl Table {
     }
 
     /// `None`, where not even the first column of numbers fits beside the names.
-    fn numbers(&self, kept_first: &[usize], width: usize) -> Option<Vec<String>> {
+    fn numbers(&self, kept_first: &[usize], names: usize, width: usize) -> Option<Vec<String>> {
         let mut shown = vec![0];
         let mut taken = self.column_width(0);
         for column in kept_first {
@@ -113,7 +122,8 @@ impl Table {
             let cells = shown.iter().zip(&widths).map(|(column, width)| {
                 let text = cell(*column);
                 let blanks = " ".repeat(width.saturating_sub(text.width()));
-                if *column == 0 { text + &blanks } else { " ".repeat(GAP) + &blanks + &text }
+                let gap = " ".repeat(if *column == 0 { 0 } else { GAP });
+                if *column < names { gap + &text + &blanks } else { gap + &blanks + &text }
             });
             cells.collect::<String>()
         };
