@@ -33,15 +33,16 @@ fn number(key: &Key) -> Option<u64> {
 }
 
 impl Replay {
-    /// The steps of a graph.
+    /// The steps of a graph; none, where it has no poses.
     pub fn of(graph: &Graph) -> Self {
         let poses = |entry: &FactorEntry| entry.keys.iter().filter_map(number).collect::<Vec<_>>();
+        let first = graph.factors().iter().flat_map(poses).min();
         let mut steps: BTreeMap<u64, Vec<FactorEntry>> = BTreeMap::new();
         for entry in graph.factors() {
             for pose in poses(entry) {
                 steps.entry(pose).or_default();
             }
-            let latest = poses(entry).into_iter().max().unwrap_or(0);
+            let Some(latest) = poses(entry).into_iter().max().or(first) else { break };
             steps.entry(latest).or_default().push(entry.clone());
         }
         // the odometry first: a pose starts from the one before it
