@@ -32,7 +32,7 @@ pub trait Factor: Debug + Send + Sync {
     /// The type-erased view of its residual.
     fn erased(&self) -> &dyn ErasedResidual;
 
-    /// The same with this up, where it takes the world's [`Up`] and its document leaves that open; `None` elsewhere.
+    /// The same with this up, where it takes the world's [`Up`](crate::Up) and its document leaves that open; `None` elsewhere.
     fn with_up(&self, _up: Direction) -> Option<Box<dyn Factor>> {
         None
     }

@@ -36,10 +36,13 @@ pub struct GraphFormat {
     pub begins: fn(&str) -> bool,
     /// Reads a text; the path is what errors name.
     pub parse: fn(&str, &Path, Reading) -> Result<GraphRead, FormatError>,
-    /// The text of a graph, and in words what the format cannot express. `None`: it is only read.
-    pub format: Option<fn(&Graph, &Values) -> (String, Vec<String>)>,
+    /// Writes a graph. `None`: the format is only read.
+    pub format: Option<GraphWriter>,
 }
 inventory::collect!(GraphFormat);
+
+/// The text of a graph with these values, and in words what the format cannot express.
+pub type GraphWriter = fn(&Graph, &Values) -> (String, Vec<String>);
 
 /// What to do where a file leaves a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -18,12 +18,11 @@ mod text;
 pub mod timestamps;
 pub mod tum;
 pub mod whole;
-pub mod words;
 
 pub use error::{BadLine, FormatError, Malformed, Mistake};
-pub use graph_format::{GraphFormat, GraphRead, Reading, Repair};
+pub use graph_format::{GraphFormat, GraphRead, GraphWriter, Reading, Repair};
 pub use pose_graph::g2o;
-pub use text::read_text;
+pub use text::{read_text, words};
 
 #[doc(hidden)]
 pub mod __private {

@@ -1,4 +1,6 @@
 //! Texts from files: read once, and not without end.
+pub mod words;
+
 use crate::error::{FormatError, Mistake, Problems, io_error};
 use crate::whole::write_whole;
 use std::fs::File;

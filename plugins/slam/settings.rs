@@ -93,9 +93,9 @@ impl Settings {
     ///
     /// # Errors
     /// Everything that is wrong with them, at its place.
-    pub fn read(node: Node, folder: &Path) -> Result<Self, Diagnostics> {
+    pub fn read(node: &Node, folder: &Path) -> Result<Self, Diagnostics> {
         let errors = Errors::new();
-        let settings = Section::new(&node, &errors).and_then(|mut section| {
+        let settings = Section::new(node, &errors).and_then(|mut section| {
             let own = OwnGraph::take(&mut section);
             let semantics = read_semantics(section.take("semantics"), folder, &own.values, &errors);
             Some(Self { semantics, own, ..section.rest()? })

@@ -45,7 +45,7 @@ pub(crate) fn cost(variants: &[VariantRecord], width: f64) -> Option<Picture> {
     let curves: Vec<Curve> = variants.iter().enumerate().map(curve).collect();
     let costs = || curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
     let log_y = costs().fold(0.0, f64::max) > 10.0 * costs().fold(f64::INFINITY, f64::min);
-    let panel = Chart { y: "cost, ½ Σ ρ".into(), log_y, from_zero: false, curves };
+    let panel = Chart { y: "cost, ½ Σ ρ".into(), log_y, begun_at_zero: false, curves };
     let text = "cost by accepted step";
     let sheet = figure(text, "accepted steps", false, &[panel], width, 0.5 * width)?;
     Some(Picture::new("cost", text, sheet))

@@ -65,9 +65,10 @@ impl Browser {
     }
 
     /// Asks for something, and waits for the answer.
-    pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
+    pub(crate) fn call(&mut self, method: &str, parameters: impl Into<Value>) -> Value {
         self.sent += 1;
-        let mut message = json!({ "id": self.sent, "method": method, "params": parameters });
+        let mut message = json!({ "id": self.sent, "method": method });
+        message["params"] = parameters.into();
         if !self.session.is_empty() {
             message["sessionId"] = Value::from(self.session.as_str());
         }

@@ -101,7 +101,7 @@ fn said<T>(format: Format, text: &str, with: impl FnOnce(&mut Section<'_>) -> Op
 fn shapes(section: &mut Section<'_>) -> Option<f64> {
     let errors = section.errors();
     let shapes: Vec<_> =
-        section.nodes("shapes").into_iter().filter_map(|node| node.read::<Box<dyn Shape>>(errors)).collect();
+        section.nodes("shapes").iter().filter_map(|node| node.read::<Box<dyn Shape>>(errors)).collect();
     Some(shapes.iter().map(|s| s.area()).sum())
 }
 

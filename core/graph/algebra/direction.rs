@@ -160,7 +160,10 @@ mod tests {
         let x = Direction::new(Vector3::x()).unwrap();
         let mut open = Up::default();
         assert_eq!(*open, Direction::Z);
-        assert!(open.fill(x) && *open == x && !open.fill(Direction::Z) && *open == x);
+        assert!(open.fill(x));
+        assert_eq!(*open, x);
+        assert!(!open.fill(Direction::Z));
+        assert_eq!(*open, x);
         let mut given: Up = serde_json::from_str("[0.0, 0.0, 2.0]").unwrap();
         assert!(!given.fill(x) && *given == Direction::Z);
     }

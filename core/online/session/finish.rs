@@ -43,8 +43,7 @@ impl Session {
         (graph, ids)
     }
 
-    /// Solves all that is there as one batch, from the estimate. The session stays as it is; see
-    /// [`adopt`](Self::adopt).
+    /// Solves all that is there as one batch, from the estimate. The session stays as it is.
     ///
     /// # Errors
     /// Where there is nothing to solve for, a setting of the solver is outside its domain, or there is no memory.

@@ -5,7 +5,7 @@ use crate::output::text::count;
 use clap::{Args, ValueEnum};
 use manifactor::config::{Document, Errors, Format, read_graph_section, write_graph};
 use manifactor::formats::whole::{can_write, write_whole};
-use manifactor::formats::{self, GraphFormat, GraphRead, Repair, read_text};
+use manifactor::formats::{self, GraphFormat, GraphRead, GraphWriter, Repair, read_text};
 use manifactor::graph::{Graph, Values};
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
 use std::collections::BTreeMap;
@@ -149,10 +149,8 @@ fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
     ))
 }
 
-type Writer = fn(&Graph, &Values) -> (String, Vec<String>);
-
 /// What writes a graph that is no document, by the extension.
-fn writer(path: &Path) -> Option<Writer> {
+fn writer(path: &Path) -> Option<GraphWriter> {
     GraphFormat::of_path(path)?.format
 }
 

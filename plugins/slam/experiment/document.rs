@@ -179,5 +179,5 @@ fn trial<'a>(
             merge(&mut node, set.clone());
         }
     }
-    Ok(Trial { labels, settings: Settings::read(node, folder)? })
+    Ok(Trial { labels, settings: Settings::read(&node, folder)? })
 }

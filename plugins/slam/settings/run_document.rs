@@ -148,7 +148,7 @@ fn read_variants(
     folder: &Path,
     errors: &Errors,
 ) -> Option<Vec<Variant>> {
-    let read = |name: String, about: Option<String>, node: Node| match Settings::read(node, folder) {
+    let read = |name: String, about: Option<String>, node: &Node| match Settings::read(node, folder) {
         Ok(settings) => Some(Variant { name, about, settings }),
         Err(diagnostics) => {
             errors.extend(diagnostics);
@@ -156,7 +156,7 @@ fn read_variants(
         }
     };
     if declared.is_empty() {
-        return Some(vec![read(ONLY.to_owned(), None, base.clone())?]);
+        return Some(vec![read(ONLY.to_owned(), None, base)?]);
     }
     // all of them are read, so that all errors are told at once
     let variants = declared.into_iter().map(|variant| {
@@ -164,7 +164,7 @@ fn read_variants(
         if let Some(set) = variant.set {
             merge(&mut node, set);
         }
-        read(variant.name.value, variant.about, node)
+        read(variant.name.value, variant.about, &node)
     });
     let variants: Vec<Option<Variant>> = variants.collect();
     variants.into_iter().collect()

@@ -12,7 +12,7 @@ pub(crate) struct Chart {
     /// Whether y goes by powers of ten.
     pub(crate) log_y: bool,
     /// Whether y begins at zero.
-    pub(crate) from_zero: bool,
+    pub(crate) begun_at_zero: bool,
     pub(crate) curves: Vec<Curve>,
 }
 
@@ -109,7 +109,7 @@ pub(crate) fn figure(
 fn upward(panel: &Chart) -> Option<Scale> {
     let numbers = panel.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
     let scale = Scale::over(numbers, panel.log_y)?;
-    Some(if panel.from_zero { scale.from_zero() } else { scale }.with_margin(0.05))
+    Some(if panel.begun_at_zero { scale.begun_at_zero() } else { scale }.with_margin(0.05))
 }
 
 /// A line of no more points than can be told apart: of those that share a pixel to the right, the first, the lowest,

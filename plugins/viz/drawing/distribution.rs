@@ -112,7 +112,7 @@ impl FiveNumbers {
         let (seen, unseen): (Vec<f64>, Vec<f64>) = self.beyond.iter().partition(|x| axes.x.holds(**x));
         // the ends are what matters; between them one dot in so many
         let each = seen.len().div_ceil(DOTS).max(1);
-        let ends = |i: usize| i % each == 0 || i + 1 == seen.len();
+        let ends = |i: usize| i.is_multiple_of(each) || i + 1 == seen.len();
         seen.iter()
             .enumerate()
             .filter(|(i, _)| ends(*i))

@@ -35,7 +35,7 @@ impl Scale {
     }
 
     /// From zero, where all numbers are above it.
-    pub(crate) fn from_zero(self) -> Self {
+    pub(crate) fn begun_at_zero(self) -> Self {
         if self.log || self.low < 0.0 { self } else { Self { low: 0.0, ..self } }
     }
 
@@ -125,7 +125,7 @@ mod tests {
     fn an_axis_begins_where_the_data_do() {
         let scale = Scale::over([2.5, 7.5].into_iter(), false).unwrap();
         assert_eq!((scale.place(2.5), scale.place(7.5), scale.place(5.0)), (0.0, 1.0, 0.5));
-        assert_eq!(scale.from_zero().place(0.0), 0.0);
+        assert_eq!(scale.begun_at_zero().place(0.0), 0.0);
         assert!(Scale::over([f64::INFINITY].into_iter(), false).is_none());
         assert!(Scale::over([-1.0].into_iter(), true).is_none());
     }

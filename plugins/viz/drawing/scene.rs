@@ -74,10 +74,13 @@ pub(crate) const TRACKS: [(&str, Stroke); 3] = [
     ("estimated", Stroke { ink: Ink::Estimate, width: 2.0, dashed: false }),
 ];
 
+/// Where a trajectory is in a frame.
+type PositionOf = fn(&FrameRecord) -> Option<Vector3<f64>>;
+
 impl Scene {
     /// Of a variant.
     pub(crate) fn of(title: impl Into<String>, variant: &VariantRecord) -> Self {
-        let positions: [fn(&FrameRecord) -> Option<Vector3<f64>>; 3] = [
+        let positions: [PositionOf; 3] = [
             |f| f.truth.map(|pose| pose.translation),
             |f| Some(f.odometry.pose.translation),
             |f| Some(f.estimate.pose.translation),

@@ -33,7 +33,7 @@ fn aligned(variant: &VariantRecord) -> String {
 /// The absolute error of positions.
 pub(super) fn absolute(variant: &VariantRecord, width: f64) -> Option<Picture> {
     let curves = curves(variant, |pose| pose.error);
-    let panel = Chart { y: "APE (m)".into(), from_zero: true, curves, ..Chart::default() };
+    let panel = Chart { y: "APE (m)".into(), begun_at_zero: true, curves, ..Chart::default() };
     let text = format!("absolute pose error, {}", aligned(variant));
     let sheet = figure(&text, TIME, false, &[panel], width, 0.5 * width)?;
     Some(Picture::new("error_over_time", text, sheet))
@@ -43,7 +43,7 @@ pub(super) fn absolute(variant: &VariantRecord, width: f64) -> Option<Picture> {
 pub(super) fn relative(variant: &VariantRecord, width: f64) -> Option<Picture> {
     let panel = |y: &str, part: usize, unit: f64| {
         let curves = curves(variant, |pose| pose.relative?.get(part).map(|x| x * unit));
-        Chart { y: y.into(), from_zero: true, curves, ..Chart::default() }
+        Chart { y: y.into(), begun_at_zero: true, curves, ..Chart::default() }
     };
     let panels = [panel("RPE (m)", 0, 1.0), panel("RPE (°)", 1, 1f64.to_degrees())];
     let frames = variant.relative_over;

@@ -59,9 +59,11 @@ pub(super) fn residuals(estimate: &Estimate) -> Vec<FactorResiduals> {
 
 /// The states of an estimate's factors, to be found by variable.
 pub(super) struct FactorStates<'a> {
-    /// By the key of each variable: type, all keys, state.
-    by_key: HashMap<&'a Key, Vec<(&'static str, &'a [Key], &'a FactorState)>>,
+    by_key: HashMap<&'a Key, Vec<OfVariable<'a>>>,
 }
+
+/// A factor of a variable: type, all keys, state.
+type OfVariable<'a> = (&'static str, &'a [Key], &'a FactorState);
 
 impl<'a> FactorStates<'a> {
     pub(super) fn of(estimate: &'a Estimate) -> Self {
