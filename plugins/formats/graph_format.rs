@@ -16,8 +16,11 @@
 //!     parse,
 //!     format: Some(|_graph, _values| ("nothing\n".to_owned(), vec![])),
 //! });
-//! assert_eq!(GraphFormat::of(Path::new("a.nothing"), "").map(|format| format.name), Some("nothing"));
-//! # fn main() {}
+//!
+//! fn main() {
+//!     let format = GraphFormat::of(Path::new("a.nothing"), "").map(|format| format.name);
+//!     assert_eq!(format, Some("nothing"));
+//! }
 //! ```
 use crate::error::FormatError;
 use manifactor_graph::{Graph, Values};
