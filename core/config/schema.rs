@@ -126,14 +126,15 @@ impl Definitions {
             .filter(|(name, value)| taken(name, value))
             .map(|(name, _)| (format!("#/$defs/{name}"), format!("#/$defs/{owner}.{name}")))
             .collect();
+        let mut moved = Vec::new();
         for (name, mut value) in definitions {
             rename(&mut value, &renamed);
             let old = format!("#/$defs/{name}");
             let name = if renamed.iter().any(|(o, _)| *o == old) { format!("{owner}.{name}") } else { name };
+            moved.push(value.clone());
             self.0.insert(name, value);
         }
         rename(&mut schema, &renamed);
-        let moved: Vec<Value> = self.0.values().cloned().collect();
         moved.iter().chain([&schema]).for_each(|schema| self.kinds_of(schema));
         schema
     }

@@ -7,9 +7,12 @@ use crate::variable::Key;
 use crate::variable::Values;
 use crate::variable::manifold_name;
 use indexmap::IndexMap;
-use serde::{Deserialize, Serialize};
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use smallvec::SmallVec;
 use std::any::TypeId;
+use std::fmt;
 use std::sync::Arc;
 
 pub use version::Version;
@@ -27,13 +30,32 @@ pub struct Graph {
 }
 
 /// How much of a variable is held at its initial value.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(untagged, expecting = "expected true, false, or an array of directions of the tangent space")]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
+#[serde(untagged)]
 pub enum Fixed {
     /// All of it (`true`), or nothing.
     Whole(bool),
     /// These directions of its tangent space, by name.
     Directions(Vec<String>),
+}
+
+impl<'de> Deserialize<'de> for Fixed {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Fixed;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("true, false, or an array of directions of the tangent space")
+            }
+            fn visit_bool<E: serde::de::Error>(self, whole: bool) -> Result<Fixed, E> {
+                Ok(Fixed::Whole(whole))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, names: A) -> Result<Fixed, A::Error> {
+                Deserialize::deserialize(SeqAccessDeserializer::new(names)).map(Fixed::Directions)
+            }
+        }
+        from.deserialize_any(Either)
+    }
 }
 
 impl Default for Fixed {
@@ -154,6 +176,18 @@ pub enum GraphError {
         /// The key.
         key: Key,
     },
+}
+
+impl GraphError {
+    /// The first of a list, a line each, and how many more there are.
+    pub fn list(errors: &[Self]) -> String {
+        const SHOWN: usize = 20;
+        let mut text: String = errors.iter().take(SHOWN).map(|e| format!("\n  {e}")).collect();
+        if errors.len() > SHOWN {
+            text += &format!("\n  and {} more", errors.len() - SHOWN);
+        }
+        text
+    }
 }
 
 impl Graph {

@@ -8,7 +8,7 @@ use manifactor_graph::{GraphError, Key};
 pub enum ChangeError {
     /// Factors and values do not fit each other or the session: everything that is wrong. Factors count from 0 in the list
     /// that was given.
-    #[error("the factors do not fit the session:{}", list(.0))]
+    #[error("the factors do not fit the session:{}", GraphError::list(.0))]
     Graph(Vec<GraphError>),
     /// A variable that is there already.
     #[error("there is a variable `{key}` already; push factors on it without a value, or choose another key")]
@@ -66,15 +66,6 @@ pub enum UpdateError {
         /// A variable that is part of it.
         key: Key,
     },
-}
-
-fn list(errors: &[GraphError]) -> String {
-    const SHOWN: usize = 20;
-    let mut text: String = errors.iter().take(SHOWN).map(|e| format!("\n  {e}")).collect();
-    if errors.len() > SHOWN {
-        text += &format!("\n  and {} more", errors.len() - SHOWN);
-    }
-    text
 }
 
 fn names(keys: &[Key]) -> String {

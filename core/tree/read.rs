@@ -42,6 +42,7 @@ impl Node {
             if !is_told {
                 errors.report(place, fault);
             }
+            let goes_on = goes_on && errors.len() < before + MOST;
             failure = match goes_on.then(|| rest.node.try_read::<T>()) {
                 Some(Err(next)) => next,
                 Some(Ok(value)) => return Some(value),
@@ -76,6 +77,9 @@ impl Node {
         Diagnostic::new(self.place.clone(), Fault::NotFinite { text })
     }
 }
+
+/// Errors of one type that are looked for: each takes another reading.
+const MOST: usize = 100;
 
 /// What is left of a node once the fields with errors are taken out of it.
 struct Rest {
@@ -175,4 +179,38 @@ fn cut_around(node: &mut Node, place: &Place, cut: &mut Vec<(Place, String)>) ->
         Cut::Elsewhere | Cut::This => {}
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::node::{Field, Table};
+    use crate::source::SourceText;
+
+    #[derive(Debug, PartialEq, serde::Deserialize)]
+    struct Sized {
+        size: f64,
+    }
+
+    /// How many errors a list is told to have in which each size is a text.
+    fn errors_of(count: usize) -> usize {
+        let source = SourceText::new("sizes", "x".repeat(2 * count));
+        let item = |at: usize| {
+            let (key, place) = (source.place(2 * at..2 * at + 1), source.place(2 * at + 1..2 * at + 2));
+            let mut table = Table::default();
+            table.insert("size".into(), Field { key, node: Node::new(place, Value::String("x".into())) });
+            Node::new(source.place(2 * at..2 * at + 2), Value::Table(table))
+        };
+        let node = Node::new(source.place(0..2 * count), Value::Array((0..count).map(item).collect()));
+        let errors = Errors::new();
+        assert_eq!(node.read::<Vec<Sized>>(&errors), None);
+        errors.len()
+    }
+
+    #[test]
+    fn all_errors_are_told_up_to_a_bound() {
+        assert_eq!(errors_of(MOST), MOST);
+        // each takes a reading of all: without a bound, a large file of errors would take hours
+        assert_eq!(errors_of(3 * MOST), MOST);
+    }
 }

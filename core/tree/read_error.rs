@@ -107,13 +107,7 @@ impl What {
                 let found = node.map_or_else(|| "something else".to_owned(), Node::in_words);
                 Fault::invalid(format!("{found} has none of the forms that are possible here"))
             }
-            // of a type with several forms, which cannot say itself what it found
-            Self::Message(message) => match (message.strip_prefix("expected "), node) {
-                (Some(expected), Some(node)) if !message.contains(" got ") => {
-                    Fault::WrongType { expected: expected.to_owned(), found: node.in_words() }
-                }
-                _ => Fault::invalid(message),
-            },
+            Self::Message(message) => Fault::invalid(message),
         }
     }
 }

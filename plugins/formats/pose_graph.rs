@@ -34,9 +34,8 @@ use record::Record;
 
 crate::register_graph_format!(GraphFormat {
     name: "g2o",
-    extensions: &["g2o", "toro"],
-    // what is in no other format is read as a pose graph, whose errors show what one looks like
-    begins: |text| GraphFormat::all().iter().all(|other| other.name == "g2o" || !(other.begins)(text)),
+    extensions: &["g2o", "toro", "graph"],
+    begins: |text| lines(text).next().is_some_and(|(_, line)| parser(tag_of(line).0).is_some()),
     parse: |text, path, reading| {
         let options = Options { repair: reading.repair, anchor: reading.anchor, ..Options::default() };
         let PoseGraph { graph, values, report } = parse(text, path, &options)?;
@@ -141,6 +140,16 @@ impl Report {
     }
 }
 
+/// The tag of a line, and what follows it.
+fn tag_of(line: &str) -> (&str, &str) {
+    line.split_once(char::is_whitespace).unwrap_or((line, ""))
+}
+
+/// What reads lines with this tag.
+fn parser(tag: &str) -> Option<record::Parse> {
+    g2o::parser(tag).or_else(|| toro::parser(tag))
+}
+
 /// Reads a g2o or TORO file.
 ///
 /// # Errors
@@ -161,8 +170,8 @@ pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<Po
     let mut unknown = BTreeMap::<String, usize>::new();
     let mut records: Vec<(usize, Record)> = vec![];
     for (line, text) in lines(text) {
-        let (tag, fields) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-        match g2o::parser(tag).or_else(|| toro::parser(tag)) {
+        let (tag, fields) = tag_of(text);
+        match parser(tag) {
             Some(parse) => {
                 let record = problems.ok(line, parse(fields.trim_start()));
                 records.extend(record.map(|record| (line, record)));

@@ -1,28 +1,9 @@
 //! The command line, end to end: the binary, its files and its exit codes.
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
-mod book;
-mod browser;
-mod check_factor;
-mod disk;
-mod documents;
-mod evaluate;
-mod exit_codes;
-mod experiment;
-mod graph;
-mod interrupt;
-mod killed;
-mod log;
-mod mistakes;
-mod names;
-mod new;
-mod overwriting;
-mod repeated;
-mod replay;
-mod reports;
-mod run;
-mod schema;
-mod solve;
-mod terminal;
+mod commands;
+mod endings;
+mod pages;
+mod words;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -17,7 +17,7 @@ use std::time::Instant;
 #[non_exhaustive]
 pub enum CompileError {
     /// Factors, values and what is held do not fit each other: everything that is wrong.
-    #[error("the graph does not fit its values:{}", list(.0))]
+    #[error("the graph does not fit its values:{}", GraphError::list(.0))]
     Graph(Vec<GraphError>),
     /// There is nothing to solve for.
     #[error("there is no variable to solve for: {0}")]
@@ -66,15 +66,6 @@ fn shortage(needed: Option<u64>, available: u64) -> String {
              take another ordering, or linear = {{ method = \"conjugate_gradients\" }}, or allow more by memory_gib"
         )
     })
-}
-
-fn list(errors: &[GraphError]) -> String {
-    const SHOWN: usize = 20;
-    let mut text: String = errors.iter().take(SHOWN).map(|e| format!("\n  {e}")).collect();
-    if errors.len() > SHOWN {
-        text += &format!("\n  and {} more", errors.len() - SHOWN);
-    }
-    text
 }
 
 pub(crate) fn compile(

@@ -1,5 +1,6 @@
 //! `manifactor replay`: a pose graph through an incremental smoother, as if it came in just now.
 use crate::failure::Failure;
+use crate::input::destination::Destination;
 use crate::input::graph_file::{self, GraphFile};
 use crate::input::solver::SolverArguments;
 use crate::interrupt;
@@ -33,12 +34,8 @@ pub(crate) struct Replay {
     /// Solve what is known at each pose that is told of as one batch, too, and tell how much more the estimate costs. Not timed.
     #[arg(long)]
     gap: bool,
-    /// Write the graph with the estimate at the end here; the extension tells the format.
-    #[arg(long, short, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Write over a file that is there already.
-    #[arg(long, requires = "out")]
-    force: bool,
+    #[command(flatten)]
+    destination: Destination,
     /// Print lines of JSON: poses, then a summary.
     #[arg(long)]
     pub(crate) json: bool,
@@ -54,9 +51,7 @@ struct Replayed {
 
 impl Replay {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
-        if let Some(path) = &self.out {
-            graph_file::check_place(path, &self.graph, self.force)?;
-        }
+        self.destination.check(&self.graph)?;
         let input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.iter().for_each(|note| output::note(note));
         let mut interrupt = interrupt::on_ctrl_c();
@@ -69,11 +64,9 @@ impl Replay {
             false => Some(replayed.session.finish(&*input.optimizer, observer).map_err(Failure::input)?),
         };
         let batch = clock.elapsed().as_secs_f64();
-        if let Some(path) = &self.out {
+        if self.destination.is_given() {
             let values = finished.as_ref().map_or_else(|| replayed.session.estimates(), |f| f.values.clone());
-            for note in graph_file::write(path, &replayed.session.graph().0, &values)? {
-                output::note(&note);
-            }
+            self.destination.write(&replayed.session.graph().0, &values)?;
         }
         self.tell(&replayed, cost, finished.as_ref(), batch);
         Ok(match finished {

@@ -1,5 +1,6 @@
 //! `manifactor solve`: a graph from a file.
 use crate::failure::Failure;
+use crate::input::destination::Destination;
 use crate::input::graph_file::{self, GraphFile};
 use crate::input::solver::SolverArguments;
 use crate::input::what_if::WhatIf;
@@ -33,12 +34,8 @@ pub(crate) struct Solve {
     /// deviations as a table; matrices with --json.
     #[arg(long, value_name = "KEYS", num_args = 0.., require_equals = true, value_delimiter = ',', default_missing_value = "")]
     covariances: Option<Vec<String>>,
-    /// Write the solved graph here; the extension tells the format.
-    #[arg(long, short, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Write over a file that is there already.
-    #[arg(long, requires = "out")]
-    force: bool,
+    #[command(flatten)]
+    destination: Destination,
     /// Print JSON: costs, iterations, termination, seconds by stage; with -v a record for each step.
     #[arg(long)]
     pub(crate) json: bool,
@@ -46,9 +43,7 @@ pub(crate) struct Solve {
 
 impl Solve {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
-        if let Some(path) = &self.out {
-            graph_file::check_place(path, &self.graph, self.force)?;
-        }
+        self.destination.check(&self.graph)?;
         let mut input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.extend(self.what_if.apply(&mut input.graph, &input.values)?);
         for note in &input.notes {
@@ -63,11 +58,7 @@ impl Solve {
         let solution = solve(&input.graph, &values, &*input.optimizer, &mut observer);
         let solution = solution.map_err(Failure::input)?;
         drop(watch);
-        if let Some(path) = &self.out {
-            for note in graph_file::write(path, &input.graph, &solution.values)? {
-                output::note(&note);
-            }
-        }
+        self.destination.write(&input.graph, &solution.values)?;
         let certificate = self.certify.then(|| certify(&input.graph, &solution.values));
         let certificate = certificate.transpose().map_err(Failure::input)?;
         let diagnosis = solution.diagnose(&input.graph).map_err(Failure::input)?;

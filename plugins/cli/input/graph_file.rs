@@ -3,9 +3,8 @@ use crate::failure::Failure;
 use crate::input::solver::SolverArguments;
 use crate::output::text::count;
 use clap::{Args, ValueEnum};
-use manifactor::config::{Document, Errors, Format, read_graph_section, write_graph};
-use manifactor::formats::whole::{can_write, write_whole};
-use manifactor::formats::{self, GraphFormat, GraphRead, GraphWriter, Repair, read_text};
+use manifactor::config::{Document, Errors, Format, read_graph_section};
+use manifactor::formats::{self, GraphFormat, GraphRead, Repair, read_text};
 use manifactor::graph::{Graph, Values};
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
 use std::collections::BTreeMap;
@@ -67,7 +66,7 @@ impl Reading {
         let (optimizer, start) = errors.finish(chosen)?;
         // a pipe can be read once
         let text = read_text(path)?;
-        let format = GraphFormat::of(path, &text).ok_or_else(|| no_format(path))?;
+        let format = GraphFormat::of(path, &text).ok_or_else(|| unknown_format(path))?;
         let GraphRead { graph, values, notes } = (format.parse)(&text, path, self.choices())?;
         Ok(GraphFile { graph, values, optimizer, start, notes })
     }
@@ -96,6 +95,15 @@ pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Resul
     Ok(errors.finish(read.flatten())?)
 }
 
+fn unknown_format(path: &Path) -> Failure {
+    let known: Vec<String> =
+        GraphFormat::all().iter().flat_map(|format| format.extensions).map(|e| format!(".{e}")).collect();
+    Failure::with_help(
+        format!("{}: neither its extension nor its first line tells a format of graphs", path.display()),
+        format!("use .toml, .json, .yaml, {}", known.join(", ")),
+    )
+}
+
 /// Refuses a file that is too large to be read, before it is.
 fn check_memory(path: &Path) -> Result<(), Failure> {
     /// Bytes of a graph for each byte of its text: at least.
@@ -119,63 +127,6 @@ fn check_memory(path: &Path) -> Result<(), Failure> {
         ),
         "allow more (ulimit -v), take fewer threads, or solve it in parts",
     ))
-}
-
-/// Whether the graph of `input` can be written here, and over what is there: asked before it is solved.
-pub(crate) fn check_place(path: &Path, input: &Path, force: bool) -> Result<(), Failure> {
-    if Format::of_path(path).is_none() && writer(path).is_none() {
-        return Err(no_format(path));
-    }
-    if !force {
-        refuse_to_replace(path, input)?;
-    }
-    can_write(path).map_err(Failure::at(path))
-}
-
-/// An error where a file would be lost.
-fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
-    let is_stream = path.metadata().is_ok_and(|at| !at.is_file() && !at.is_dir());
-    // a link that leads nowhere is something too
-    if is_stream || path.symlink_metadata().is_err() {
-        return Ok(());
-    }
-    let is_input =
-        path.canonicalize().is_ok_and(|there| input.canonicalize().is_ok_and(|graph| graph == there));
-    let what =
-        if is_input { "is the graph itself, whose comments would be lost" } else { "is there already" };
-    Err(Failure::with_help(
-        format!("{} {what}", path.display()),
-        "choose another name, or write over it with --force",
-    ))
-}
-
-/// What writes a graph that is no document, by the extension.
-fn writer(path: &Path) -> Option<GraphWriter> {
-    GraphFormat::of_path(path)?.format
-}
-
-fn no_format(path: &Path) -> Failure {
-    let written = GraphFormat::all().into_iter().filter(|format| format.format.is_some());
-    let mut extensions = vec![".toml", ".json", ".yaml"];
-    let others: Vec<String> =
-        written.filter_map(|format| Some(format!(".{}", format.extensions.first()?))).collect();
-    extensions.extend(others.iter().map(String::as_str));
-    let last = extensions.pop().unwrap_or_default();
-    Failure::with_help(
-        format!("{}: the extension names no format that graphs are written in", path.display()),
-        format!("use {} or {last}", extensions.join(", ")),
-    )
-}
-
-/// Writes a graph with these values; returns what the format cannot express.
-pub(crate) fn write(path: &Path, graph: &Graph, values: &Values) -> Result<Vec<String>, Failure> {
-    let (text, notes) = match (Format::of_path(path), writer(path)) {
-        (Some(format), _) => (write_graph(graph, values, format).map_err(Failure::input)?, Vec::new()),
-        (None, Some(writer)) => writer(graph, values),
-        (None, None) => return Err(no_format(path)),
-    };
-    write_whole(path, text.as_bytes()).map_err(Failure::at(path))?;
-    Ok(notes)
 }
 
 /// What is in a graph, in a few lines.

@@ -121,10 +121,10 @@ pub(crate) struct Declared {
 /// The header of a run's document, and its settings as they are written. What is wrong with the header is reported, and it
 /// is as if nothing had been said.
 pub(crate) fn split(root: &Node, errors: &Errors) -> Option<(Header, Node)> {
+    Section::new(root, errors)?.ignore_rest();
     let (mut header, mut settings) = (root.clone(), root.clone());
     header.retain(|field| Header::FIELDS.contains(&field));
     settings.retain(|field| !Header::FIELDS.contains(&field));
-    Section::new(root, errors)?.ignore_rest();
     let header = header.read::<Header>(errors).unwrap_or_default();
     for (i, second) in header.variants.iter().enumerate() {
         let mut earlier = header.variants.iter().take(i);

@@ -1,5 +1,5 @@
 //! Sweeps that are killed at random moments of their work, and go on.
-use crate::experiment::tables;
+use crate::commands::experiment::tables;
 use crate::{folder, manifactor, path, root};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::path::Path;
@@ -33,7 +33,7 @@ fn sweep() -> String {
 }
 
 /// When a sweep is killed: by what can be seen of it, and not by a time, which is another on each machine.
-enum Moment {
+pub(crate) enum Moment {
     /// So many trials are in the journal.
     Trials(usize),
     /// This file is there.
@@ -66,13 +66,13 @@ impl Moment {
 }
 
 /// Whole lines of the journal.
-fn trials(out: &Path) -> usize {
+pub(crate) fn trials(out: &Path) -> usize {
     let journal = std::fs::read(out.join("trials.jsonl")).unwrap_or_default();
     journal.iter().filter(|byte| **byte == b'\n').count()
 }
 
 /// Runs a sweep until it ends or the moment has come to kill it; whether it ended.
-fn ends_before(config: &str, out: &Path, moment: &Moment) -> bool {
+pub(crate) fn ends_before(config: &str, out: &Path, moment: &Moment) -> bool {
     let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
         .current_dir(root())
         .args(["experiment", config, "--threads", "2", "--out"])

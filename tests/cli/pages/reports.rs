@@ -1,4 +1,4 @@
-use crate::browser::Browser;
+use crate::pages::browser::Browser;
 use crate::{folder, manifactor, path};
 use std::path::{Path, PathBuf};
 

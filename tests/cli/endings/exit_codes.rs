@@ -1,5 +1,5 @@
 //! The table of exit codes in `docs/reliability.md`.
-use crate::interrupt::{AtWork, ENDLESS, RUN};
+use crate::endings::interrupt::{AtWork, ENDLESS, RUN};
 use crate::{folder, path, root, run};
 use std::process::{Command, Stdio};
 use tempfile::TempDir;

@@ -1,5 +1,5 @@
 //! Disks that are full, files that may not grow, folders for reading only, and streams without a reader.
-use crate::experiment::tables;
+use crate::commands::experiment::tables;
 use crate::{folder, manifactor, path, root};
 use std::io::Read;
 use std::path::Path;

@@ -1,8 +1,7 @@
-use crate::{Ran, folder, manifactor, path, root, run};
+use crate::endings::killed::{Moment, ends_before, trials};
+use crate::{Ran, folder, manifactor, path, run};
 use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::Duration;
 
 const BASE: &str = r#"
 semantics = "table_one"
@@ -39,11 +38,6 @@ fn sweep(folder: &tempfile::TempDir, out: &str, threads: usize) -> Ran {
     manifactor(&format!("experiment {} --out {out} --threads {threads}", path(folder, "sweep.toml")))
 }
 
-/// Whole lines of a file.
-fn lines(path: &str) -> usize {
-    std::fs::read_to_string(path).map_or(0, |text| text.matches('\n').count())
-}
-
 #[test]
 fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
     let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
@@ -51,21 +45,9 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
     let ran = sweep(&folder, &whole, 2).ended(0);
     assert!(ran.stdout.contains("less the baseline") && ran.stdout.contains("position"), "{}", ran.stdout);
 
-    let log = format!("{killed}/trials.jsonl");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
-        .current_dir(root())
-        .args(["experiment", &path(&folder, "sweep.toml"), "--out", &killed, "--threads", "1"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    // until three trials are done, or all: how long that takes is the machine's business
-    while lines(&log) < 3 && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    let done = lines(&log);
+    // or it ends before, on a machine that is fast enough
+    ends_before(&path(&folder, "sweep.toml"), Path::new(&killed), &Moment::Trials(3));
+    let (log, done) = (format!("{killed}/trials.jsonl"), trials(Path::new(&killed)));
     assert!(done >= 3);
     // the line that a kill would have torn
     let mut file = std::fs::OpenOptions::new().append(true).open(&log).unwrap();
@@ -78,12 +60,12 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
         "{}",
         ran.stderr
     );
-    assert_eq!(lines(&log), 12);
+    assert_eq!(trials(Path::new(&killed)), 12);
     assert!(tables(&killed) == tables(&whole));
     // a third time there is nothing to do
     let ran = sweep(&folder, &killed, 2).ended(0);
     assert!(ran.stderr.contains("12 of 12 trials done, 12 of them before"), "{}", ran.stderr);
-    assert_eq!(lines(&log), 12);
+    assert_eq!(trials(Path::new(&killed)), 12);
 }
 
 #[test]

@@ -1,0 +1,87 @@
+//! Where a graph is written, and what is not written over.
+use crate::failure::Failure;
+use crate::output;
+use clap::Args;
+use manifactor::config::{Format, write_graph};
+use manifactor::formats::whole::{can_write, write_whole};
+use manifactor::formats::{GraphFormat, GraphWriter};
+use manifactor::graph::{Graph, Values};
+use std::path::{Path, PathBuf};
+
+/// `--out` and `--force`.
+#[derive(Debug, Args)]
+pub(crate) struct Destination {
+    /// Write the graph with the estimate here; the extension tells the format.
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write over a file that is there already.
+    #[arg(long, requires = "out")]
+    force: bool,
+}
+
+impl Destination {
+    /// Whether the graph of `input` can be written there, and over what is there: asked before it is solved.
+    pub(crate) fn check(&self, input: &Path) -> Result<(), Failure> {
+        let Some(path) = &self.out else { return Ok(()) };
+        if Format::of_path(path).is_none() && writer(path).is_none() {
+            return Err(no_format(path));
+        }
+        if !self.force {
+            refuse_to_replace(path, input)?;
+        }
+        can_write(path).map_err(Failure::at(path))
+    }
+
+    /// Whether a graph is to be written.
+    pub(crate) fn is_given(&self) -> bool {
+        self.out.is_some()
+    }
+
+    /// Writes a graph with these values, if that was asked for, and tells what the format cannot express.
+    pub(crate) fn write(&self, graph: &Graph, values: &Values) -> Result<(), Failure> {
+        let Some(path) = &self.out else { return Ok(()) };
+        let (text, notes) = match (Format::of_path(path), writer(path)) {
+            (Some(format), _) => (write_graph(graph, values, format).map_err(Failure::input)?, Vec::new()),
+            (None, Some(writer)) => writer(graph, values),
+            (None, None) => return Err(no_format(path)),
+        };
+        write_whole(path, text.as_bytes()).map_err(Failure::at(path))?;
+        notes.iter().for_each(|note| output::note(note));
+        Ok(())
+    }
+}
+
+/// An error where a file would be lost.
+fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
+    let is_stream = path.metadata().is_ok_and(|at| !at.is_file() && !at.is_dir());
+    // a link that leads nowhere is something too
+    if is_stream || path.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    let is_input =
+        path.canonicalize().is_ok_and(|there| input.canonicalize().is_ok_and(|graph| graph == there));
+    let what =
+        if is_input { "is the graph itself, whose comments would be lost" } else { "is there already" };
+    Err(Failure::with_help(
+        format!("{} {what}", path.display()),
+        "choose another name, or write over it with --force",
+    ))
+}
+
+/// What writes a graph that is no document, by the extension.
+fn writer(path: &Path) -> Option<GraphWriter> {
+    GraphFormat::of_path(path)?.format
+}
+
+fn no_format(path: &Path) -> Failure {
+    let written = GraphFormat::all().into_iter().filter(|format| format.format.is_some());
+    let mut extensions = vec![".toml", ".json", ".yaml"];
+    let others: Vec<String> =
+        written.filter_map(|format| Some(format!(".{}", format.extensions.first()?))).collect();
+    extensions.extend(others.iter().map(String::as_str));
+    let last = extensions.pop().unwrap_or_default();
+    Failure::with_help(
+        format!("{}: the extension names no format that graphs are written in", path.display()),
+        format!("use {} or {last}", extensions.join(", ")),
+    )
+}

@@ -1,0 +1,3 @@
+//! Pages and pictures.
+mod browser;
+mod reports;

@@ -1,0 +1,5 @@
+//! What is printed: examples of the book, messages, logs, on any terminal.
+mod book;
+mod log;
+mod mistakes;
+mod terminal;
