@@ -10,6 +10,7 @@ pub(crate) mod outline;
 mod picture;
 mod scale;
 mod scene;
+mod series;
 mod viewpoint;
 
 pub(crate) use chart::{Chart, Curve, figure};
@@ -20,4 +21,5 @@ pub use picture::{NotDrawn, Picture};
 #[cfg(test)]
 pub(crate) use scene::{Object, Track};
 pub(crate) use scene::{Palette, Scene};
+pub(crate) use series::stretches;
 pub(crate) use viewpoint::Viewpoint;

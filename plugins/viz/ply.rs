@@ -1,31 +1,34 @@
 //! The map as PLY, for mesh viewers: ellipsoids as triangles, trajectories as edges, each vertex with its colour.
 use crate::canvas::{Ink, Theme};
-use crate::drawing::{Palette, Scene};
+use crate::drawing::{Palette, Scene, stretches};
 use manifactor_slam::record::{RunRecord, VariantRecord};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-/// From pole to pole, and around.
-const RINGS: usize = 12;
-const SECTORS: usize = 24;
+/// Rings of an ellipsoid from pole to pole, and how many of them where there are more objects than that. Sectors are twice as
+/// many.
+const RINGS: [usize; 2] = [12, 5];
+const MANY: usize = 500;
 
 /// The estimated objects and all trajectories of a variant, in metres, in the frame of its record.
 pub fn ply(run: &RunRecord, variant: &VariantRecord) -> String {
     let palette = Palette::of(run);
     let scene = Scene::of("", variant);
     let (mut vertices, mut faces, mut edges) = (Lines::default(), Lines::default(), Lines::default());
+    let rings = RINGS[usize::from(scene.objects.len() > MANY)];
+    let sectors = 2 * rings;
     for object in &scene.objects {
         let Some(shape) = &object.estimate else { continue };
         let (first, ink) = (vertices.count, palette.ink(&object.class));
-        for (ring, sector) in (0..=RINGS).flat_map(|ring| (0..SECTORS).map(move |sector| (ring, sector))) {
+        for (ring, sector) in (0..=rings).flat_map(|ring| (0..sectors).map(move |sector| (ring, sector))) {
             let (polar, around) =
-                (PI * ring as f64 / RINGS as f64, 2.0 * PI * sector as f64 / SECTORS as f64);
+                (PI * ring as f64 / rings as f64, 2.0 * PI * sector as f64 / sectors as f64);
             let point = Vector3::new(polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos());
             vertices.vertex(&(shape.centroid + shape.axes * point), ink);
         }
-        for (ring, sector) in (0..RINGS).flat_map(|ring| (0..SECTORS).map(move |sector| (ring, sector))) {
-            let at = |ring: usize, sector: usize| first + ring * SECTORS + sector % SECTORS;
+        for (ring, sector) in (0..rings).flat_map(|ring| (0..sectors).map(move |sector| (ring, sector))) {
+            let at = |ring: usize, sector: usize| first + ring * sectors + sector % sectors;
             let (a, b, c, d) =
                 (at(ring, sector), at(ring + 1, sector), at(ring + 1, sector + 1), at(ring, sector + 1));
             faces.line(format_args!("3 {a} {b} {c}"));
@@ -33,9 +36,11 @@ pub fn ply(run: &RunRecord, variant: &VariantRecord) -> String {
         }
     }
     for track in &scene.tracks {
-        let first = vertices.count;
-        track.positions.iter().for_each(|p| vertices.vertex(p, track.stroke.ink));
-        (first + 1..vertices.count).for_each(|i| edges.line(format_args!("{} {i}", i - 1)));
+        for stretch in stretches(track.positions.iter().copied()) {
+            let first = vertices.count;
+            stretch.iter().for_each(|p| vertices.vertex(p, track.stroke.ink));
+            (first + 1..vertices.count).for_each(|i| edges.line(format_args!("{} {i}", i - 1)));
+        }
     }
     format!(
         "ply\nformat ascii 1.0\ncomment manifactor {}\n\

@@ -13,18 +13,20 @@ pub(crate) use residual::{RESIDUALS, row as residual_row};
 /// cost, and some images.
 pub fn run_pictures(run: &RunRecord, variant: &VariantRecord, width: f64) -> Vec<Picture> {
     let palette = Palette::of(run);
-    let scene = Scene::of(format!("{}: {}", run.title, variant.name), variant);
-    let mut pictures =
-        vec![map(&scene, Viewpoint::Top, &palette, width), map(&scene, Viewpoint::Side, &palette, width)];
-    pictures.extend(charts(variant, width));
-    let frames = frames_seen(variant, variant.images).into_iter();
-    let frames = frames.filter_map(|number| Some((number, variant.frames.get(number)?)));
-    pictures.extend(frames.map(|(number, frame)| image(variant, number, frame, &palette, width)));
+    let mut pictures = maps_and_charts(format!("{}: {}", run.title, variant.name), variant, &palette, width);
+    pictures.extend(images(variant, &palette, width));
     pictures
 }
 
-/// The pictures that are charts.
-pub(crate) fn charts(variant: &VariantRecord, width: f64) -> Vec<Picture> {
+/// The maps, under this title, and the charts of a variant.
+pub(crate) fn maps_and_charts(
+    title: String,
+    variant: &VariantRecord,
+    palette: &Palette,
+    width: f64,
+) -> Vec<Picture> {
+    let scene = Scene::of(title, variant);
+    let maps = [Viewpoint::Top, Viewpoint::Side].map(|view| Some(map(&scene, view, palette, width)));
     let charts = [
         error::absolute(variant, width),
         error::relative(variant, width),
@@ -33,7 +35,15 @@ pub(crate) fn charts(variant: &VariantRecord, width: f64) -> Vec<Picture> {
         residual::residuals(variant, width),
         cost(std::slice::from_ref(variant), width),
     ];
-    charts.into_iter().flatten().collect()
+    maps.into_iter().chain(charts).flatten().collect()
+}
+
+/// Some images of a variant, with what the estimate puts there.
+pub(crate) fn images(variant: &VariantRecord, palette: &Palette, width: f64) -> Vec<Picture> {
+    let frames = frames_seen(variant, variant.images).into_iter();
+    frames
+        .filter_map(|number| Some(image(variant, number, variant.frames.get(number)?, palette, width)))
+        .collect()
 }
 
 /// The cost by iteration, a curve for each variant.

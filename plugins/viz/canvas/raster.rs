@@ -3,22 +3,24 @@ use super::font::{Outlines, outlines, text_width};
 use super::{Anchor, DASHES, Ink, Item, Sheet, Text, Theme};
 use tiny_skia::{Color, FillRule, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform};
 
-/// Pixels of a PNG for each of the sheet: sharp where it is shown large, and in print.
-const SCALE: f32 = 2.0;
+/// Pixels of a PNG for each of the sheet: sharp where it is shown large, and in print. Fewer, where the sheet is large.
+const SCALE: f64 = 2.0;
 /// Most pixels along a side.
 const MOST: f64 = 16_000.0;
 
 impl Sheet {
     /// The PNG's bytes; `Err` says why there is none.
     pub(crate) fn png(&self, theme: Theme) -> Result<Vec<u8>, String> {
-        let [width, height] = [self.width, self.height].map(|x| x * f64::from(SCALE));
-        if !(width >= 1.0 && height >= 1.0 && width <= MOST && height <= MOST) {
-            return Err(format!("{width:.0} by {height:.0} pixels are out of reach"));
+        let scale = SCALE.min(MOST / self.width.max(self.height));
+        let [width, height] = [self.width, self.height].map(|x| x * scale);
+        if !(width >= 1.0 && height >= 1.0) {
+            let (width, height) = (self.width, self.height);
+            return Err(format!("a picture of {width:.0} by {height:.0} pixels is out of reach"));
         }
         let pixels = Pixmap::new(width.round() as u32, height.round() as u32);
         let mut pixels = pixels.ok_or_else(|| "there is no room for its pixels".to_owned())?;
         pixels.fill(color(Ink::Paper, theme, 1.0));
-        let transform = Transform::from_scale(SCALE, SCALE);
+        let transform = Transform::from_scale(scale as f32, scale as f32);
         for item in &self.items {
             match item {
                 Item::Path { points, closed, stroke, fill } => {

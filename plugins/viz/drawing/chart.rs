@@ -2,6 +2,7 @@
 use super::axes::{Axes, HEAD, title};
 use super::legend::{Entry, legend};
 use super::scale::Scale;
+use super::series::stretches;
 use crate::canvas::{Ink, Sheet, Stroke};
 
 /// Curves over a common axis.
@@ -23,6 +24,7 @@ pub(crate) struct Curve {
     pub(crate) stroke: Stroke,
     /// Whether each point has a dot.
     pub(crate) dots: bool,
+    /// In order along the axis; one that is not finite is a value that is missing.
     pub(crate) points: Vec<(f64, f64)>,
 }
 
@@ -57,19 +59,13 @@ pub(crate) fn figure(
     let panels: Vec<Chart> = panels
         .iter()
         .map(|panel| {
-            let mut panel = panel.clone();
-            let shown = |p: &(f64, f64)| shown(&panel, p);
-            let keep = |curve: &Curve| Curve {
-                points: curve.points.iter().copied().filter(shown).collect(),
-                ..curve.clone()
-            };
-            panel.curves = panel.curves.iter().map(keep).filter(|curve| !curve.points.is_empty()).collect();
-            panel
+            let has_points = |curve: &&Curve| curve.points.iter().any(|p| shown(panel, p));
+            Chart { curves: panel.curves.iter().filter(has_points).cloned().collect(), ..panel.clone() }
         })
         .filter(|panel| !panel.curves.is_empty())
         .collect();
-    let along = panels.iter().flat_map(|panel| &panel.curves).flat_map(|curve| &curve.points).map(|p| p.0);
-    let along = Scale::over(along, log_x)?;
+    let points = |panel| points(panel).filter(move |p| shown(panel, p));
+    let along = Scale::over(panels.iter().flat_map(points).map(|p| p.0), log_x)?;
 
     let mut entries: Vec<Entry> = vec![];
     for curve in panels.iter().flat_map(|panel| &panel.curves) {
@@ -96,20 +92,25 @@ pub(crate) fn figure(
         let axes = Axes { area, x: along, y, x_label, y_label: panel.y.clone() };
         axes.draw(&mut sheet);
         for Curve { stroke, points, dots, .. } in &panel.curves {
-            let points: Vec<[f64; 2]> = thinned(points.iter().map(|p| axes.point(p.0, p.1)).collect());
-            if *dots {
-                points.iter().for_each(|p| sheet.dot(*p, 2.6, stroke.ink));
+            let known = points.iter().map(|p| shown(panel, p).then(|| axes.point(p.0, p.1)));
+            for points in stretches(known).into_iter().map(thinned) {
+                if *dots {
+                    points.iter().for_each(|p| sheet.dot(*p, 2.6, stroke.ink));
+                }
+                sheet.line(points, *stroke);
             }
-            sheet.line(points, *stroke);
         }
     }
     Some(sheet)
 }
 
 fn upward(panel: &Chart) -> Option<Scale> {
-    let numbers = panel.curves.iter().flat_map(|curve| &curve.points).map(|p| p.1);
-    let scale = Scale::over(numbers, panel.log_y)?;
-    Some(if panel.begun_at_zero { scale.begun_at_zero() } else { scale }.with_margin(0.05))
+    let zero = panel.begun_at_zero.then_some(0.0);
+    Some(Scale::over(points(panel).map(|p| p.1).chain(zero), panel.log_y)?.with_margin(0.05))
+}
+
+fn points(panel: &Chart) -> impl Iterator<Item = &(f64, f64)> {
+    panel.curves.iter().flat_map(|curve| &curve.points)
 }
 
 /// A line of no more points than can be told apart: of those that share a pixel to the right, the first, the lowest,
@@ -153,6 +154,20 @@ mod tests {
         assert!(!svg.contains("NaN") && !svg.contains("nothing"));
         assert_eq!(sheet.png(Theme::Dark).unwrap().get(..4), Some(&b"\x89PNG"[..]));
         assert!(figure("", "", false, &[Chart::default()], 700.0, 400.0).is_none());
+    }
+
+    #[test]
+    fn a_curve_is_not_drawn_across_a_gap() {
+        let curve: Vec<(f64, f64)> = (0..100).map(|i| (f64::from(i), 1.0 + f64::from(i))).collect();
+        let lines = |points: Vec<(f64, f64)>| {
+            let panel = Chart { curves: vec![Curve::new("c", Ink::Series(3), points)], ..Chart::default() };
+            let svg =
+                figure("", "t", false, &[panel], 700.0, 400.0).unwrap().svg("", Colors::Of(Theme::Light));
+            svg.matches(&Ink::Series(3).hex(Theme::Light)).count()
+        };
+        let mut broken = curve.clone();
+        broken[30..70].iter_mut().for_each(|p| p.1 = f64::NAN);
+        assert_eq!(lines(broken), lines(curve) + 1);
     }
 
     #[test]

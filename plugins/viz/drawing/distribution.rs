@@ -22,17 +22,20 @@ struct FiveNumbers {
     beyond: Vec<f64>,
 }
 
-/// Pixels of a group; dots that are drawn of each.
+/// Pixels of a group; how many groups there is room for; dots that are drawn of each.
 const ROW: f64 = 30.0;
+const ROWS: usize = 400;
 const DOTS: usize = 60;
 
 impl Distribution {
     /// A box from quartile to quartile for each group, with the median in it; whiskers to the last value within one and a
-    /// half times its width; what lies beyond as dots, and at an arrow what would make the rest too small to see. Values
+    /// half times its width; values beyond the whiskers as dots, those off the scale counted at an arrow. Values
     /// that are not finite are left out; `None` where nothing is left.
     pub(crate) fn sheet(&self, width: f64) -> Option<Sheet> {
         let groups = self.groups.iter().filter_map(|(name, values)| Some((name, FiveNumbers::of(values)?)));
-        let groups: Vec<(&String, FiveNumbers)> = groups.collect();
+        let mut groups: Vec<(&String, FiveNumbers)> = groups.collect();
+        let left_out = groups.len().saturating_sub(ROWS);
+        groups.truncate(ROWS);
         let ends = groups.iter().flat_map(|(_, five)| five.whiskers);
         let within = Scale::over(ends, false)?.with_margin(1.0);
         let shown = |(_, five): &(&String, FiveNumbers)| -> Vec<f64> {
@@ -43,7 +46,11 @@ impl Distribution {
         let left = (widest + 18.0).min(0.4 * width);
         let height = HEAD + 6.0 + ROW * groups.len() as f64 + 40.0;
         let mut sheet = Sheet::new(width, height);
-        title(&mut sheet, &self.title);
+        let text = match left_out {
+            0 => self.title.clone(),
+            n => format!("{} (the first {ROWS} groups; {n} more)", self.title),
+        };
+        title(&mut sheet, &text);
         let area = [left, HEAD + 6.0, width - 40.0, height - 40.0];
         let rows = Scale::new(0.0, groups.len() as f64);
         let axes = Axes { area, x, y: rows, x_label: String::new(), y_label: String::new() };
@@ -156,6 +163,14 @@ mod tests {
             assert!(quartiles[0] <= quartiles[1] && quartiles[1] <= quartiles[2]);
         }
         assert_eq!(FiveNumbers::of(&[1.0, 2.0, 3.0, 4.0, 99.0]).unwrap().beyond, [99.0]);
+    }
+
+    #[test]
+    fn a_picture_of_many_groups_ends() {
+        let groups = (0..3000).map(|i| (format!("group {i}"), vec![f64::from(i)])).collect();
+        let sheet = Distribution { title: "ate".into(), x: "ate".into(), groups }.sheet(900.0).unwrap();
+        assert!(sheet.svg("", Colors::Of(Theme::Light)).contains("2600 more"));
+        assert_eq!(sheet.png(Theme::Light).unwrap().get(..4), Some(&b"\x89PNG"[..]));
     }
 
     #[test]

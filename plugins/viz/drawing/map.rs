@@ -5,7 +5,8 @@ use super::legend::{Entry, legend};
 use super::outline::Shape;
 use super::picture::Picture;
 use super::scale::Scale;
-use super::scene::{Object, Palette, Scene};
+use super::scene::{Object, Palette, Scene, Track};
+use super::series::{spaced, stretches};
 use super::viewpoint::Viewpoint;
 use crate::canvas::{Ink, Sheet, Stroke};
 use nalgebra::{Point2, Vector2};
@@ -25,45 +26,34 @@ type Outline<'a> = (&'a str, Vec<Point2<f64>>);
 /// are. Coordinates that are not finite are left out.
 pub(crate) fn map(scene: &Scene, view: Viewpoint, palette: &Palette, width: f64) -> Picture {
     let plane = view.plane(&scene.up);
-    let tracks: Vec<Vec<Point2<f64>>> = scene
-        .tracks
-        .iter()
-        .map(|track| {
-            track
-                .positions
-                .iter()
-                .filter(|p| p.iter().all(|x| x.is_finite()))
-                .map(|p| plane.project(p))
-                .collect()
-        })
-        .collect();
+    let stretches = |track: &Track| stretches(track.positions.iter().map(|p| Some(plane.project(&(*p)?))));
+    let tracks: Vec<Vec<Vec<Point2<f64>>>> = scene.tracks.iter().map(stretches).collect();
     let outlines = |of: fn(&Object) -> Option<&Shape>| -> Vec<Outline<'_>> {
         let outline = |o| of(o).and_then(|shape| shape.outline(&plane));
         scene.objects.iter().filter_map(|o| Some((o.class.as_str(), outline(o)?))).collect()
     };
     let (truths, estimates) = (outlines(|o| o.truth.as_ref()), outlines(|o| o.estimate.as_ref()));
-    let mut frame = Frame::default();
-    tracks.iter().flatten().for_each(|p| frame.include(p));
-    truths.iter().flat_map(|(_, outline)| outline).for_each(|p| frame.include(p));
-    let (near, outside) = frame.include_near(&estimates);
+    let mut extent = Extent::default();
+    tracks.iter().flatten().flatten().for_each(|p| extent.include(p));
+    truths.iter().flat_map(|(_, outline)| outline).for_each(|p| extent.include(p));
+    let (near, outside) = extent.include_near(&estimates);
 
     let entries = legend(&entries(scene, palette, &truths, &estimates), width - 20.0);
     let top = HEAD + entries.height + 8.0;
-    let Plot { x, y, area: [left, _, right, height] } = frame.on(width);
+    let Plot { x, y, area: [left, _, right, height] } = extent.on(width);
     let area = [left, top, right, top + height];
     let [x_label, y_label] = plane.labels.map(|label| format!("{label} (m)"));
     let axes = Axes { area, x, y, y_label, x_label };
     let mut sheet = Sheet::new(width, top + height + Axes::below("x") + 2.0);
     let text = match outside {
         0 => scene.title.clone(),
-        n => format!("{} ({n} of {} objects outside the picture)", scene.title, scene.objects.len()),
+        n => format!("{} ({n} of {} objects outside the picture)", scene.title, estimates.len()),
     };
     title(&mut sheet, &text);
     sheet.place(entries, [10.0, HEAD]);
     axes.draw(&mut sheet);
 
-    let drawn =
-        |points: &[Point2<f64>]| -> Vec<[f64; 2]> { points.iter().map(|p| axes.point(p.x, p.y)).collect() };
+    let drawn = |points: &[Point2<f64>]| spaced(points.iter().map(|p| axes.point(p.x, p.y)).collect());
     for (class, outline) in &near {
         let ink = palette.ink(class);
         sheet.outline(drawn(outline), Stroke::solid(ink, 1.8), Some((ink, 0.18)));
@@ -71,8 +61,8 @@ pub(crate) fn map(scene: &Scene, view: Viewpoint, palette: &Palette, width: f64)
     for (class, outline) in &truths {
         sheet.outline(drawn(outline), Stroke::dashed(palette.ink(class), 1.3), None);
     }
-    for (track, points) in scene.tracks.iter().zip(&tracks) {
-        sheet.line(drawn(points), track.stroke);
+    for (track, stretches) in scene.tracks.iter().zip(&tracks) {
+        stretches.iter().for_each(|points| sheet.line(drawn(points), track.stroke));
     }
     // seen from the side, what stands on one table stands on one line
     if view == Viewpoint::Top {
@@ -126,24 +116,30 @@ fn around(points: &[[f64; 2]]) -> [f64; 4] {
 
 /// The part of the plane that is shown.
 #[derive(Debug, Default)]
-struct Frame(Option<(Point2<f64>, Point2<f64>)>);
+struct Extent(Option<(Point2<f64>, Point2<f64>)>);
 
-impl Frame {
+impl Extent {
     fn include(&mut self, p: &Point2<f64>) {
         let (low, high) = self.0.unwrap_or((*p, *p));
         self.0 = Some((low.inf(p), high.sup(p)));
     }
 
-    fn contains(&self, p: &Point2<f64>) -> bool {
-        self.0.is_some_and(|(low, high)| low <= *p && *p <= high)
+    /// How far out of it a point lies along x or y.
+    fn beyond(&self, p: &Point2<f64>) -> f64 {
+        self.0.map_or(0.0, |(low, high)| (low - p).sup(&(p - high)).max().max(0.0))
     }
 
-    /// Includes the outlines that lie within half the frame's size around it, and returns them; how many do not.
+    /// Includes the outlines that lie within half the extent's size around it, or three times as far out as the median
+    /// one, and returns them; how many do not. What most objects are beyond is a camera that hardly moved.
     fn include_near<'a>(&mut self, outlines: &'a [Outline<'a>]) -> (Vec<&'a Outline<'a>>, usize) {
-        let margin = Vector2::repeat(0.5 * self.size());
-        let around = self.0.map(|(low, high)| Frame(Some((low - margin, high + margin))));
-        let is_near = |o: &&Outline<'_>| around.as_ref().is_none_or(|a| o.1.iter().all(|p| a.contains(p)));
-        let near: Vec<_> = outlines.iter().filter(is_near).collect();
+        let beyond = |o: &Outline<'_>| o.1.iter().map(|p| self.beyond(p)).fold(0.0, f64::max);
+        let distances: Vec<f64> = outlines.iter().map(beyond).collect();
+        let mut sorted = distances.clone();
+        sorted.sort_by(f64::total_cmp);
+        let median = sorted.get(sorted.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
+        let margin = (0.5 * self.size()).max(3.0 * median);
+        let near = outlines.iter().zip(&distances).filter(|(_, distance)| **distance <= margin);
+        let near: Vec<_> = near.map(|(outline, _)| outline).collect();
         near.iter().flat_map(|(_, outline)| outline).for_each(|p| self.include(p));
         let outside = outlines.len() - near.len();
         (near, outside)

@@ -1,5 +1,8 @@
 //! An axis: which numbers it spans, and which of them are written.
 
+/// The farthest from zero that an axis reaches.
+const FAR: f64 = 1e300;
+
 /// What an axis spans, from where the data begin to where they end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scale {
@@ -20,8 +23,10 @@ impl Scale {
         let ends = shown.fold(None, |ends: Option<(f64, f64)>, x| {
             Some(ends.map_or((x, x), |(low, high)| (low.min(x), high.max(x))))
         });
-        let (low, high) = ends?;
-        Some(Self { low, high, log }.with_extent())
+        // margins and ratios of what is farther out would overflow
+        let (low, high) = ends.map(|(low, high)| (low.clamp(-FAR, FAR), high.clamp(-FAR, FAR)))?;
+        let low = if log { low.max(high * 1e-100).max(1.0 / FAR) } else { low };
+        Some(Self { low, high: high.max(low), log }.with_extent())
     }
 
     /// A scale that is as wide as it can be drawn: one number alone, or several that rounding makes one, get room.
@@ -30,13 +35,16 @@ impl Scale {
         if log {
             return if high > low * 1.0001 { self } else { Self { low: low / 1.5, high: high * 1.5, log } };
         }
-        let least = 1e-9 * low.abs().max(high.abs());
-        if high - low > least { self } else { Self { low: low - 0.5 - least, high: high + 0.5 + least, log } }
-    }
-
-    /// From zero, where all numbers are above it.
-    pub(crate) fn begun_at_zero(self) -> Self {
-        if self.log || self.low < 0.0 { self } else { Self { low: 0.0, ..self } }
+        let size = low.abs().max(high.abs());
+        let least = 1e-12 * size;
+        if high - low > least {
+            return self;
+        }
+        if size == 0.0 {
+            return Self { low: 0.0, high: 1.0, log };
+        }
+        let room = (0.1 * size).min(0.5).max(10.0 * least);
+        Self { low: low - room, high: high + room, log }
     }
 
     /// With a share of its extent above, and below if it does not begin at zero.
@@ -44,7 +52,7 @@ impl Scale {
         let Self { low, high, log } = self;
         if log {
             let factor = (high / low).powf(share);
-            return Self { low: low / factor, high: high * factor, log };
+            return Self { low: (low / factor).max(1.0 / FAR), high: (high * factor).min(FAR), log };
         }
         let margin = share * (high - low);
         Self { low: if low == 0.0 { 0.0 } else { low - margin }, high: high + margin, log }
@@ -94,14 +102,18 @@ impl Scale {
 
 /// A number, with the digits that tell it from its neighbours a step away.
 fn written(x: f64, step: f64) -> String {
-    let size = x.abs().max(step.abs());
-    if size >= 1e6 || step.abs() < 1e-4 {
-        return format!("{x:.0e}").replace("e0", "");
+    if x == 0.0 {
+        return "0".to_owned();
     }
-    // a step of 0.2 takes one digit, as 0.5 does and 0.1
-    let digits = (-(step * 1.0001).log10().floor()).clamp(0.0, 6.0) as usize;
-    let text = format!("{x:.digits$}");
-    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".to_owned() } else { text }
+    // the place of the last digit: a step of 0.2 takes one behind the point, as 0.5 does and 0.1
+    let exponent = |x: f64| (x.abs() * 1.0001).log10().floor() as i32;
+    let last = exponent(step);
+    if last >= 5 || (last < -4 && x.abs() < 1e-2) {
+        let digits = usize::try_from(exponent(x) - last).unwrap_or(0).min(15);
+        return format!("{x:.digits$e}");
+    }
+    let digits = usize::try_from(-last).unwrap_or(0).min(15);
+    format!("{x:.digits$}")
 }
 
 #[cfg(test)]
@@ -117,15 +129,37 @@ mod tests {
     fn ticks_are_round_and_within_the_data() {
         assert_eq!(ticks(&[0.13, 1.02], false), ["0.2", "0.4", "0.6", "0.8", "1.0"]);
         assert_eq!(ticks(&[-0.02, 0.05], false), ["-0.02", "0", "0.02", "0.04"]);
-        assert_eq!(ticks(&[3.0, 3.0, f64::NAN], false), ["2.6", "2.8", "3.0", "3.2", "3.4"]);
+        assert_eq!(ticks(&[3.0, 3.0, f64::NAN], false), ["2.8", "3.0", "3.2"]);
         assert_eq!(ticks(&[1e-6, 1e-2], true), ["1e-6", "1e-5", "0.0001", "0.001", "0.01"]);
+    }
+
+    #[test]
+    fn neighbours_are_told_apart() {
+        assert_eq!(ticks(&[0.0, 3e-4], false), ["0", "0.0001", "0.0002", "0.0003"]);
+        assert_eq!(ticks(&[5e-5, 2e-4], false), ["5e-5", "1.0e-4", "1.5e-4", "2.0e-4"]);
+        assert_eq!(ticks(&[5e6, 5e6 + 4.0], false), ["5000000", "5000001", "5000002", "5000003", "5000004"]);
+        assert_eq!(ticks(&[1.2, 1.200_02], false).get(1).map(String::as_str), Some("1.200005"));
+        assert_eq!(ticks(&[0.0, 4e7], false), ["0", "1e7", "2e7", "3e7", "4e7"]);
+    }
+
+    #[test]
+    fn one_number_and_the_ends_of_all_numbers_have_room() {
+        assert_eq!(ticks(&[0.0, 0.0], false).first().map(String::as_str), Some("0"));
+        assert!(ticks(&[0.0, 0.0], false).iter().all(|text| !text.starts_with('-')));
+        assert_eq!(ticks(&[1e-5, 1e-5], false), ["9.0e-6", "9.5e-6", "1.00e-5", "1.05e-5", "1.10e-5"]);
+        for numbers in [[1e308, 1e-308], [f64::MAX, f64::MIN_POSITIVE], [-1e308, 1e308], [1e-320, 1e-310]] {
+            for log in [false, true] {
+                let Some(scale) = Scale::over(numbers.into_iter(), log) else { continue };
+                let scale = scale.with_margin(0.05);
+                assert!(scale.ticks(5).iter().all(|(x, _)| (-0.1..=1.1).contains(&scale.place(*x))));
+            }
+        }
     }
 
     #[test]
     fn an_axis_begins_where_the_data_do() {
         let scale = Scale::over([2.5, 7.5].into_iter(), false).unwrap();
         assert_eq!((scale.place(2.5), scale.place(7.5), scale.place(5.0)), (0.0, 1.0, 0.5));
-        assert_eq!(scale.begun_at_zero().place(0.0), 0.0);
         assert!(Scale::over([f64::INFINITY].into_iter(), false).is_none());
         assert!(Scale::over([-1.0].into_iter(), true).is_none());
     }

@@ -26,8 +26,8 @@ pub(crate) struct Track {
     pub(crate) name: String,
     /// How it is drawn.
     pub(crate) stroke: Stroke,
-    /// Where the camera was, in order of time.
-    pub(crate) positions: Vec<Vector3<f64>>,
+    /// Where the camera was, frame by frame; `None` where that is not known.
+    pub(crate) positions: Vec<Option<Vector3<f64>>>,
 }
 
 /// An object: where it is, where it is estimated to be, or both.
@@ -88,7 +88,7 @@ impl Scene {
         let tracks = TRACKS.iter().zip(positions).map(|((name, stroke), of)| Track {
             name: (*name).to_owned(),
             stroke: *stroke,
-            positions: variant.frames.iter().filter_map(of).collect(),
+            positions: variant.frames.iter().map(of).map(|p| p.filter(is_finite)).collect(),
         });
         let object = |object: &ObjectRecord| Object {
             class: object.class.clone(),
@@ -98,10 +98,14 @@ impl Scene {
         Self {
             title: title.into(),
             up: variant.up,
-            tracks: tracks.filter(|track| !track.positions.is_empty()).collect(),
+            tracks: tracks.filter(|track| track.positions.iter().any(Option::is_some)).collect(),
             objects: variant.objects.iter().map(object).collect(),
         }
     }
+}
+
+fn is_finite(position: &Vector3<f64>) -> bool {
+    position.iter().all(|x| x.is_finite())
 }
 
 fn ellipsoid(quadric: &DualQuadric) -> Shape {

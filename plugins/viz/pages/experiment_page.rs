@@ -31,6 +31,9 @@ pub fn experiment_pictures(
     summary.metrics.iter().filter_map(picture).collect()
 }
 
+/// Trials that the page lists.
+const TRIALS: usize = 1000;
+
 /// The page of an experiment. `trials` is the table of trials, `config` what was read.
 pub fn experiment_page(experiment: &Experiment, summary: &Summary, trials: &Table, config: &str) -> String {
     let mut page = Page::new(&experiment.title);
@@ -55,14 +58,17 @@ pub fn experiment_page(experiment: &Experiment, summary: &Summary, trials: &Tabl
     let pictures = experiment_pictures(experiment, summary, trials, WIDTH);
     page.pictures(pictures.iter().map(|picture| (picture, caption.to_owned())));
     page.heading("Trials");
-    let header: Vec<String> = trials.columns.iter().map(|(name, _)| name.clone()).collect();
     let rows = trials.rows().unwrap_or_default();
+    if rows > TRIALS {
+        page.paragraph(&format!("The first {TRIALS} of {rows}; trials.csv has all."));
+    }
+    let header: Vec<String> = trials.columns.iter().map(|(name, _)| name.clone()).collect();
     let cell = |column: &Column, row| match column {
         Column::Text(cells) => cells.get(row).cloned().unwrap_or_default(),
         Column::Number(cells) => cells.get(row).copied().flatten().map_or(String::new(), short),
     };
     let row = |row| trials.columns.iter().map(|(_, column)| cell(column, row)).collect();
-    page.table(&header, &(0..rows).map(row).collect::<Vec<Vec<String>>>());
+    page.table(&header, &(0..rows.min(TRIALS)).map(row).collect::<Vec<Vec<String>>>());
     page.heading("Config");
     page.folded("The experiment", config);
     page.html()
@@ -114,5 +120,6 @@ fn curves(summary: &Summary, x: &str, metric: &str) -> Vec<Curve> {
             }
         }
     }
+    curves.iter_mut().for_each(|curve| curve.points.sort_by(|a, b| a.0.total_cmp(&b.0)));
     curves
 }

@@ -1,8 +1,8 @@
 //! The page of a run: the map in 3D, its variants side by side, and what was done with each object.
 use super::run_tables::{noise, objects, overview, own_variables, words};
 use super::{page::Page, viewer};
-use crate::drawing::{Palette, Picture, Scene, Viewpoint, frames_seen, image, map};
-use crate::run::{RESIDUALS, charts, cost, residual_row};
+use crate::drawing::{Palette, Picture, Scene, Viewpoint, map};
+use crate::run::{RESIDUALS, cost, images, maps_and_charts, residual_row};
 use manifactor_slam::record::{RunRecord, VariantRecord};
 use manifactor_slam::report::{RunReport, VariantReport};
 
@@ -34,11 +34,12 @@ pub fn run_page(report: &RunReport, record: &RunRecord, configs: &[String]) -> S
     page.table(&header, &rows);
     page.definitions(&about(record));
     page.definitions(&DEFINITIONS);
-    in_3d(&mut page, record);
-    side_by_side(&mut page, record);
+    let palette = Palette::of(record);
+    in_3d(&mut page, record, &palette);
+    side_by_side(&mut page, record, &palette);
     let reports = report.variants.iter().zip(&record.variants).zip(configs);
     for ((report, record), config) in reports {
-        variant(&mut page, report, record, config);
+        variant(&mut page, report, record, &palette, config);
     }
     page.heading("Files").files(&["report.json".to_owned(), "record.json".to_owned()]);
     page.paragraph(&version());
@@ -49,39 +50,30 @@ fn about(record: &RunRecord) -> Vec<(&str, &str)> {
     record.variants.iter().filter_map(|v| Some((v.name.as_str(), v.about.as_deref()?))).collect()
 }
 
-fn in_3d(page: &mut Page, record: &RunRecord) {
+fn in_3d(page: &mut Page, record: &RunRecord, palette: &Palette) {
     let Some(last) = record.variants.last() else { return };
     page.heading("Map");
     let scene = Scene::of(format!("{}: {}", record.title, last.name), last);
-    let picture = map(&scene, Viewpoint::Top, &Palette::of(record), 1.6 * WIDTH);
+    let picture = map(&scene, Viewpoint::Top, palette, 1.6 * WIDTH);
     page.own("<div id=\"static-map\">", "");
     page.picture(
         &picture,
         "The map from above. Where the browser has WebGL 2, it is a map in 3D that can be turned.",
     );
     page.own("</div>", "");
-    page.data("run-data", &viewer::data(record)).own(viewer::MARKUP, &viewer::SCRIPTS.concat());
+    page.data("run-data", &viewer::data(record, palette)).own(viewer::MARKUP, &viewer::SCRIPTS.concat());
 }
 
 /// Each kind of picture once, the variants beside each other.
-fn side_by_side(page: &mut Page, record: &RunRecord) {
+fn side_by_side(page: &mut Page, record: &RunRecord, palette: &Palette) {
     page.heading("Variants side by side");
-    let palette = Palette::of(record);
     if let Some(picture) = cost(&record.variants, WIDTH) {
         page.pictures([(&picture, CAPTIONS[0].1.to_owned())].into_iter());
     }
     let all: Vec<(&VariantRecord, Vec<Picture>)> = record
         .variants
         .iter()
-        .map(|variant| {
-            let scene = Scene::of(variant.name.clone(), variant);
-            let mut pictures = vec![
-                map(&scene, Viewpoint::Top, &palette, WIDTH),
-                map(&scene, Viewpoint::Side, &palette, WIDTH),
-            ];
-            pictures.extend(charts(variant, WIDTH));
-            (variant, pictures)
-        })
+        .map(|variant| (variant, maps_and_charts(variant.name.clone(), variant, palette, WIDTH)))
         .collect();
     for (name, caption) in CAPTIONS.iter().skip(1) {
         let of_name = all.iter().filter_map(|(variant, pictures)| {
@@ -98,7 +90,10 @@ const CAPTIONS: [(&str, &str); 8] = [
         "cost",
         "The cost after each accepted step, from where the solve began. Costs compare between variants of the same noise and factors alone.",
     ),
-    ("map_top", "the map from above. True objects and the true path are dashed."),
+    (
+        "map_top",
+        "the map from above. The true path is dashed, and so are true objects: the ellipsoid that fills the cuboid of each.",
+    ),
     ("map_side", "the map from the side, up being up."),
     ("error_over_time", "distance of each position from the true one, after alignment of the whole path."),
     (
@@ -114,17 +109,13 @@ const CAPTIONS: [(&str, &str); 8] = [
 ];
 
 /// What is told of one variant alone.
-fn variant(page: &mut Page, report: &VariantReport, record: &VariantRecord, config: &str) {
+fn variant(page: &mut Page, report: &VariantReport, record: &VariantRecord, palette: &Palette, config: &str) {
     page.heading(&report.name);
     if let Some(about) = &record.about {
         page.paragraph(about);
     }
     page.warnings(&report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
-    let palette = Palette::new(record.classes().into_iter());
-    let frames = frames_seen(record, record.images).into_iter();
-    let images =
-        frames.filter_map(|number| Some(image(record, number, record.frames.get(number)?, &palette, WIDTH)));
-    let images: Vec<Picture> = images.collect();
+    let images = images(record, palette, WIDTH);
     let caption =
         "Boxes as the detector drew them are dashed; outlines of the estimated ellipsoids are filled.";
     page.pictures(images.iter().map(|picture| (picture, caption.to_owned())));

@@ -18,24 +18,29 @@ pub(super) const SCRIPTS: [&str; 6] = [
 ];
 
 /// All that the script draws. Metres to a hundredth of a millimetre and pixels to a tenth: no more is seen.
-pub(super) fn data(run: &RunRecord) -> Value {
-    let palette = Palette::of(run);
+pub(super) fn data(run: &RunRecord, palette: &Palette) -> Value {
     let color = |ink: Ink| ink.hex(Theme::Light);
     json!({
         "colors": { "odometry": color(Ink::Odometry), "estimate": color(Ink::Estimate) },
-        "variants": run.variants.iter().map(|variant| of_variant(variant, &palette)).collect::<Vec<_>>(),
+        "variants": run.variants.iter().map(|variant| of_variant(variant, palette)).collect::<Vec<_>>(),
     })
 }
+
+/// Frames of a variant that the page has: more cannot be told apart on a screen, and a browser takes long to read them.
+const FRAMES: usize = 5000;
 
 fn of_variant(variant: &VariantRecord, palette: &Palette) -> Value {
     let start = variant.frames.first().map_or(0.0, |frame| frame.timestamp);
     let camera = &variant.camera;
     let up = numbers(variant.up.iter(), 6);
+    let every = variant.frames.len().div_ceil(FRAMES).max(1);
     json!({
         "name": variant.name,
         "up": up,
         "camera": [camera.fx, camera.fy, camera.cx, camera.cy, f64::from(camera.width), f64::from(camera.height)],
-        "frames": variant.frames.iter().map(|frame| of_frame(frame, start)).collect::<Vec<_>>(),
+        // each frame, or every second, third, … of a long recording
+        "every": every,
+        "frames": variant.frames.iter().step_by(every).map(|frame| of_frame(frame, start)).collect::<Vec<_>>(),
         "objects": variant.objects.iter().map(|object| of_object(object, palette)).collect::<Vec<_>>(),
     })
 }

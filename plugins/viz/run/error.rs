@@ -2,6 +2,7 @@
 use super::{TIME, clock};
 use crate::canvas::Ink;
 use crate::drawing::{Chart, Curve, Picture, figure};
+use manifactor_formats::words::count;
 use manifactor_slam::record::{FrameRecord, TrackedPose, VariantRecord};
 
 type Part = fn(&FrameRecord) -> &TrackedPose;
@@ -12,7 +13,8 @@ const BOTH: [(&str, Ink, Part); 2] =
 fn curves(variant: &VariantRecord, error: impl Fn(&TrackedPose) -> Option<f64>) -> Vec<Curve> {
     let clock = clock(variant);
     let curve = |(name, ink, of): &(&str, Ink, Part)| {
-        let points = variant.frames.iter().filter_map(|f| Some((clock(f.timestamp), error(of(f))?)));
+        let error = |f| error(of(f)).unwrap_or(f64::NAN);
+        let points = variant.frames.iter().map(|f| (clock(f.timestamp), error(f)));
         Curve::new(name, *ink, points.collect())
     };
     BOTH.iter().map(curve).collect()
@@ -47,7 +49,7 @@ pub(super) fn relative(variant: &VariantRecord, width: f64) -> Option<Picture> {
     };
     let panels = [panel("RPE (m)", 0, 1.0), panel("RPE (°)", 1, 1f64.to_degrees())];
     let frames = variant.relative_over;
-    let text = format!("relative pose error over {frames} frame{}", if frames == 1 { "" } else { "s" });
+    let text = format!("relative pose error over {}", count(frames, "frame"));
     let sheet = figure(&text, TIME, false, &panels, width, 0.7 * width)?;
     Some(Picture::new("relative_error", text, sheet))
 }

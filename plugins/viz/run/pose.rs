@@ -41,12 +41,13 @@ fn picture(
     let clock = clock(variant);
     let mut panels = labels.map(|y| Chart { y: y.to_owned(), ..Chart::default() });
     for (name, ink, of) in TRACKS {
-        let there = variant.frames.iter().filter_map(|f| Some((clock(f.timestamp), of(f)?)));
-        let (times, poses): (Vec<f64>, Vec<Se3>) = there.unzip();
-        let numbers = numbers(&poses);
+        let poses: Vec<Option<Se3>> = variant.frames.iter().map(of).collect();
+        let mut numbers = numbers(&poses.iter().copied().flatten().collect::<Vec<_>>()).into_iter();
+        let numbers: Vec<_> =
+            poses.iter().map(|pose| pose.and_then(|_| numbers.next()).unwrap_or([f64::NAN; 3])).collect();
         for (i, panel) in panels.iter_mut().enumerate() {
-            let points = times.iter().zip(&numbers).filter_map(|(t, n)| Some((*t, *n.get(i)?))).collect();
-            let curve = Curve::new(name, ink, points);
+            let points = variant.frames.iter().zip(&numbers).map(|(f, n)| (clock(f.timestamp), n[i]));
+            let curve = Curve::new(name, ink, points.collect());
             panel.curves.push(if ink == Ink::Truth { curve.dashed() } else { curve });
         }
     }

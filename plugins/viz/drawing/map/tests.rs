@@ -12,11 +12,12 @@ fn ellipsoid(centroid: [f64; 3], semi_axes: [f64; 3], yaw: f64) -> Shape {
 
 /// A camera on a circle around a table with four objects.
 fn desk() -> Scene {
-    let circle = |radius: f64, drift: f64| -> Vec<Vector3<f64>> {
+    let circle = |radius: f64, drift: f64| -> Vec<Option<Vector3<f64>>> {
         let angle = |k: usize| std::f64::consts::TAU * 0.9 * k as f64 / 100.0;
         let point = |k: usize| {
             let (sin, cos) = angle(k).sin_cos();
-            Vector3::new(radius * cos + drift * k as f64, radius * sin, 1.2 + 0.1 * (3.0 * angle(k)).sin())
+            let height = 1.2 + 0.1 * (3.0 * angle(k)).sin();
+            Some(Vector3::new(radius * cos + drift * k as f64, radius * sin, height))
         };
         (0..100).map(point).collect()
     };
@@ -81,18 +82,41 @@ fn an_estimate_far_away_does_not_shrink_the_rest() {
 }
 
 #[test]
+fn objects_around_a_camera_that_hardly_moved_are_shown() {
+    let mut scene = desk();
+    scene.objects.iter_mut().for_each(|object| object.truth = None);
+    let (track, stroke) = ("estimated".to_owned(), TRACKS[2].1);
+    for positions in [vec![Some(Vector3::zeros())], vec![Some(Vector3::zeros()), Some(Vector3::repeat(0.01))]]
+    {
+        scene.tracks = vec![Track { name: track.clone(), stroke, positions }];
+        assert!(!svg(&scene, Viewpoint::Top).contains("outside the picture"));
+    }
+}
+
+#[test]
+fn a_path_is_not_drawn_across_a_gap() {
+    let mut scene = desk();
+    scene.objects.clear();
+    let paths = |scene: &Scene| svg(scene, Viewpoint::Top).matches("stroke-dasharray").count();
+    let whole = paths(&scene);
+    scene.tracks[0].positions[30..70].fill(None);
+    assert_eq!(paths(&scene), whole + 1);
+}
+
+#[test]
 fn what_is_not_finite_is_left_out() {
     let mut scene = desk();
-    scene.tracks[2].positions[3] = Vector3::new(f64::NAN, 0.0, f64::INFINITY);
+    scene.tracks[2].positions[3] = None;
     scene.objects[1].estimate = Some(ellipsoid([f64::NAN; 3], [1.0; 3], 0.0));
     assert!(!svg(&scene, Viewpoint::Top).contains("NaN"));
 }
 
 #[test]
 fn an_empty_scene_is_an_empty_picture() {
-    for tracks in
-        [vec![], vec![Track { name: "one".into(), stroke: TRACKS[0].1, positions: vec![Vector3::zeros()] }]]
-    {
+    for tracks in [
+        vec![],
+        vec![Track { name: "one".into(), stroke: TRACKS[0].1, positions: vec![Some(Vector3::zeros())] }],
+    ] {
         let svg = svg(&Scene { tracks, ..Scene::default() }, Viewpoint::Top);
         assert!(svg.contains("</svg>"));
     }

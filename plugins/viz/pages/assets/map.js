@@ -6,6 +6,7 @@ class MapView {
     this.canvas = this.find("canvas");
     this.renderer = new Renderer(this.canvas);
     this.extent = extent(run.variants);
+    this.mostError = run.variants.flatMap(v => v.frames).reduce((most, f) => Math.max(most, f[5] ?? 0), 1e-9);
     this.state = { frame: 0, selected: null, show: {}, active: this.first() };
     this.orbit = new Orbit(this.canvas, run.variants[0].up, this.extent, () => this.redraw(), (x, y) => this.tap(x, y), e => this.pressed(e));
     this.controls();
@@ -13,6 +14,8 @@ class MapView {
     new ResizeObserver(() => this.redraw()).observe(this.canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
     this.panels();
+    // at once: an error is told in place of the map
+    this.draw();
   }
 
   // On a wide screen the first variant and the last; else the last alone.
@@ -27,6 +30,11 @@ class MapView {
 
   get frames() {
     return Math.max(...this.variants.map(v => v.frames.length), 1);
+  }
+
+  // The longest of the variants shown tells the time.
+  get longest() {
+    return this.variants.reduce((a, b) => (b.frames.length > a.frames.length ? b : a));
   }
 
   controls() {
@@ -62,8 +70,9 @@ class MapView {
   goTo(frame) {
     this.state.frame = Math.min(Math.max(frame, 0), this.frames - 1);
     this.find("time").value = this.state.frame;
-    const seconds = this.variants[0].frames[this.state.frame]?.[0];
-    this.find("clock").textContent = `frame ${this.state.frame}${seconds == null ? "" : `, ${seconds.toFixed(2)} s`}`;
+    const { frames, every } = this.longest, seconds = frames[this.state.frame]?.[0];
+    const thinned = every > 1 ? ` (every ${every}th is shown)` : "";
+    this.find("clock").textContent = `frame ${this.state.frame * every}${seconds == null ? "" : `, ${seconds.toFixed(2)} s`}${thinned}`;
     this.redraw();
   }
 
@@ -159,7 +168,7 @@ class MapView {
     const depth = 0.09 * this.extent.radius, gravity = show.grid ? ground(segments, variant.up, this.extent, style.grid).gravity : null;
     if (show.truth) segments.path(frames.map(f => f[1]), 2, () => truth, true);
     if (show.odometry) segments.path(frames.map(f => f[2]), 2, () => odometry);
-    const most = this.mostError();
+    const most = this.mostError;
     segments.path(frames.map(f => f[4]), show.error ? 5 : 3, i => show.error && frames[i][5] != null ? ramp(frames[i][5] / most) : estimate);
     const each = Math.max(1, Math.round(frames.length / 16));
     if (show.frusta) frames.forEach((f, i) => { if (i % each === 0) segments.frustum(f[4], camera, 0.6 * depth, estimate.map(c => 0.5 * c + 0.5 * style.paper[0]), 1); });
@@ -174,10 +183,6 @@ class MapView {
         segments.add(now[4], object.estimate, color.map((c, i) => 0.6 * c + 0.4 * style.paper[i]), 1, { dashed: true });
     }
     return { ellipsoids, segments: segments.numbers, gravity };
-  }
-
-  mostError() {
-    return Math.max(...this.run.variants.flatMap(v => v.frames).map(f => f[5] ?? 0), 1e-9);
   }
 
   // The names of objects that have room, nearest first, and the variant's own.
@@ -215,7 +220,7 @@ class MapView {
     const list = [];
     if (known && show.truth) list.push(entry("true path; cuboids are true objects", style.text, "dashed"));
     if (show.odometry) list.push(entry("odometry", this.run.colors.odometry));
-    if (show.error && known) list.push(entry(`error of the estimated path, 0 to ${this.mostError().toPrecision(3)} m`, "", "ramp"));
+    if (show.error && known) list.push(entry(`error of the estimated path, 0 to ${this.mostError.toPrecision(3)} m`, "", "ramp"));
     else list.push(entry("estimated", this.run.colors.estimate));
     this.find("key").replaceChildren(...list);
   }
@@ -226,6 +231,7 @@ try {
   window.mapView = new MapView(JSON.parse(document.getElementById("run-data").textContent));
 } catch (error) {
   document.documentElement.dataset.map = "static";
+  document.documentElement.classList.remove("webgl");
   document.querySelector("#static-map figcaption")?.append(` (${error.message})`);
 }
 document.documentElement.dataset.map ??= "webgl";

@@ -24,12 +24,15 @@ class Segments {
   add(a, b, color, width, { to = color, along = 0, dashed = false } = {}) {
     this.numbers.push(...a.slice(0, 3), ...b.slice(0, 3), ...color, ...to, along, width, dashed ? 1 : 0);
   }
+  // A path through the points that are known, with no line where more are missing than five times as many as usual.
   path(points, width, color, dashed = false) {
+    const known = [...points.keys()].filter(i => points[i]), steps = known.slice(1).map((k, i) => k - known[i]);
+    const gap = 5 * (steps.toSorted((a, b) => a - b)[steps.length >> 1] ?? 1);
     let along = 0;
-    for (let i = 1; i < points.length; i++) {
-      const [a, b] = [points[i - 1], points[i]];
-      if (!a || !b) continue;
-      this.add(a, b, color(i - 1), width, { to: color(i), along, dashed });
+    for (let k = 1; k < known.length; k++) {
+      if (steps[k - 1] > gap) continue;
+      const [i, j] = [known[k - 1], known[k]], [a, b] = [points[i], points[j]];
+      this.add(a, b, color(i), width, { to: color(j), along, dashed });
       along += norm(sub(b, a));
     }
   }
