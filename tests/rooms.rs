@@ -105,24 +105,47 @@ fn needs(of_crate: &Path) -> BTreeMap<String, BTreeSet<String>> {
     needs
 }
 
+/// The rooms of a crate, floor by floor from the ground; and those that need each other, or need such, with what they need.
+fn floors(of_crate: &Path) -> (Vec<BTreeSet<String>>, BTreeMap<String, BTreeSet<String>>) {
+    let (mut left, mut floors) = (needs(of_crate), vec![]);
+    loop {
+        let floor: BTreeSet<String> =
+            left.iter().filter(|(_, needs)| needs.is_empty()).map(|(room, _)| room.clone()).collect();
+        if floor.is_empty() {
+            return (floors, left);
+        }
+        left.retain(|room, _| !floor.contains(room));
+        left.values_mut().for_each(|needs| needs.retain(|need| !floor.contains(need)));
+        floors.push(floor);
+    }
+}
+
 #[test]
 fn rooms_are_in_floors() {
     let mut circles = vec![];
     for of_crate in crates() {
-        let mut left = needs(&of_crate);
-        // floor by floor, from the ground: rooms that need none of those left, until only circles are
-        loop {
-            let names: BTreeSet<String> = left.keys().cloned().collect();
-            left.iter_mut().for_each(|(_, needs)| needs.retain(|need| names.contains(need)));
-            left.retain(|_, needs| !needs.is_empty());
-            if left.len() == names.len() {
-                break;
-            }
-        }
-        let name = of_crate.strip_prefix(root()).unwrap().display();
-        circles.extend(left.into_iter().map(|(room, needs)| format!("{name}: {room} needs {needs:?}")));
+        let name = of_crate.strip_prefix(root()).unwrap().display().to_string();
+        let needs = floors(&of_crate).1.into_iter();
+        circles.extend(needs.map(|(room, needs)| format!("{name}: {room} needs {needs:?}")));
     }
     assert!(circles.is_empty(), "rooms that need each other, and what needs those:\n{}", circles.join("\n"));
+}
+
+#[test]
+fn the_plan_of_the_house_is_as_it_is_built() {
+    let page = std::fs::read_to_string(root().join("docs/decisions/folders.md")).unwrap();
+    let mut wrong = vec![];
+    for of_crate in crates() {
+        let name = of_crate.file_name().unwrap().to_str().unwrap();
+        let floor = |rooms: &BTreeSet<String>| rooms.iter().cloned().collect::<Vec<_>>().join(", ");
+        let floors = floors(&of_crate).0.iter().map(floor).collect::<Vec<_>>().join(" · ");
+        let files = sources(&of_crate).iter().filter(|file| file.parent() == Some(&of_crate)).count();
+        let is_row = |line: &&str| line.starts_with(&format!("| {name} | {floors} | {files} |"));
+        if page.lines().filter(is_row).count() != 1 {
+            wrong.push(format!("| {name} | {floors} | {files} |"));
+        }
+    }
+    assert!(wrong.is_empty(), "docs/decisions/folders.md should have these rows:\n{}", wrong.join("\n"));
 }
 
 #[test]
