@@ -64,7 +64,7 @@ impl<'e> Section<'e> {
     }
 
     /// Takes a field as it stands; an error if it is not there.
-    pub fn take_required(&mut self, field: &str) -> Option<&'e Node> {
+    pub(crate) fn take_required(&mut self, field: &str) -> Option<&'e Node> {
         let node = self.take(field);
         if node.is_none() {
             self.missing.push(field.to_owned());

@@ -48,7 +48,7 @@ impl SourceText {
     }
 
     /// Line and column of a byte offset, both from 1; the column counts characters.
-    pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
+    pub(crate) fn line_and_column(&self, offset: usize) -> (usize, usize) {
         let text = self.text();
         let lines = self.0.lines.get_or_init(|| {
             std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect()
@@ -105,7 +105,7 @@ impl Place {
 
     /// The part on the first line, so that a message about a long table does not show all of it.
     #[must_use]
-    pub fn first_line(mut self) -> Place {
+    pub(crate) fn first_line(mut self) -> Place {
         if let Some(length) = self.text().find(['\n', '\r']) {
             self.end = self.start + length as u32;
         }

@@ -86,10 +86,13 @@ impl Failure {
         for report in self.reports() {
             output::say_styled(&report);
         }
+        if self.omitted() > 0 {
+            output::say(&format!("and {} more errors", self.omitted()));
+        }
     }
 
     fn to_json(&self) -> Value {
-        let errors = match self {
+        let errors: Vec<Value> = match self {
             Self::Documents(list) => list.iter().map(place_as_json).collect(),
             Self::Input { message, help } => vec![json!({ "message": message, "help": help })],
             Self::NotThere { message } => vec![json!({ "message": message })],
@@ -97,7 +100,18 @@ impl Failure {
                 vec![json!({ "message": source.to_string(), "file": path.display().to_string() })]
             }
         };
-        json!({ "errors": errors })
+        match self.omitted() {
+            0 => json!({ "errors": errors }),
+            omitted => json!({ "errors": errors, "omitted": omitted }),
+        }
+    }
+
+    /// How many errors there are besides those that are told.
+    fn omitted(&self) -> usize {
+        match self {
+            Self::Documents(list) => list.omitted(),
+            _ => 0,
+        }
     }
 
     fn reports(&self) -> Vec<String> {
