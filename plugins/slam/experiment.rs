@@ -47,5 +47,6 @@ pub use output::write;
 pub use runner::{Progress, run};
 pub use summary::{Comparison, Group, Summary};
 pub use summary_settings::SummarySettings;
-pub use table::{times_table, trials_table};
+pub(crate) use table::times_table;
+pub use table::trials_table;
 pub use trial::{Trial, TrialOutcome, TrialRecord};

@@ -8,7 +8,7 @@ use crate::estimate::Estimate;
 use crate::output::record::{FrameRecord, RECORD, RunRecord, VariantRecord};
 use crate::output::report::{RunReport, VariantReport};
 use crate::settings::run_document::{RunDocument, Variant, absolute, slug};
-use manifactor_config::{Format, WriteError, to_json, to_toml, write_graph};
+use manifactor_config::{Format, WriteError, to_toml, write_graph};
 use manifactor_formats::table::TableError;
 use manifactor_formats::tum;
 use manifactor_formats::whole;
@@ -58,7 +58,7 @@ pub enum OutputError {
 }
 
 /// The folder of a variant.
-pub fn variant_folder(output: &Path, variant: &str) -> PathBuf {
+pub(crate) fn variant_folder(output: &Path, variant: &str) -> PathBuf {
     output.join(slug(variant))
 }
 
@@ -80,7 +80,7 @@ pub fn write_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputE
 /// Where one cannot be written.
 pub fn write_report(output: &Path, report: &RunReport, record: &RunRecord) -> Result<(), OutputError> {
     write_document(&output.join(RECORD), compact(record))?;
-    write_document(&output.join("report.json"), to_json(report))
+    write_document(&output.join("report.json"), results(report))
 }
 
 /// Writes all files of a variant into its folder, and returns it.
@@ -98,15 +98,15 @@ pub fn write_variant(
     let file = |name: &str| folder.join(name);
     write_document(&file("config.toml"), resolved(run, variant))?;
     write_whole(&file("trajectory.txt"), tum::format(&estimate.trajectory()))?;
-    write_document(&file("objects.json"), to_json(&report.objects))?;
+    write_document(&file("objects.json"), results(&report.objects))?;
     write_document(&file("frames.jsonl"), lines(&record.frames))?;
     let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);
     write_document(&file("graph.json"), graph)?;
     write_whole(&file("iterations.csv"), iterations(&estimate.solution.outcome.history))?;
-    write_document(&file("metrics.json"), to_json(report))?;
+    write_document(&file("metrics.json"), results(report))?;
     if variant.settings.report.covariances {
         let marginals = estimate.solution.marginals(&estimate.mapping.graph, &[])?;
-        write_document(&file("covariances.json"), to_json(&marginals))?;
+        write_document(&file("covariances.json"), results(&marginals))?;
     }
     Ok(folder)
 }
@@ -122,13 +122,19 @@ fn lines(frames: &[FrameRecord]) -> Result<String, WriteError> {
     frames.iter().map(|frame| Ok(compact(frame)? + "\n")).collect()
 }
 
-/// JSON on one line.
+/// Results as JSON, to be read by people as well. Unlike in a document, a number may be infinite or none, as a cost that
+/// overflows is: it is null.
+pub(crate) fn results(value: &impl Serialize) -> Result<String, WriteError> {
+    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(inexpressible)
+}
+
+/// The same on one line.
 fn compact(value: &impl Serialize) -> Result<String, WriteError> {
-    let problem = |error: serde_json::Error| WriteError::Inexpressible {
-        format: Format::Json,
-        message: error.to_string(),
-    };
-    serde_json::to_string(value).map_err(problem)
+    serde_json::to_string(value).map_err(inexpressible)
+}
+
+fn inexpressible(error: serde_json::Error) -> WriteError {
+    WriteError::Inexpressible { format: Format::Json, message: error.to_string() }
 }
 
 /// The settings of one variant as a document of its own.

@@ -5,7 +5,7 @@ use crate::output;
 use crate::output::text::count;
 use crate::status::Status;
 use clap::Args;
-use manifactor::slam::output::write_whole;
+use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::slam::record::{RecordError, RunRecord};
 use manifactor::viz::{ply, run_pictures};
 use std::path::PathBuf;
@@ -22,12 +22,18 @@ pub(crate) struct Plot {
     /// The folder for the pictures. Default: that of the run.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Write into --out even where others have written there.
+    #[arg(long, requires = "out")]
+    force: bool,
 }
 
 impl Plot {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         let record = RunRecord::read(&self.folder)?;
         let out = self.out.as_ref().unwrap_or(&self.folder);
+        // the run's own pictures are made again; another folder has to be ours
+        let claim = |out| OutputFolder::claim(out, "plot", &self.folder, self.force);
+        let _claimed = self.out.as_deref().map(claim).transpose()?;
         let mut written = 0;
         for variant in &record.variants {
             let pictures = run_pictures(&record, variant, self.look.width());

@@ -1,8 +1,8 @@
 //! The files that an experiment leaves.
 use super::document::Documents;
 use super::{Comparison, Experiment, Interval, Journal, Summary, times_table, trials_table};
-use crate::output::{OutputError, write_document, write_whole};
-use manifactor_config::{to_json, to_toml};
+use crate::output::{OutputError, results, write_document, write_whole};
+use manifactor_config::to_toml;
 use manifactor_formats::table::{Column, Table, TableError, to_parquet};
 use std::fmt;
 
@@ -28,7 +28,7 @@ pub fn write(experiment: &Experiment, journal: &Journal) -> Result<Summary, Outp
     let summary = Summary::new(experiment, journal);
     write("summary.csv", csv(&summary.table()))?;
     write_whole(&file("summary.md"), summary.markdown())?;
-    write_document(&file("summary.json"), to_json(&summary))?;
+    write_document(&file("summary.json"), results(&summary))?;
     Ok(summary)
 }
 

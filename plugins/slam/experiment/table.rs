@@ -26,7 +26,7 @@ pub fn trials_table(experiment: &Experiment, journal: &Journal) -> Table {
 }
 
 /// How long each trial took, in seconds.
-pub fn times_table(experiment: &Experiment, journal: &Journal) -> Table {
+pub(crate) fn times_table(experiment: &Experiment, journal: &Journal) -> Table {
     let records: Vec<&TrialRecord> = records(experiment, journal).collect();
     let mut columns = labels(experiment, &records);
     let seconds = records.iter().map(|record| Some(record.seconds)).collect();

@@ -8,7 +8,7 @@ use crate::settings::run_document::{Variant, slug};
 use manifactor_graph::Direction;
 use manifactor_quadric::Camera;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::{Path, PathBuf};
 
 mod drawn;
@@ -23,7 +23,7 @@ pub use objects::{ObjectRecord, Solid};
 pub use variables::OwnVariable;
 
 /// The file that holds it, in the folder of the run.
-pub const RECORD: &str = "record.json";
+pub(crate) const RECORD: &str = "record.json";
 
 /// Why a record could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -37,13 +37,23 @@ pub enum RecordError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// It is not one, or another version wrote it.
-    #[error("{} is not a record of this version of manifactor: {source}", path.display())]
+    /// It is not one, or one with other fields, as another version may have written.
+    #[error("{} is not a record of a run, as this version writes them: {source}", path.display())]
     NotARecord {
         /// The file.
         path: PathBuf,
         /// What is wrong.
         source: serde_json::Error,
+    },
+    /// Pictures would be written somewhere else.
+    #[error("{}: the variant {variant:?} has the folder {folder:?}, which is not that of its name", path.display())]
+    Folder {
+        /// The file.
+        path: PathBuf,
+        /// The variant.
+        variant: String,
+        /// What the file says.
+        folder: String,
     },
 }
 
@@ -85,6 +95,7 @@ pub struct VariantRecord {
     /// Variables of the run's own.
     pub variables: Vec<OwnVariable>,
     /// The cost after each accepted step; the first is where the solve began.
+    #[serde(deserialize_with = "finite_or_nan")]
     pub cost: Vec<f64>,
     /// Residuals at the estimate, by type of factor.
     pub residuals: Vec<FactorResiduals>,
@@ -101,12 +112,21 @@ impl RunRecord {
     /// Reads the record of a run's folder.
     ///
     /// # Errors
-    /// Where there is none, or one of another version.
+    /// Where there is none, it cannot be read, or a variant's folder is not within that of the run.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let path = folder.join(RECORD);
         let text = std::fs::read_to_string(&path)
             .map_err(|source| RecordError::Io { path: path.clone(), source })?;
-        serde_json::from_str(&text).map_err(|source| RecordError::NotARecord { path, source })
+        let record: Self = match serde_json::from_str(&text) {
+            Ok(record) => record,
+            Err(source) => return Err(RecordError::NotARecord { path, source }),
+        };
+        match record.variants.iter().find(|variant| variant.folder != slug(&variant.name)) {
+            Some(VariantRecord { name, folder, .. }) => {
+                Err(RecordError::Folder { path, variant: name.clone(), folder: folder.clone() })
+            }
+            None => Ok(record),
+        }
     }
 }
 
@@ -140,6 +160,12 @@ impl VariantRecord {
         names.dedup();
         names
     }
+}
+
+/// Numbers, of which those that are not finite were written as null.
+fn finite_or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
+    let numbers = Vec::<Option<f64>>::deserialize(from)?;
+    Ok(numbers.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
 }
 
 /// Up in the frame of the record. If it is unknown, up in the first image is the best guess.

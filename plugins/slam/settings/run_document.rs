@@ -20,7 +20,7 @@
 //! name = "with orientation"
 //! ```
 use crate::settings::Settings;
-use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Node, Placed, Section, merge};
+use manifactor_config::{Diagnostic, Diagnostics, Document, Errors, Fault, Node, Placed, Section, merge};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Map;
@@ -127,6 +127,10 @@ pub(crate) fn split(root: &Node, errors: &Errors) -> Option<(Header, Node)> {
     settings.retain(|field| !Header::FIELDS.contains(&field));
     let header = header.read::<Header>(errors).unwrap_or_default();
     for (i, second) in header.variants.iter().enumerate() {
+        if slug(&second.name).len() > LONGEST {
+            let long = format!("names a folder, and is longer than {LONGEST} letters");
+            errors.report(second.name.place.clone(), Fault::invalid(long));
+        }
         let mut earlier = header.variants.iter().take(i);
         // their folders would be one
         if let Some(first) = earlier.find(|first| slug(&first.name) == slug(&second.name)) {
@@ -170,8 +174,11 @@ fn read_variants(
     variants.into_iter().collect()
 }
 
+/// Bytes of the name of a folder that all file systems take, with room for what is written beside it.
+const LONGEST: usize = 200;
+
 /// A name as part of a path: letters, digits and hyphens.
-pub fn slug(name: &str) -> String {
+pub(crate) fn slug(name: &str) -> String {
     let plain: String =
         name.chars().map(|c| if c.is_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
     let parts: Vec<&str> = plain.split('-').filter(|part| !part.is_empty()).collect();

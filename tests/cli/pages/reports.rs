@@ -188,3 +188,25 @@ fn pictures_are_made_again_from_the_folder() {
     let nowhere = manifactor(&format!("plot {}", path(&folder, "nowhere"))).ended(3);
     assert!(nowhere.stderr.contains("record.json"), "{}", nowhere.stderr);
 }
+
+#[test]
+fn pictures_go_nowhere_but_into_their_folders() {
+    let folder = folder(&[]);
+    let (out, other) = (path(&folder, "desk"), path(&folder, "other"));
+    manifactor(&format!(
+        "run examples/desk/desk.toml --out {out} --set source.trajectory.frames=20 --set source.scene.objects=4"
+    ));
+    // another's folder
+    std::fs::create_dir_all(format!("{other}/quadricslam")).unwrap();
+    std::fs::write(format!("{other}/quadricslam/map.ply"), "precious").unwrap();
+    manifactor(&format!("plot {out} --out {other}")).ended(2);
+    assert_eq!(std::fs::read_to_string(format!("{other}/quadricslam/map.ply")).unwrap(), "precious");
+    manifactor(&format!("plot {out} --out {other} --force")).ended(0);
+    // a record that leads out of the folder
+    let record = std::fs::read_to_string(format!("{out}/record.json")).unwrap();
+    let moved = record.replacen("\"folder\":\"quadricslam\"", "\"folder\":\"../escaped\"", 1);
+    assert_ne!(moved, record);
+    std::fs::write(format!("{out}/record.json"), moved).unwrap();
+    manifactor(&format!("plot {out}")).ended(2).complains("which is not that of its name");
+    assert!(!Path::new(&path(&folder, "escaped")).exists());
+}

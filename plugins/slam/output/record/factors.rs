@@ -18,6 +18,7 @@ pub struct FactorResiduals {
     /// The mean of the weights that losses give them.
     pub weight: f64,
     /// All rows of all factors, in standard deviations.
+    #[serde(deserialize_with = "super::finite_or_nan")]
     pub rows: Vec<f64>,
 }
 
@@ -31,6 +32,7 @@ pub struct AppliedFactor {
     /// The other variables that it connects.
     pub with: Vec<String>,
     /// Its residual at the estimate, in standard deviations; empty where it takes no part.
+    #[serde(deserialize_with = "super::finite_or_nan")]
     pub residual: Vec<f64>,
 }
 
