@@ -248,3 +248,13 @@ fn the_defaults_of_every_schema_are_those_that_are_read() {
     }
     assert!(compared > 100, "{compared}");
 }
+
+#[test]
+fn the_example_of_a_literal_graph_is_one() {
+    let source = include_str!("../core/config/graph_document/read.rs");
+    let example = source.split("/// ```toml").nth(1).unwrap().split("/// ```").next().unwrap();
+    let text: String = example.lines().map(|line| line.trim_start_matches("///").to_owned() + "\n").collect();
+    let document = Document::parse("read.rs", text, Format::Toml).unwrap();
+    let (graph, values) = manifactor::config::read_graph(&document).unwrap();
+    assert_eq!((graph.factors().len(), values.len()), (1, 2));
+}

@@ -3,8 +3,9 @@
 //! It begins with what there is, name by name, so that a reader finds the way from a document to a type and back.
 pub(crate) mod fields;
 
+use crate::input::graph_file;
 use crate::reference::fields::{Field, fields};
-use manifactor::config::{Definitions, graph_root};
+use manifactor::config::Definitions;
 use manifactor::graph::Noise;
 use manifactor::graph::catalogue::{self, Entry};
 use manifactor::graph::invariance::invariances_of;
@@ -31,7 +32,7 @@ type Root = fn(&mut Definitions) -> Value;
 /// The whole page.
 pub(crate) fn markdown() -> String {
     let roots: [(&str, Root); 4] = [
-        ("A literal graph", graph_root),
+        ("A literal graph", graph_file::root),
         ("A run", run_root),
         ("A file of semantic rules", rules_root),
         ("An experiment", experiment_root),

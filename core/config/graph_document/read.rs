@@ -14,12 +14,16 @@ use std::sync::Arc;
 /// ```toml
 /// [[variables]]
 /// key = "x0"
-/// value = { type = "se2", x = 0.0, y = 0.0, theta = 0.0 }
+/// value = { type = "se2", translation = [0.0, 0.0], angle = 0.0 }
 /// fixed = true                                   # or the names of some directions of its tangent space
+///
+/// [[variables]]
+/// key = "x1"
+/// value = { type = "se2", translation = [1.0, 0.0], angle = 0.1 }
 ///
 /// [[factors]]
 /// keys = ["x0", "x1"]
-/// factor = { type = "between_se2", x = 1.0, y = 0.0, theta = 0.1 }
+/// factor = { type = "between_se2", relative = { translation = [1.0, 0.0], angle = 0.1 } }
 /// noise = { sigmas = [0.1, 0.1, 0.02] }          # unit, where it is left out
 /// loss = { type = "huber", scale = 1.345 }       # none, where it is left out
 /// ```

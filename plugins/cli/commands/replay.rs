@@ -9,7 +9,7 @@ use crate::output::text::{Table, count, keys, seconds};
 use crate::status::Status;
 use clap::Args;
 use manifactor::formats::replay::{Latencies, Replay as Steps};
-use manifactor::online::{Finished, Report, Session, Settings};
+use manifactor::online::{Finished, Report, Session};
 use manifactor::solve::{All, Interrupt, Silent};
 use serde_json::json;
 use std::path::PathBuf;
@@ -28,10 +28,10 @@ pub(crate) struct Replay {
     solver: SolverArguments,
     #[command(flatten)]
     reading: graph_file::Reading,
-    /// Tell of every N-th pose. With --json: a line of JSON for each. The last is always told of.
+    /// Report every N-th pose, and always the last; with --json, a line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
-    /// Solve what is known at each pose that is told of as one batch, too, and tell how much more the estimate costs. Not timed.
+    /// At each reported pose, also solve everything so far as one batch, and print by what share the estimate costs more. Not timed.
     #[arg(long)]
     gap: bool,
     #[command(flatten)]
@@ -52,6 +52,12 @@ struct Replayed {
 impl Replay {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         self.destination.check(&self.graph)?;
+        if self.solver.names_a_start() {
+            return Err(Failure::with_help(
+                "a replay begins each pose where odometry leads: --start has no meaning here",
+                "leave it out",
+            ));
+        }
         let input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.iter().for_each(|note| output::note(note));
         let mut interrupt = interrupt::on_ctrl_c();
@@ -76,7 +82,7 @@ impl Replay {
     }
 
     fn replay(&self, input: &GraphFile, interrupt: &Interrupt) -> Result<Replayed, Failure> {
-        let session = Session::new(Settings::default()).map_err(Failure::input)?;
+        let session = Session::new(input.online.clone()).map_err(Failure::input)?;
         let report = Report::default();
         let mut replayed = Replayed { session, times: vec![], report, interrupted: false };
         let mut steps = Steps::of(&input.graph);

@@ -3,10 +3,12 @@ use crate::failure::Failure;
 use crate::input::solver::SolverArguments;
 use crate::output::text::count;
 use clap::{Args, ValueEnum};
-use manifactor::config::{Document, Errors, Format, read_graph_section};
+use manifactor::config::{Definitions, Document, Errors, Format, graph_root, read_graph_section};
 use manifactor::formats::{self, GraphFormat, GraphRead, Repair, read_text};
 use manifactor::graph::{Graph, Values};
+use manifactor::online::Settings as Online;
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -37,6 +39,8 @@ pub(crate) struct GraphFile {
     pub values: Values,
     pub optimizer: Box<dyn Optimizer>,
     pub start: Box<dyn Start>,
+    /// How `replay` trades time for accuracy.
+    pub online: Online,
     /// What the reader had to decide.
     pub notes: Vec<String>,
 }
@@ -52,7 +56,7 @@ impl Reading {
         }
     }
 
-    /// A file in a registered format: solver and start are all that `--set` can set.
+    /// A file in a registered format: solver, start and `online` are all that `--set` can set.
     fn plain(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         let mut settings = Document::parse("settings", "", Format::Toml)?;
         solver.apply(&mut settings)?;
@@ -60,15 +64,16 @@ impl Reading {
         let chosen = settings.section(&errors).and_then(|mut section| {
             let optimizer = solver.take(&mut section, settings.source());
             let start = solver.take_start(&mut section, settings.source());
+            let online = section.optional("online").unwrap_or_default();
             section.finish();
-            optimizer.zip(start)
+            Some((optimizer?, start?, online))
         });
-        let (optimizer, start) = errors.finish(chosen)?;
+        let (optimizer, start, online) = errors.finish(chosen)?;
         // a pipe can be read once
         let text = read_text(path)?;
         let format = GraphFormat::of(path, &text).ok_or_else(|| unknown_format(path))?;
         let GraphRead { graph, values, notes } = (format.parse)(&text, path, self.choices())?;
-        Ok(GraphFile { graph, values, optimizer, start, notes })
+        Ok(GraphFile { graph, values, optimizer, start, online, notes })
     }
 
     fn choices(&self) -> formats::Reading {
@@ -81,7 +86,14 @@ impl Reading {
     }
 }
 
-/// A literal graph, which may name its solver and its start.
+/// The schema of a graph's document: of the graph, and of what the commands read beside it.
+pub(crate) fn root(definitions: &mut Definitions) -> Value {
+    let mut root = graph_root(definitions);
+    root["properties"]["online"] = definitions.of::<Online>();
+    root
+}
+
+/// A literal graph, which may name its solver and its start, and how it is replayed.
 pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Result<GraphFile, Failure> {
     solver.apply(&mut document)?;
     let errors = Errors::new();
@@ -89,8 +101,9 @@ pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Resul
         let (graph, values) = read_graph_section(&mut section);
         let optimizer = solver.take(&mut section, document.source());
         let start = solver.take_start(&mut section, document.source());
+        let online = section.optional("online").unwrap_or_default();
         section.finish();
-        Some(GraphFile { graph, values, optimizer: optimizer?, start: start?, notes: Vec::new() })
+        Some(GraphFile { graph, values, optimizer: optimizer?, start: start?, online, notes: Vec::new() })
     });
     Ok(errors.finish(read.flatten())?)
 }

@@ -9,10 +9,10 @@ use std::path::Path;
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct Look {
     /// The width of pictures, in pixels of the SVG; a PNG has two for each.
-    #[arg(long, value_name = "PIXELS", default_value = "900", value_parser = clap::value_parser!(u16).range(300..=4000))]
+    #[arg(long, value_name = "PIXELS", default_value_t = Look::default().size, value_parser = clap::value_parser!(u16).range(300..=4000))]
     size: u16,
     /// The theme of pictures.
-    #[arg(long, value_enum, default_value = "light")]
+    #[arg(long, value_enum, default_value_t = Look::default().theme)]
     theme: Shade,
 }
 

@@ -20,6 +20,11 @@ pub(crate) struct SolverArguments {
 }
 
 impl SolverArguments {
+    /// Whether `--start` is given.
+    pub(crate) fn names_a_start(&self) -> bool {
+        self.start.is_some()
+    }
+
     /// `--set` alone.
     pub(crate) fn set_only(set: &[String]) -> Self {
         Self { solver: None, start: None, set: set.to_vec() }

@@ -55,3 +55,35 @@ fn a_graph_without_poses_is_refused() {
         .ended(2)
         .complains("there are no poses to replay");
 }
+
+#[test]
+fn settings_come_from_the_document_and_the_command_line() {
+    let folder = folder(&[("square.g2o", &square())]);
+    let graph = path(&folder, "square.g2o");
+    let gap = |options: &str| {
+        let ran = manifactor(&format!("replay {graph} --json --gap {options}")).ended(0);
+        let relinearized = lines(&ran.stdout)[0]["report"]["relinearized"].as_u64().unwrap();
+        (lines(&ran.stdout)[0]["gap"].as_f64().unwrap(), relinearized)
+    };
+    // all that moves is linearized anew at each update: the last update is a step of Gauss-Newton
+    let exact = "--set online.relinearize_every=1 --set online.bend=0 --set online.deviation=0";
+    assert!(gap(exact).0 < 1e-9 && gap(exact).1 > gap("").1);
+    // the same from a document
+    let literal = path(&folder, "square.toml");
+    manifactor(&format!("solve {graph} --out {literal}")).ended(0);
+    let text = std::fs::read_to_string(&literal).unwrap();
+    let settings = "[online]\nrelinearize_every = 1\nbend = 0.0\ndeviation = 0.0\n";
+    std::fs::write(&literal, text + "\n" + settings).unwrap();
+    let ran = manifactor(&format!("replay {literal} --json --gap")).ended(0);
+    assert!(lines(&ran.stdout)[0]["gap"].as_f64().unwrap() < 1e-9);
+    manifactor(&format!("solve {literal}")).ended(0);
+    manifactor(&format!("replay {graph} --set online.bend=-1")).ended(2).complains("0 or more");
+    manifactor(&format!("replay {graph} --set online.bent=1")).ended(2).complains("did you mean `bend`?");
+}
+
+#[test]
+fn a_start_is_refused() {
+    let folder = folder(&[("square.g2o", &square())]);
+    let graph = path(&folder, "square.g2o");
+    manifactor(&format!("replay {graph} --start chordal")).ended(2).complains("--start has no meaning here");
+}

@@ -129,3 +129,27 @@ fn a_variable_of_a_run_is_no_pose_and_no_object() {
     run("quarter").ended(0);
     run("q1").ended(2).complains("`q1` is the key of a pose or an object");
 }
+
+#[test]
+fn a_cost_that_overflows_is_told_in_a_report() {
+    let folder = folder(&[]);
+    let out = path(&folder, "desk");
+    let ran = manifactor(&format!(
+        "run examples/desk/desk.toml --json --out {out} {SMALL} --set detections.noise.sigma=1e-170"
+    ));
+    assert_eq!(ran.code, 1, "{}", ran.stderr);
+    let solve = &ran.json()["variants"][0]["solve"];
+    assert!(solve["initial_cost"].is_null() && solve["termination"]["status"] != "converged", "{solve}");
+    assert!(Path::new(&out).join("report.html").is_file());
+    manifactor(&format!("plot {out}")).ended(0);
+}
+
+#[test]
+fn a_name_that_is_too_long_for_a_folder_is_refused_before_the_run() {
+    let long = "n".repeat(300);
+    let text = format!("source = {{ type = \"simulated\" }}\n[[variants]]\nname = \"{long}\"\n");
+    let folder = folder(&[("long.toml", &text)]);
+    manifactor(&format!("check {}", path(&folder, "long.toml")))
+        .ended(2)
+        .complains("names a folder, and is longer than 200 letters");
+}

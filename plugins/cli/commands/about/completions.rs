@@ -5,7 +5,7 @@ use crate::status::Status;
 use clap::{Args, Command};
 use clap_complete::{Shell, generate};
 
-/// Print what a shell needs to complete commands and flags.
+/// Print a script by which a shell completes commands and flags.
 ///
 /// For bash: manifactor completions bash > ~/.local/share/bash-completion/completions/manifactor
 #[derive(Debug, Args)]

@@ -1,9 +1,10 @@
 //! `manifactor schema`: one JSON Schema for editors.
 use crate::failure::Failure;
+use crate::input::graph_file;
 use crate::output;
 use crate::status::Status;
 use clap::{Args, ValueEnum};
-use manifactor::config::{Definitions, graph_root};
+use manifactor::config::Definitions;
 use manifactor::slam::schema::{experiment_root, rules_root, run_root};
 use serde_json::{Value, json};
 
@@ -33,12 +34,12 @@ impl Schema {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         let mut definitions = Definitions::new();
         let root = match self.document {
-            Document::Graph => graph_root(&mut definitions),
+            Document::Graph => graph_file::root(&mut definitions),
             Document::Run => run_root(&mut definitions),
             Document::Experiment => experiment_root(&mut definitions),
             Document::Rules => rules_root(&mut definitions),
             Document::Any => {
-                let roots = [graph_root, run_root, experiment_root, rules_root];
+                let roots = [graph_file::root, run_root, experiment_root, rules_root];
                 let any = roots.map(|root: fn(&mut Definitions) -> Value| root(&mut definitions));
                 json!({ "title": "A document of Manifactor", "anyOf": any })
             }
