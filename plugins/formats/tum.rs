@@ -20,7 +20,7 @@ pub struct StampedPose {
 }
 
 /// How far behind the line before a line may be, in seconds.
-pub const LATE: f64 = 0.05;
+pub(crate) const LATE: f64 = 0.05;
 
 /// A trajectory, and what had to be done to its file.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -42,7 +42,7 @@ pub use bootstrap::{Interval, bootstrap};
 pub(crate) use document::ExperimentDocument;
 pub use document::{Documents, Experiment};
 pub use journal::{Journal, JournalError};
-pub use measures::{measure_names, measures};
+pub use measures::measures;
 pub use output::write;
 pub use runner::{Progress, run};
 pub use summary::{Comparison, Group, Summary};

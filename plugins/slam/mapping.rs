@@ -78,7 +78,7 @@ pub enum MappingError {
 }
 
 /// The key of a pose.
-pub fn pose_key(frame: usize) -> Key {
+pub(crate) fn pose_key(frame: usize) -> Key {
     Key::indexed("x", frame)
 }
 

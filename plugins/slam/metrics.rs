@@ -11,7 +11,8 @@ mod tests;
 
 pub use align::{Alignment, Similarity, align};
 pub use associate::{PosePair, associate};
-pub use error::{Pairing, RelativeError, absolute_error, relative_error, relative_errors};
+pub(crate) use error::relative_errors;
+pub use error::{Pairing, RelativeError, absolute_error, relative_error};
 pub use statistics::Statistics;
 
 /// Why an error could not be measured.

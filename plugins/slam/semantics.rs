@@ -34,13 +34,14 @@ mod rule_factor;
 #[cfg(test)]
 mod tests;
 
-pub use apply::{Applied, Candidate, Judge, LeftOut, Verdict};
+pub use apply::{Applied, LeftOut};
+pub(crate) use apply::{Candidate, Judge};
 pub use condition::Near;
 pub(crate) use read::{RulesDocument, SemanticsDocument, read_semantics};
 pub use rule_factor::{RuleError, RuleFactor};
 
 /// The paper's Table I.
-pub const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
+pub(crate) const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 
 /// Stands for all classes.
 const ANY: &str = "*";

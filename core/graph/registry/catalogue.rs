@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::sync::OnceLock;
 
 /// The field of a document that names a type.
-pub const TAG: &str = "type";
+pub(crate) const TAG: &str = "type";
 
 /// A trait object whose implementations are chosen by name. [`kind!`](crate::kind) makes a trait one.
 pub trait Kind: 'static {

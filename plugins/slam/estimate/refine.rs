@@ -17,7 +17,7 @@ const ELONGATION: f64 = 1.5;
 
 /// The objects of a map, each with its factors.
 #[derive(Debug)]
-pub struct Refiner<'a> {
+pub(crate) struct Refiner<'a> {
     objects: Vec<(Key, Vec<&'a FactorEntry>)>,
     /// Axes like the world's, one of them up.
     upright: So3,
@@ -25,7 +25,7 @@ pub struct Refiner<'a> {
 
 impl<'a> Refiner<'a> {
     /// Sorts the factors of a map by object.
-    pub fn new(mapping: &'a Mapping) -> Self {
+    pub(crate) fn new(mapping: &'a Mapping) -> Self {
         let mapped = mapping.mapped().map(|object| (object.key.clone(), vec![]));
         let mut objects: IndexMap<Key, Vec<&FactorEntry>> = mapped.collect();
         for entry in mapping.graph.factors() {
@@ -40,7 +40,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// Puts each object where it costs the least, as far as any of the starts leads there.
-    pub fn refine(&self, values: &mut Values) {
+    pub(crate) fn refine(&self, values: &mut Values) {
         for (key, entries) in &self.objects {
             if let Ok(start) = values.get::<DualQuadric>(key).copied() {
                 let better = self.better(key, start, entries, values);

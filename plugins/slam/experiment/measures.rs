@@ -70,7 +70,7 @@ pub fn measures(estimate: &Estimate, report: &VariantReport) -> IndexMap<String,
 }
 
 /// The names of all that is measured under these alignments.
-pub fn measure_names(alignments: &[Alignment]) -> Vec<String> {
+pub(crate) fn measure_names(alignments: &[Alignment]) -> Vec<String> {
     let by = alignments.iter().flat_map(|by| BY_ALIGNMENT.iter().map(|(name, _)| aligned(name, *by)));
     by.chain(ONCE.iter().map(|(name, _)| (*name).to_owned())).collect()
 }

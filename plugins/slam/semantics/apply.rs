@@ -9,7 +9,7 @@ use std::collections::HashSet;
 
 /// An object that rules look at: one that is mapped.
 #[derive(Debug, Clone)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// Its key in the graph.
     pub key: Key,
     /// What it is taken for.
@@ -50,7 +50,7 @@ pub struct LeftOut {
 
 /// What the rules have for one object.
 #[derive(Debug, Clone, Default)]
-pub struct Verdict {
+pub(crate) struct Verdict {
     /// The factors.
     pub entries: Vec<FactorEntry>,
     /// The same, with reasons.
@@ -61,7 +61,7 @@ pub struct Verdict {
 
 /// Applies rules to one object after the other.
 #[derive(Debug)]
-pub struct Judge<'a> {
+pub(crate) struct Judge<'a> {
     rules: &'a [Rule],
     aliases: &'a Aliases,
     up: Option<Direction>,
@@ -73,7 +73,7 @@ pub struct Judge<'a> {
 
 impl<'a> Judge<'a> {
     /// Over all objects that are mapped.
-    pub fn new(
+    pub(crate) fn new(
         rules: &'a [Rule],
         aliases: &'a Aliases,
         up: Option<Direction>,
@@ -86,7 +86,7 @@ impl<'a> Judge<'a> {
     ///
     /// # Errors
     /// If a rule needs to know up and up is unknown.
-    pub fn judge(&mut self, object: &Candidate) -> Result<Verdict, RuleError> {
+    pub(crate) fn judge(&mut self, object: &Candidate) -> Result<Verdict, RuleError> {
         let mut verdict = Verdict::default();
         for (i, rule) in self.rules.iter().enumerate() {
             let Some(share) = rule.share(object.class.as_ref(), self.aliases) else { continue };

@@ -1,3 +1,4 @@
+use super::apply::Verdict;
 use super::*;
 use manifactor_config::{Document, Errors, Format};
 use manifactor_geometry::{Se3, So3};

@@ -158,7 +158,10 @@ class MapView {
       const variant = this.variants[i];
       if (variant.frames[this.state.frame]) drawImage(canvas, variant, this.state.frame, this.state.selected, style);
     });
-    describe(this.find("object"), this.variants, this.state.selected, this.state.frame);
+    // a screen reader reads it anew where it changes, not where the camera turns
+    const { selected, frame, active } = this.state, told = [selected, frame, active].join();
+    if (this.told !== told) describe(this.find("object"), this.variants, selected, frame);
+    this.told = told;
     Object.assign(this.canvas.dataset, { selected: this.state.selected ?? "", frame: this.state.frame, drawn: +(this.canvas.dataset.drawn ?? 0) + 1 });
   }
 
