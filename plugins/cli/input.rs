@@ -1,6 +1,7 @@
 //! What a command line names: files of graphs and runs, solvers, changes to either, and how pictures look.
 pub(crate) mod choice;
 pub(crate) mod destination;
+pub(crate) mod document;
 pub(crate) mod graph_file;
 pub(crate) mod pictures;
 pub(crate) mod run_file;

@@ -94,6 +94,12 @@ impl Inspection {
         Ok(Self { variables: variables.collect(), factors, factors_by_key, cost })
     }
 
+    /// Puts the factors that cost most first; those that cost the same stay in the order of the graph.
+    pub(crate) fn sort_by_cost(&mut self) {
+        let cost = |row: &FactorRow| row.after.as_ref().unwrap_or(&row.before).cost;
+        self.factors.sort_by(|a, b| cost(b).total_cmp(&cost(a)));
+    }
+
     /// The factors of each key, with what they cost.
     pub(crate) fn table(&self) -> String {
         let header = ["factor", "keys", "cost before", "after", "weight", "residual"];

@@ -11,7 +11,10 @@ use std::path::Path;
 /// may have. A regular file may be longer.
 const STREAM: u64 = 256 << 20;
 
-/// Reads a file, once: it may be a pipe.
+/// Standard input, where a path is asked for.
+pub const STDIN: &str = "-";
+
+/// Reads a file, once: it may be a pipe. `-` is standard input.
 ///
 /// # Errors
 /// A file that cannot be read or is not UTF-8; more than 256 MiB from what is no regular file.
@@ -33,6 +36,9 @@ pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), FormatError> {
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
+    if path == Path::new(STDIN) {
+        return read_bounded(io::stdin().lock(), 0, STREAM);
+    }
     let file = File::open(path)?;
     let about = file.metadata()?;
     let length = if about.is_file() { about.len() } else { 0 };

@@ -24,7 +24,19 @@ fn manifactor(arguments: &str) -> Ran {
 fn run<'a>(arguments: impl IntoIterator<Item = &'a str>, variables: &[(&str, &str)]) -> Ran {
     let mut command = Command::new(env!("CARGO_BIN_EXE_manifactor"));
     command.current_dir(root()).args(arguments).env("NO_COLOR", "1").env_remove("MANIFACTOR_DATA");
-    let output = command.envs(variables.iter().copied()).output().unwrap();
+    ran(command.envs(variables.iter().copied()))
+}
+
+/// Runs the binary with a text on its standard input.
+fn fed(arguments: &str, text: &str) -> Ran {
+    let folder = folder(&[("stdin", text)]);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_manifactor"));
+    command.current_dir(root()).args(arguments.split_whitespace()).env("NO_COLOR", "1");
+    ran(command.stdin(std::fs::File::open(path(&folder, "stdin")).unwrap()))
+}
+
+fn ran(command: &mut Command) -> Ran {
+    let output = command.output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }

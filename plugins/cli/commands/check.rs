@@ -1,5 +1,6 @@
 //! `manifactor check`: a document, without solving anything.
 use crate::failure::Failure;
+use crate::input::document::Content;
 use crate::input::graph_file::{self, GraphFile, Reading};
 use crate::input::run_file::RunArguments;
 use crate::input::solver::SolverArguments;
@@ -7,7 +8,7 @@ use crate::output;
 use crate::output::text::count;
 use crate::status::Status;
 use clap::Args;
-use manifactor::config::{Document, Format, Value};
+use manifactor::config::{Document, Value};
 use manifactor::slam::mapping::Mapping;
 use manifactor::slam::run::Run as Running;
 use serde_json::json;
@@ -30,14 +31,13 @@ pub(crate) struct Check {
 impl Check {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         let path = &self.run.config;
-        let found = if Format::of_path(path).is_some() {
-            let document = Document::open(path)?;
-            // a run may have variables of its own
-            let is_graph = matches!(&document.root().value, Value::Table(t) if t.contains_key("variables") && !t.contains_key("source"));
-            let solver = SolverArguments::set_only(&self.run.set);
-            if is_graph { graph(&graph_file::literal(document, &solver)?) } else { self.document(document)? }
-        } else {
-            graph(&self.reading.open(path, &SolverArguments::set_only(&self.run.set))?)
+        let solver = SolverArguments::set_only(&self.run.set);
+        let found = match Content::open(path)? {
+            Content::Graph(text, format) => graph(&self.reading.plain(path, &text, format, &solver)?),
+            Content::Document(document) if is_graph(&document) => {
+                graph(&graph_file::literal(document, &solver)?)
+            }
+            Content::Document(document) => self.document(document)?,
         };
         if self.json {
             output::json(&json!({ "errors": [], "found": found }));
@@ -78,4 +78,9 @@ fn graph(input: &GraphFile) -> String {
         output::note(note);
     }
     graph_file::summary(input).trim_end().to_owned()
+}
+
+/// Whether a document is a literal graph. A run may have variables of its own, and has a source.
+fn is_graph(document: &Document) -> bool {
+    matches!(&document.root().value, Value::Table(t) if t.contains_key("variables") && !t.contains_key("source"))
 }

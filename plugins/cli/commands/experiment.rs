@@ -1,5 +1,6 @@
 //! `manifactor experiment`: a sweep from its document to its tables.
 use crate::failure::Failure;
+use crate::input::document;
 use crate::input::pictures::Look;
 use crate::interrupt;
 use crate::output::text::{count, on_one_line};
@@ -7,7 +8,7 @@ use crate::output::{self, summary_table};
 use crate::status::Status;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use manifactor::config::Document;
+
 use manifactor::slam::experiment::{self, Experiment as Sweep, Journal, Progress, Summary};
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::slam::source::Folders;
@@ -48,7 +49,7 @@ pub(crate) struct Experiment {
 
 impl Experiment {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
-        let mut document = Document::open(&self.config)?;
+        let mut document = document::open(&self.config)?;
         document.set(&self.set)?;
         let mut sweep = Sweep::read(&document)?;
         if let Some(out) = &self.out {

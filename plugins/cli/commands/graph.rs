@@ -6,7 +6,7 @@ use crate::input::what_if::WhatIf;
 use crate::inspection::{Inspection, states};
 use crate::output;
 use crate::status::Status;
-use clap::{ArgGroup, Args};
+use clap::{ArgGroup, Args, ValueEnum};
 use manifactor::solve::{Silent, solve};
 use std::path::PathBuf;
 
@@ -25,6 +25,12 @@ pub(crate) struct ShowGraph {
     solver: SolverArguments,
     #[command(flatten)]
     reading: Reading,
+    /// List the factors in this order. Default: that of the graph.
+    #[arg(long, value_enum, conflicts_with_all = ["dot", "svg"])]
+    sort: Option<Order>,
+    /// List the first N factors only.
+    #[arg(long, value_name = "N", conflicts_with_all = ["dot", "svg"])]
+    top: Option<usize>,
     /// Print the language of Graphviz.
     #[arg(long)]
     dot: bool,
@@ -34,6 +40,13 @@ pub(crate) struct ShowGraph {
     /// Print a picture, seen from above.
     #[arg(long)]
     svg: bool,
+}
+
+/// An order of factors.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Order {
+    /// The most expensive first: after the solve, if there is one.
+    Cost,
 }
 
 impl ShowGraph {
@@ -54,7 +67,11 @@ impl ShowGraph {
             let problem = solution.problem(&input.graph).map_err(Failure::input)?;
             after = Some((&solution.values, states(&problem, &input.graph)));
         }
-        let inspection = Inspection::new(&input.graph, &start, after)?;
+        let mut inspection = Inspection::new(&input.graph, &start, after)?;
+        if let Some(Order::Cost) = self.sort {
+            inspection.sort_by_cost();
+        }
+        inspection.factors.truncate(self.top.unwrap_or(usize::MAX));
         if self.json {
             output::json(&inspection);
         } else if self.dot {

@@ -1,10 +1,11 @@
 //! Graphs in files, by extension.
 use crate::failure::Failure;
+use crate::input::document::Content;
 use crate::input::solver::SolverArguments;
 use crate::output::text::count;
 use clap::{Args, ValueEnum};
 use manifactor::config::{Definitions, Document, Errors, Format, graph_root, read_graph_section};
-use manifactor::formats::{self, GraphFormat, GraphRead, Repair, read_text};
+use manifactor::formats::{self, GraphFormat, GraphRead, Repair};
 use manifactor::graph::{Graph, Values};
 use manifactor::online::Settings as Online;
 use manifactor::solve::{Bytes, Optimizer, Start, available_memory, memory_limit};
@@ -49,15 +50,20 @@ impl Reading {
     /// Reads a graph, and the solver and start that file and command line ask for.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         check_memory(path)?;
-        if Format::of_path(path).is_some() {
-            literal(Document::open(path)?, solver)
-        } else {
-            self.plain(path, solver)
+        match Content::open(path)? {
+            Content::Document(document) => literal(document, solver),
+            Content::Graph(text, format) => self.plain(path, &text, format, solver),
         }
     }
 
     /// A file in a registered format: solver, start and `online` are all that `--set` can set.
-    fn plain(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
+    pub(crate) fn plain(
+        &self,
+        path: &Path,
+        text: &str,
+        format: &GraphFormat,
+        solver: &SolverArguments,
+    ) -> Result<GraphFile, Failure> {
         let mut settings = Document::parse("settings", "", Format::Toml)?;
         solver.apply(&mut settings)?;
         let errors = Errors::new();
@@ -69,10 +75,7 @@ impl Reading {
             Some((optimizer?, start?, online))
         });
         let (optimizer, start, online) = errors.finish(chosen)?;
-        // a pipe can be read once
-        let text = read_text(path)?;
-        let format = GraphFormat::of(path, &text).ok_or_else(|| unknown_format(path))?;
-        let GraphRead { graph, values, notes } = (format.parse)(&text, path, self.choices())?;
+        let GraphRead { graph, values, notes } = (format.parse)(text, path, self.choices())?;
         Ok(GraphFile { graph, values, optimizer, start, online, notes })
     }
 
@@ -106,15 +109,6 @@ pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Resul
         Some(GraphFile { graph, values, optimizer: optimizer?, start: start?, online, notes: Vec::new() })
     });
     Ok(errors.finish(read.flatten())?)
-}
-
-fn unknown_format(path: &Path) -> Failure {
-    let known: Vec<String> =
-        GraphFormat::all().iter().flat_map(|format| format.extensions).map(|e| format!(".{e}")).collect();
-    Failure::with_help(
-        format!("{}: neither its extension nor its first line tells a format of graphs", path.display()),
-        format!("use .toml, .json, .yaml, {}", known.join(", ")),
-    )
 }
 
 /// Refuses a file that is too large to be read, before it is.

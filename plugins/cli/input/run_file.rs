@@ -1,5 +1,6 @@
 //! The documents that describe runs.
 use crate::failure::Failure;
+use crate::input::document;
 use clap::Args;
 use manifactor::config::Document;
 use manifactor::slam::run_document::RunDocument;
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// What all commands on a run's document take.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// The document that describes the run.
+    /// The document that describes the run; `-` is standard input, TOML or JSON.
     pub(crate) config: PathBuf,
     /// Set a value of the document, such as `solver.stop.max_iterations=50` or `source.seed=2`.
     #[arg(long, value_name = "KEY=VALUE")]
@@ -21,7 +22,7 @@ pub(crate) struct RunArguments {
 impl RunArguments {
     /// Reads the document.
     pub(crate) fn open(&self) -> Result<RunDocument, Failure> {
-        self.read(Document::open(&self.config)?)
+        self.read(document::open(&self.config)?)
     }
 
     /// A document that was opened already.

@@ -1,4 +1,4 @@
-use crate::{folder, manifactor, path};
+use crate::{fed, folder, manifactor, path};
 
 const GRAPH: &str = r#"
 [[variables]]
@@ -63,4 +63,35 @@ fn graphs_are_drawn() {
         "{svg}"
     );
     manifactor(&format!("graph {graph} --svg --dot")).ended(2);
+}
+
+#[test]
+fn the_most_expensive_factors_are_listed_first() {
+    let files = folder(&[("graph.toml", GRAPH)]);
+    let graph = path(&files, "graph.toml");
+    let numbers = |options: &str| -> Vec<u64> {
+        let json = manifactor(&format!("graph {graph} --json {options}")).ended(0).json();
+        json["factors"].as_array().unwrap().iter().map(|row| row["number"].as_u64().unwrap()).collect()
+    };
+    assert_eq!(numbers(""), [0, 1]);
+    assert_eq!(numbers("--sort cost"), [1, 0]);
+    assert_eq!(numbers("--sort cost --top 1"), [1]);
+    manifactor(&format!("graph {graph} --top 1 --dot")).ended(2);
+}
+
+#[test]
+fn a_graph_or_a_run_comes_from_standard_input() {
+    let cost = |ran: crate::Ran| ran.ended(0).json()["final_cost"].as_f64().unwrap();
+    let files = folder(&[("graph.toml", GRAPH)]);
+    let graph = path(&files, "graph.toml");
+    let expected = cost(manifactor(&format!("solve {graph} --json")));
+    assert_eq!(cost(fed("solve - --json", GRAPH)), expected);
+    // as JSON, and as a pose graph, which its first line tells
+    let as_json = path(&files, "graph.json");
+    manifactor(&format!("solve {graph} --out {as_json}")).ended(0);
+    fed("solve - --json", &std::fs::read_to_string(&as_json).unwrap()).ended(0);
+    assert_eq!(cost(fed("solve - --json", "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n")), 0.0);
+    assert!(fed("check -", "source = { type = 'simulated' }").ended(0).stdout.contains("A run of 1 variant"));
+    fed("check -", "source = { type = 'simulatd' }").ended(2).complains("standard input:1");
+    fed("solve -", "nothing of the kind").ended(2);
 }
