@@ -29,6 +29,6 @@ mod tree;
 
 pub use error::{ChangeError, UpdateError};
 pub use factor_id::FactorId;
-pub use report::Report;
+pub use report::{Report, Shared};
 pub use session::{CovarianceError, Finished, Session};
 pub use settings::Settings;

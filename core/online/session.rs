@@ -10,7 +10,7 @@ mod update;
 
 use crate::fronts::{Fronts, Scalar};
 use crate::model::Model;
-use crate::report::Report;
+use crate::report::{Report, Shared};
 use crate::settings::Settings;
 use crate::tree::{Couplings, Tree};
 use changes::Pending;
@@ -42,6 +42,8 @@ pub struct Session {
     /// Variables that have left the region of their linearization.
     waiting: Vec<u32>,
     is_waiting: Vec<bool>,
+    /// Those that have left it so far that they cannot wait; some may be back, or be named twice.
+    urgent: Vec<u32>,
     /// Steps that the last pass changed, as they were before: to go back half the way.
     moved: Vec<(u32, usize)>,
     before: Vec<f64>,
@@ -49,6 +51,10 @@ pub struct Session {
     open: BTreeSet<Scalar>,
     parked: BTreeSet<u32>,
     inactive: BTreeSet<u32>,
+    /// Parked variables whose factors were linearized anew since they were judged.
+    doubtful: Vec<u32>,
+    /// The keys of those that are parked, for reports.
+    waiting_keys: Shared<Key>,
 }
 
 impl fmt::Debug for Session {
@@ -76,11 +82,14 @@ impl Session {
             updates: 0,
             waiting: vec![],
             is_waiting: vec![],
+            urgent: vec![],
             moved: vec![],
             before: vec![],
             open: BTreeSet::new(),
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),
+            doubtful: vec![],
+            waiting_keys: Shared::default(),
         })
     }
 
@@ -148,7 +157,7 @@ impl Session {
 
     /// What is parked, undetermined and inactive, for a report.
     fn tell(&self, report: &mut Report) {
-        report.parked = self.parked.iter().map(|v| self.key(*v)).collect();
+        report.parked = self.waiting_keys.clone();
         let name = |(v, d): &Scalar| Some((self.key(*v), *self.model.place(*v).tangent.get(*d as usize)?));
         report.undetermined = self.open.iter().filter_map(name).collect();
         report.inactive = self.inactive.len();

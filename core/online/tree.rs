@@ -33,7 +33,7 @@ pub(crate) struct Front {
     pub parent: u32,
     /// By their lowest variable: updates are added in an order that does not depend on history.
     pub children: Vec<u32>,
-    lowest: u32,
+    pub lowest: u32,
     /// Multiply-adds to make it again.
     pub operations: f64,
 }

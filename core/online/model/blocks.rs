@@ -4,6 +4,7 @@
 //! came.
 use super::regions::{Region, Regions};
 use smallvec::SmallVec;
+use std::collections::BTreeMap;
 
 /// Variables that share a factor.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +50,8 @@ struct Variable {
 pub(crate) struct Blocks {
     variables: Vec<Variable>,
     pairs: Vec<Pair>,
-    unused: Vec<u32>,
+    /// By number of entries.
+    unused: BTreeMap<u32, Vec<u32>>,
     /// Column-major; of diagonal blocks, the lower triangle.
     diagonals: Vec<f64>,
     off_diagonals: Vec<f64>,
@@ -134,23 +136,12 @@ impl Blocks {
 
     fn new_pair(&mut self, lower: u32, higher: u32) -> u32 {
         let entries = self.dim(lower) * self.dim(higher);
-        // the last one only: in most graphs all pairs are of one size
-        let fits = |pair: &&u32| self.pairs[**pair as usize].entries as usize == entries;
-        let pair = match self.unused.last().filter(fits).copied() {
-            Some(pair) => {
-                self.unused.pop();
-                pair
-            }
-            None => {
-                self.pairs.push(Pair {
-                    at: self.off_diagonals.len(),
-                    entries: entries as u32,
-                    ..Pair::default()
-                });
-                self.off_diagonals.resize(self.off_diagonals.len() + entries, 0.0);
-                self.pairs.len() as u32 - 1
-            }
-        };
+        let pair = self.unused.get_mut(&(entries as u32)).and_then(Vec::pop).unwrap_or_else(|| {
+            let at = self.off_diagonals.len();
+            self.pairs.push(Pair { at, entries: entries as u32, ..Pair::default() });
+            self.off_diagonals.resize(at + entries, 0.0);
+            self.pairs.len() as u32 - 1
+        });
         let found = &mut self.pairs[pair as usize];
         (found.lower, found.higher) = (lower, higher);
         self.variables[lower as usize].coupled.push(Coupling { other: higher, pair });
@@ -186,7 +177,8 @@ impl Blocks {
                 if factors.is_empty() {
                     self.variables[u as usize].coupled.retain(|c| c.other != v);
                     self.variables[v as usize].coupled.retain(|c| c.other != u);
-                    self.unused.push(pair);
+                    let entries = self.pairs[pair as usize].entries;
+                    self.unused.entry(entries).or_default().push(pair);
                 }
             }
         }
@@ -293,5 +285,23 @@ fn add_diagonal(h: &mut [f64], d: usize, region: Region, at: usize, numbers: &Re
     for c in 0..d {
         let from = &numbers.h[region.column(at + c)..][..d - c];
         h[c * d + c..(c + 1) * d].iter_mut().zip(from).for_each(|(h, x)| *h += x);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_of_several_sizes_come_and_go_in_the_same_memory() {
+        let mut blocks = Blocks::default();
+        [6, 6, 9].iter().for_each(|dim| blocks.push(*dim, 0));
+        let factors = [[(0, 0), (1, 6)], [(0, 0), (2, 6)]];
+        for n in 0..100 {
+            let both: [u32; 2] = std::array::from_fn(|i| 2 * n + i as u32);
+            both.iter().zip(&factors).for_each(|(f, members)| blocks.connect(*f, members));
+            both.iter().zip(&factors).for_each(|(f, members)| blocks.disconnect(*f, members));
+        }
+        assert_eq!((blocks.pairs.len(), blocks.off_diagonals.len()), (2, 36 + 54));
     }
 }

@@ -1,73 +1,55 @@
 //! Factors at the trial points, and variables on their way to these: a few of each.
-use super::Model;
+use super::{Factor, Model};
 use manifactor_graph::batch::Evaluation;
 use smallvec::SmallVec;
 
 impl Model {
-    /// Evaluates factors at the trial points, batch by batch, and sums the account up.
-    fn evaluate(
-        &mut self,
-        factors: &[u32],
-        mut of_batch: impl FnMut(&mut Self, usize, &[u32]) -> Evaluation,
-    ) -> Evaluation {
+    /// Linearizes factors at the trial points, batch by batch. What they had is gone; at the same points, they have the same
+    /// bits again.
+    pub(crate) fn linearize(&mut self, factors: &[u32]) -> Evaluation {
         let mut listed = std::mem::take(&mut self.listed);
         listed.resize_with(self.batches.as_slice().len(), Vec::new);
-        for f in factors {
-            if let Some(factor) = &self.factors[*f as usize] {
-                listed[factor.batch as usize].push(factor.index);
-            }
-        }
-        let mut total = Evaluation::default();
-        for (b, indices) in listed.iter_mut().enumerate().filter(|(_, indices)| !indices.is_empty()) {
-            indices.sort_unstable();
-            total = total.and(of_batch(self, b, indices));
-            indices.clear();
-        }
-        self.listed = listed;
-        total
-    }
-
-    /// Linearizes factors at the trial points. What they had is gone: see [`save`](Self::save).
-    pub(crate) fn linearize(&mut self, factors: &[u32]) -> Evaluation {
         for f in factors {
             let Some(factor) = &self.factors[*f as usize] else { continue };
             self.numbers.clear(self.regions[*f as usize]);
             self.blocks.mark_factor(&factor.members);
+            listed[factor.batch as usize].push(factor.index);
         }
-        let mut total = self.evaluate(factors, |model, batch, indices| {
-            let to = &mut model.numbers.normal_equations();
-            model.batches.as_mut_slice()[batch].linearize_at(indices, &model.trial, to)
-        });
+        let mut total = Evaluation::default();
+        for (b, indices) in listed.iter_mut().enumerate().filter(|(_, indices)| !indices.is_empty()) {
+            indices.sort_unstable();
+            let to = &mut self.numbers.normal_equations();
+            total = total.and(self.batches.as_mut_slice()[b].linearize_at(indices, &self.trial, to));
+            indices.clear();
+        }
+        self.listed = listed;
         if total.not_finite.is_none() {
-            let is_bad = |f: &&u32| !self.numbers.is_finite(self.regions[**f as usize]);
-            total.not_finite = factors.iter().find(is_bad).map(|f| *f as usize);
+            total.not_finite = factors.iter().find(|f| !self.is_finite(**f)).map(|f| *f as usize);
         }
         total
     }
 
-    /// The cost of factors at the trial points, over those that took part in their last linearization.
-    pub(crate) fn cost(&mut self, factors: &[u32]) -> Evaluation {
-        self.evaluate(factors, |model, batch, indices| {
-            model.batches.as_slice()[batch].cost_at(indices, &model.trial)
-        })
+    /// Whether a factor's part of H and g is finite.
+    pub(crate) fn is_finite(&self, factor: u32) -> bool {
+        self.numbers.is_finite(self.regions[factor as usize])
     }
 
-    /// What factors add to H and g, for [`restore`](Self::restore).
-    pub(crate) fn save(&self, factors: &[u32]) -> Vec<f64> {
-        let mut saved = vec![];
-        factors.iter().for_each(|f| self.numbers.save(self.regions[*f as usize], &mut saved));
-        saved
+    /// The factors of some variables, ascending.
+    pub(crate) fn factors_of(&self, variables: &[u32]) -> Vec<u32> {
+        let mut factors: Vec<u32> = variables.iter().flat_map(|v| self.blocks.factors(*v)).collect();
+        factors.sort_unstable();
+        factors.dedup();
+        factors
     }
 
-    /// Puts back what factors added to H and g.
-    pub(crate) fn restore(&mut self, factors: &[u32], saved: &[f64]) {
-        let mut rest = saved;
-        for f in factors {
-            rest = self.numbers.restore(self.regions[*f as usize], rest);
-            if let Some(factor) = &self.factors[*f as usize] {
-                self.blocks.mark_factor(&factor.members);
-            }
-        }
+    /// The cost of factors at the trial points, over those that took part in their last linearization. It is summed in the
+    /// order of `factors`, one by one: where they are in their batches depends on history.
+    pub(crate) fn cost(&self, factors: &[u32]) -> Evaluation {
+        let factors = factors.iter().filter_map(|f| self.factor(*f));
+        let one = |factor: &Factor| {
+            self.batches.as_slice()[factor.batch as usize].cost_at(&[factor.index], &self.trial)
+        };
+        factors.map(one).fold(Evaluation::default(), Evaluation::and)
     }
 
     /// Makes the sums anew that a changed factor is part of.

@@ -57,21 +57,6 @@ impl Regions {
         self.g[region.g..region.g + region.scalars as usize].fill(0.0);
     }
 
-    /// Appends the numbers of a region to a list.
-    pub(crate) fn save(&self, region: Region, to: &mut Vec<f64>) {
-        to.extend_from_slice(&self.h[region.h..region.h + region.entries()]);
-        to.extend_from_slice(&self.g[region.g..region.g + region.scalars as usize]);
-    }
-
-    /// Puts back what was saved; returns what follows it in the list.
-    pub(crate) fn restore<'a>(&mut self, region: Region, from: &'a [f64]) -> &'a [f64] {
-        let (h, rest) = from.split_at(region.entries());
-        let (g, rest) = rest.split_at(region.scalars as usize);
-        self.h[region.h..region.h + h.len()].copy_from_slice(h);
-        self.g[region.g..region.g + g.len()].copy_from_slice(g);
-        rest
-    }
-
     /// Whether all numbers of a region are finite.
     pub(crate) fn is_finite(&self, region: Region) -> bool {
         let (h, g) =

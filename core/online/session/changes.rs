@@ -33,6 +33,8 @@ pub(super) struct Touched {
     pub(super) variables: Vec<u32>,
     /// Factors that are to be linearized.
     pub(super) factors: Vec<u32>,
+    /// Factors that were taken out; some may be back.
+    pub(super) removed: Vec<u32>,
     /// Variables that may have lost what determined them, or have gained it.
     pub(super) doubtful: Vec<u32>,
     /// Variables of which other directions are held now.
@@ -55,7 +57,7 @@ impl Change {
                 let factor = model.remove(number)?;
                 touched.variables.extend(factor.variables());
                 touched.doubtful.extend(factor.variables());
-                touched.factors.retain(|f| *f != number);
+                touched.removed.push(number);
                 let resolved = factor.resolved()?;
                 Some(Self::Insert { number, entry: factor.entry, resolved, weight: factor.weight })
             }

@@ -79,20 +79,24 @@ impl Session {
 
     /// Goes on from other values, those of [`finish`](Self::finish), say: all is linearized there. Keys that the session
     /// does not have are left out.
-    pub(super) fn adopt(&mut self, values: &Values) -> Result<(), Overflow> {
+    pub(super) fn adopt(&mut self, values: &Values, report: &mut Report) -> Result<(), Overflow> {
         let mut points = vec![];
         for (v, key) in self.model.keys().enumerate() {
             let (v, point) = (v as u32, self.model.point(v as u32));
             let step = point.zip(values.variable(key.as_str())).and_then(|(p, x)| p.erased().local(x));
             points.extend(step.map(|step| (v, step)));
         }
-        let mut held = vec![];
-        for (v, step) in points.into_iter().filter(|(v, _)| !self.model.place(*v).is_held()) {
+        let (before, mut held) = (self.delta.clone(), vec![]);
+        for (v, step) in points.into_iter().filter(|(v, _)| self.model.place(*v).is_in_tree()) {
             let range = self.model.blocks.range(v);
             self.delta[range].copy_from_slice(&step);
             held.push(v);
         }
         let all = Touched { variables: held.clone(), held, ..Touched::default() };
-        self.pass(&all, &Moves::default(), false, &mut Report::default())
+        let passed = self.pass(&all, &Moves::default(), false, report);
+        if passed.is_err() {
+            self.delta = before;
+        }
+        passed
     }
 }

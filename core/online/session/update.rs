@@ -31,12 +31,12 @@ impl Session {
             self.model.push_variable(key, &*value, held);
         }
         touched.doubtful.extend(variables as u32..self.model.variables() as u32);
+        touched.doubtful.extend(&self.doubtful);
         self.resize();
         for change in pending.changes {
             undo.changes.extend(change.apply(&mut self.model, &mut touched));
         }
-        touched.factors.sort_unstable();
-        touched.factors.dedup();
+        self.sort(&mut touched.factors);
         let evaluation = self.model.linearize(&touched.factors);
         if let Some(factor) = evaluation.not_finite {
             let entry = self.model.factor(factor as u32).map(|factor| &factor.entry);
@@ -79,7 +79,13 @@ impl Session {
         self.delta.resize(self.model.blocks.scalars(), 0.0);
         self.changed.resize(n, 0);
         self.is_waiting.resize(n, false);
-        self.waiting.retain(|v| (*v as usize) < n);
+    }
+
+    /// The factors of a list that are there, each once.
+    fn sort(&self, factors: &mut Vec<u32>) {
+        factors.retain(|f| self.model.factor(*f).is_some());
+        factors.sort_unstable();
+        factors.dedup();
     }
 
     /// Takes changes back, the last first.
@@ -89,15 +95,13 @@ impl Session {
         for change in undo.changes.into_iter().rev() {
             change.apply(&mut self.model, &mut touched);
         }
-        touched.factors.retain(|f| self.model.factor(*f).is_some());
-        touched.factors.sort_unstable();
-        touched.factors.dedup();
+        self.sort(&mut touched.factors);
         self.model.linearize(&touched.factors);
         for f in touched.factors {
             self.model.count(f, self.model.is_whole(f));
             self.note_activity(f);
         }
-        self.inactive.retain(|f| self.model.factor(*f).is_some());
+        self.forget_inactive(&touched.removed);
         self.model.sum_up();
         self.model.truncate(undo.variables);
         self.resize();
@@ -105,11 +109,23 @@ impl Session {
 
     /// Notes which factors take no part; variables that lose one may not be determined any more.
     pub(super) fn doubt_inactive(&mut self, touched: &mut Touched) {
-        self.inactive.retain(|f| self.model.factor(*f).is_some());
+        self.forget_inactive(&touched.removed);
         for f in &touched.factors {
             if self.note_activity(*f) {
                 touched.doubtful.extend(self.model.factor(*f).into_iter().flat_map(|f| f.variables()));
             }
+        }
+    }
+
+    fn forget_inactive(&mut self, removed: &[u32]) {
+        for f in removed.iter().filter(|f| self.model.factor(**f).is_none()) {
+            self.inactive.remove(f);
+        }
+    }
+
+    pub(super) fn note_activities(&mut self, factors: &[u32]) {
+        for f in factors {
+            self.note_activity(*f);
         }
     }
 
@@ -143,7 +159,7 @@ impl Session {
         last.sort_unstable();
         last.dedup();
         let chosen = self.choose(&touched.held, is_turn);
-        let relinearized = self.relinearize(chosen);
+        let relinearized = self.relinearize(chosen, &touched.held);
         for v in &relinearized.variables {
             self.touch_around(*v, &mut affected);
         }
@@ -158,8 +174,9 @@ impl Session {
             return Err(overflow);
         }
         self.exchange(&affected, &redone, moves);
+        self.doubt_parked(&relinearized.factors);
         report.relinearized += relinearized.variables.len();
-        self.accept_points(relinearized);
+        self.accept_points(&relinearized, is_turn);
         for f in &redone.new {
             let front = &self.tree.fronts[*f as usize];
             report.operations += front.operations;
@@ -178,7 +195,7 @@ impl Session {
     }
 
     fn redo(&mut self, affected: &Affected, moves: &Moves, last: &[u32]) -> Redone {
-        let leaves = |v: u32| moves.leaving.contains(&v);
+        let leaves = |v: u32| moves.leaving.binary_search(&v).is_ok();
         let is_last = |v: u32| last.binary_search(&v).is_ok();
         self.tree.redo(affected, &moves.entering, leaves, is_last, &self.model)
     }
@@ -202,11 +219,16 @@ impl Session {
         for f in &redone.new {
             self.open.extend(self.fronts.open(*f));
         }
+        self.doubtful.retain(|v| moves.judged.binary_search(v).is_err());
+        let mut has_changed = false;
         for v in &moves.judged {
-            match self.model.place(*v).parked {
+            has_changed |= match self.model.place(*v).parked {
                 true => self.parked.insert(*v),
                 false => self.parked.remove(v),
             };
+        }
+        if has_changed {
+            self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Sessions against fresh builds.
 #![allow(missing_docs, clippy::unwrap_used)]
 mod errors;
+mod failures;
 mod history;
 mod parking;
 mod steps;

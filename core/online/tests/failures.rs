@@ -1,0 +1,61 @@
+//! An update that failed leaves no trace, also not in what comes after it.
+use crate::history::{Change, History, bits, change};
+use crate::toy::{At, Careless, Plane};
+use manifactor_graph::{Fixed, Graph, Noise, Values};
+use manifactor_online::Settings;
+use proptest::prelude::*;
+
+/// Pushes, removes, re-weights and holds, and fails at last: by a residual that is not finite, or a sum that overflows.
+fn fail(history: &mut History, n: usize, overflows: bool) {
+    let session = &mut history.session;
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("new", Plane { x: -4.0, y: 1.0 });
+    for _ in 0..3 {
+        graph.add(["new"], At { at: [3.0, 0.0] }).noise(Noise::sigma(1e-154).unwrap());
+    }
+    if !overflows {
+        graph.add(["new"], Careless {});
+    }
+    for key in history.keys.iter().take(n % 5) {
+        session.fix(key, &Fixed::Whole(n.is_multiple_of(2))).unwrap();
+        if key.as_str().starts_with('p') {
+            graph.add([key.clone(), "new".into()], crate::toy::Apart { by: [1.0, 0.0] });
+        }
+    }
+    session.push(&graph, &values).unwrap();
+    for id in history.ids.iter().skip(n % 7).take(n % 4) {
+        session.set_weight(*id, 0.5).unwrap();
+    }
+    for id in history.ids.iter().skip(n % 3).step_by(3).take(n % 6) {
+        session.remove(&[*id]).unwrap();
+    }
+    session.update().unwrap_err();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::default())]
+    #[test]
+    fn a_failed_update_leaves_no_trace(
+        before in prop::collection::vec(change(), 1..40),
+        after in prop::collection::vec(change(), 1..40),
+        n in 0..1000usize,
+        overflows in any::<bool>(),
+        every in 1..4usize,
+    ) {
+        let settings = Settings { relinearize_every: every, ..Settings::default() };
+        let [mut one, mut other] = std::array::from_fn(|_| History::new(settings.clone()));
+        for history in [&mut one, &mut other] {
+            history.apply_all(&before);
+            history.apply(&Change::Update);
+        }
+        fail(&mut one, n, overflows);
+        prop_assert_eq!(one.session.cost().to_bits(), other.session.cost().to_bits());
+        prop_assert_eq!(bits(&one.session), bits(&other.session));
+        for change in after.iter().chain(&[Change::Update]) {
+            prop_assert_eq!(one.apply(change), other.apply(change));
+        }
+        prop_assert_eq!(bits(&one.session), bits(&other.session));
+        let keys: Vec<_> = one.keys.iter().map(|key| key.as_str()).collect();
+        prop_assert_eq!(one.session.covariance(&keys), other.session.covariance(&keys));
+    }
+}
