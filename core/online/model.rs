@@ -1,11 +1,13 @@
 //! What is estimated, and from what: variables at their linearization points, and factors with their parts of H and g.
 mod blocks;
 mod evaluation;
+mod factors;
 mod regions;
 
 use crate::tree::Couplings;
 pub(crate) use blocks::Blocks;
 
+use factors::Factors;
 use indexmap::IndexMap;
 use manifactor_graph::batch::{Batches, Member};
 use manifactor_graph::column::{Columns, FIXED};
@@ -49,6 +51,8 @@ pub(crate) struct Factor {
     members: SmallVec<[(u32, u32); 2]>,
     batch: u32,
     index: u32,
+    /// Where its region is.
+    region: u32,
     pub weight: f64,
 }
 
@@ -72,10 +76,8 @@ pub(crate) struct Model {
     /// Linearization points; and where variables are about to be linearized: the same, but during an update.
     points: Columns,
     pub trial: Columns,
-    factors: Vec<Option<Factor>>,
-    /// By factor.
-    regions: Vec<Region>,
-    numbers: Regions,
+    factors: Factors,
+    regions: Regions,
     batches: Batches,
     pub blocks: Blocks,
     /// By batch, factors that are about to be evaluated.
@@ -83,6 +85,9 @@ pub(crate) struct Model {
 }
 
 impl Couplings for Model {
+    fn variables(&self) -> usize {
+        self.keys.len()
+    }
     fn dim(&self, variable: u32) -> usize {
         self.blocks.dim(variable)
     }
@@ -92,19 +97,20 @@ impl Couplings for Model {
 }
 
 impl Model {
-    pub(crate) fn variables(&self) -> usize {
-        self.keys.len()
+    /// The number of the next new factor.
+    pub(crate) fn next_factor(&self) -> u32 {
+        self.factors.next
     }
-    /// Numbers that factors have had, those that are gone among them.
-    pub(crate) fn factors(&self) -> usize {
-        self.factors.len()
+    /// Leaves numbers out: they were those of factors that are gone.
+    pub(crate) fn skip_to(&mut self, next: u32) {
+        self.factors.next = self.factors.next.max(next);
     }
     pub(crate) fn factor(&self, factor: u32) -> Option<&Factor> {
-        self.factors.get(factor as usize)?.as_ref()
+        self.factors.get(factor)
     }
     /// The factors that are there, with their numbers.
     pub(crate) fn all_factors(&self) -> impl Iterator<Item = (u32, &Factor)> {
-        self.factors.iter().enumerate().filter_map(|(f, factor)| Some((f as u32, factor.as_ref()?)))
+        self.factors.iter()
     }
     pub(crate) fn variable(&self, key: &str) -> Option<u32> {
         self.keys.get_index_of(key).map(|v| v as u32)
@@ -168,16 +174,19 @@ impl Model {
             *at = scalars;
             scalars += self.blocks.dim(*v) as u32;
         }
-        let region = self.numbers.take(scalars);
-        if self.factors.len() <= number as usize {
-            self.factors.resize_with(number as usize + 1, || None);
-            self.regions.resize(number as usize + 1, Region::default());
-        }
-        self.regions[number as usize] = region;
-        self.blocks.connect(number, &members);
+        let place = self.regions.take(scalars);
+        let region = self.regions[place];
+        self.blocks.connect(number, place, &members);
         let batch = self.batches.place(entry.factor.erased(), &resolved.whitener, entry.loss.as_deref());
-        let factor =
-            Factor { entry: entry.clone(), variables, members, batch: batch as u32, index: 0, weight };
+        let factor = Factor {
+            entry: entry.clone(),
+            variables,
+            members,
+            batch: batch as u32,
+            index: 0,
+            region: place,
+            weight,
+        };
         let index: SmallVec<[u32; 4]> =
             factor.variables.iter().map(|v| self.keys[*v as usize].index).collect();
         let (starts, held) = self.starts(&factor, region);
@@ -193,11 +202,11 @@ impl Model {
             whitener: &resolved.whitener,
             loss: entry.loss.as_deref(),
         });
-        let place = to.len() - 1;
+        let index = to.len() - 1;
         if weight != 1.0 {
-            to.set_weight(place, weight);
+            to.set_weight(index, weight);
         }
-        self.factors[number as usize] = Some(Factor { index: place as u32, ..factor });
+        self.factors.insert(number, Factor { index: index as u32, ..factor });
     }
 
     /// By variable of a factor's residual: where it begins in the gradient, and what is held of it.
@@ -226,12 +235,12 @@ impl Model {
 
     /// Takes a factor out.
     pub(crate) fn remove(&mut self, number: u32) -> Option<Factor> {
-        let factor = self.factors.get_mut(number as usize)?.take()?;
+        let factor = self.factors.remove(number)?;
         self.blocks.disconnect(number, &factor.members);
-        self.numbers.give(std::mem::take(&mut self.regions[number as usize]));
+        self.regions.give(factor.region);
         let batch = &mut self.batches.as_mut_slice()[factor.batch as usize];
         if let Some(moved) = batch.remove(factor.index as usize)
-            && let Some(moved) = &mut self.factors[moved]
+            && let Some(moved) = self.factors.get_mut(moved as u32)
         {
             moved.index = factor.index;
         }
@@ -240,7 +249,7 @@ impl Model {
 
     /// Makes a factor count so many times; returns how many times it did.
     pub(crate) fn weigh(&mut self, number: u32, weight: f64) -> Option<f64> {
-        let factor = self.factors.get_mut(number as usize)?.as_mut()?;
+        let factor = self.factors.get_mut(number)?;
         self.batches.as_mut_slice()[factor.batch as usize].set_weight(factor.index as usize, weight);
         Some(std::mem::replace(&mut factor.weight, weight))
     }
@@ -250,8 +259,8 @@ impl Model {
         let before = std::mem::replace(&mut self.keys[variable as usize].held, held);
         self.blocks.hold(variable, held);
         for f in self.blocks.factors(variable).collect::<Vec<_>>() {
-            let Some(factor) = &self.factors[f as usize] else { continue };
-            let (starts, held) = self.starts(factor, self.regions[f as usize]);
+            let Some(factor) = self.factors.get(f) else { continue };
+            let (starts, held) = self.starts(factor, self.regions[factor.region]);
             self.batches.as_mut_slice()[factor.batch as usize].hold(factor.index as usize, &starts, &held);
         }
         before
@@ -272,8 +281,8 @@ impl Model {
 
     /// Says whether a factor's part counts in the sums.
     pub(crate) fn count(&mut self, number: u32, counts: bool) {
-        let Some(factor) = &self.factors[number as usize] else { return };
-        if std::mem::replace(&mut self.regions[number as usize].counts, counts) != counts {
+        let Some(factor) = self.factors.get(number) else { return };
+        if self.regions.count(factor.region, counts) != counts {
             self.blocks.mark_factor(&factor.members);
         }
     }

@@ -4,6 +4,7 @@ mod covariance;
 mod finish;
 mod parking;
 mod relinearization;
+mod saving;
 mod step_control;
 mod substitution;
 mod update;

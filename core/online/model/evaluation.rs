@@ -10,15 +10,15 @@ impl Model {
         let mut listed = std::mem::take(&mut self.listed);
         listed.resize_with(self.batches.as_slice().len(), Vec::new);
         for f in factors {
-            let Some(factor) = &self.factors[*f as usize] else { continue };
-            self.numbers.clear(self.regions[*f as usize]);
+            let Some(factor) = self.factors.get(*f) else { continue };
+            self.regions.clear(factor.region);
             self.blocks.mark_factor(&factor.members);
             listed[factor.batch as usize].push(factor.index);
         }
         let mut total = Evaluation::default();
         for (b, indices) in listed.iter_mut().enumerate().filter(|(_, indices)| !indices.is_empty()) {
             indices.sort_unstable();
-            let to = &mut self.numbers.normal_equations();
+            let to = &mut self.regions.normal_equations();
             total = total.and(self.batches.as_mut_slice()[b].linearize_at(indices, &self.trial, to));
             indices.clear();
         }
@@ -31,7 +31,7 @@ impl Model {
 
     /// Whether a factor's part of H and g is finite.
     pub(crate) fn is_finite(&self, factor: u32) -> bool {
-        self.numbers.is_finite(self.regions[factor as usize])
+        self.factor(factor).is_none_or(|factor| self.regions.is_finite(factor.region))
     }
 
     /// The factors of some variables, ascending.
@@ -54,12 +54,12 @@ impl Model {
 
     /// Makes the sums anew that a changed factor is part of.
     pub(crate) fn sum_up(&mut self) {
-        self.blocks.sum_up(&self.regions, &self.numbers);
+        self.blocks.sum_up(&self.regions);
     }
 
     /// A variable's own block of H over the factors that `counts` names; see [`Blocks::own_block`].
     pub(crate) fn own_block(&self, variable: u32, counts: impl Fn(u32) -> bool) -> SmallVec<[f64; 36]> {
-        self.blocks.own_block(variable, &self.regions, &self.numbers, counts)
+        self.blocks.own_block(variable, &self.regions, counts)
     }
 
     /// Moves the trial point of a variable by a step from its linearization point.

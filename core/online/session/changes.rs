@@ -3,6 +3,7 @@ use super::Session;
 use crate::error::ChangeError;
 use crate::factor_id::FactorId;
 use crate::model::Model;
+use crate::tree::Couplings;
 use indexmap::IndexMap;
 use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values, Variable};
 use std::any::TypeId;
@@ -24,6 +25,12 @@ pub(super) struct Pending {
     /// Numbers of factors: the next one; and whether those with changes are there, after these.
     numbers: Option<u32>,
     is_there: IndexMap<u32, Option<FactorEntry>>,
+}
+
+impl Pending {
+    pub(super) fn is_empty(&self) -> bool {
+        self.variables.is_empty() && self.changes.is_empty()
+    }
 }
 
 /// What changes have touched.
@@ -129,7 +136,7 @@ impl Session {
             self.fix(key, fixed)?;
         }
         let ids = factors.factors().iter().zip(resolved).map(|(entry, resolved)| {
-            let number = self.pending.numbers.unwrap_or(self.model.factors() as u32);
+            let number = self.pending.numbers.unwrap_or(self.model.next_factor());
             self.pending.numbers = Some(number + 1);
             self.insert(number, entry.clone(), resolved, 1.0)
         });
@@ -230,7 +237,7 @@ impl Session {
     }
 
     /// The number and the type of a variable, of a pending one too.
-    fn find(&self, key: &str) -> Option<(usize, TypeId)> {
+    pub(super) fn find(&self, key: &str) -> Option<(usize, TypeId)> {
         if let Some(variable) = self.model.variable(key) {
             return Some((variable as usize, self.model.type_of(variable)?));
         }

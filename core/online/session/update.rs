@@ -72,7 +72,7 @@ impl Session {
     }
 
     /// Room for as many variables as the model has.
-    fn resize(&mut self) {
+    pub(super) fn resize(&mut self) {
         let n = self.model.variables();
         self.tree.resize(n);
         self.fronts.resize(n);

@@ -4,6 +4,7 @@ mod errors;
 mod failures;
 mod history;
 mod parking;
+mod saving;
 mod steps;
 #[path = "../../solve/tests/toy/mod.rs"]
 mod toy;

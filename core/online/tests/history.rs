@@ -97,6 +97,11 @@ impl History {
         graph
     }
 
+    /// The same history, with another session.
+    pub(crate) fn with(&self, session: Session) -> Self {
+        Self { session, keys: self.keys.clone(), ids: self.ids.clone(), count: self.count }
+    }
+
     pub(crate) fn apply_all(&mut self, changes: &[Change]) -> Vec<Report> {
         changes.iter().filter_map(|change| self.apply(change)).collect()
     }
