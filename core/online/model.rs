@@ -144,6 +144,8 @@ impl Model {
             self.trial.add(id, value.erased().new_column());
             self.points.add(id, value.erased().new_column())
         });
+        let plain = evaluation::plain(value);
+        let value = plain.as_deref().unwrap_or(value);
         self.points.column_mut(column).push(value);
         self.trial.column_mut(column).push(value);
         let index = self.points.column(column).len() as u32 - 1;

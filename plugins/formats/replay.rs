@@ -192,7 +192,7 @@ impl Latencies {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use manifactor_geometry::{Between, LieGroup, Se2};
+    use manifactor_geometry::{Between, Se2};
 
     #[test]
     fn factors_wait_until_something_known_reaches_them_and_come_in_their_order() {

@@ -1,5 +1,6 @@
 //! Factors at the trial points, and variables on their way to these: a few of each.
 use super::{Factor, Model};
+use manifactor_graph::Variable;
 use manifactor_graph::batch::Evaluation;
 use smallvec::SmallVec;
 
@@ -68,6 +69,18 @@ impl Model {
         self.trial.column_mut(column).retract_at(self.points.column(column), index, step);
     }
 
+    /// The same, to linearize there: the point is as its text says. One that comes of a step may know more, a cosine that was
+    /// not taken of its angle, say, and would have other bits after it was saved and loaded.
+    pub(crate) fn try_point(&mut self, variable: u32, step: &[f64]) {
+        self.try_step(variable, step);
+        let (column, index) = self.keys[variable as usize].in_columns();
+        let trial = self.trial.column_mut(column);
+        let point = trial.get(index).and_then(|point| plain(&*point));
+        if let Some(point) = point {
+            trial.set(index, &*point);
+        }
+    }
+
     /// Puts the trial point of a variable back to its linearization point.
     pub(crate) fn reset_trial(&mut self, variable: u32) {
         let (column, index) = self.keys[variable as usize].in_columns();
@@ -79,4 +92,10 @@ impl Model {
         let (column, index) = self.keys[variable as usize].in_columns();
         self.points.column_mut(column).copy_at(self.trial.column(column), index);
     }
+}
+
+/// The same point, by a step of zero.
+pub(super) fn plain(point: &dyn Variable) -> Option<Box<dyn Variable>> {
+    let zeros: SmallVec<[f64; 9]> = SmallVec::from_elem(0.0, point.erased().dim());
+    point.erased().retract(&zeros)
 }

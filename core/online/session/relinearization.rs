@@ -98,7 +98,7 @@ impl Session {
         let share = 0.5_f64.powi(halvings as i32);
         let step = self.delta[self.model.blocks.range(variable)].iter().map(|d| d * share);
         let step: SmallVec<[f64; 9]> = step.collect();
-        self.model.try_step(variable, &step);
+        self.model.try_point(variable, &step);
     }
 
     /// Linearizes some of the `factors`, and names those that cannot be: they took part before and do not any more, or are

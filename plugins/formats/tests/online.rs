@@ -77,6 +77,33 @@ fn any_number_of_threads_gives_the_same_bits() {
     assert!(bits(2) == alone && bits(4) == alone);
 }
 
+#[test]
+fn a_replay_goes_on_after_a_restart_bit_for_bit() {
+    for name in ["intel", "parking-garage", "input_M3500_g2o"] {
+        let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
+        let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+        let (mut steps, mut session) = (Replay::of(&graph), Session::new(Settings::default()).unwrap());
+        let mut other = None;
+        for n in 0..400 {
+            let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
+            let next = |session: &mut Session| {
+                session.push(&step.factors, &step.values).unwrap();
+                session.update().unwrap()
+            };
+            let report = next(&mut session);
+            if let Some(other) = &mut other {
+                assert_eq!(next(other), report, "{name}, pose {n}");
+            }
+            if n == 237 {
+                other = Some(Session::load(&session.save().unwrap()).unwrap());
+            }
+        }
+        let (text, other) = (session.save().unwrap(), other.unwrap());
+        assert!(other.save().unwrap() == text, "{name}");
+        assert_eq!(session.covariance(&["x300", "x17"]), other.covariance(&["x300", "x17"]), "{name}");
+    }
+}
+
 /// Victoria Park as a graph: poses by their numbers, trees by their ids.
 fn victoria_park(path: PathBuf) -> Graph {
     let mut graph = Graph::new();
