@@ -11,6 +11,8 @@ pub struct Report {
     pub redone: usize,
     /// Variables that were linearized at a new point.
     pub relinearized: usize,
+    /// Variables whose relinearization the budget has put off: they come in the next updates.
+    pub postponed: usize,
     /// Variables whose step was computed again.
     pub solved: usize,
     /// Multiplications and additions of the factorization.

@@ -60,6 +60,7 @@ pub(crate) struct Saved {
     pub settings: Settings,
     pub updates: usize,
     pub next_factor: u32,
+    pub postponed: usize,
     /// By number.
     pub variables: Vec<SavedVariable>,
     /// By ascending number.

@@ -42,6 +42,8 @@ pub struct Session {
     updates: usize,
     /// Variables that have left the region of their linearization.
     waiting: Vec<u32>,
+    /// How many of them the budget has put off.
+    postponed: usize,
     is_waiting: Vec<bool>,
     /// Those that have left it so far that they cannot wait; some may be back, or be named twice.
     urgent: Vec<u32>,
@@ -82,6 +84,7 @@ impl Session {
             pass: 0,
             updates: 0,
             waiting: vec![],
+            postponed: 0,
             is_waiting: vec![],
             urgent: vec![],
             moved: vec![],
@@ -162,5 +165,6 @@ impl Session {
         let name = |(v, d): &Scalar| Some((self.key(*v), *self.model.place(*v).tangent.get(*d as usize)?));
         report.undetermined = self.open.iter().filter_map(name).collect();
         report.inactive = self.inactive.len();
+        report.postponed = self.postponed;
     }
 }

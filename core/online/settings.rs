@@ -25,11 +25,15 @@ pub struct Settings {
     pub urgent: f64,
     /// Such passes that one update may take. Default: 1.
     pub passes: usize,
+    /// Multiply-adds that an update may take where it relinearizes, for deadlines. Relinearizations beyond it wait for the next
+    /// updates, those furthest out first; an update that has nothing else to do takes one at least. What new factors need
+    /// is never put off, nor is a step shortened later because of it. Default: no budget.
+    pub budget: Option<f64>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { relinearize_every: 10, bend: 0.1, deviation: 0.01, urgent: 10.0, passes: 1 }
+        Self { relinearize_every: 10, bend: 0.1, deviation: 0.01, urgent: 10.0, passes: 1, budget: None }
     }
 }
 
@@ -40,7 +44,8 @@ impl Settings {
     /// Names the one that is not.
     pub fn check(&self) -> Result<(), SettingError> {
         let all = [("bend", self.bend), ("deviation", self.deviation), ("urgent", self.urgent)];
-        match all.into_iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
+        let budget = self.budget.map(|budget| ("budget", budget));
+        match all.into_iter().chain(budget).find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
             Some((setting, got)) => Err(SettingError { setting, expected: "0 or more", got }),
             None => Ok(()),
         }

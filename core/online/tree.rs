@@ -108,6 +108,11 @@ impl Tree {
         }
     }
 
+    /// Takes fronts out of the affected ones again, all but the first.
+    pub(crate) fn untouch(&mut self, affected: &mut Affected, first: usize) {
+        affected.0.drain(first..).for_each(|f| self.marked[f as usize] = false);
+    }
+
     /// Orders the variables of the affected fronts anew, and makes fronts of them. `entering` are variables that were not in
     /// the tree; `leaves` says of the others which are not to be in it any more, `is_last` which to eliminate last.
     pub(crate) fn redo(

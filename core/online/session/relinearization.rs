@@ -4,7 +4,7 @@
 //! be: |δᵢ| ≤ √(bend · σᵢ) with σᵢ = 1/√Hᵢᵢ, the precision of the factors around. Thresholds in radians and metres would
 //! be too coarse for precise data and too fine for coarse data, and need one number for each type of variable.
 use super::Session;
-use crate::tree::NONE;
+use crate::tree::{Affected, NONE};
 use smallvec::SmallVec;
 
 /// Variables at new points.
@@ -38,15 +38,55 @@ impl Session {
         !self.urgent.is_empty()
     }
 
-    /// The variables to relinearize: those whose held directions have changed, and in turn those that wait.
-    pub(super) fn choose(&self, held: &[u32], is_turn: bool) -> Vec<u32> {
+    /// The variables to relinearize: those whose held directions have changed, and in turn those that wait, as far as the
+    /// budget goes. `spent` are the operations of the update so far.
+    pub(super) fn choose(
+        &mut self,
+        held: &[u32],
+        is_turn: bool,
+        affected: &mut Affected,
+        spent: f64,
+    ) -> Vec<u32> {
         let mut chosen: Vec<u32> = held.to_vec();
         if is_turn {
-            chosen.extend(self.waiting.iter().filter(|v| self.is_out(**v)));
+            let mut out: Vec<u32> = self.waiting.iter().copied().filter(|v| self.is_out(*v)).collect();
+            if let Some(budget) = self.settings.budget {
+                self.postponed = out.len();
+                self.afford(&mut out, budget - spent, spent == 0.0 && held.is_empty(), affected);
+                self.postponed -= out.len();
+            }
+            chosen.append(&mut out);
         }
         chosen.sort_unstable();
         chosen.dedup();
         chosen
+    }
+
+    /// Keeps those variables that the budget allows for, the furthest out first. What a relinearization costs is what the
+    /// fronts above the variable cost as they are; those that are `affected` anyway come first.
+    fn afford(&mut self, variables: &mut Vec<u32>, budget: f64, is_alone: bool, affected: &mut Affected) {
+        let mut by_excess: Vec<(f64, u32)> = variables.iter().map(|v| (self.excess(*v), *v)).collect();
+        by_excess.sort_unstable_by(|(a, v), (b, u)| b.total_cmp(a).then(v.cmp(u)));
+        let first = affected.0.len();
+        let cost = |session: &Self, from: usize, affected: &Affected| -> f64 {
+            affected.0[from..].iter().map(|f| session.tree.fronts[*f as usize].operations).sum()
+        };
+        let mut left = budget - cost(self, 0, affected);
+        let mut must_take = is_alone && first == 0;
+        variables.clear();
+        for (_, v) in by_excess {
+            let before = affected.0.len();
+            self.touch_around(v, affected);
+            let needed = cost(self, before, affected);
+            if needed <= left || must_take {
+                left -= needed;
+                must_take = false;
+                variables.push(v);
+            } else {
+                self.tree.untouch(affected, before);
+            }
+        }
+        self.tree.untouch(affected, first);
     }
 
     /// Whether a variable is out of the region of its linearization, and solved for.

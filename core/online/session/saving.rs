@@ -29,6 +29,7 @@ impl Session {
         let saved = Saved {
             settings: self.settings.clone(),
             updates: self.updates,
+            postponed: self.postponed,
             next_factor: self.model.next_factor(),
             variables,
             factors: factors.collect(),
@@ -48,7 +49,7 @@ impl Session {
     pub fn load(text: &str) -> Result<Self, LoadError> {
         let saved = Saved::read(text)?;
         let mut session = Session::new(saved.settings).map_err(|e| LoadError::Read(e.to_string()))?;
-        session.updates = saved.updates;
+        (session.updates, session.postponed) = (saved.updates, saved.postponed);
         for variable in &saved.variables {
             insert(&mut session.model, variable)?;
         }

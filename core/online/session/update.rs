@@ -46,7 +46,8 @@ impl Session {
         }
         self.doubt_inactive(&mut touched);
         undo.moves = self.park(&mut touched);
-        let is_turn = (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
+        let is_turn =
+            self.postponed > 0 || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
         let moves = std::mem::take(&mut undo.moves);
         if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);
@@ -158,7 +159,8 @@ impl Session {
         let mut last = touched.variables.clone();
         last.sort_unstable();
         last.dedup();
-        let chosen = self.choose(&touched.held, is_turn);
+        let postponed = self.postponed;
+        let chosen = self.choose(&touched.held, is_turn, &mut affected, report.operations);
         let relinearized = self.relinearize(chosen, &touched.held);
         for v in &relinearized.variables {
             self.touch_around(*v, &mut affected);
@@ -170,6 +172,7 @@ impl Session {
         if let Err(overflow) = built {
             self.tree.drop_new(&affected, &redone);
             self.take_back_points(&relinearized);
+            self.postponed = postponed;
             self.model.sum_up();
             return Err(overflow);
         }
@@ -187,7 +190,7 @@ impl Session {
     }
 
     /// Touches a variable's front and those of its neighbours: all fronts that have it among their rows are above those.
-    fn touch_around(&mut self, variable: u32, affected: &mut Affected) {
+    pub(super) fn touch_around(&mut self, variable: u32, affected: &mut Affected) {
         self.tree.touch(variable, affected);
         for other in self.model.coupled(variable) {
             self.tree.touch(other, affected);

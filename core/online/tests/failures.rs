@@ -41,8 +41,9 @@ proptest! {
         n in 0..1000usize,
         overflows in any::<bool>(),
         every in 1..4usize,
+        budget in prop_oneof![Just(None), Just(Some(300.0))],
     ) {
-        let settings = Settings { relinearize_every: every, ..Settings::default() };
+        let settings = Settings { relinearize_every: every, budget, ..Settings::default() };
         let [mut one, mut other] = std::array::from_fn(|_| History::new(settings.clone()));
         for history in [&mut one, &mut other] {
             history.apply_all(&before);

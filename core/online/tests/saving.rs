@@ -12,8 +12,9 @@ proptest! {
         after in prop::collection::vec(change(), 1..40),
         every in 1..4usize,
         bend in prop_oneof![Just(0.1), Just(0.001)],
+        budget in prop_oneof![Just(None), Just(Some(300.0))],
     ) {
-        let settings = Settings { relinearize_every: every, bend, ..Settings::default() };
+        let settings = Settings { relinearize_every: every, bend, budget, ..Settings::default() };
         let mut history = History::new(settings);
         history.apply_all(&before);
         history.apply(&Change::Update);

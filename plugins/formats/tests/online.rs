@@ -104,6 +104,44 @@ fn a_replay_goes_on_after_a_restart_bit_for_bit() {
     }
 }
 
+#[test]
+fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
+    let Some(path) = data("g2o/input_M3500_g2o.g2o") else { return };
+    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let run = |budget: Option<f64>| {
+        let mut session = Session::new(Settings { budget, ..Settings::default() }).unwrap();
+        let (mut steps, mut reports) = (Replay::of(&graph), vec![]);
+        for _ in 0..1000 {
+            let step = steps.step(|key| session.estimate(key)).unwrap().unwrap();
+            session.push(&step.factors, &step.values).unwrap();
+            reports.push(session.update().unwrap());
+        }
+        (session, reports)
+    };
+    let (mut free, of_free) = run(None);
+    let budget = 2e4;
+    let (mut bounded, of_bounded) = run(Some(budget));
+    let most = |reports: &[Report]| {
+        // what new factors need is not bounded, nor are steps that had to be shortened
+        let relinearizing = reports.iter().filter(|r| r.relinearized > 0 && r.halved == 0);
+        relinearizing.map(|r| r.operations).fold(0.0, f64::max)
+    };
+    let (without, with) = (most(&of_free), most(&of_bounded));
+    assert!(
+        without > 10.0 * budget && with < 1.5 * budget,
+        "{without} without, {with} with a budget of {budget}"
+    );
+    assert!(of_bounded.iter().any(|r| r.postponed > 0) && of_free.iter().all(|r| r.postponed == 0));
+    let mut empty = 0;
+    while bounded.update().unwrap().postponed > 0 || empty < 20 {
+        empty += 1;
+        assert!(empty < 3000, "variables wait for ever");
+    }
+    (0..20).for_each(|_| drop(free.update().unwrap()));
+    let (cost, expected) = (bounded.cost(), free.cost());
+    assert!((cost - expected).abs() < 1e-3 * expected, "{cost}, without a budget {expected}");
+}
+
 /// Victoria Park as a graph: poses by their numbers, trees by their ids.
 fn victoria_park(path: PathBuf) -> Graph {
     let mut graph = Graph::new();
