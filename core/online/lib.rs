@@ -21,6 +21,7 @@
 mod error;
 mod factor_id;
 mod fronts;
+mod gone;
 mod model;
 mod report;
 mod saved;
@@ -33,4 +34,4 @@ pub use factor_id::FactorId;
 pub use report::{Report, Shared};
 pub use saved::{LoadError, SaveError};
 pub use session::{CovarianceError, Finished, Session};
-pub use settings::Settings;
+pub use settings::{Settings, Window};

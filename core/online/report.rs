@@ -1,4 +1,5 @@
 //! What an update did.
+use crate::factor_id::FactorId;
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::ops::Deref;
@@ -29,6 +30,10 @@ pub struct Report {
     /// Directions that nothing constrains, by variable and name of the tangent direction: a free gauge, say. They are held
     /// where they were.
     pub undetermined: Vec<(Key, &'static str)>,
+    /// Variables that have left: their factors are part of a linear prior now.
+    pub sealed: Vec<Key>,
+    /// Factors that were dropped with them, as they took no part.
+    pub dropped: Vec<FactorId>,
     /// Factors that are not defined where they were last linearized, and take no part.
     pub inactive: usize,
 }

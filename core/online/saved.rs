@@ -7,6 +7,7 @@
 //!
 //! What is saved is what history has left: factors, linearization points, steps, and which variables are eliminated together.
 //! The numbers of the factorization are not: from the same points, in the same tree, they have the same bits again.
+use crate::gone::{GoneKeys, Runs};
 use crate::settings::Settings;
 use manifactor_graph::{FactorEntry, GraphError, Key, Variable};
 use serde::{Deserialize, Serialize};
@@ -68,6 +69,12 @@ pub(crate) struct Saved {
     /// Children before parents.
     pub fronts: Vec<SavedFront>,
     /// Variables that have left the region of their linearization, those that have left it far, and those to be judged.
+    pub born: u64,
+    /// Numbers of variables that are gone, those that are used again first last.
+    pub unused: Vec<u32>,
+    pub priors: Vec<SavedPrior>,
+    pub gone: GoneKeys,
+    pub gone_factors: Runs,
     pub waiting: Vec<u32>,
     pub urgent: Vec<u32>,
     pub doubtful: Vec<u32>,
@@ -77,6 +84,8 @@ pub(crate) struct Saved {
 #[serde(deny_unknown_fields)]
 pub(crate) struct SavedVariable {
     pub key: Key,
+    /// How many came before it; `None` where it is gone.
+    pub born: Option<u64>,
     /// Its linearization point, and the bits of its step from there.
     pub point: Box<dyn Variable>,
     pub step: Vec<u64>,
@@ -90,6 +99,17 @@ pub(crate) struct SavedFactor {
     pub number: u32,
     pub weight: f64,
     pub entry: FactorEntry,
+}
+
+/// A linear prior, its numbers by their bits.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SavedPrior {
+    pub number: u32,
+    pub variables: Vec<u32>,
+    pub h: Vec<u64>,
+    pub g: Vec<u64>,
+    pub constant: u64,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -29,11 +29,33 @@ pub struct Settings {
     /// updates, those furthest out first; an update that has nothing else to do takes one at least. What new factors need
     /// is never put off, nor is a step shortened later because of it. Default: no budget.
     pub budget: Option<f64>,
+    /// What stays of a graph that grows without end. Default: all of it.
+    pub window: Option<Window>,
+}
+
+/// A window that moves with the newest variables.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Window {
+    /// Variables that stay, the newest of those whose type is not kept; at least one. Older ones leave at the end of an update,
+    /// as by [`Session::marginalize`](crate::Session::marginalize).
+    pub poses: usize,
+    /// Names of types whose variables never leave: `"dual_quadric"`, say. Default: none.
+    #[serde(default)]
+    pub keep: Vec<String>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { relinearize_every: 10, bend: 0.1, deviation: 0.01, urgent: 10.0, passes: 1, budget: None }
+        Self {
+            relinearize_every: 10,
+            bend: 0.1,
+            deviation: 0.01,
+            urgent: 10.0,
+            passes: 1,
+            budget: None,
+            window: None,
+        }
     }
 }
 

@@ -11,7 +11,7 @@ impl Model {
         let mut listed = std::mem::take(&mut self.listed);
         listed.resize_with(self.batches.as_slice().len(), Vec::new);
         for f in factors {
-            let Some(factor) = self.factors.get(*f) else { continue };
+            let Some(factor) = self.factors.get(*f).filter(|factor| factor.entry.is_some()) else { continue };
             self.regions.clear(factor.region);
             self.blocks.mark_factor(&factor.members);
             listed[factor.batch as usize].push(factor.index);
@@ -45,10 +45,12 @@ impl Model {
 
     /// The cost of factors at the trial points, over those that took part in their last linearization. It is summed in the
     /// order of `factors`, one by one: where they are in their batches depends on history.
-    pub(crate) fn cost(&self, factors: &[u32]) -> Evaluation {
+    /// `delta` are the steps to the trial points, by scalar of all variables; `None` where these are the linearization points.
+    pub(crate) fn cost(&self, factors: &[u32], delta: Option<&[f64]>) -> Evaluation {
         let factors = factors.iter().filter_map(|f| self.factor(*f));
-        let one = |factor: &Factor| {
-            self.batches.as_slice()[factor.batch as usize].cost_at(&[factor.index], &self.trial)
+        let one = |factor: &Factor| match factor.entry.is_some() {
+            true => self.batches.as_slice()[factor.batch as usize].cost_at(&[factor.index], &self.trial),
+            false => self.prior_cost(factor, delta),
         };
         factors.map(one).fold(Evaluation::default(), Evaluation::and)
     }
@@ -65,7 +67,7 @@ impl Model {
 
     /// Moves the trial point of a variable by a step from its linearization point.
     pub(crate) fn try_step(&mut self, variable: u32, step: &[f64]) {
-        let (column, index) = self.keys[variable as usize].in_columns();
+        let (column, index) = self.places[variable as usize].in_columns();
         self.trial.column_mut(column).retract_at(self.points.column(column), index, step);
     }
 
@@ -73,7 +75,7 @@ impl Model {
     /// not taken of its angle, say, and would have other bits after it was saved and loaded.
     pub(crate) fn try_point(&mut self, variable: u32, step: &[f64]) {
         self.try_step(variable, step);
-        let (column, index) = self.keys[variable as usize].in_columns();
+        let (column, index) = self.places[variable as usize].in_columns();
         let trial = self.trial.column_mut(column);
         let point = trial.get(index).and_then(|point| plain(&*point));
         if let Some(point) = point {
@@ -83,13 +85,13 @@ impl Model {
 
     /// Puts the trial point of a variable back to its linearization point.
     pub(crate) fn reset_trial(&mut self, variable: u32) {
-        let (column, index) = self.keys[variable as usize].in_columns();
+        let (column, index) = self.places[variable as usize].in_columns();
         self.trial.column_mut(column).copy_at(self.points.column(column), index);
     }
 
     /// Makes the trial point of a variable its linearization point.
     pub(crate) fn accept(&mut self, variable: u32) {
-        let (column, index) = self.keys[variable as usize].in_columns();
+        let (column, index) = self.places[variable as usize].in_columns();
         self.points.column_mut(column).copy_at(self.trial.column(column), index);
     }
 }

@@ -5,6 +5,7 @@ use super::parking::Moves;
 use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
 use crate::report::Report;
+use crate::tree::NONE;
 use manifactor_graph::{Fixed, Graph, Values};
 use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 
@@ -24,12 +25,13 @@ impl Session {
     pub fn graph(&self) -> (Graph, Vec<FactorId>) {
         let (mut graph, mut ids) = (Graph::new(), vec![]);
         for f in self.counted() {
-            let Some(factor) = self.model.factor(f) else { continue };
-            graph.push(factor.entry.clone());
+            let Some(entry) = self.model.factor(f).and_then(|factor| factor.entry.clone()) else { continue };
+            graph.push(entry);
             ids.push(FactorId(f));
         }
-        for (v, key) in self.model.keys().enumerate() {
-            let place = self.model.place(v as u32);
+        for v in self.model.by_age() {
+            let place = self.model.place(v);
+            let key = &place.key;
             let names = place.tangent.iter().enumerate().filter(|(d, _)| place.held >> d & 1 == 1);
             match place.is_held() {
                 true => graph.fix(key),
@@ -81,13 +83,16 @@ impl Session {
     /// does not have are left out.
     pub(super) fn adopt(&mut self, values: &Values, report: &mut Report) -> Result<(), Overflow> {
         let mut points = vec![];
-        for (v, key) in self.model.keys().enumerate() {
-            let (v, point) = (v as u32, self.model.point(v as u32));
+        for v in self.model.by_age() {
+            let (key, point) = (&self.model.place(v).key, self.model.point(v));
             let step = point.zip(values.variable(key.as_str())).and_then(|(p, x)| p.erased().local(x));
             points.extend(step.map(|step| (v, step)));
         }
         let (before, mut held) = (self.delta.clone(), vec![]);
-        for (v, step) in points.into_iter().filter(|(v, _)| self.model.place(*v).is_in_tree()) {
+        for (v, step) in points
+            .into_iter()
+            .filter(|(v, _)| self.tree.front_of(*v) != NONE && self.model.place(*v).sealed == 0)
+        {
             let range = self.model.blocks.range(v);
             self.delta[range].copy_from_slice(&step);
             held.push(v);

@@ -34,7 +34,8 @@ impl Session {
         let mut queue: VecDeque<u32> = candidates.iter().copied().collect();
         while let Some(v) = queue.pop_front() {
             let place = self.model.place(v);
-            if !place.parked && !place.is_held() && !self.is_determined(v) {
+            // a prior says something of the others, also where it leaves this one open
+            if !place.parked && !place.is_held() && place.sealed == 0 && !self.is_determined(v) {
                 self.model.place_mut(v).parked = true;
                 parked.insert(v);
                 queue.extend(self.model.coupled(v));

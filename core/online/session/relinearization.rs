@@ -31,7 +31,7 @@ impl Session {
     pub(super) fn is_urgent(&mut self) -> bool {
         let most = self.settings.urgent.powi(2);
         let mut urgent = std::mem::take(&mut self.urgent);
-        urgent.retain(|v| self.excess(*v) > most && self.tree.front_of(*v) != NONE);
+        urgent.retain(|v| self.excess(*v) > most && self.may_move(*v));
         urgent.sort_unstable();
         urgent.dedup();
         self.urgent = urgent;
@@ -57,6 +57,7 @@ impl Session {
             }
             chosen.append(&mut out);
         }
+        chosen.retain(|v| self.model.place(*v).sealed == 0);
         chosen.sort_unstable();
         chosen.dedup();
         chosen
@@ -91,7 +92,12 @@ impl Session {
 
     /// Whether a variable is out of the region of its linearization, and solved for.
     fn is_out(&self, variable: u32) -> bool {
-        self.excess(variable) > 1.0 && self.tree.front_of(variable) != NONE
+        self.excess(variable) > 1.0 && self.may_move(variable)
+    }
+
+    /// Whether a variable may be linearized anew: it is solved for, and no prior holds its point.
+    fn may_move(&self, variable: u32) -> bool {
+        self.tree.front_of(variable) != NONE && self.model.place(variable).sealed == 0
     }
 
     /// Linearizes the factors of these variables, which ascend, where the variables are estimated to be; their steps are

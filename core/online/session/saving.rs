@@ -1,7 +1,7 @@
 //! A session that goes on after a restart.
 use super::Session;
-use crate::model::Model;
-use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedVariable};
+use crate::model::{Model, NewNumber, Prior};
+use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
 use crate::tree::{Couplings, Tree};
 
 impl Session {
@@ -15,15 +15,16 @@ impl Session {
             return Err(SaveError::Pending);
         }
         let mut variables = vec![];
-        for (v, key) in self.model.keys().enumerate() {
-            let (v, key) = (v as u32, key.clone());
+        for v in 0..self.model.variables() as u32 {
             let Some(point) = self.model.point(v) else { continue };
             let step = self.delta[self.model.blocks.range(v)].iter().map(|d| d.to_bits()).collect();
             let place = self.model.place(v);
-            variables.push(SavedVariable { key, point, step, held: place.held, parked: place.parked });
+            let (key, born) = (place.key.clone(), place.is_there.then_some(place.born));
+            let (held, parked) = (place.held, place.parked);
+            variables.push(SavedVariable { key, born, point, step, held, parked });
         }
-        let factors = self.model.all_factors().map(|(number, factor)| {
-            let entry = factor.entry.clone();
+        let factors = self.model.all_factors().map(|(number, factor, entry)| {
+            let entry = entry.clone();
             SavedFactor { number, weight: factor.weight, entry }
         });
         let saved = Saved {
@@ -34,6 +35,11 @@ impl Session {
             variables,
             factors: factors.collect(),
             fronts: self.tree.save(),
+            born: self.model.born(),
+            unused: self.model.unused(),
+            priors: self.model.priors().filter_map(|f| self.save_prior(f)).collect(),
+            gone: self.gone.clone(),
+            gone_factors: self.gone_factors.clone(),
             waiting: sorted(&self.waiting),
             urgent: sorted(&self.urgent),
             doubtful: self.doubtful.clone(),
@@ -53,9 +59,13 @@ impl Session {
         for variable in &saved.variables {
             insert(&mut session.model, variable)?;
         }
+        let is_gone = saved.variables.iter().filter(|variable| variable.born.is_none()).count();
+        let fits = session.model.restore(saved.born, &saved.unused) && saved.unused.len() == is_gone;
+        fits.then_some(()).ok_or(LoadError::Inconsistent("variables that are gone"))?;
         session.resize();
         let steps = saved.variables.iter().flat_map(|variable| &variable.step);
         session.delta.iter_mut().zip(steps).for_each(|(to, step)| *to = f64::from_bits(*step));
+        session.put_priors(&saved.priors, saved.next_factor)?;
         session.put_factors(&saved.factors, saved.next_factor)?;
         session.tree = Tree::load(saved.fronts, &session.model, |v| session.model.place(v).is_in_tree())
             .ok_or(LoadError::Inconsistent("its fronts do not fit its factors"))?;
@@ -69,7 +79,40 @@ impl Session {
         saved.waiting.iter().for_each(|v| session.is_waiting[*v as usize] = true);
         (session.waiting, session.urgent, session.doubtful) = (saved.waiting, saved.urgent, saved.doubtful);
         session.waiting.dedup();
+        (session.gone, session.gone_factors) = (saved.gone, saved.gone_factors);
+        session.model.by_age().into_iter().for_each(|v| session.note_age(v));
         Ok(session)
+    }
+
+    fn save_prior(&self, number: u32) -> Option<SavedPrior> {
+        let Prior { variables, h, g, constant } = self.model.prior(number)?;
+        let bits = |list: Vec<f64>| list.into_iter().map(f64::to_bits).collect();
+        Some(SavedPrior { number, variables, h: bits(h), g: bits(g), constant: constant.to_bits() })
+    }
+
+    /// What variables that are gone have left behind.
+    fn put_priors(&mut self, priors: &[SavedPrior], next: u32) -> Result<(), LoadError> {
+        let n = self.model.variables() as u32;
+        for SavedPrior { number, variables, h, g, constant } in priors {
+            let ascend = variables.windows(2).all(|pair| pair[0] < pair[1]);
+            let are_there = variables.iter().all(|v| *v < n && self.model.place(*v).is_there);
+            let dim: usize = if are_there { variables.iter().map(|v| self.dim(*v)).sum() } else { 0 };
+            let numbers =
+                |bits: &[u64]| -> Vec<f64> { bits.iter().map(|bits| f64::from_bits(*bits)).collect() };
+            let prior = Prior {
+                variables: variables.clone(),
+                h: numbers(h),
+                g: numbers(g),
+                constant: f64::from_bits(*constant),
+            };
+            let is_finite = prior.h.iter().chain(&prior.g).chain([&prior.constant]).all(|x| x.is_finite());
+            let fits = h.len() == dim * (dim + 1) / 2 && g.len() == dim && *number < next;
+            if !(ascend && are_there && is_finite && fits) || self.model.factor(*number).is_some() {
+                return Err(LoadError::Inconsistent("what variables have left behind"));
+            }
+            self.model.insert_prior(*number, &prior);
+        }
+        Ok(())
     }
 
     /// Factors, linearized where they were.
@@ -77,7 +120,8 @@ impl Session {
         let mut errors = vec![];
         for (i, SavedFactor { number, weight, entry }) in factors.iter().enumerate() {
             let is_next = i == 0 || factors[i - 1].number < *number;
-            if !is_next || *number >= next || !(*weight >= 0.0 && weight.is_finite()) {
+            let is_taken = self.model.factor(*number).is_some();
+            if !is_next || is_taken || *number >= next || !(*weight >= 0.0 && weight.is_finite()) {
                 return Err(LoadError::Inconsistent("a factor's number or weight"));
             }
             if let Some(resolved) = entry.resolve(i, |key| self.find(key), &mut errors) {
@@ -109,7 +153,7 @@ impl Session {
         for f in &all {
             self.open.extend(self.fronts.open(*f));
         }
-        let parked = |v: &u32| self.model.place(*v).parked;
+        let parked = |v: &u32| self.model.place(*v).parked && self.model.place(*v).is_there;
         self.parked = (0..self.model.variables() as u32).filter(parked).collect();
         self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
         Ok(())
@@ -117,18 +161,20 @@ impl Session {
 }
 
 fn insert(model: &mut Model, saved: &SavedVariable) -> Result<(), LoadError> {
-    let SavedVariable { key, point, step, held, parked } = saved;
+    let SavedVariable { key, born, point, step, held, parked } = saved;
     let value = point.erased();
     let dim = value.dim();
-    if model.variable(key.as_str()).is_some() || step.len() != dim || !value.is_finite() {
+    let is_known = born.is_some() && model.variable(key.as_str()).is_some();
+    if is_known || step.len() != dim || !value.is_finite() {
         return Err(LoadError::Inconsistent("a variable's key, point or step"));
     }
     if dim < 32 && held >> dim != 0 {
         return Err(LoadError::Inconsistent("directions that are held"));
     }
     let v = model.variables() as u32;
-    model.push_variable(key.clone(), &**point, *held);
-    model.place_mut(v).parked = *parked;
+    model.push_variable(key.clone(), &**point, *held, NewNumber { number: v, is_reused: false });
+    let place = model.place_mut(v);
+    (place.parked, place.is_there, place.born) = (*parked, born.is_some(), born.unwrap_or_default());
     Ok(())
 }
 

@@ -78,7 +78,7 @@ impl Session {
         for v in &variables {
             self.model.try_step(*v, &self.delta[self.model.blocks.range(*v)]);
         }
-        let cost = self.model.cost(factors);
+        let cost = self.model.cost(factors, Some(&self.delta));
         variables.iter().for_each(|v| self.model.reset_trial(*v));
         cost
     }

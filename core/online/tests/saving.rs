@@ -1,5 +1,5 @@
 //! A session that was saved goes on as if nothing had been.
-use crate::history::{Change, History, bits, change};
+use crate::history::{Change, History, bits, change, window};
 use crate::toy::Plane;
 use manifactor_graph::{Graph, Values};
 use manifactor_online::{LoadError, SaveError, Session, Settings};
@@ -13,8 +13,9 @@ proptest! {
         every in 1..4usize,
         bend in prop_oneof![Just(0.1), Just(0.001)],
         budget in prop_oneof![Just(None), Just(Some(300.0))],
+        window in prop_oneof![Just(None), window().prop_map(Some)],
     ) {
-        let settings = Settings { relinearize_every: every, bend, budget, ..Settings::default() };
+        let settings = Settings { relinearize_every: every, bend, budget, window, ..Settings::default() };
         let mut history = History::new(settings);
         history.apply_all(&before);
         history.apply(&Change::Update);
@@ -26,7 +27,7 @@ proptest! {
         prop_assert_eq!(history.apply(&Change::Update), other.apply(&Change::Update));
         prop_assert_eq!(bits(&history.session), bits(&other.session));
         prop_assert_eq!(history.session.cost().to_bits(), other.session.cost().to_bits());
-        let keys: Vec<_> = history.keys.iter().map(|key| key.as_str()).collect();
+        let keys = history.present();
         prop_assert_eq!(history.session.covariance(&keys), other.session.covariance(&keys));
     }
 }
