@@ -1,4 +1,6 @@
 //! The whole of a session as one batch.
+mod prior;
+
 use super::Session;
 use super::changes::Touched;
 use super::parking::Moves;
@@ -6,7 +8,7 @@ use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
 use crate::report::Report;
 use crate::tree::NONE;
-use manifactor_graph::{Fixed, Graph, Values};
+use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Noise, Values};
 use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 
 /// A session that was solved as one batch.
@@ -14,14 +16,16 @@ use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 pub struct Finished {
     /// The estimate of each variable; those that were parked are where they were.
     pub values: Values,
-    /// What the solver has to tell. Its factors count from 0 in the order of `factors`.
+    /// What the solver has to tell. Its factors count from 0 in the order of `factors`; after these come the rows of linear
+    /// priors.
     pub outcome: Outcome,
     /// The factors that took part: all, but for those of parked variables.
     pub factors: Vec<FactorId>,
 }
 
 impl Session {
-    /// The factors that count, as a graph with what is held, and their ids.
+    /// The factors that count, as a graph with what is held, and their ids. What variables have left behind that are gone is
+    /// not among them.
     pub fn graph(&self) -> (Graph, Vec<FactorId>) {
         let (mut graph, mut ids) = (Graph::new(), vec![]);
         for f in self.counted() {
@@ -55,7 +59,8 @@ impl Session {
         observer: &mut dyn Observer,
     ) -> Result<Finished, CompileError> {
         optimizer.check()?;
-        let (graph, factors) = self.graph();
+        let (mut graph, factors) = self.graph();
+        self.add_priors(&mut graph);
         let mut values = self.estimates();
         let is_in = |key: &str| {
             let place = self.model.variable(key).map(|v| self.model.place(v));
@@ -67,7 +72,8 @@ impl Session {
         }
         let mut problem = Problem::compile_for(&graph, &solved_for, &optimizer.linear())?;
         let weights = factors.iter().map(|f| self.model.factor(f.0).map_or(1.0, |factor| factor.weight));
-        let weights: Vec<f64> = weights.collect();
+        let of_priors = std::iter::repeat_n(1.0, graph.factors().len() - factors.len());
+        let weights: Vec<f64> = weights.chain(of_priors).collect();
         if weights.iter().any(|weight| *weight != 1.0) {
             // they were checked when they were set
             let _ = problem.set_weights(&weights);
@@ -77,6 +83,17 @@ impl Session {
             values.insert_boxed(key.clone(), value.erased().clone_box());
         }
         Ok(Finished { values, outcome, factors })
+    }
+
+    /// Adds what variables that are gone have left behind.
+    fn add_priors(&self, graph: &mut Graph) {
+        for prior in self.model.priors().filter_map(|f| self.model.prior(f)) {
+            let points = prior.variables.iter().filter_map(|v| self.model.point(*v)).collect();
+            let keys: Vec<Key> = prior.variables.iter().map(|v| self.key(*v)).collect();
+            for factor in prior::factors(&prior, points) {
+                graph.push(FactorEntry { keys: keys.clone(), factor, noise: Noise::unit(), loss: None });
+            }
+        }
     }
 
     /// Goes on from other values, those of [`finish`](Self::finish), say: all is linearized there. Keys that the session

@@ -4,7 +4,7 @@ use crate::toy::{Apart, At, Distance, Logarithm, Plane};
 use crate::world::Ahead;
 use manifactor_graph::{Fixed, Graph, Key, Values, Variable};
 use manifactor_online::{ChangeError, Session, Settings, Window};
-use manifactor_solve::Problem;
+use manifactor_solve::{LevenbergMarquardt, Problem, Silent};
 use proptest::prelude::*;
 
 /// Nothing is linearized anew, and every change passed on: what is solved is one linear system.
@@ -20,6 +20,7 @@ fn numbers(session: &Session, keys: &[&str]) -> Vec<f64> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { max_global_rejects: 1 << 16, ..ProptestConfig::default() })]
     #[test]
     fn what_stays_is_where_it_was_and_as_sure(
         changes in prop::collection::vec(change(), 1..60),
@@ -168,4 +169,28 @@ fn memory_stays_and_a_window_goes_on_after_a_restart() {
     }
     let (first, last) = (bytes[1], bytes[5]);
     assert!(last.0 <= first.0 + first.0 / 10 && last.1 <= first.1 + first.1 / 10, "{bytes:?}");
+}
+
+#[test]
+fn a_batch_solve_knows_what_has_left() {
+    let mut session = windowed(4, &[]);
+    for i in 0..20 {
+        let (mut graph, mut values) = step(i);
+        values.insert(Key::indexed("x", i), Plane { x: 1.1 * i as f64 + 0.05, y: 0.0 });
+        if i > 0 {
+            graph.add([Key::indexed("x", i - 1), Key::indexed("x", i)], Distance { by: 1.2 });
+        }
+        session.push(&graph, &values).unwrap();
+        session.update().unwrap();
+    }
+    for _ in 0..20 {
+        session.update().unwrap();
+    }
+    let finished = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap();
+    let (cost, best) = (session.cost(), finished.outcome.final_cost);
+    assert!((cost - best).abs() < 1e-6 * best, "{cost} {best}");
+    let (x, batch): (Plane, &Plane) = (session.get("x19").unwrap(), finished.values.get("x19").unwrap());
+    assert!((x.x - batch.x).abs() < 1e-6, "{x:?} {batch:?}");
+    // 19 distances of 1.2 and 19 steps of 1 along a line, and the origin
+    assert!((x.x - 19.0 * 1.1).abs() < 1e-6, "{x:?}");
 }
