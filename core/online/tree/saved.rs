@@ -61,7 +61,7 @@ impl Tree {
             let mut later = coupled.filter(|u| tree.front_of[*u as usize] > f);
             later.all(|u| is_row[u as usize] == f).then_some(())?;
             // it stands in front of its rows, and has none where it is a root
-            (parent.is_some() == !rows.is_empty() && parent.is_none_or(|p| p > f)).then_some(())?;
+            (parent.is_some() != rows.is_empty() && parent.is_none_or(|p| p > f)).then_some(())?;
             let mut front = Front { blocks, rows, parent: parent.unwrap_or(NONE), ..Front::default() };
             front.measure(|v| graph.dim(v));
             (!front.blocks.is_empty()).then_some(())?;
