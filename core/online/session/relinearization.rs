@@ -91,7 +91,7 @@ impl Session {
     }
 
     /// Whether a variable is out of the region of its linearization, and solved for.
-    fn is_out(&self, variable: u32) -> bool {
+    pub(super) fn is_out(&self, variable: u32) -> bool {
         self.excess(variable) > 1.0 && self.may_move(variable)
     }
 

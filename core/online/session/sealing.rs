@@ -6,10 +6,12 @@
 //! 2008).
 use super::Session;
 use super::changes::Touched;
+use super::parking::Moves;
 use crate::error::ChangeError;
 use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
 use crate::report::Report;
+use crate::tree::Couplings;
 use manifactor_graph::Key;
 
 impl Session {
@@ -77,6 +79,11 @@ impl Session {
     pub(super) fn seal(&mut self, leaving: &[u32], report: &mut Report) -> Result<(), Overflow> {
         if leaving.is_empty() {
             return Ok(());
+        }
+        // what is frozen should not be far off; where it cannot be linearized anew, it stays as it is
+        let is_stale = |v: &u32| self.is_out(*v) || self.model.coupled(*v).any(|u| self.is_out(u));
+        if leaving.iter().any(is_stale) {
+            let _ = self.pass(&Touched::default(), &Moves::default(), true, report);
         }
         let mut touched = Touched::default();
         for v in leaving {

@@ -17,7 +17,7 @@ struct Undo {
 }
 
 impl Session {
-    /// Makes the changes since the last update, and brings the estimate up to date.
+    /// Makes the changes since the last update, and brings the estimate up to date. Then those variables leave that are to.
     ///
     /// # Errors
     /// Where a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last
@@ -57,18 +57,7 @@ impl Session {
             return Err(UpdateError::Overflow { key });
         }
         self.updates += 1;
-        self.control_step(&mut report);
-        for _ in 0..self.settings.passes {
-            if !self.is_urgent() {
-                break;
-            }
-            // what the changes need has been done: a pass that fails leaves that as it is
-            let none = (Touched::default(), Moves::default());
-            if self.pass(&none.0, &none.1, true, &mut report).is_err() {
-                break;
-            }
-            self.control_step(&mut report);
-        }
+        self.follow_up(&mut report);
         undo.variables.iter().for_each(|at| self.note_age(at.number));
         let leaving = self.leaving(&pending.leaving);
         if let Err(Overflow(variable)) = self.seal(&leaving, &mut report) {
@@ -76,6 +65,18 @@ impl Session {
         }
         self.tell(&mut report);
         Ok(report)
+    }
+
+    /// Shortens steps that are too long, and takes those passes that cannot wait. What the changes need has been done: a pass
+    /// that fails leaves that as it is.
+    fn follow_up(&mut self, report: &mut Report) {
+        self.control_step(report);
+        for _ in 0..self.settings.passes {
+            if !self.is_urgent() || self.pass(&Touched::default(), &Moves::default(), true, report).is_err() {
+                return;
+            }
+            self.control_step(report);
+        }
     }
 
     /// Room for as many variables as the model has.

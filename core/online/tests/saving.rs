@@ -2,7 +2,7 @@
 use crate::history::{Change, History, bits, change, window};
 use crate::toy::Plane;
 use manifactor_graph::{Graph, Values};
-use manifactor_online::{LoadError, SaveError, Session, Settings};
+use manifactor_online::{LoadError, SaveError, Session, Settings, Window};
 use proptest::prelude::*;
 
 proptest! {
@@ -32,8 +32,8 @@ proptest! {
     }
 }
 
-fn session() -> Session {
-    let mut history = History::new(Settings::default());
+fn session(window: Option<Window>) -> Session {
+    let mut history = History::new(Settings { window, ..Settings::default() });
     let pairs = (0..12).map(|i| Change::Pair(i, i + 1));
     let changes: Vec<Change> =
         [Change::Plane, Change::Space].into_iter().cycle().take(12).chain(pairs).collect();
@@ -44,7 +44,7 @@ fn session() -> Session {
 
 #[test]
 fn what_is_no_session_is_refused_with_a_reason() {
-    let text = session().save().unwrap();
+    let text = session(None).save().unwrap();
     assert_eq!(Session::load("").unwrap_err(), LoadError::Foreign);
     assert_eq!(Session::load("{\"factors\": []}").unwrap_err(), LoadError::Foreign);
     let later = text.replacen("session 1 ", "session 2 ", 1);
@@ -58,7 +58,7 @@ fn what_is_no_session_is_refused_with_a_reason() {
 
 #[test]
 fn changes_that_no_update_has_made_are_not_lost_silently() {
-    let mut session = session();
+    let mut session = session(None);
     let mut values = Values::new();
     values.insert("late", Plane { x: 0.0, y: 0.0 });
     session.push(&Graph::new(), &values).unwrap();
@@ -76,8 +76,8 @@ fn resealed(json: &str) -> String {
 
 proptest! {
     #[test]
-    fn a_document_that_contradicts_itself_is_no_panic(place in any::<prop::sample::Index>(), digit in 0..10u8, other in any::<prop::sample::Index>()) {
-        let text = session().save().unwrap();
+    fn a_document_that_contradicts_itself_is_no_panic(place in any::<prop::sample::Index>(), digit in 0..10u8, other in any::<prop::sample::Index>(), window in prop_oneof![Just(None), window().prop_map(Some)]) {
+        let text = session(window).save().unwrap();
         let json = text.split_once('\n').unwrap().1.trim_end();
         // digits are what structure and numbers are made of: one of the fronts, and one of all
         let digits = |from: usize| -> Vec<usize> {

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 /// Nothing is linearized anew, and every change passed on: what is solved is one linear system.
 fn linear() -> Settings {
-    Settings { relinearize_every: usize::MAX, deviation: 0.0, passes: 0, urgent: 1e9, ..Settings::default() }
+    Settings { relinearize_every: usize::MAX, bend: 1e30, deviation: 0.0, passes: 0, ..Settings::default() }
 }
 
 fn numbers(session: &Session, keys: &[&str]) -> Vec<f64> {

@@ -5,7 +5,7 @@ use manifactor_geometry::{Between, Coordinates, Landmark, Point2, Range, Se2, Se
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
-use manifactor_online::{Report, Session, Settings};
+use manifactor_online::{Report, Session, Settings, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{DMatrix, Vector2, Vector3};
 use std::path::PathBuf;
@@ -140,6 +140,34 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
     (0..20).for_each(|_| drop(free.update().unwrap()));
     let (cost, expected) = (bounded.cost(), free.cost());
     assert!((cost - expected).abs() < 1e-3 * expected, "{cost}, without a budget {expected}");
+}
+
+#[test]
+fn a_window_that_holds_all_closures_is_as_good_as_all() {
+    let Some(path) = data("g2o/sphere2500.g2o") else { return };
+    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let window = Some(Window { poses: 120, keep: vec![] });
+    let mut narrow = Session::new(Settings { window, ..Settings::default() }).unwrap();
+    let (mut all, mut steps) = (Session::new(Settings::default()).unwrap(), Replay::of(&graph));
+    let mut bytes = vec![];
+    for n in 0..500 {
+        let step = steps.step(|key| all.estimate(key)).unwrap().unwrap();
+        for session in [&mut narrow, &mut all] {
+            session.push(&step.factors, &step.values).unwrap();
+            session.update().unwrap();
+        }
+        if n % 100 == 99 {
+            bytes.push(narrow.bytes());
+        }
+    }
+    assert_eq!((narrow.variables(), all.variables()), (120, 500));
+    let [one, other] = [&narrow, &all].map(|session| session.covariance(&["x499"]).unwrap());
+    assert!((&one - &other).norm() < 0.02 * other.norm(), "{one} {other}");
+    let [one, batch]: [Se3; 2] = [&narrow, &all].map(|session| session.get("x499").unwrap());
+    let apart = batch.local(&one).component_div(&other.diagonal().map(f64::sqrt).fixed_rows::<6>(0));
+    assert!(apart.amax() < 0.5, "{apart} standard deviations");
+    assert!(bytes[4] < 2 * bytes[2], "{bytes:?}");
+    println!("{apart} {bytes:?} {}", all.bytes());
 }
 
 /// Victoria Park as a graph: poses by their numbers, trees by their ids.
