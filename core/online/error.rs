@@ -22,6 +22,28 @@ pub enum ChangeError {
         /// What was asked for.
         key: Key,
     },
+    /// A variable that has left the session: its factors are part of a linear prior, which nothing can be added to.
+    #[error(
+        "`{key}` has left the session; a factor to it, or another variable of that name, is not possible any more"
+    )]
+    Gone {
+        /// What was asked for.
+        key: Key,
+    },
+    /// A factor of variables that have left the session.
+    #[error("factor {factor} has left the session with its variables: it is part of a linear prior")]
+    GoneFactor {
+        /// What was asked for.
+        factor: FactorId,
+    },
+    /// A variable that has to keep its linearization point, as a neighbour of variables that have left.
+    #[error(
+        "`{key}` cannot be held or freed: it is tied to variables that have left, and keeps its linearization point"
+    )]
+    Sealed {
+        /// Its key.
+        key: Key,
+    },
     /// A factor that is not there, or not any more.
     #[error("there is no factor {factor}: it was removed, or is of another session")]
     NoFactor {

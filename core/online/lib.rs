@@ -21,14 +21,17 @@
 mod error;
 mod factor_id;
 mod fronts;
+mod gone;
 mod model;
 mod report;
+mod saved;
 mod session;
 mod settings;
 mod tree;
 
 pub use error::{ChangeError, UpdateError};
 pub use factor_id::FactorId;
-pub use report::Report;
+pub use report::{Report, Shared};
+pub use saved::{LoadError, SaveError};
 pub use session::{CovarianceError, Finished, Session};
-pub use settings::Settings;
+pub use settings::{Settings, Window};

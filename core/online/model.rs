@@ -1,12 +1,17 @@
 //! What is estimated, and from what: variables at their linearization points, and factors with their parts of H and g.
 mod blocks;
 mod evaluation;
+mod factors;
 mod regions;
+mod sealing;
+mod variables;
 
 use crate::tree::Couplings;
 pub(crate) use blocks::Blocks;
+pub(crate) use sealing::Prior;
+pub(crate) use variables::{NewNumber, Reserved};
 
-use indexmap::IndexMap;
+use factors::Factors;
 use manifactor_graph::batch::{Batches, Member};
 use manifactor_graph::column::{Columns, FIXED};
 use manifactor_graph::normal_equations::Slot;
@@ -14,10 +19,15 @@ use manifactor_graph::{FactorEntry, Key, Resolved, Variable, VariableIndices};
 use regions::{Region, Regions};
 use smallvec::SmallVec;
 use std::any::TypeId;
+use std::collections::HashMap;
 
 /// A variable of a session.
 #[derive(Debug, Clone)]
 pub(crate) struct Place {
+    pub key: Key,
+    /// How many came before it; and whether it is there still.
+    pub born: u64,
+    pub is_there: bool,
     /// Which column, and where in it.
     pub column: u32,
     pub index: u32,
@@ -26,6 +36,8 @@ pub(crate) struct Place {
     pub held: u32,
     /// Whether it waits, outside of the tree, for factors that determine it.
     pub parked: bool,
+    /// Linear priors that it is part of: it keeps its linearization point, as they do.
+    pub sealed: u32,
 }
 
 impl Place {
@@ -39,24 +51,34 @@ impl Place {
     }
 }
 
-/// A factor of a session.
+/// A factor of a session, or a linear prior that variables have left behind.
 #[derive(Debug, Clone)]
 pub(crate) struct Factor {
-    pub entry: FactorEntry,
+    /// `None` for a prior, which is in no batch: its region is all that there is.
+    pub entry: Option<FactorEntry>,
     /// In the order of its residual.
     variables: VariableIndices,
     /// Ascending, each with where it begins among the factor's scalars.
     members: SmallVec<[(u32, u32); 2]>,
     batch: u32,
     index: u32,
+    /// Where its region is.
+    region: u32,
     pub weight: f64,
+    /// What a prior costs at the linearization points.
+    pub constant: f64,
 }
 
 impl Factor {
+    fn prior(members: SmallVec<[(u32, u32); 2]>, region: u32, constant: f64) -> Self {
+        let variables = VariableIndices::new();
+        Self { entry: None, variables, members, batch: 0, index: 0, region, weight: 1.0, constant }
+    }
     /// Its variables and its noise, as they were looked up; `None` where that is not possible any more.
     pub(crate) fn resolved(&self) -> Option<Resolved> {
-        let rows = self.entry.factor.erased().signature().rows.unwrap_or(0);
-        let whitener = self.entry.noise.whitener(rows).ok()?;
+        let entry = self.entry.as_ref()?;
+        let rows = entry.factor.erased().signature().rows.unwrap_or(0);
+        let whitener = entry.noise.whitener(rows).ok()?;
         Some(Resolved { variables: self.variables.clone(), whitener })
     }
     /// Its variables, ascending.
@@ -68,14 +90,16 @@ impl Factor {
 /// Variables and factors, which come and go.
 #[derive(Default)]
 pub(crate) struct Model {
-    keys: IndexMap<Key, Place, foldhash::fast::RandomState>,
+    places: Vec<Place>,
+    numbers: HashMap<Key, u32, foldhash::fast::RandomState>,
+    /// By column, numbers of variables that are gone.
+    unused: Vec<Vec<u32>>,
+    born: u64,
     /// Linearization points; and where variables are about to be linearized: the same, but during an update.
     points: Columns,
     pub trial: Columns,
-    factors: Vec<Option<Factor>>,
-    /// By factor.
-    regions: Vec<Region>,
-    numbers: Regions,
+    factors: Factors,
+    regions: Regions,
     batches: Batches,
     pub blocks: Blocks,
     /// By batch, factors that are about to be evaluated.
@@ -83,6 +107,9 @@ pub(crate) struct Model {
 }
 
 impl Couplings for Model {
+    fn variables(&self) -> usize {
+        self.places.len()
+    }
     fn dim(&self, variable: u32) -> usize {
         self.blocks.dim(variable)
     }
@@ -92,34 +119,33 @@ impl Couplings for Model {
 }
 
 impl Model {
-    pub(crate) fn variables(&self) -> usize {
-        self.keys.len()
+    /// The number of the next new factor.
+    pub(crate) fn next_factor(&self) -> u32 {
+        self.factors.next
     }
-    /// Numbers that factors have had, those that are gone among them.
-    pub(crate) fn factors(&self) -> usize {
-        self.factors.len()
+    /// Leaves numbers out: they were those of factors that are gone.
+    pub(crate) fn skip_to(&mut self, next: u32) {
+        self.factors.next = self.factors.next.max(next);
     }
     pub(crate) fn factor(&self, factor: u32) -> Option<&Factor> {
-        self.factors.get(factor as usize)?.as_ref()
+        self.factors.get(factor)
     }
-    /// The factors that are there, with their numbers.
-    pub(crate) fn all_factors(&self) -> impl Iterator<Item = (u32, &Factor)> {
-        self.factors.iter().enumerate().filter_map(|(f, factor)| Some((f as u32, factor.as_ref()?)))
+    /// The factors that are there, with their numbers; no priors.
+    pub(crate) fn all_factors(&self) -> impl Iterator<Item = (u32, &Factor, &FactorEntry)> {
+        self.factors.iter().filter_map(|(f, factor)| Some((f, factor, factor.entry.as_ref()?)))
     }
     pub(crate) fn variable(&self, key: &str) -> Option<u32> {
-        self.keys.get_index_of(key).map(|v| v as u32)
+        self.numbers.get(key).copied()
     }
     pub(crate) fn place(&self, variable: u32) -> &Place {
-        &self.keys[variable as usize]
+        &self.places[variable as usize]
     }
     pub(crate) fn place_mut(&mut self, variable: u32) -> &mut Place {
-        &mut self.keys[variable as usize]
+        &mut self.places[variable as usize]
     }
-    pub(crate) fn key(&self, variable: u32) -> Option<&Key> {
-        self.keys.get_index(variable as usize).map(|(key, _)| key)
-    }
-    pub(crate) fn keys(&self) -> impl Iterator<Item = &Key> {
-        self.keys.keys()
+    /// Number of variables that are there.
+    pub(crate) fn present(&self) -> usize {
+        self.numbers.len()
     }
     /// The type of a variable.
     pub(crate) fn type_of(&self, variable: u32) -> Option<TypeId> {
@@ -129,33 +155,6 @@ impl Model {
     pub(crate) fn point(&self, variable: u32) -> Option<Box<dyn Variable>> {
         let place = self.place(variable);
         self.points.column(place.column as usize).get(place.index as usize)
-    }
-
-    /// Appends a variable.
-    pub(crate) fn push_variable(&mut self, key: Key, value: &dyn Variable, held: u32) {
-        let (id, tangent) = (value.erased().type_id(), value.erased().tangent());
-        let column = self.points.position(id).unwrap_or_else(|| {
-            self.trial.add(id, value.erased().new_column());
-            self.points.add(id, value.erased().new_column())
-        });
-        self.points.column_mut(column).push(value);
-        self.trial.column_mut(column).push(value);
-        let index = self.points.column(column).len() as u32 - 1;
-        let column = column as u32;
-        // parked until its factors are looked at
-        self.keys.insert(key, Place { column, index, tangent, held, parked: true });
-        self.blocks.push(tangent.len(), held);
-    }
-
-    /// Keeps the first variables; the others are without factors.
-    pub(crate) fn truncate(&mut self, variables: usize) {
-        while self.keys.len() > variables {
-            let Some((_, place)) = self.keys.pop() else { break };
-            for columns in [&mut self.points, &mut self.trial] {
-                columns.column_mut(place.column as usize).truncate(place.index as usize);
-            }
-        }
-        self.blocks.truncate(variables);
     }
 
     /// Puts a factor in, under a number that is unused. It is not linearized yet.
@@ -168,42 +167,45 @@ impl Model {
             *at = scalars;
             scalars += self.blocks.dim(*v) as u32;
         }
-        let region = self.numbers.take(scalars);
-        if self.factors.len() <= number as usize {
-            self.factors.resize_with(number as usize + 1, || None);
-            self.regions.resize(number as usize + 1, Region::default());
-        }
-        self.regions[number as usize] = region;
-        self.blocks.connect(number, &members);
+        let place = self.regions.take(scalars);
+        let region = self.regions[place];
+        self.blocks.connect(number, place, &members);
         let batch = self.batches.place(entry.factor.erased(), &resolved.whitener, entry.loss.as_deref());
-        let factor =
-            Factor { entry: entry.clone(), variables, members, batch: batch as u32, index: 0, weight };
+        let residual = entry;
+        let entry = entry.clone();
+        let factor = Factor {
+            variables,
+            batch: batch as u32,
+            weight,
+            entry: Some(entry),
+            ..Factor::prior(members, place, 0.0)
+        };
         let index: SmallVec<[u32; 4]> =
-            factor.variables.iter().map(|v| self.keys[*v as usize].index).collect();
+            factor.variables.iter().map(|v| self.places[*v as usize].index).collect();
         let (starts, held) = self.starts(&factor, region);
         let slots = self.slots(&factor, region);
         let to = &mut self.batches.as_mut_slice()[batch];
         to.push(&Member {
             entry: number as usize,
-            factor: entry.factor.erased().as_any(),
+            factor: residual.factor.erased().as_any(),
             index: &index,
             starts: &starts,
             held: &held,
             slots: &slots,
             whitener: &resolved.whitener,
-            loss: entry.loss.as_deref(),
+            loss: residual.loss.as_deref(),
         });
-        let place = to.len() - 1;
+        let index = to.len() - 1;
         if weight != 1.0 {
-            to.set_weight(place, weight);
+            to.set_weight(index, weight);
         }
-        self.factors[number as usize] = Some(Factor { index: place as u32, ..factor });
+        self.factors.insert(number, Factor { index: index as u32, ..factor });
     }
 
     /// By variable of a factor's residual: where it begins in the gradient, and what is held of it.
     fn starts(&self, factor: &Factor, region: Region) -> (SmallVec<[u32; 4]>, SmallVec<[u32; 4]>) {
         let one = |v: &u32| {
-            let place = &self.keys[*v as usize];
+            let place = &self.places[*v as usize];
             let start = if place.is_held() { FIXED } else { (region.g as u32) + factor.at(*v) };
             (start, if place.is_held() { 0 } else { place.held })
         };
@@ -226,12 +228,16 @@ impl Model {
 
     /// Takes a factor out.
     pub(crate) fn remove(&mut self, number: u32) -> Option<Factor> {
-        let factor = self.factors.get_mut(number as usize)?.take()?;
+        let factor = self.factors.remove(number)?;
         self.blocks.disconnect(number, &factor.members);
-        self.numbers.give(std::mem::take(&mut self.regions[number as usize]));
+        self.regions.give(factor.region);
+        if factor.entry.is_none() {
+            factor.members.iter().for_each(|(v, _)| self.places[*v as usize].sealed -= 1);
+            return Some(factor);
+        }
         let batch = &mut self.batches.as_mut_slice()[factor.batch as usize];
         if let Some(moved) = batch.remove(factor.index as usize)
-            && let Some(moved) = &mut self.factors[moved]
+            && let Some(moved) = self.factors.get_mut(moved as u32)
         {
             moved.index = factor.index;
         }
@@ -240,18 +246,18 @@ impl Model {
 
     /// Makes a factor count so many times; returns how many times it did.
     pub(crate) fn weigh(&mut self, number: u32, weight: f64) -> Option<f64> {
-        let factor = self.factors.get_mut(number as usize)?.as_mut()?;
+        let factor = self.factors.get_mut(number)?;
         self.batches.as_mut_slice()[factor.batch as usize].set_weight(factor.index as usize, weight);
         Some(std::mem::replace(&mut factor.weight, weight))
     }
 
     /// Sets what is held of a variable; returns what was. Its factors are to be linearized after that.
     pub(crate) fn hold(&mut self, variable: u32, held: u32) -> u32 {
-        let before = std::mem::replace(&mut self.keys[variable as usize].held, held);
+        let before = std::mem::replace(&mut self.places[variable as usize].held, held);
         self.blocks.hold(variable, held);
         for f in self.blocks.factors(variable).collect::<Vec<_>>() {
-            let Some(factor) = &self.factors[f as usize] else { continue };
-            let (starts, held) = self.starts(factor, self.regions[f as usize]);
+            let Some(factor) = self.factors.get(f).filter(|factor| factor.entry.is_some()) else { continue };
+            let (starts, held) = self.starts(factor, self.regions[factor.region]);
             self.batches.as_mut_slice()[factor.batch as usize].hold(factor.index as usize, &starts, &held);
         }
         before
@@ -260,8 +266,8 @@ impl Model {
     /// Whether a factor takes part: it is defined where it was last linearized, and counts.
     pub(crate) fn takes_part(&self, number: u32) -> bool {
         self.factor(number).is_some_and(|factor| {
-            let batch = &self.batches.as_slice()[factor.batch as usize];
-            factor.weight != 0.0 && batch.is_active(factor.index as usize)
+            let batch = || &self.batches.as_slice()[factor.batch as usize];
+            factor.entry.is_none() || (factor.weight != 0.0 && batch().is_active(factor.index as usize))
         })
     }
 
@@ -272,8 +278,8 @@ impl Model {
 
     /// Says whether a factor's part counts in the sums.
     pub(crate) fn count(&mut self, number: u32, counts: bool) {
-        let Some(factor) = &self.factors[number as usize] else { return };
-        if std::mem::replace(&mut self.regions[number as usize].counts, counts) != counts {
+        let Some(factor) = self.factors.get(number) else { return };
+        if self.regions.count(factor.region, counts) != counts {
             self.blocks.mark_factor(&factor.members);
         }
     }

@@ -1,6 +1,9 @@
 //! What an update did.
+use crate::factor_id::FactorId;
 use manifactor_graph::Key;
 use serde::Serialize;
+use std::ops::Deref;
+use std::sync::Arc;
 
 /// The account of one update.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -9,6 +12,8 @@ pub struct Report {
     pub redone: usize,
     /// Variables that were linearized at a new point.
     pub relinearized: usize,
+    /// Variables whose relinearization the budget has put off: they come in the next updates.
+    pub postponed: usize,
     /// Variables whose step was computed again.
     pub solved: usize,
     /// Multiplications and additions of the factorization.
@@ -21,10 +26,43 @@ pub struct Report {
     pub solved_batch: bool,
     /// Variables that wait for factors to determine them. Their own block of H has no full rank, so that they and their
     /// factors take no part yet.
-    pub parked: Vec<Key>,
+    pub parked: Shared<Key>,
     /// Directions that nothing constrains, by variable and name of the tangent direction: a free gauge, say. They are held
     /// where they were.
     pub undetermined: Vec<(Key, &'static str)>,
+    /// Variables that have left: their factors are part of a linear prior now.
+    pub sealed: Vec<Key>,
+    /// Factors that were dropped with them, as they took no part.
+    pub dropped: Vec<FactorId>,
     /// Factors that are not defined where they were last linearized, and take no part.
     pub inactive: usize,
+}
+
+/// A list that reports share until it changes: it may be long, and most updates leave it as it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Shared<T>(Arc<[T]>);
+
+impl<T> Default for Shared<T> {
+    fn default() -> Self {
+        Self(Arc::from([]))
+    }
+}
+impl<T> Deref for Shared<T> {
+    type Target = [T];
+    fn deref(&self) -> &[T] {
+        &self.0
+    }
+}
+impl<T> FromIterator<T> for Shared<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(items: I) -> Self {
+        Self(items.into_iter().collect())
+    }
+}
+impl<'a, T> IntoIterator for &'a Shared<T> {
+    type Item = &'a T;
+    type IntoIter = std::slice::Iter<'a, T>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.iter()
+    }
 }

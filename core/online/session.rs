@@ -4,20 +4,23 @@ mod covariance;
 mod finish;
 mod parking;
 mod relinearization;
+mod saving;
+mod sealing;
 mod step_control;
 mod substitution;
 mod update;
 
 use crate::fronts::{Fronts, Scalar};
+use crate::gone::{GoneKeys, Runs};
 use crate::model::Model;
-use crate::report::Report;
+use crate::report::{Report, Shared};
 use crate::settings::Settings;
 use crate::tree::{Couplings, Tree};
 use changes::Pending;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
 use manifactor_solve::SettingError;
 use std::any::TypeId;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt;
 
 pub use covariance::CovarianceError;
@@ -41,7 +44,11 @@ pub struct Session {
     updates: usize,
     /// Variables that have left the region of their linearization.
     waiting: Vec<u32>,
+    /// How many of them the budget has put off.
+    postponed: usize,
     is_waiting: Vec<bool>,
+    /// Those that have left it so far that they cannot wait; some may be back, or be named twice.
+    urgent: Vec<u32>,
     /// Steps that the last pass changed, as they were before: to go back half the way.
     moved: Vec<(u32, usize)>,
     before: Vec<f64>,
@@ -49,11 +56,19 @@ pub struct Session {
     open: BTreeSet<Scalar>,
     parked: BTreeSet<u32>,
     inactive: BTreeSet<u32>,
+    /// Parked variables whose factors were linearized anew since they were judged.
+    doubtful: Vec<u32>,
+    /// Of a window: the variables that it holds and when they came, the oldest first.
+    ages: VecDeque<(u32, u64)>,
+    gone: GoneKeys,
+    gone_factors: Runs,
+    /// The keys of those that are parked, for reports.
+    waiting_keys: Shared<Key>,
 }
 
 impl fmt::Debug for Session {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Session({} variables, {} updates)", self.model.variables(), self.updates)
+        write!(f, "Session({} variables, {} updates)", self.variables(), self.updates)
     }
 }
 
@@ -75,12 +90,19 @@ impl Session {
             pass: 0,
             updates: 0,
             waiting: vec![],
+            postponed: 0,
             is_waiting: vec![],
+            urgent: vec![],
             moved: vec![],
             before: vec![],
             open: BTreeSet::new(),
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),
+            doubtful: vec![],
+            ages: VecDeque::new(),
+            gone: GoneKeys::default(),
+            gone_factors: Runs::default(),
+            waiting_keys: Shared::default(),
         })
     }
 
@@ -108,7 +130,8 @@ impl Session {
     /// All estimates, in the order in which the variables came.
     pub fn estimates(&self) -> Values {
         let mut values = Values::new();
-        for key in self.model.keys() {
+        for v in self.model.by_age() {
+            let key = &self.model.place(v).key;
             if let Some(value) = self.estimate(key.as_str()) {
                 values.insert_boxed(key.clone(), value);
             }
@@ -118,19 +141,19 @@ impl Session {
 
     /// Number of variables, those that are parked or held among them.
     pub fn variables(&self) -> usize {
-        self.model.variables()
+        self.model.present()
     }
 
     /// ½ Σ ρ at the estimate, over all factors that took part where they were last linearized and whose variables are not
-    /// parked. It looks at every factor.
+    /// parked; of variables that have left, what their linear priors say. It looks at every factor.
     pub fn cost(&mut self) -> f64 {
-        let factors: Vec<u32> = self.counted().collect();
+        let factors: Vec<u32> = self.counted().chain(self.model.priors()).collect();
         self.cost_of(&factors).cost
     }
 
     /// The factors that count: none of their variables is parked.
     fn counted(&self) -> impl Iterator<Item = u32> {
-        self.model.all_factors().map(|(f, _)| f).filter(|f| self.model.is_whole(*f))
+        self.model.all_factors().map(|(f, ..)| f).filter(|f| self.model.is_whole(*f))
     }
 
     /// Bytes of the factorization.
@@ -143,14 +166,15 @@ impl Session {
     }
 
     fn key(&self, variable: u32) -> Key {
-        self.model.key(variable).cloned().unwrap_or_else(|| Key::from(""))
+        self.model.place(variable).key.clone()
     }
 
     /// What is parked, undetermined and inactive, for a report.
     fn tell(&self, report: &mut Report) {
-        report.parked = self.parked.iter().map(|v| self.key(*v)).collect();
+        report.parked = self.waiting_keys.clone();
         let name = |(v, d): &Scalar| Some((self.key(*v), *self.model.place(*v).tangent.get(*d as usize)?));
         report.undetermined = self.open.iter().filter_map(name).collect();
         report.inactive = self.inactive.len();
+        report.postponed = self.postponed;
     }
 }

@@ -25,11 +25,37 @@ pub struct Settings {
     pub urgent: f64,
     /// Such passes that one update may take. Default: 1.
     pub passes: usize,
+    /// Multiply-adds that an update may take where it relinearizes, for deadlines. Relinearizations beyond it wait for the next
+    /// updates, those furthest out first; an update that has nothing else to do takes one at least. What new factors need
+    /// is never put off, nor is a step shortened later because of it. Default: no budget.
+    pub budget: Option<f64>,
+    /// What stays of a graph that grows without end. Default: all of it.
+    pub window: Option<Window>,
+}
+
+/// A window that moves with the newest variables.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Window {
+    /// Variables that stay, the newest of those whose type is not kept; at least one. Older ones leave at the end of an update,
+    /// as by [`Session::marginalize`](crate::Session::marginalize).
+    pub poses: usize,
+    /// Names of types whose variables never leave: `"dual_quadric"`, say. Default: none.
+    #[serde(default)]
+    pub keep: Vec<String>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { relinearize_every: 10, bend: 0.1, deviation: 0.01, urgent: 10.0, passes: 1 }
+        Self {
+            relinearize_every: 10,
+            bend: 0.1,
+            deviation: 0.01,
+            urgent: 10.0,
+            passes: 1,
+            budget: None,
+            window: None,
+        }
     }
 }
 
@@ -40,7 +66,8 @@ impl Settings {
     /// Names the one that is not.
     pub fn check(&self) -> Result<(), SettingError> {
         let all = [("bend", self.bend), ("deviation", self.deviation), ("urgent", self.urgent)];
-        match all.into_iter().find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
+        let budget = self.budget.map(|budget| ("budget", budget));
+        match all.into_iter().chain(budget).find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
             Some((setting, got)) => Err(SettingError { setting, expected: "0 or more", got }),
             None => Ok(()),
         }

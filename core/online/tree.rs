@@ -15,6 +15,7 @@
 //! ```
 mod amalgamation;
 mod order;
+mod saved;
 
 use order::{Group, Order};
 
@@ -33,9 +34,21 @@ pub(crate) struct Front {
     pub parent: u32,
     /// By their lowest variable: updates are added in an order that does not depend on history.
     pub children: Vec<u32>,
-    lowest: u32,
+    pub lowest: u32,
     /// Multiply-adds to make it again.
     pub operations: f64,
+}
+
+impl Front {
+    /// What follows from its blocks and rows.
+    fn measure(&mut self, dim: impl Fn(u32) -> usize) {
+        self.width = self.blocks.iter().map(|v| dim(*v)).sum();
+        self.below = self.rows.iter().map(|v| dim(*v)).sum();
+        self.lowest = self.blocks.iter().copied().min().unwrap_or(NONE);
+        let (k, m) = (self.width as f64, self.below as f64);
+        // its elimination, and its update into the parent
+        self.operations = k * k * k / 3.0 + k * k * m + k * m * m + 0.5 * m * m;
+    }
 }
 
 /// Fronts in a slab, and by variable the one that eliminates it.
@@ -65,6 +78,8 @@ pub(crate) struct Redone {
 
 /// What the tree has to know of the graph.
 pub(crate) trait Couplings {
+    /// Number of variables, those that are not in the tree among them.
+    fn variables(&self) -> usize;
     /// Dimension of a variable's tangent space.
     fn dim(&self, variable: u32) -> usize;
     /// Variables that share a factor with this one, whether they are in the tree or not.
@@ -91,6 +106,11 @@ impl Tree {
             affected.0.push(front);
             front = self.fronts[front as usize].parent;
         }
+    }
+
+    /// Takes fronts out of the affected ones again, all but the first.
+    pub(crate) fn untouch(&mut self, affected: &mut Affected, first: usize) {
+        affected.0.drain(first..).for_each(|f| self.marked[f as usize] = false);
     }
 
     /// Orders the variables of the affected fronts anew, and makes fronts of them. `entering` are variables that were not in
@@ -164,14 +184,9 @@ impl Tree {
             [&mut blocks, &mut rows].into_iter().flatten().for_each(|b| *b = variables[*b as usize]);
             let front = &mut self.fronts[number[g] as usize];
             front.children.clear();
-            front.width = blocks.iter().map(|v| graph.dim(*v)).sum();
-            front.below = rows.iter().map(|v| graph.dim(*v)).sum();
             front.parent = number.get(parents[g] as usize).copied().unwrap_or(NONE);
-            front.lowest = blocks.iter().copied().min().unwrap_or(NONE);
-            let (k, m) = (front.width as f64, front.below as f64);
-            // its elimination, and its update into the parent
-            front.operations = k * k * k / 3.0 + k * k * m + k * m * m + 0.5 * m * m;
             (front.blocks, front.rows) = (blocks, rows);
+            front.measure(|v| graph.dim(v));
         }
         for (kept, parent) in kept.iter_mut() {
             let rows = self.fronts[*kept as usize].rows.iter().map(|v| self.local[*v as usize] as usize);
@@ -192,10 +207,14 @@ impl Tree {
             }
         }
         for f in new {
-            let mut children = std::mem::take(&mut self.fronts[*f as usize].children);
-            children.sort_unstable_by_key(|c| self.fronts[*c as usize].lowest);
-            self.fronts[*f as usize].children = children;
+            self.sort_children(*f);
         }
+    }
+
+    fn sort_children(&mut self, front: u32) {
+        let mut children = std::mem::take(&mut self.fronts[front as usize].children);
+        children.sort_unstable_by_key(|c| self.fronts[*c as usize].lowest);
+        self.fronts[front as usize].children = children;
     }
 
     /// Puts the new fronts in the place of the affected ones.

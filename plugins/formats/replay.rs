@@ -5,14 +5,13 @@
 use manifactor_geometry::{Tree, spanning_tree};
 use manifactor_graph::{FactorEntry, Graph, Key, ValueError, Values, Variable};
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, HashSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet, VecDeque};
 
 /// A graph, step by step.
 #[derive(Debug, Clone)]
 pub struct Replay {
     steps: VecDeque<Vec<FactorEntry>>,
-    /// Factors that nothing known reaches yet.
-    waiting: Vec<FactorEntry>,
+    waiting: Waiting,
     known: HashSet<Key>,
     /// What is held, and has not been told yet.
     fixed: Graph,
@@ -51,7 +50,12 @@ impl Replay {
         }
         let mut fixed = Graph::new();
         graph.fixed().iter().for_each(|(key, held)| fixed.set_fixed(key, held.clone()));
-        Self { steps: steps.into_values().collect(), waiting: vec![], known: HashSet::new(), fixed }
+        Self {
+            steps: steps.into_values().collect(),
+            waiting: Waiting::default(),
+            known: HashSet::new(),
+            fixed,
+        }
     }
 
     /// Steps that are left.
@@ -73,7 +77,7 @@ impl Replay {
         estimate: impl Fn(&str) -> Option<Box<dyn Variable>>,
     ) -> Result<Option<Step>, ValueError> {
         let Some(new) = self.steps.pop_front() else { return Ok(None) };
-        self.waiting.extend(new);
+        new.into_iter().for_each(|entry| self.waiting.push(entry, &self.known));
         let (factors, keys) = self.reach();
         let mut values = Values::new();
         let mut step = Step::default();
@@ -105,23 +109,57 @@ impl Replay {
     /// them, in order. The very first are reached from nothing.
     fn reach(&mut self) -> (Vec<FactorEntry>, Vec<Key>) {
         let (mut factors, mut keys) = (vec![], vec![]);
-        loop {
-            let is_reached = |entry: &FactorEntry| entry.keys.iter().any(|key| self.known.contains(key));
-            let next = match self.known.is_empty() {
-                true => 0,
-                false => self.waiting.iter().position(is_reached).unwrap_or(self.waiting.len()),
-            };
-            if next >= self.waiting.len() {
-                return (factors, keys);
-            }
-            let entry = self.waiting.remove(next);
+        while let Some(entry) = self.waiting.next(self.known.is_empty()) {
             for key in &entry.keys {
                 if self.known.insert(key.clone()) {
                     keys.push(key.clone());
+                    self.waiting.tell(key);
                 }
             }
             factors.push(entry);
         }
+        (factors, keys)
+    }
+}
+
+/// Factors that have come, but are not out: the first that something known reaches is the next.
+#[derive(Debug, Clone, Default)]
+struct Waiting {
+    /// By number, in the order in which they came.
+    factors: BTreeMap<usize, FactorEntry>,
+    reached: BTreeSet<usize>,
+    /// By variable that is not known: the factors that wait for it.
+    by_key: HashMap<Key, Vec<usize>>,
+    numbers: usize,
+}
+
+impl Waiting {
+    fn push(&mut self, entry: FactorEntry, known: &HashSet<Key>) {
+        let number = self.numbers;
+        self.numbers += 1;
+        if entry.keys.iter().any(|key| known.contains(key)) {
+            self.reached.insert(number);
+        } else {
+            for key in &entry.keys {
+                self.by_key.entry(key.clone()).or_default().push(number);
+            }
+        }
+        self.factors.insert(number, entry);
+    }
+
+    /// Says that a variable is known now.
+    fn tell(&mut self, key: &Key) {
+        let factors = self.by_key.remove(key).unwrap_or_default();
+        self.reached.extend(factors.into_iter().filter(|number| self.factors.contains_key(number)));
+    }
+
+    /// Takes out the first factor that is reached; the very first of all, where nothing is known.
+    fn next(&mut self, is_first: bool) -> Option<FactorEntry> {
+        let number = match is_first {
+            true => self.factors.keys().next().copied(),
+            false => self.reached.pop_first(),
+        };
+        self.factors.remove(&number?)
     }
 }
 
@@ -148,5 +186,37 @@ impl Latencies {
             sorted.get(place).copied().unwrap_or_default()
         };
         Self { total: seconds.iter().sum(), p50: at(0.5), p99: at(0.99), max: at(1.0) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_geometry::{Between, Se2};
+
+    #[test]
+    fn factors_wait_until_something_known_reaches_them_and_come_in_their_order() {
+        let mut graph = Graph::new();
+        let mut link = |a: &str, b: &str| {
+            graph.add([a, b], Between { relative: Se2::identity() });
+        };
+        // pose 3 is tied to what is known by pose 5 alone, and landmark m by pose 3
+        [("x0", "x1"), ("x1", "x2"), ("x3", "m"), ("m", "x4"), ("x2", "x5"), ("x4", "x5")]
+            .into_iter()
+            .for_each(|(a, b)| link(a, b));
+        let mut replay = Replay::of(&graph);
+        let mut told: Vec<Vec<String>> = vec![];
+        let mut known = Values::new();
+        while let Some(step) = replay.step(|key| known.variable(key).map(|v| v.erased().clone_box())).unwrap()
+        {
+            let links = step.factors.factors().iter().map(|f| format!("{}-{}", f.keys[0], f.keys[1]));
+            told.push(links.collect());
+            for (key, value) in step.values.iter() {
+                known.insert_boxed(key.clone(), value.erased().clone_box());
+            }
+        }
+        assert_eq!(told[..5], [vec![], vec!["x0-x1".to_owned()], vec!["x1-x2".into()], vec![], vec![]]);
+        assert_eq!(told[5], ["x2-x5", "x4-x5", "m-x4", "x3-m"].map(String::from));
+        assert_eq!(known.len(), 7);
     }
 }

@@ -2,8 +2,9 @@
 //!
 //! A sum is taken in the order of the factors' numbers, so that it depends on the factors that are there and not on how they
 //! came.
-use super::regions::{Region, Regions};
+use super::regions::Regions;
 use smallvec::SmallVec;
+use std::collections::BTreeMap;
 
 /// Variables that share a factor.
 #[derive(Debug, Clone, Copy)]
@@ -12,11 +13,21 @@ pub(crate) struct Coupling {
     pub pair: u32,
 }
 
-/// A factor of a variable, and where the variable begins among the factor's scalars.
+/// A factor of a variable, where its region is, and where the variable begins among the factor's scalars.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     factor: u32,
+    region: u32,
     at: u32,
+}
+
+/// A factor of two variables.
+#[derive(Debug, Clone, Copy)]
+struct Shared {
+    factor: u32,
+    region: u32,
+    lower: u32,
+    higher: u32,
 }
 
 /// The block of two variables: rows of the higher one, columns of the lower.
@@ -26,8 +37,8 @@ struct Pair {
     higher: u32,
     at: usize,
     entries: u32,
-    /// By factor, where both begin among its scalars.
-    factors: SmallVec<[(u32, u32, u32); 2]>,
+    /// By ascending factor: where its region is, and where both begin among its scalars.
+    factors: SmallVec<[Shared; 2]>,
     is_dirty: bool,
 }
 
@@ -49,7 +60,8 @@ struct Variable {
 pub(crate) struct Blocks {
     variables: Vec<Variable>,
     pairs: Vec<Pair>,
-    unused: Vec<u32>,
+    /// By number of entries.
+    unused: BTreeMap<u32, Vec<u32>>,
     /// Column-major; of diagonal blocks, the lower triangle.
     diagonals: Vec<f64>,
     off_diagonals: Vec<f64>,
@@ -134,23 +146,12 @@ impl Blocks {
 
     fn new_pair(&mut self, lower: u32, higher: u32) -> u32 {
         let entries = self.dim(lower) * self.dim(higher);
-        // the last one only: in most graphs all pairs are of one size
-        let fits = |pair: &&u32| self.pairs[**pair as usize].entries as usize == entries;
-        let pair = match self.unused.last().filter(fits).copied() {
-            Some(pair) => {
-                self.unused.pop();
-                pair
-            }
-            None => {
-                self.pairs.push(Pair {
-                    at: self.off_diagonals.len(),
-                    entries: entries as u32,
-                    ..Pair::default()
-                });
-                self.off_diagonals.resize(self.off_diagonals.len() + entries, 0.0);
-                self.pairs.len() as u32 - 1
-            }
-        };
+        let pair = self.unused.get_mut(&(entries as u32)).and_then(Vec::pop).unwrap_or_else(|| {
+            let at = self.off_diagonals.len();
+            self.pairs.push(Pair { at, entries: entries as u32, ..Pair::default() });
+            self.off_diagonals.resize(at + entries, 0.0);
+            self.pairs.len() as u32 - 1
+        });
         let found = &mut self.pairs[pair as usize];
         (found.lower, found.higher) = (lower, higher);
         self.variables[lower as usize].coupled.push(Coupling { other: higher, pair });
@@ -159,16 +160,16 @@ impl Blocks {
     }
 
     /// Adds a factor of these variables, which ascend, each with its first scalar among the factor's.
-    pub(crate) fn connect(&mut self, factor: u32, members: &[(u32, u32)]) {
+    pub(crate) fn connect(&mut self, factor: u32, region: u32, members: &[(u32, u32)]) {
         for (n, &(v, at)) in members.iter().enumerate() {
             let factors = &mut self.variables[v as usize].factors;
             let place = factors.partition_point(|part| part.factor < factor);
-            factors.insert(place, Part { factor, at });
+            factors.insert(place, Part { factor, region, at });
             for &(u, at_lower) in &members[..n] {
                 let pair = self.pair(u, v).unwrap_or_else(|| self.new_pair(u, v));
                 let factors = &mut self.pairs[pair as usize].factors;
-                let place = factors.partition_point(|part| part.0 < factor);
-                factors.insert(place, (factor, at_lower, at));
+                let place = factors.partition_point(|part| part.factor < factor);
+                factors.insert(place, Shared { factor, region, lower: at_lower, higher: at });
             }
         }
         self.mark_factor(members);
@@ -182,11 +183,12 @@ impl Blocks {
             for &(u, _) in &members[..n] {
                 let Some(pair) = self.pair(u, v) else { continue };
                 let factors = &mut self.pairs[pair as usize].factors;
-                factors.retain(|part| part.0 != factor);
+                factors.retain(|part| part.factor != factor);
                 if factors.is_empty() {
                     self.variables[u as usize].coupled.retain(|c| c.other != v);
                     self.variables[v as usize].coupled.retain(|c| c.other != u);
-                    self.unused.push(pair);
+                    let entries = self.pairs[pair as usize].entries;
+                    self.unused.entry(entries).or_default().push(pair);
                 }
             }
         }
@@ -211,15 +213,15 @@ impl Blocks {
         }
     }
 
-    /// Makes the sums anew that a changed factor is part of. `regions` are by factor.
-    pub(crate) fn sum_up(&mut self, regions: &[Region], numbers: &Regions) {
+    /// Makes the sums anew that a changed factor is part of.
+    pub(crate) fn sum_up(&mut self, regions: &Regions) {
         for v in std::mem::take(&mut self.dirty) {
             self.variables[v as usize].is_dirty = false;
-            self.sum_variable(v, regions, numbers);
+            self.sum_variable(v, regions);
         }
         for pair in std::mem::take(&mut self.dirty_pairs) {
             self.pairs[pair as usize].is_dirty = false;
-            self.sum_pair(pair, regions, numbers);
+            self.sum_pair(pair, regions);
         }
     }
 
@@ -227,21 +229,20 @@ impl Blocks {
     pub(crate) fn own_block(
         &self,
         variable: u32,
-        regions: &[Region],
-        numbers: &Regions,
+        regions: &Regions,
         counts: impl Fn(u32) -> bool,
     ) -> SmallVec<[f64; 36]> {
         let v = &self.variables[variable as usize];
         let d = v.dim as usize;
         let mut h = SmallVec::from_elem(0.0, d * d);
         for part in v.factors.iter().filter(|part| counts(part.factor)) {
-            add_diagonal(&mut h, d, regions[part.factor as usize], part.at as usize, numbers);
+            add_diagonal(&mut h, d, part.region, part.at as usize, regions);
         }
         (0..d).filter(|c| v.held >> c & 1 == 1).for_each(|c| h[c * d + c] = 1.0);
         h
     }
 
-    fn sum_variable(&mut self, variable: u32, regions: &[Region], numbers: &Regions) {
+    fn sum_variable(&mut self, variable: u32, regions: &Regions) {
         let v = &self.variables[variable as usize];
         let d = v.dim as usize;
         let h = &mut self.diagonals[v.diagonal..v.diagonal + d * d];
@@ -249,10 +250,10 @@ impl Blocks {
         h.fill(0.0);
         g.fill(0.0);
         for part in &v.factors {
-            let (region, at) = (regions[part.factor as usize], part.at as usize);
+            let (region, at) = (regions[part.region], part.at as usize);
             if region.counts {
-                add_diagonal(h, d, region, at, numbers);
-                g.iter_mut().zip(&numbers.g[region.g + at..]).for_each(|(g, x)| *g += x);
+                add_diagonal(h, d, part.region, at, regions);
+                g.iter_mut().zip(&regions.g[region.g + at..]).for_each(|(g, x)| *g += x);
             }
         }
         for c in 0..d {
@@ -263,17 +264,17 @@ impl Blocks {
         }
     }
 
-    fn sum_pair(&mut self, pair: u32, regions: &[Region], numbers: &Regions) {
+    fn sum_pair(&mut self, pair: u32, regions: &Regions) {
         let pair = &self.pairs[pair as usize];
         let (columns, rows) = (self.dim(pair.lower), self.dim(pair.higher));
         let block = &mut self.off_diagonals[pair.at..pair.at + rows * columns];
         block.fill(0.0);
-        for &(factor, lower, higher) in &pair.factors {
-            let region = regions[factor as usize];
+        for &Shared { region, lower, higher, .. } in &pair.factors {
+            let region = regions[region];
             if region.counts {
                 for (c, column) in block.chunks_exact_mut(rows).enumerate() {
                     let at = lower as usize + c;
-                    let from = &numbers.h[region.column(at) + higher as usize - at..][..rows];
+                    let from = &regions.h[region.column(at) + higher as usize - at..][..rows];
                     column.iter_mut().zip(from).for_each(|(h, x)| *h += x);
                 }
             }
@@ -289,9 +290,28 @@ impl Blocks {
 
 /// Adds a variable's own part of a region, lower triangle.
 #[inline(always)]
-fn add_diagonal(h: &mut [f64], d: usize, region: Region, at: usize, numbers: &Regions) {
+fn add_diagonal(h: &mut [f64], d: usize, region: u32, at: usize, regions: &Regions) {
+    let region = regions[region];
     for c in 0..d {
-        let from = &numbers.h[region.column(at + c)..][..d - c];
+        let from = &regions.h[region.column(at + c)..][..d - c];
         h[c * d + c..(c + 1) * d].iter_mut().zip(from).for_each(|(h, x)| *h += x);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_of_several_sizes_come_and_go_in_the_same_memory() {
+        let mut blocks = Blocks::default();
+        [6, 6, 9].iter().for_each(|dim| blocks.push(*dim, 0));
+        let factors = [[(0, 0), (1, 6)], [(0, 0), (2, 6)]];
+        for n in 0..100 {
+            let both: [u32; 2] = std::array::from_fn(|i| 2 * n + i as u32);
+            both.iter().zip(&factors).for_each(|(f, members)| blocks.connect(*f, 0, members));
+            both.iter().zip(&factors).for_each(|(f, members)| blocks.disconnect(*f, members));
+        }
+        assert_eq!((blocks.pairs.len(), blocks.off_diagonals.len()), (2, 36 + 54));
     }
 }

@@ -2,6 +2,7 @@
 //! away, without a look at any other.
 use manifactor_graph::normal_equations::NormalEquations;
 use std::collections::BTreeMap;
+use std::ops::Index;
 
 /// A factor's region: the packed lower triangle of H over its own `scalars`, and its gradient.
 ///
@@ -17,7 +18,7 @@ pub(crate) struct Region {
 
 impl Region {
     /// Entries of the triangle.
-    fn entries(self) -> usize {
+    pub(crate) fn entries(self) -> usize {
         let n = self.scalars as usize;
         n * (n + 1) / 2
     }
@@ -29,51 +30,56 @@ impl Region {
     }
 }
 
-/// The memory of all regions. That of factors that are gone is used again.
+/// All regions by their place, and their memory. That of factors that are gone is used again.
 #[derive(Debug, Default)]
 pub(crate) struct Regions {
+    all: Vec<Region>,
     pub h: Vec<f64>,
     pub g: Vec<f64>,
-    unused: BTreeMap<u32, Vec<Region>>,
+    /// By number of scalars.
+    unused: BTreeMap<u32, Vec<u32>>,
+}
+
+impl Index<u32> for Regions {
+    type Output = Region;
+    #[inline(always)]
+    fn index(&self, place: u32) -> &Region {
+        &self.all[place as usize]
+    }
 }
 
 impl Regions {
-    pub(crate) fn take(&mut self, scalars: u32) -> Region {
-        if let Some(region) = self.unused.get_mut(&scalars).and_then(Vec::pop) {
-            return region;
+    /// The place of a region that counts.
+    pub(crate) fn take(&mut self, scalars: u32) -> u32 {
+        if let Some(place) = self.unused.get_mut(&scalars).and_then(Vec::pop) {
+            self.all[place as usize].counts = true;
+            return place;
         }
         let region = Region { h: self.h.len(), g: self.g.len(), scalars, counts: true };
         self.h.resize(self.h.len() + region.entries(), 0.0);
         self.g.resize(self.g.len() + scalars as usize, 0.0);
-        region
+        self.all.push(region);
+        self.all.len() as u32 - 1
     }
 
-    pub(crate) fn give(&mut self, region: Region) {
-        self.unused.entry(region.scalars).or_default().push(Region { counts: true, ..region });
+    pub(crate) fn give(&mut self, place: u32) {
+        self.unused.entry(self[place].scalars).or_default().push(place);
     }
 
-    pub(crate) fn clear(&mut self, region: Region) {
+    /// Sets whether a region counts; returns whether it did.
+    pub(crate) fn count(&mut self, place: u32, counts: bool) -> bool {
+        std::mem::replace(&mut self.all[place as usize].counts, counts)
+    }
+
+    pub(crate) fn clear(&mut self, place: u32) {
+        let region = self[place];
         self.h[region.h..region.h + region.entries()].fill(0.0);
         self.g[region.g..region.g + region.scalars as usize].fill(0.0);
     }
 
-    /// Appends the numbers of a region to a list.
-    pub(crate) fn save(&self, region: Region, to: &mut Vec<f64>) {
-        to.extend_from_slice(&self.h[region.h..region.h + region.entries()]);
-        to.extend_from_slice(&self.g[region.g..region.g + region.scalars as usize]);
-    }
-
-    /// Puts back what was saved; returns what follows it in the list.
-    pub(crate) fn restore<'a>(&mut self, region: Region, from: &'a [f64]) -> &'a [f64] {
-        let (h, rest) = from.split_at(region.entries());
-        let (g, rest) = rest.split_at(region.scalars as usize);
-        self.h[region.h..region.h + h.len()].copy_from_slice(h);
-        self.g[region.g..region.g + g.len()].copy_from_slice(g);
-        rest
-    }
-
     /// Whether all numbers of a region are finite.
-    pub(crate) fn is_finite(&self, region: Region) -> bool {
+    pub(crate) fn is_finite(&self, place: u32) -> bool {
+        let region = self[place];
         let (h, g) =
             (&self.h[region.h..][..region.entries()], &self.g[region.g..][..region.scalars as usize]);
         h.iter().chain(g).all(|x| x.is_finite())

@@ -2,7 +2,7 @@
 use super::Session;
 use crate::error::ChangeError;
 use crate::factor_id::FactorId;
-use crate::model::Model;
+use crate::model::{Model, NewNumber, Reserved};
 use indexmap::IndexMap;
 use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values, Variable};
 use std::any::TypeId;
@@ -16,14 +16,30 @@ pub(super) enum Change {
     Hold { variable: u32, held: u32 },
 }
 
+/// A variable that comes with the next update.
+pub(super) struct NewVariable {
+    pub(super) value: Box<dyn Variable>,
+    pub(super) held: u32,
+    pub(super) at: NewNumber,
+}
+
 /// What the next update is to do.
 #[derive(Default)]
 pub(super) struct Pending {
-    pub(super) variables: IndexMap<Key, (Box<dyn Variable>, u32)>,
+    pub(super) variables: IndexMap<Key, NewVariable>,
+    reserved: Reserved,
+    /// Variables that are to leave.
+    pub(super) leaving: Vec<Key>,
     pub(super) changes: Vec<Change>,
     /// Numbers of factors: the next one; and whether those with changes are there, after these.
     numbers: Option<u32>,
     is_there: IndexMap<u32, Option<FactorEntry>>,
+}
+
+impl Pending {
+    pub(super) fn is_empty(&self) -> bool {
+        self.variables.is_empty() && self.changes.is_empty() && self.leaving.is_empty()
+    }
 }
 
 /// What changes have touched.
@@ -33,6 +49,8 @@ pub(super) struct Touched {
     pub(super) variables: Vec<u32>,
     /// Factors that are to be linearized.
     pub(super) factors: Vec<u32>,
+    /// Factors that were taken out; some may be back.
+    pub(super) removed: Vec<u32>,
     /// Variables that may have lost what determined them, or have gained it.
     pub(super) doubtful: Vec<u32>,
     /// Variables of which other directions are held now.
@@ -55,9 +73,9 @@ impl Change {
                 let factor = model.remove(number)?;
                 touched.variables.extend(factor.variables());
                 touched.doubtful.extend(factor.variables());
-                touched.factors.retain(|f| *f != number);
+                touched.removed.push(number);
                 let resolved = factor.resolved()?;
-                Some(Self::Insert { number, entry: factor.entry, resolved, weight: factor.weight })
+                Some(Self::Insert { number, entry: factor.entry?, resolved, weight: factor.weight })
             }
             Self::Weigh { number, weight } => {
                 let before = model.weigh(number, weight)?;
@@ -97,10 +115,22 @@ impl Session {
         if let Some((key, _)) = values.iter().find(|(key, _)| is_known(key)) {
             return Err(ChangeError::Known { key: key.clone() });
         }
+        let of_factors = factors.factors().iter().flat_map(|entry| &entry.keys).chain(factors.fixed().keys());
+        let named = values.iter().map(|(key, _)| key).chain(of_factors);
+        if let Some(key) = named.into_iter().find(|key| self.gone.contains(key.as_str())) {
+            return Err(ChangeError::Gone { key: key.clone() });
+        }
+        let is_sealed =
+            |key: &&Key| self.model.variable(key.as_str()).is_some_and(|v| self.model.place(v).sealed > 0);
+        if let Some(key) = factors.fixed().keys().find(is_sealed) {
+            return Err(ChangeError::Sealed { key: key.clone() });
+        }
         let mut errors = vec![];
-        let known = self.model.variables() + self.pending.variables.len();
+        let mut reserved = self.pending.reserved.clone();
+        let at = values.iter().map(|(_, value)| self.model.reserve(value.erased().type_id(), &mut reserved));
+        let at: Vec<NewNumber> = at.collect();
         let find = |key: &str| {
-            let new = values.find(key).map(|(i, value)| (known + i, value.erased().type_id()));
+            let new = values.find(key).map(|(i, value)| (at[i].number as usize, value.erased().type_id()));
             new.or_else(|| self.find(key))
         };
         let mut resolved = Vec::with_capacity(factors.factors().len());
@@ -119,15 +149,17 @@ impl Session {
         if !errors.is_empty() {
             return Err(ChangeError::Graph(errors));
         }
-        for (key, value) in values.iter() {
+        self.pending.reserved = reserved;
+        for ((key, value), at) in values.iter().zip(at) {
             let held = factors.fixed().get(key).map_or(0, |fixed| fixed.bits(value.erased().tangent()));
-            self.pending.variables.insert(key.clone(), (value.erased().clone_box(), held));
+            let new = NewVariable { value: value.erased().clone_box(), held, at };
+            self.pending.variables.insert(key.clone(), new);
         }
         for (key, fixed) in factors.fixed().iter().filter(|(key, _)| !values.contains(key.as_str())) {
             self.fix(key, fixed)?;
         }
         let ids = factors.factors().iter().zip(resolved).map(|(entry, resolved)| {
-            let number = self.pending.numbers.unwrap_or(self.model.factors() as u32);
+            let number = self.pending.numbers.unwrap_or(self.model.next_factor());
             self.pending.numbers = Some(number + 1);
             self.insert(number, entry.clone(), resolved, 1.0)
         });
@@ -148,7 +180,7 @@ impl Session {
     pub fn remove(&mut self, factors: &[FactorId]) -> Result<(), ChangeError> {
         let mut seen = std::collections::HashSet::new();
         if let Some(factor) = factors.iter().find(|f| self.entry(**f).is_none() || !seen.insert(**f)) {
-            return Err(ChangeError::NoFactor { factor: *factor });
+            return Err(self.no_factor(*factor));
         }
         for FactorId(number) in factors {
             self.pending.is_there.insert(*number, None);
@@ -163,7 +195,7 @@ impl Session {
     /// # Errors
     /// Where there is no such factor, or `entry` does not fit, or is between other variables.
     pub fn replace(&mut self, factor: FactorId, entry: FactorEntry) -> Result<(), ChangeError> {
-        let before = self.entry(factor).ok_or(ChangeError::NoFactor { factor })?;
+        let before = self.entry(factor).ok_or_else(|| self.no_factor(factor))?;
         if before.keys != entry.keys {
             return Err(ChangeError::Keys { factor, expected: before.keys.clone() });
         }
@@ -181,7 +213,7 @@ impl Session {
     /// # Errors
     /// Where there is no such factor, or the weight is negative or not finite.
     pub fn set_weight(&mut self, factor: FactorId, weight: f64) -> Result<(), ChangeError> {
-        self.entry(factor).ok_or(ChangeError::NoFactor { factor })?;
+        self.entry(factor).ok_or_else(|| self.no_factor(factor))?;
         if !(weight >= 0.0 && weight.is_finite()) {
             return Err(ChangeError::Weight { factor, weight });
         }
@@ -195,8 +227,11 @@ impl Session {
     /// # Errors
     /// Where there is no such variable, or its tangent space has no such direction.
     pub fn fix(&mut self, key: &Key, fixed: &Fixed) -> Result<(), ChangeError> {
-        let tangent =
-            self.tangent(key.as_str()).ok_or_else(|| ChangeError::NoVariable { key: key.clone() })?;
+        let tangent = self.tangent(key.as_str()).ok_or_else(|| self.no_variable(key))?;
+        let variable = self.model.variable(key.as_str());
+        if variable.is_some_and(|v| self.model.place(v).sealed > 0) {
+            return Err(ChangeError::Sealed { key: key.clone() });
+        }
         let mut errors = vec![];
         fixed.check(key, tangent, &mut errors);
         if !errors.is_empty() {
@@ -204,9 +239,8 @@ impl Session {
         }
         let held = fixed.bits(tangent);
         match self.pending.variables.get_mut(key) {
-            Some((_, of_new)) => *of_new = held,
+            Some(new) => new.held = held,
             None => {
-                let variable = self.model.variable(key.as_str());
                 let changes = variable.map(|variable| Change::Hold { variable, held });
                 self.pending.changes.extend(changes);
             }
@@ -218,28 +252,28 @@ impl Session {
     pub fn entry(&self, factor: FactorId) -> Option<&FactorEntry> {
         match self.pending.is_there.get(&factor.0) {
             Some(pending) => pending.as_ref(),
-            None => self.model.factor(factor.0).map(|factor| &factor.entry),
+            None => self.model.factor(factor.0)?.entry.as_ref(),
         }
     }
 
     /// How often a factor counts, as of the last update; `None` where it is not there.
     pub fn weight(&self, factor: FactorId) -> Option<f64> {
-        self.model.factor(factor.0).map(|factor| factor.weight)
+        self.model.factor(factor.0).filter(|factor| factor.entry.is_some()).map(|factor| factor.weight)
     }
 
     /// The number and the type of a variable, of a pending one too.
-    fn find(&self, key: &str) -> Option<(usize, TypeId)> {
+    pub(super) fn find(&self, key: &str) -> Option<(usize, TypeId)> {
         if let Some(variable) = self.model.variable(key) {
             return Some((variable as usize, self.model.type_of(variable)?));
         }
-        let (i, _, (value, _)) = self.pending.variables.get_full(key)?;
-        Some((self.model.variables() + i, value.erased().type_id()))
+        let new = self.pending.variables.get(key)?;
+        Some((new.at.number as usize, new.value.erased().type_id()))
     }
 
     fn tangent(&self, key: &str) -> Option<&'static [&'static str]> {
         match self.model.variable(key) {
             Some(variable) => Some(self.model.place(variable).tangent),
-            None => self.pending.variables.get(key).map(|(value, _)| value.erased().tangent()),
+            None => self.pending.variables.get(key).map(|new| new.value.erased().tangent()),
         }
     }
 }

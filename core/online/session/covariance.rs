@@ -3,6 +3,7 @@ use super::Session;
 use crate::tree::NONE;
 use manifactor_graph::Key;
 use nalgebra::DMatrix;
+use std::cmp::Reverse;
 
 /// Why there is no covariance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -49,8 +50,8 @@ impl Session {
         }
         // Σᵢⱼ = (L⁻¹eᵢ)ᵀ(L⁻¹eⱼ), and such a column is zero but on the path from its front to the root
         let path = self.path(&variables);
-        for f in &path.fronts {
-            if let Some((v, direction)) = self.fronts.open(*f).first() {
+        for step in &path.steps {
+            if let Some((v, direction)) = self.fronts.open(step.front).first() {
                 let direction = self.model.place(*v).tangent[*direction as usize];
                 return Err(CovarianceError::Undetermined { key: self.key(*v), direction });
             }
@@ -69,44 +70,57 @@ impl Session {
 
     /// The fronts on the way from variables to their roots.
     fn path(&self, variables: &[u32]) -> Path {
-        let mut path = Path { first: vec![NONE; self.model.variables()], ..Path::default() };
-        // from each variable up to where the path is joined; what is found later stands before it
+        let mut fronts = vec![];
         for v in variables {
-            let (mut f, mut way) = (self.tree.front_of(*v), vec![]);
-            while f != NONE && !path.fronts.contains(&f) {
-                way.push(f);
+            let first = fronts.len();
+            let mut f = self.tree.front_of(*v);
+            while f != NONE {
+                fronts.push((0, f));
                 f = self.tree.fronts[f as usize].parent;
             }
-            way.append(&mut path.fronts);
-            path.fronts = way;
+            let depth = fronts.len();
+            (first..depth).for_each(|i| fronts[i].0 = depth - i);
         }
-        for f in &path.fronts {
-            for v in &self.tree.fronts[*f as usize].blocks {
-                path.first[*v as usize] = path.scalars as u32;
-                path.scalars += self.dim(*v);
+        // children before parents; which place in memory a front has depends on history, its variables do not
+        fronts.sort_unstable_by_key(|(depth, f)| (Reverse(*depth), self.tree.fronts[*f as usize].lowest));
+        fronts.dedup();
+        let mut path = Path::default();
+        for (_, front) in fronts {
+            let mut at = path.scalars as u32;
+            path.steps.push(Step { front, first: at, rows: vec![] });
+            for v in &self.tree.fronts[front as usize].blocks {
+                path.first.push((*v, at));
+                at += self.dim(*v) as u32;
             }
+            path.scalars = at as usize;
         }
+        path.first.sort_unstable();
+        for i in 0..path.steps.len() {
+            let rows = &self.tree.fronts[path.steps[i].front as usize].rows;
+            path.steps[i].rows = rows.iter().map(|v| (path.first(*v), self.dim(*v) as u32)).collect();
+        }
+        path.of_front = path.steps.iter().enumerate().map(|(i, step)| (step.front, i as u32)).collect();
+        path.of_front.sort_unstable();
         path
     }
 
     /// L⁻¹e along the path, e for one direction of a variable.
     fn column(&self, path: &Path, variable: u32, direction: usize) -> Vec<f64> {
         let mut x = vec![0.0; path.scalars];
-        x[path.first[variable as usize] as usize + direction] = 1.0;
+        x[path.first(variable) as usize + direction] = 1.0;
         let mut f = self.tree.front_of(variable);
         let mut below = vec![];
-        while f != NONE {
+        while let Some(step) = path.step(f) {
             let front = &self.tree.fronts[f as usize];
-            let first = path.first[front.blocks[0] as usize] as usize;
+            let first = step.first as usize;
             below.clear();
             below.resize(front.below, 0.0);
             self.fronts.forward(front, f, &mut x[first..first + front.width], &mut below);
             let mut rest = &below[..];
-            for row in &front.rows {
-                let (of_row, after) = rest.split_at(self.dim(*row));
+            for (at, dim) in &step.rows {
+                let (of_row, after) = rest.split_at(*dim as usize);
                 rest = after;
-                let at = path.first[*row as usize] as usize;
-                x[at..at + of_row.len()].iter_mut().zip(of_row).for_each(|(x, b)| *x += b);
+                x[*at as usize..].iter_mut().zip(of_row).for_each(|(x, b)| *x += b);
             }
             f = front.parent;
         }
@@ -117,8 +131,29 @@ impl Session {
 /// Fronts on paths to the root, children before parents.
 #[derive(Default)]
 struct Path {
-    fronts: Vec<u32>,
-    /// By variable, its first scalar among those of the path.
-    first: Vec<u32>,
+    steps: Vec<Step>,
+    /// The first scalar of each variable on the path; and the step of each front. Both ascend.
+    first: Vec<(u32, u32)>,
+    of_front: Vec<(u32, u32)>,
     scalars: usize,
+}
+
+/// A front on a path.
+struct Step {
+    front: u32,
+    /// Its first scalar on the path, and where its rows have theirs, with their dimensions.
+    first: u32,
+    rows: Vec<(u32, u32)>,
+}
+
+impl Path {
+    /// The first scalar of a variable on the path; 0 for one that is held.
+    fn first(&self, variable: u32) -> u32 {
+        let place = self.first.binary_search_by_key(&variable, |(v, _)| *v);
+        place.map_or(0, |place| self.first[place].1)
+    }
+    fn step(&self, front: u32) -> Option<&Step> {
+        let place = self.of_front.binary_search_by_key(&front, |(f, _)| *f).ok()?;
+        self.steps.get(self.of_front[place].1 as usize)
+    }
 }

@@ -1,11 +1,14 @@
 //! The whole of a session as one batch.
+mod prior;
+
 use super::Session;
 use super::changes::Touched;
 use super::parking::Moves;
 use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
 use crate::report::Report;
-use manifactor_graph::{Fixed, Graph, Values};
+use crate::tree::NONE;
+use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Noise, Values};
 use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 
 /// A session that was solved as one batch.
@@ -13,23 +16,26 @@ use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 pub struct Finished {
     /// The estimate of each variable; those that were parked are where they were.
     pub values: Values,
-    /// What the solver has to tell. Its factors count from 0 in the order of `factors`.
+    /// What the solver has to tell. Its factors count from 0 in the order of `factors`; after these come the rows of linear
+    /// priors.
     pub outcome: Outcome,
     /// The factors that took part: all, but for those of parked variables.
     pub factors: Vec<FactorId>,
 }
 
 impl Session {
-    /// The factors that count, as a graph with what is held, and their ids.
+    /// The factors that count, as a graph with what is held, and their ids. What variables have left behind that are gone is
+    /// not among them.
     pub fn graph(&self) -> (Graph, Vec<FactorId>) {
         let (mut graph, mut ids) = (Graph::new(), vec![]);
         for f in self.counted() {
-            let Some(factor) = self.model.factor(f) else { continue };
-            graph.push(factor.entry.clone());
+            let Some(entry) = self.model.factor(f).and_then(|factor| factor.entry.clone()) else { continue };
+            graph.push(entry);
             ids.push(FactorId(f));
         }
-        for (v, key) in self.model.keys().enumerate() {
-            let place = self.model.place(v as u32);
+        for v in self.model.by_age() {
+            let place = self.model.place(v);
+            let key = &place.key;
             let names = place.tangent.iter().enumerate().filter(|(d, _)| place.held >> d & 1 == 1);
             match place.is_held() {
                 true => graph.fix(key),
@@ -53,7 +59,8 @@ impl Session {
         observer: &mut dyn Observer,
     ) -> Result<Finished, CompileError> {
         optimizer.check()?;
-        let (graph, factors) = self.graph();
+        let (mut graph, factors) = self.graph();
+        self.add_priors(&mut graph);
         let mut values = self.estimates();
         let is_in = |key: &str| {
             let place = self.model.variable(key).map(|v| self.model.place(v));
@@ -65,7 +72,8 @@ impl Session {
         }
         let mut problem = Problem::compile_for(&graph, &solved_for, &optimizer.linear())?;
         let weights = factors.iter().map(|f| self.model.factor(f.0).map_or(1.0, |factor| factor.weight));
-        let weights: Vec<f64> = weights.collect();
+        let of_priors = std::iter::repeat_n(1.0, graph.factors().len() - factors.len());
+        let weights: Vec<f64> = weights.chain(of_priors).collect();
         if weights.iter().any(|weight| *weight != 1.0) {
             // they were checked when they were set
             let _ = problem.set_weights(&weights);
@@ -77,22 +85,40 @@ impl Session {
         Ok(Finished { values, outcome, factors })
     }
 
+    /// Adds what variables that are gone have left behind.
+    fn add_priors(&self, graph: &mut Graph) {
+        for prior in self.model.priors().filter_map(|f| self.model.prior(f)) {
+            let points = prior.variables.iter().filter_map(|v| self.model.point(*v)).collect();
+            let keys: Vec<Key> = prior.variables.iter().map(|v| self.key(*v)).collect();
+            for factor in prior::factors(&prior, points) {
+                graph.push(FactorEntry { keys: keys.clone(), factor, noise: Noise::unit(), loss: None });
+            }
+        }
+    }
+
     /// Goes on from other values, those of [`finish`](Self::finish), say: all is linearized there. Keys that the session
     /// does not have are left out.
-    pub(super) fn adopt(&mut self, values: &Values) -> Result<(), Overflow> {
+    pub(super) fn adopt(&mut self, values: &Values, report: &mut Report) -> Result<(), Overflow> {
         let mut points = vec![];
-        for (v, key) in self.model.keys().enumerate() {
-            let (v, point) = (v as u32, self.model.point(v as u32));
+        for v in self.model.by_age() {
+            let (key, point) = (&self.model.place(v).key, self.model.point(v));
             let step = point.zip(values.variable(key.as_str())).and_then(|(p, x)| p.erased().local(x));
             points.extend(step.map(|step| (v, step)));
         }
-        let mut held = vec![];
-        for (v, step) in points.into_iter().filter(|(v, _)| !self.model.place(*v).is_held()) {
+        let (before, mut held) = (self.delta.clone(), vec![]);
+        for (v, step) in points
+            .into_iter()
+            .filter(|(v, _)| self.tree.front_of(*v) != NONE && self.model.place(*v).sealed == 0)
+        {
             let range = self.model.blocks.range(v);
             self.delta[range].copy_from_slice(&step);
             held.push(v);
         }
         let all = Touched { variables: held.clone(), held, ..Touched::default() };
-        self.pass(&all, &Moves::default(), false, &mut Report::default())
+        let passed = self.pass(&all, &Moves::default(), false, report);
+        if passed.is_err() {
+            self.delta = before;
+        }
+        passed
     }
 }

@@ -14,9 +14,10 @@ const RANK: f64 = 1e-8;
 /// Variables that begin or cease to be solved for.
 #[derive(Debug, Default)]
 pub(super) struct Moves {
+    /// Both ascend.
     pub(super) entering: Vec<u32>,
     pub(super) leaving: Vec<u32>,
-    /// Those that were looked at, and those of them whose flag has changed.
+    /// Those that were looked at, ascending, and those of them whose flag has changed.
     pub(super) judged: Vec<u32>,
     pub(super) flipped: Vec<u32>,
 }
@@ -33,14 +34,16 @@ impl Session {
         let mut queue: VecDeque<u32> = candidates.iter().copied().collect();
         while let Some(v) = queue.pop_front() {
             let place = self.model.place(v);
-            if !place.parked && !place.is_held() && !self.is_determined(v) {
+            // a prior says something of the others, also where it leaves this one open
+            if !place.parked && !place.is_held() && place.sealed == 0 && !self.is_determined(v) {
                 self.model.place_mut(v).parked = true;
                 parked.insert(v);
                 queue.extend(self.model.coupled(v));
             }
         }
         let others = parked.iter().filter(|v| !candidates.contains(v)).map(|v| (*v, false));
-        let before: Vec<(u32, bool)> = was_parked.into_iter().chain(others).collect();
+        let mut before: Vec<(u32, bool)> = was_parked.into_iter().chain(others).collect();
+        before.sort_unstable();
         let mut moves = Moves::default();
         let mut factors = touched.factors.clone();
         for (v, was_parked) in before {
@@ -66,6 +69,16 @@ impl Session {
             }
         }
         moves
+    }
+
+    /// Has parked variables looked at again by the next update, as their factors say something else now.
+    pub(super) fn doubt_parked(&mut self, factors: &[u32]) {
+        let factors =
+            factors.iter().filter(|f| !self.model.is_whole(**f)).filter_map(|f| self.model.factor(*f));
+        let parked = factors.flat_map(|f| f.variables()).filter(|v| self.model.place(*v).parked);
+        self.doubtful.extend(parked);
+        self.doubtful.sort_unstable();
+        self.doubtful.dedup();
     }
 
     /// Takes back what [`park`](Self::park) decided.

@@ -4,17 +4,20 @@
 //! be: |δᵢ| ≤ √(bend · σᵢ) with σᵢ = 1/√Hᵢᵢ, the precision of the factors around. Thresholds in radians and metres would
 //! be too coarse for precise data and too fine for coarse data, and need one number for each type of variable.
 use super::Session;
+use crate::tree::{Affected, NONE};
+use smallvec::SmallVec;
 
-/// Variables at new points, and what takes them back.
+/// Variables at new points.
 #[derive(Debug, Default)]
 pub(super) struct Relinearized {
     pub(super) variables: Vec<u32>,
-    factors: Vec<u32>,
-    saved: Vec<f64>,
+    pub(super) factors: Vec<u32>,
 }
 
-/// Halvings of a step that leads out of the domain of a factor.
-const HALVINGS: usize = 4;
+/// Halvings of a step that leads out of the domain of a factor; then the variable stays.
+const HALVINGS: u32 = 4;
+/// Rounds of such halvings, each of some variables, before all of them stay.
+const ROUNDS: usize = 16;
 
 impl Session {
     /// The square of how many times its threshold the largest component of a variable's step is.
@@ -25,79 +28,172 @@ impl Session {
     }
 
     /// Whether something cannot wait for the next turn: after a large loop closure, a step is no estimate of anything.
-    pub(super) fn is_urgent(&self) -> bool {
-        let urgent = self.settings.urgent.powi(2);
-        self.waiting.iter().any(|v| self.excess(*v) > urgent)
+    pub(super) fn is_urgent(&mut self) -> bool {
+        let most = self.settings.urgent.powi(2);
+        let mut urgent = std::mem::take(&mut self.urgent);
+        urgent.retain(|v| self.excess(*v) > most && self.may_move(*v));
+        urgent.sort_unstable();
+        urgent.dedup();
+        self.urgent = urgent;
+        !self.urgent.is_empty()
     }
 
-    /// The variables to relinearize: those whose held directions have changed, and in turn those that wait.
-    pub(super) fn choose(&mut self, held: &[u32], is_turn: bool) -> Vec<u32> {
+    /// The variables to relinearize: those whose held directions have changed, and in turn those that wait, as far as the
+    /// budget goes. `spent` are the operations of the update so far.
+    pub(super) fn choose(
+        &mut self,
+        held: &[u32],
+        is_turn: bool,
+        affected: &mut Affected,
+        spent: f64,
+    ) -> Vec<u32> {
         let mut chosen: Vec<u32> = held.to_vec();
         if is_turn {
-            for v in std::mem::take(&mut self.waiting) {
-                self.is_waiting[v as usize] = false;
-                if self.excess(v) > 1.0 && self.tree.front_of(v) != crate::tree::NONE {
-                    chosen.push(v);
-                }
+            let mut out: Vec<u32> = self.waiting.iter().copied().filter(|v| self.is_out(*v)).collect();
+            if let Some(budget) = self.settings.budget {
+                self.postponed = out.len();
+                self.afford(&mut out, budget - spent, spent == 0.0 && held.is_empty(), affected);
+                self.postponed -= out.len();
             }
+            chosen.append(&mut out);
         }
+        chosen.retain(|v| self.model.place(*v).sealed == 0);
         chosen.sort_unstable();
         chosen.dedup();
         chosen
     }
 
-    /// Linearizes the factors of these variables where the variables are estimated to be; their steps are still what they
-    /// were. Where a factor is not defined there any more, or not finite, half the way there; at last, not at all.
-    pub(super) fn relinearize(&mut self, variables: Vec<u32>) -> Relinearized {
-        let mut factors: Vec<u32> = variables.iter().flat_map(|v| self.model.blocks.factors(*v)).collect();
-        factors.sort_unstable();
-        factors.dedup();
-        let saved = self.model.save(&factors);
-        let inactive = factors.iter().filter(|f| !self.model.takes_part(**f)).count();
-        let mut share = 1.0;
-        for _ in 0..HALVINGS {
-            for v in &variables {
-                let step: smallvec::SmallVec<[f64; 9]> =
-                    self.delta[self.model.blocks.range(*v)].iter().map(|d| d * share).collect();
-                self.model.try_step(*v, &step);
+    /// Keeps those variables that the budget allows for, the furthest out first. What a relinearization costs is what the
+    /// fronts above the variable cost as they are; those that are `affected` anyway come first.
+    fn afford(&mut self, variables: &mut Vec<u32>, budget: f64, is_alone: bool, affected: &mut Affected) {
+        let mut by_excess: Vec<(f64, u32)> = variables.iter().map(|v| (self.excess(*v), *v)).collect();
+        by_excess.sort_unstable_by(|(a, v), (b, u)| b.total_cmp(a).then(v.cmp(u)));
+        let first = affected.0.len();
+        let cost = |session: &Self, from: usize, affected: &Affected| -> f64 {
+            affected.0[from..].iter().map(|f| session.tree.fronts[*f as usize].operations).sum()
+        };
+        let mut left = budget - cost(self, 0, affected);
+        let mut must_take = is_alone && first == 0;
+        variables.clear();
+        for (_, v) in by_excess {
+            let before = affected.0.len();
+            self.touch_around(v, affected);
+            let needed = cost(self, before, affected);
+            if needed <= left || must_take {
+                left -= needed;
+                must_take = false;
+                variables.push(v);
+            } else {
+                self.tree.untouch(affected, before);
             }
-            let evaluation = self.model.linearize(&factors);
-            let out = factors.iter().filter(|f| !self.model.takes_part(**f)).count();
-            if evaluation.not_finite.is_none() && out <= inactive {
-                for f in &factors {
-                    self.note_activity(*f);
-                }
-                return Relinearized { variables, factors, saved };
-            }
-            share *= 0.5;
         }
-        self.take_back_points(&Relinearized { variables, factors, saved });
+        self.tree.untouch(affected, first);
+    }
+
+    /// Whether a variable is out of the region of its linearization, and solved for.
+    pub(super) fn is_out(&self, variable: u32) -> bool {
+        self.excess(variable) > 1.0 && self.may_move(variable)
+    }
+
+    /// Whether a variable may be linearized anew: it is solved for, and no prior holds its point.
+    fn may_move(&self, variable: u32) -> bool {
+        self.tree.front_of(variable) != NONE && self.model.place(variable).sealed == 0
+    }
+
+    /// Linearizes the factors of these variables, which ascend, where the variables are estimated to be; their steps are
+    /// still what they were. Where a factor is not defined there any more, or not finite, its variables go half the way,
+    /// then half of that; at last, they stay. `held` are those that have to be linearized, wherever that is.
+    pub(super) fn relinearize(&mut self, mut variables: Vec<u32>, held: &[u32]) -> Relinearized {
+        let factors = self.model.factors_of(&variables);
+        let took_part: Vec<bool> = factors.iter().map(|f| self.model.takes_part(*f)).collect();
+        let mut halved = vec![0; variables.len()];
+        let (mut moving, mut around) = (variables.clone(), factors.clone());
+        for _ in 0..ROUNDS {
+            for v in &moving {
+                let times = variables.binary_search(v).map_or(HALVINGS, |place| halved[place]);
+                self.try_share(*v, times);
+            }
+            let out = self.linearize_within(&around, &factors, &took_part);
+            if out.is_empty() {
+                self.note_activities(&factors);
+                let mut times = halved.iter();
+                variables.retain(|v| times.next().is_some_and(|t| *t < HALVINGS) || held.contains(v));
+                return Relinearized { variables, factors };
+            }
+            let of_these = out.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables());
+            moving = of_these.filter(|v| variables.binary_search(v).is_ok()).collect();
+            moving.sort_unstable();
+            moving.dedup();
+            for v in &moving {
+                if let Ok(place) = variables.binary_search(v) {
+                    halved[place] += 1;
+                }
+            }
+            around = self.model.factors_of(&moving);
+        }
+        self.take_back_points(&Relinearized { variables, factors });
         Relinearized::default()
+    }
+
+    /// Moves a variable's trial point by its step, halved so many times.
+    fn try_share(&mut self, variable: u32, halvings: u32) {
+        if halvings >= HALVINGS {
+            self.model.reset_trial(variable);
+            return;
+        }
+        let share = 0.5_f64.powi(halvings as i32);
+        let step = self.delta[self.model.blocks.range(variable)].iter().map(|d| d * share);
+        let step: SmallVec<[f64; 9]> = step.collect();
+        self.model.try_point(variable, &step);
+    }
+
+    /// Linearizes some of the `factors`, and names those that cannot be: they took part before and do not any more, or are
+    /// not finite.
+    fn linearize_within(&mut self, some: &[u32], factors: &[u32], took_part: &[bool]) -> Vec<u32> {
+        let evaluation = self.model.linearize(some);
+        let has_left = |f: &u32| {
+            let took_part = factors.binary_search(f).is_ok_and(|place| took_part[place]);
+            (took_part && !self.model.takes_part(*f)) || !self.model.is_finite(*f)
+        };
+        let mut out: Vec<u32> = some.iter().copied().filter(has_left).collect();
+        out.extend(evaluation.not_finite.map(|f| f as u32));
+        out
     }
 
     /// Goes back to the old linearization points.
     pub(super) fn take_back_points(&mut self, relinearized: &Relinearized) {
-        for v in &relinearized.variables {
-            self.model.reset_trial(*v);
-            self.wait(*v);
-        }
-        // the list of those that take part is made again, too
+        relinearized.variables.iter().for_each(|v| self.model.reset_trial(*v));
+        // at the old points, they have their old bits
         self.model.linearize(&relinearized.factors);
-        self.model.restore(&relinearized.factors, &relinearized.saved);
+        self.note_activities(&relinearized.factors);
     }
 
-    /// Makes the new points those of the session.
-    pub(super) fn accept_points(&mut self, relinearized: Relinearized) {
-        for v in relinearized.variables {
-            self.model.accept(v);
-            self.delta[self.model.blocks.range(v)].fill(0.0);
+    /// Makes the new points those of the session. After a turn, nothing waits that is not out any more.
+    pub(super) fn accept_points(&mut self, relinearized: &Relinearized, is_turn: bool) {
+        for v in &relinearized.variables {
+            self.model.accept(*v);
+            self.delta[self.model.blocks.range(*v)].fill(0.0);
+            self.is_waiting[*v as usize] = false;
+        }
+        if is_turn || !relinearized.variables.is_empty() {
+            let mut waiting = std::mem::take(&mut self.waiting);
+            waiting.retain(|v| {
+                let stays = self.is_waiting[*v as usize] && (!is_turn || self.is_out(*v));
+                self.is_waiting[*v as usize] = stays;
+                stays
+            });
+            self.waiting = waiting;
         }
     }
 
-    /// Notes that a variable is to be relinearized when its turn comes.
-    pub(super) fn wait(&mut self, variable: u32) {
-        if !std::mem::replace(&mut self.is_waiting[variable as usize], true) {
+    /// Notes that a variable is to be relinearized when its turn comes, where its step is too long for its linearization.
+    pub(super) fn note_excess(&mut self, variable: u32) {
+        let excess = self.excess(variable);
+        if excess > 1.0 && !std::mem::replace(&mut self.is_waiting[variable as usize], true) {
             self.waiting.push(variable);
+        }
+        if excess > self.settings.urgent.powi(2) {
+            self.urgent.push(variable);
         }
     }
 }

@@ -23,23 +23,20 @@ impl Session {
             }
             // from the shorter step, linearized there
             let moved: Vec<u32> = self.moved.iter().map(|(v, _)| *v).collect();
-            moved.iter().for_each(|v| self.wait(*v));
             let held = Touched { held: moved, ..Touched::default() };
             if self.pass(&held, &Moves::default(), false, report).is_err() {
                 return;
             }
         }
         if self.is_urgent() && self.shorten(report) {
-            report.solved_batch = self.settle();
+            report.solved_batch = self.settle(report);
         }
     }
 
     /// Halves the last step until it lowers the cost of the factors around; whether it had to be.
     fn shorten(&mut self, report: &mut Report) -> bool {
-        let mut factors: Vec<u32> =
-            self.moved.iter().flat_map(|(v, _)| self.model.blocks.factors(*v)).collect();
-        factors.sort_unstable();
-        factors.dedup();
+        let moved: Vec<u32> = self.moved.iter().map(|(v, _)| *v).collect();
+        let mut factors = self.model.factors_of(&moved);
         factors.retain(|f| self.model.is_whole(*f));
         let after = self.cost_of(&factors);
         self.exchange_steps();
@@ -81,15 +78,16 @@ impl Session {
         for v in &variables {
             self.model.try_step(*v, &self.delta[self.model.blocks.range(*v)]);
         }
-        let cost = self.model.cost(factors);
+        let cost = self.model.cost(factors, Some(&self.delta));
         variables.iter().for_each(|v| self.model.reset_trial(*v));
         cost
     }
 
     /// Solves all of it as one batch from the estimate, and goes on from there; whether the cost has fallen.
-    fn settle(&mut self) -> bool {
+    fn settle(&mut self, report: &mut Report) -> bool {
         let Ok(finished) = self.finish(&LevenbergMarquardt::default(), &mut Silent) else { return false };
-        finished.outcome.final_cost < finished.outcome.initial_cost && self.adopt(&finished.values).is_ok()
+        finished.outcome.final_cost < finished.outcome.initial_cost
+            && self.adopt(&finished.values, report).is_ok()
     }
 }
 

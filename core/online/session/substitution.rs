@@ -45,10 +45,7 @@ impl Session {
         }
         let solved = front.blocks.len();
         for i in first..self.moved.len() {
-            let (v, _) = self.moved[i];
-            if !self.is_waiting[v as usize] && self.excess(v) > 1.0 {
-                self.wait(v);
-            }
+            self.note_excess(self.moved[i].0);
         }
         solved
     }

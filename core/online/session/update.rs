@@ -1,22 +1,23 @@
 //! One update: changes, the part of the tree that they touch, and the steps that follow from it.
 use super::Session;
-use super::changes::{Change, Touched};
+use super::changes::{Change, NewVariable, Touched};
 use super::parking::Moves;
 use crate::error::UpdateError;
 use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
+use crate::model::NewNumber;
 use crate::report::Report;
 use crate::tree::{Affected, Couplings, Redone};
 
 /// What takes changes back.
 struct Undo {
-    variables: usize,
+    variables: Vec<NewNumber>,
     changes: Vec<Change>,
     moves: Moves,
 }
 
 impl Session {
-    /// Makes the changes since the last update, and brings the estimate up to date.
+    /// Makes the changes since the last update, and brings the estimate up to date. Then those variables leave that are to.
     ///
     /// # Errors
     /// Where a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last
@@ -25,28 +26,29 @@ impl Session {
         let pending = std::mem::take(&mut self.pending);
         let mut report = Report::default();
         let mut touched = Touched::default();
-        let variables = self.model.variables();
-        let mut undo = Undo { variables, changes: vec![], moves: Moves::default() };
-        for (key, (value, held)) in pending.variables {
-            self.model.push_variable(key, &*value, held);
+        let mut undo = Undo { variables: vec![], changes: vec![], moves: Moves::default() };
+        for (key, NewVariable { value, held, at }) in pending.variables {
+            self.model.push_variable(key, &*value, held, at);
+            undo.variables.push(at);
+            touched.doubtful.push(at.number);
         }
-        touched.doubtful.extend(variables as u32..self.model.variables() as u32);
+        touched.doubtful.extend(&self.doubtful);
         self.resize();
         for change in pending.changes {
             undo.changes.extend(change.apply(&mut self.model, &mut touched));
         }
-        touched.factors.sort_unstable();
-        touched.factors.dedup();
+        self.sort(&mut touched.factors);
         let evaluation = self.model.linearize(&touched.factors);
         if let Some(factor) = evaluation.not_finite {
-            let entry = self.model.factor(factor as u32).map(|factor| &factor.entry);
+            let entry = self.model.factor(factor as u32).and_then(|factor| factor.entry.as_ref());
             let keys = entry.map_or(vec![], |entry| entry.keys.clone());
             self.take_back(undo);
             return Err(UpdateError::NonFinite { factor: FactorId(factor as u32), keys });
         }
         self.doubt_inactive(&mut touched);
         undo.moves = self.park(&mut touched);
-        let is_turn = (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
+        let is_turn =
+            self.postponed > 0 || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
         let moves = std::mem::take(&mut undo.moves);
         if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);
@@ -55,31 +57,43 @@ impl Session {
             return Err(UpdateError::Overflow { key });
         }
         self.updates += 1;
-        self.control_step(&mut report);
-        for _ in 0..self.settings.passes {
-            if !self.is_urgent() {
-                break;
-            }
-            // what the changes need has been done: a pass that fails leaves that as it is
-            let none = (Touched::default(), Moves::default());
-            if self.pass(&none.0, &none.1, true, &mut report).is_err() {
-                break;
-            }
-            self.control_step(&mut report);
+        self.follow_up(&mut report);
+        undo.variables.iter().for_each(|at| self.note_age(at.number));
+        let leaving = self.leaving(&pending.leaving);
+        if let Err(Overflow(variable)) = self.seal(&leaving, &mut report) {
+            return Err(UpdateError::Overflow { key: self.key(variable) });
         }
         self.tell(&mut report);
         Ok(report)
     }
 
+    /// Shortens steps that are too long, and takes those passes that cannot wait. What the changes need has been done: a pass
+    /// that fails leaves that as it is.
+    fn follow_up(&mut self, report: &mut Report) {
+        self.control_step(report);
+        for _ in 0..self.settings.passes {
+            if !self.is_urgent() || self.pass(&Touched::default(), &Moves::default(), true, report).is_err() {
+                return;
+            }
+            self.control_step(report);
+        }
+    }
+
     /// Room for as many variables as the model has.
-    fn resize(&mut self) {
+    pub(super) fn resize(&mut self) {
         let n = self.model.variables();
         self.tree.resize(n);
         self.fronts.resize(n);
         self.delta.resize(self.model.blocks.scalars(), 0.0);
         self.changed.resize(n, 0);
         self.is_waiting.resize(n, false);
-        self.waiting.retain(|v| (*v as usize) < n);
+    }
+
+    /// The factors of a list that are there, each once.
+    fn sort(&self, factors: &mut Vec<u32>) {
+        factors.retain(|f| self.model.factor(*f).is_some());
+        factors.sort_unstable();
+        factors.dedup();
     }
 
     /// Takes changes back, the last first.
@@ -89,27 +103,37 @@ impl Session {
         for change in undo.changes.into_iter().rev() {
             change.apply(&mut self.model, &mut touched);
         }
-        touched.factors.retain(|f| self.model.factor(*f).is_some());
-        touched.factors.sort_unstable();
-        touched.factors.dedup();
+        self.sort(&mut touched.factors);
         self.model.linearize(&touched.factors);
         for f in touched.factors {
             self.model.count(f, self.model.is_whole(f));
             self.note_activity(f);
         }
-        self.inactive.retain(|f| self.model.factor(*f).is_some());
+        self.forget_inactive(&touched.removed);
         self.model.sum_up();
-        self.model.truncate(undo.variables);
+        undo.variables.into_iter().rev().for_each(|at| self.model.take_out(at));
         self.resize();
     }
 
     /// Notes which factors take no part; variables that lose one may not be determined any more.
     pub(super) fn doubt_inactive(&mut self, touched: &mut Touched) {
-        self.inactive.retain(|f| self.model.factor(*f).is_some());
+        self.forget_inactive(&touched.removed);
         for f in &touched.factors {
             if self.note_activity(*f) {
                 touched.doubtful.extend(self.model.factor(*f).into_iter().flat_map(|f| f.variables()));
             }
+        }
+    }
+
+    fn forget_inactive(&mut self, removed: &[u32]) {
+        for f in removed.iter().filter(|f| self.model.factor(**f).is_none()) {
+            self.inactive.remove(f);
+        }
+    }
+
+    pub(super) fn note_activities(&mut self, factors: &[u32]) {
+        for f in factors {
+            self.note_activity(*f);
         }
     }
 
@@ -142,8 +166,9 @@ impl Session {
         let mut last = touched.variables.clone();
         last.sort_unstable();
         last.dedup();
-        let chosen = self.choose(&touched.held, is_turn);
-        let relinearized = self.relinearize(chosen);
+        let postponed = self.postponed;
+        let chosen = self.choose(&touched.held, is_turn, &mut affected, report.operations);
+        let relinearized = self.relinearize(chosen, &touched.held);
         for v in &relinearized.variables {
             self.touch_around(*v, &mut affected);
         }
@@ -154,12 +179,14 @@ impl Session {
         if let Err(overflow) = built {
             self.tree.drop_new(&affected, &redone);
             self.take_back_points(&relinearized);
+            self.postponed = postponed;
             self.model.sum_up();
             return Err(overflow);
         }
         self.exchange(&affected, &redone, moves);
+        self.doubt_parked(&relinearized.factors);
         report.relinearized += relinearized.variables.len();
-        self.accept_points(relinearized);
+        self.accept_points(&relinearized, is_turn);
         for f in &redone.new {
             let front = &self.tree.fronts[*f as usize];
             report.operations += front.operations;
@@ -170,7 +197,7 @@ impl Session {
     }
 
     /// Touches a variable's front and those of its neighbours: all fronts that have it among their rows are above those.
-    fn touch_around(&mut self, variable: u32, affected: &mut Affected) {
+    pub(super) fn touch_around(&mut self, variable: u32, affected: &mut Affected) {
         self.tree.touch(variable, affected);
         for other in self.model.coupled(variable) {
             self.tree.touch(other, affected);
@@ -178,7 +205,7 @@ impl Session {
     }
 
     fn redo(&mut self, affected: &Affected, moves: &Moves, last: &[u32]) -> Redone {
-        let leaves = |v: u32| moves.leaving.contains(&v);
+        let leaves = |v: u32| moves.leaving.binary_search(&v).is_ok();
         let is_last = |v: u32| last.binary_search(&v).is_ok();
         self.tree.redo(affected, &moves.entering, leaves, is_last, &self.model)
     }
@@ -202,11 +229,16 @@ impl Session {
         for f in &redone.new {
             self.open.extend(self.fronts.open(*f));
         }
+        self.doubtful.retain(|v| moves.judged.binary_search(v).is_err());
+        let mut has_changed = false;
         for v in &moves.judged {
-            match self.model.place(*v).parked {
+            has_changed |= match self.model.place(*v).parked {
                 true => self.parked.insert(*v),
                 false => self.parked.remove(v),
             };
+        }
+        if has_changed {
+            self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
         }
     }
 }

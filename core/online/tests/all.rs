@@ -1,9 +1,12 @@
 //! Sessions against fresh builds.
 #![allow(missing_docs, clippy::unwrap_used)]
 mod errors;
+mod failures;
 mod history;
 mod parking;
+mod saving;
 mod steps;
 #[path = "../../solve/tests/toy/mod.rs"]
 mod toy;
+mod windows;
 mod world;

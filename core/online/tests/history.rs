@@ -2,13 +2,13 @@
 use crate::toy::{Apart, At, Centre, Distance, Plane};
 use crate::world::{Beyond, Near, Shadow, Space};
 use manifactor_graph::loss::Huber;
-use manifactor_graph::{Fixed, Graph, Key, Noise, Values};
-use manifactor_online::{FactorId, Session, Settings};
+use manifactor_graph::{Fixed, Graph, Key, Noise, Values, Variable};
+use manifactor_online::{ChangeError, FactorId, Report, Session, Settings, Window};
 use manifactor_solve::{GaussNewton, Silent};
 use proptest::prelude::*;
 
 #[derive(Debug, Clone)]
-enum Change {
+pub(crate) enum Change {
     Plane,
     Space,
     Pair(usize, usize),
@@ -21,7 +21,7 @@ enum Change {
     Update,
 }
 
-fn change() -> impl Strategy<Value = Change> {
+pub(crate) fn change() -> impl Strategy<Value = Change> {
     let n = 0..64usize;
     prop_oneof![
         2 => Just(Change::Plane),
@@ -37,16 +37,31 @@ fn change() -> impl Strategy<Value = Change> {
     ]
 }
 
+pub(crate) fn window() -> impl Strategy<Value = Window> {
+    let keep = prop_oneof![Just(vec![]), Just(vec!["toy_space".to_owned()])];
+    (1..6usize, keep).prop_map(|(poses, keep)| Window { poses, keep })
+}
+
+/// A change of something that has left a window is refused, and that is all.
+pub(crate) fn allowed<T: Default>(result: Result<T, ChangeError>) -> T {
+    match result {
+        Err(ChangeError::Gone { .. } | ChangeError::GoneFactor { .. } | ChangeError::Sealed { .. }) => {
+            T::default()
+        }
+        result => result.unwrap(),
+    }
+}
+
 /// A session, and what has been done to it.
-struct History {
-    session: Session,
-    keys: Vec<Key>,
-    ids: Vec<FactorId>,
+pub(crate) struct History {
+    pub(crate) session: Session,
+    pub(crate) keys: Vec<Key>,
+    pub(crate) ids: Vec<FactorId>,
     count: usize,
 }
 
 impl History {
-    fn new(settings: Settings) -> Self {
+    pub(crate) fn new(settings: Settings) -> Self {
         Self { session: Session::new(settings).unwrap(), keys: vec![], ids: vec![], count: 0 }
     }
 
@@ -61,7 +76,7 @@ impl History {
     }
 
     fn push(&mut self, graph: &Graph, values: &Values) {
-        self.ids.extend(self.session.push(graph, values).unwrap());
+        self.ids.extend(allowed(self.session.push(graph, values)));
     }
 
     fn variable(&mut self, is_plane: bool) {
@@ -97,7 +112,22 @@ impl History {
         graph
     }
 
-    fn apply(&mut self, change: &Change) {
+    /// The same history, with another session.
+    pub(crate) fn with(&self, session: Session) -> Self {
+        Self { session, keys: self.keys.clone(), ids: self.ids.clone(), count: self.count }
+    }
+
+    /// The keys of variables that are there.
+    pub(crate) fn present(&self) -> Vec<&str> {
+        self.keys.iter().map(Key::as_str).filter(|key| self.session.estimate(key).is_some()).collect()
+    }
+
+    pub(crate) fn apply_all(&mut self, changes: &[Change]) -> Vec<Report> {
+        changes.iter().filter_map(|change| self.apply(change)).collect()
+    }
+
+    /// Makes a change; the report, where that is an update.
+    pub(crate) fn apply(&mut self, change: &Change) -> Option<Report> {
         let (n, m) = (self.keys.len(), self.ids.len());
         match *change {
             Change::Plane => self.variable(true),
@@ -108,11 +138,11 @@ impl History {
             }
             Change::Triple(a, b, c) => {
                 let planes: Vec<usize> = (0..n).filter(|v| self.is_plane(*v)).collect();
-                let Some(k) = (planes.len() > 2).then_some(planes.len()) else { return };
+                let k = (planes.len() > 2).then_some(planes.len())?;
                 let mut chosen = vec![planes[a % k], planes[b % k], planes[c % k]];
                 chosen.dedup();
                 if chosen.first() == chosen.last() {
-                    return;
+                    return None;
                 }
                 let (mut graph, x) = (Graph::new(), self.number());
                 graph.add(chosen.iter().map(|v| self.keys[*v].clone()), Centre { at: [x, -x] });
@@ -128,11 +158,11 @@ impl History {
             }
             Change::Remove(f) if m > 0 => {
                 let id = self.ids.swap_remove(f % m);
-                self.session.remove(&[id]).unwrap();
+                allowed(self.session.remove(&[id]));
             }
-            Change::Weigh(f, weight) if m > 0 => self.session.set_weight(self.ids[f % m], weight).unwrap(),
+            Change::Weigh(f, weight) if m > 0 => allowed(self.session.set_weight(self.ids[f % m], weight)),
             Change::Replace(f) if m > 0 => {
-                let mut entry = self.session.entry(self.ids[f % m]).unwrap().clone();
+                let mut entry = self.session.entry(self.ids[f % m])?.clone();
                 let observed = entry.factor.erased().signature().rows.unwrap();
                 entry.noise(Noise::sigmas(&vec![0.7; observed]).unwrap());
                 self.session.replace(self.ids[f % m], entry).unwrap();
@@ -142,14 +172,23 @@ impl History {
                 let named = tangent.iter().enumerate().filter(|(d, _)| bits >> d & 1 == 1);
                 let names: Vec<String> = named.map(|(_, name)| (*name).to_owned()).collect();
                 let key = self.keys[v % n].clone();
-                self.session.fix(&key, &Fixed::Directions(names)).unwrap();
+                allowed(self.session.fix(&key, &Fixed::Directions(names)));
             }
-            Change::Update => {
-                self.session.update().unwrap();
-            }
+            Change::Update => return Some(self.session.update().unwrap()),
             _ => {}
         }
+        None
     }
+}
+
+/// All estimates, bit by bit.
+pub(crate) fn bits(session: &Session) -> Vec<(Key, Vec<u64>)> {
+    let numbers = |value: &dyn Variable| -> Vec<f64> {
+        let (plane, space) = (Plane { x: 0.0, y: 0.0 }, Space { at: [0.0; 3] });
+        plane.erased().local(value).or_else(|| space.erased().local(value)).unwrap()
+    };
+    let bits = |value| numbers(value).into_iter().map(f64::to_bits).collect();
+    session.estimates().iter().map(|(key, value)| (key.clone(), bits(value))).collect()
 }
 
 fn difference(a: &Values, b: &Values) -> f64 {
@@ -165,13 +204,11 @@ fn exact() -> Settings {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::default())]
     #[test]
     fn any_history_ends_where_a_fresh_build_does(changes in prop::collection::vec(change(), 1..60)) {
         let mut history = History::new(exact());
-        for change in &changes {
-            history.apply(change);
-        }
+        history.apply_all(&changes);
         let mut report = history.session.update().unwrap();
         for _ in 0..20 {
             report = history.session.update().unwrap();
@@ -191,7 +228,9 @@ proptest! {
         }
         let anew = fresh.update().unwrap();
         prop_assert!(anew.undetermined.is_empty() && anew.parked.is_empty());
-        history.session.update().unwrap();
+        let last = history.session.update().unwrap();
+        // rounding can tip the balance where a step has to be shortened
+        prop_assume!(last.halved == 0 && anew.halved == 0);
         let now = history.session.estimates();
         let apart = difference(&fresh.estimates(), &now);
         // Gauss-Newton may step far on ranges

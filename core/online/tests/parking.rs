@@ -1,5 +1,6 @@
 //! Variables that nothing determines.
 use crate::toy::{At, Distance, Logarithm, Plane};
+use crate::world::Ahead;
 use manifactor_graph::{Graph, Key, Values};
 use manifactor_online::{CovarianceError, Session, Settings};
 
@@ -24,7 +25,7 @@ fn a_point_that_ranges_do_not_determine_waits_for_another() {
     graph.add(["a", "point"], Distance { by: 3.0 });
     session.push(&graph, &values).unwrap();
     let report = session.update().unwrap();
-    assert_eq!(report.parked, [Key::from("point")]);
+    assert_eq!(report.parked[..], [Key::from("point")]);
     assert!(report.undetermined.is_empty());
     assert!(matches!(session.covariance(&["point"]), Err(CovarianceError::Parked { .. })));
     // its range says nothing of `a`
@@ -35,7 +36,7 @@ fn a_point_that_ranges_do_not_determine_waits_for_another() {
     assert!(session.update().unwrap().parked.is_empty());
     assert!(session.covariance(&["point", "a"]).is_ok());
     session.remove(&ids).unwrap();
-    assert_eq!(session.update().unwrap().parked, [Key::from("point")]);
+    assert_eq!(session.update().unwrap().parked[..], [Key::from("point")]);
 }
 
 #[test]
@@ -68,5 +69,23 @@ fn a_factor_that_is_not_defined_parks_what_hangs_on_it_alone() {
     graph.add(["p"], Logarithm { to: 2.0 });
     session.push(&graph, &values).unwrap();
     let report = session.update().unwrap();
-    assert_eq!((report.parked, report.inactive), (vec![Key::from("p")], 1));
+    assert_eq!((&report.parked[..], report.inactive), (&[Key::from("p")][..], 1));
+}
+
+#[test]
+fn a_parked_variable_enters_when_its_factors_become_defined_elsewhere() {
+    let mut session =
+        Session::new(Settings { relinearize_every: 1, passes: 0, ..Settings::default() }).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("a", Plane { x: 3.0, y: 0.0 });
+    values.insert("b", Plane { x: 1.0, y: 0.0 });
+    graph.add(["a"], At { at: [0.0, 0.0] });
+    graph.add(["a", "b"], Ahead { by: [1.0, 0.0] });
+    session.push(&graph, &values).unwrap();
+    // there is no logarithm of b − a, until `a` is linearized at its estimate
+    let report = session.update().unwrap();
+    assert_eq!((&report.parked[..], report.inactive), (&[Key::from("b")][..], 1));
+    session.update().unwrap();
+    let report = session.update().unwrap();
+    assert!(report.parked.is_empty() && report.inactive == 0, "{report:?}");
 }

@@ -81,3 +81,45 @@ fn losses_and_weights_end_where_a_batch_does() {
     let (p, batch): (Plane, &Plane) = (session.get("p").unwrap(), finished.values.get("p").unwrap());
     assert!((p.x - batch.x).abs() < 1e-4 && (session.cost() - finished.outcome.final_cost).abs() < 1e-8);
 }
+
+#[test]
+fn steps_that_stay_too_long_end_in_a_batch_solve() {
+    let mut session = Session::new(Settings::default()).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: -1.2, y: 1.0 });
+    // a valley so narrow that steps of Gauss-Newton leave it again and again
+    graph.add(["p"], Valley {}).noise(Noise::sigmas(&[1e-2, 1.0]).unwrap());
+    session.push(&graph, &values).unwrap();
+    let report = session.update().unwrap();
+    assert!(report.solved_batch && report.halved >= 3, "{report:?}");
+    assert!(session.cost() < 1e-6, "{}", session.cost());
+    // and the session goes on from there
+    let mut graph = Graph::new();
+    graph.add(["p"], At { at: [1.0, 1.0] });
+    session.push(&graph, &Values::new()).unwrap();
+    assert!(!session.update().unwrap().solved_batch);
+    assert!((session.get::<Plane>("p").unwrap().x - 1.0).abs() < 1e-3);
+}
+
+#[test]
+fn a_factor_that_would_leave_its_domain_does_not_stop_others() {
+    let patient = Settings { relinearize_every: 1, bend: 1e-4, urgent: 1e9, ..Settings::default() };
+    let mut session = Session::new(patient).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    // the first step leads to x ≈ −8000, and an eighth of it is too far
+    values.insert("out", Plane { x: 1000.0, y: 0.0 });
+    graph.add(["out"], Logarithm { to: 0.1 }).noise(Noise::sigma(1e-3).unwrap());
+    graph.add(["out"], At { at: [-1e5, 0.0] }).noise(Noise::sigma(1e3).unwrap());
+    values.insert("in", Plane { x: 9.0, y: 0.0 });
+    graph.add(["in"], Logarithm { to: 5.0 });
+    graph.add(["in"], At { at: [9.0, 0.0] }).noise(Noise::sigma(100.0).unwrap());
+    session.push(&graph, &values).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!(report.relinearized, 0, "the first update has nothing to linearize anew");
+    let report = session.update().unwrap();
+    assert!(report.relinearized >= 1 && report.inactive == 0, "{report:?}");
+    for _ in 0..20 {
+        assert_eq!(session.update().unwrap().inactive, 0);
+    }
+    assert!((session.get::<Plane>("in").unwrap().x - 5.0).abs() < 0.1);
+}

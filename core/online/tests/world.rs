@@ -1,7 +1,7 @@
 //! A second manifold, of another dimension, and factors between the two.
 use crate::toy::Plane;
 use manifactor_graph::{
-    Dimension, Jet, JetOf, Lifted, Manifold, Residual, Scalar, register_factor, register_manifold,
+    Dimension, Jet, JetOf, Lifted, Manifold, Refs, Residual, Scalar, register_factor, register_manifold,
 };
 use nalgebra::{U2, U3, Vector2, Vector3};
 use schemars::JsonSchema;
@@ -78,3 +78,20 @@ impl Residual for Near {
     }
 }
 register_factor!("toy_near", Near);
+
+/// r = (ln(b.x − a.x) − ln by.x, b.y − a.y − by.y): nothing where b is not ahead.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub(crate) struct Ahead {
+    pub(crate) by: [f64; 2],
+}
+impl Residual for Ahead {
+    type Variables = (Plane, Plane);
+    type Dim = U2;
+    fn residual<T: Scalar>(&self, (a, b): Lifted<Self::Variables, T>) -> Vector2<T> {
+        Vector2::new((b.x - a.x).ln() - T::from(self.by[0].ln()), b.y - a.y - T::from(self.by[1]))
+    }
+    fn is_defined(&self, (a, b): Refs<'_, Self::Variables>) -> bool {
+        b.x > a.x
+    }
+}
+register_factor!("toy_ahead", Ahead);

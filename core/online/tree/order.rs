@@ -151,6 +151,8 @@ impl Order {
             }
             (self.elements[v], self.coupled[v]) = (elements, coupled);
         }
+        // neighbours stand in an order that depends on history
+        group.blocks[1..].sort_unstable();
         group.rows.extend(self.members[range].iter().copied().filter(|v| self.alive[*v as usize]));
         self.left[element as usize] = group.rows.iter().map(|v| self.dim[*v as usize]).sum();
         group
@@ -246,11 +248,25 @@ mod tests {
                 order.couple(a as usize, b);
                 order.couple(b as usize, a);
             }
+            let own = edges.clone();
             for clique in &cliques {
                 order.clique(clique.iter().copied());
                 edges.extend(clique.iter().flat_map(|a| clique.iter().filter(move |b| a > b).map(move |b| (*a, *b))));
             }
             let groups = order.groups();
+            // history shows in the order of lists: the groups are the same
+            let mut other = Order::default();
+            other.begin((0..m).map(|v| (1 + v % 3, last.contains(&v))));
+            for clique in cliques.iter().rev() {
+                other.clique(clique.iter().rev().copied());
+            }
+            for &(a, b) in own.iter().rev() {
+                other.couple(b as usize, a);
+                other.couple(a as usize, b);
+            }
+            for (one, other) in groups.iter().zip(other.groups()) {
+                prop_assert_eq!(&one.blocks, &other.blocks);
+            }
             let eliminated: Vec<u32> = groups.iter().flat_map(|g| g.blocks.iter().copied()).collect();
             let mut sorted = eliminated.clone();
             sorted.sort_unstable();

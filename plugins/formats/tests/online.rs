@@ -5,7 +5,7 @@ use manifactor_geometry::{Between, Coordinates, Landmark, Point2, Range, Se2, Se
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
-use manifactor_online::{Report, Session, Settings};
+use manifactor_online::{Report, Session, Settings, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{DMatrix, Vector2, Vector3};
 use std::path::PathBuf;
@@ -75,6 +75,99 @@ fn any_number_of_threads_gives_the_same_bits() {
     };
     let alone = bits(1);
     assert!(bits(2) == alone && bits(4) == alone);
+}
+
+#[test]
+fn a_replay_goes_on_after_a_restart_bit_for_bit() {
+    for name in ["intel", "parking-garage", "input_M3500_g2o"] {
+        let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
+        let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+        let (mut steps, mut session) = (Replay::of(&graph), Session::new(Settings::default()).unwrap());
+        let mut other = None;
+        for n in 0..400 {
+            let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
+            let next = |session: &mut Session| {
+                session.push(&step.factors, &step.values).unwrap();
+                session.update().unwrap()
+            };
+            let report = next(&mut session);
+            if let Some(other) = &mut other {
+                assert_eq!(next(other), report, "{name}, pose {n}");
+            }
+            if n == 237 {
+                other = Some(Session::load(&session.save().unwrap()).unwrap());
+            }
+        }
+        let (text, other) = (session.save().unwrap(), other.unwrap());
+        assert!(other.save().unwrap() == text, "{name}");
+        assert_eq!(session.covariance(&["x300", "x17"]), other.covariance(&["x300", "x17"]), "{name}");
+    }
+}
+
+#[test]
+fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
+    let Some(path) = data("g2o/input_M3500_g2o.g2o") else { return };
+    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let run = |budget: Option<f64>| {
+        let mut session = Session::new(Settings { budget, ..Settings::default() }).unwrap();
+        let (mut steps, mut reports) = (Replay::of(&graph), vec![]);
+        for _ in 0..1000 {
+            let step = steps.step(|key| session.estimate(key)).unwrap().unwrap();
+            session.push(&step.factors, &step.values).unwrap();
+            reports.push(session.update().unwrap());
+        }
+        (session, reports)
+    };
+    let (mut free, of_free) = run(None);
+    let budget = 2e4;
+    let (mut bounded, of_bounded) = run(Some(budget));
+    let most = |reports: &[Report]| {
+        // what new factors need is not bounded, nor are steps that had to be shortened
+        let relinearizing = reports.iter().filter(|r| r.relinearized > 0 && r.halved == 0);
+        relinearizing.map(|r| r.operations).fold(0.0, f64::max)
+    };
+    let (without, with) = (most(&of_free), most(&of_bounded));
+    assert!(
+        without > 10.0 * budget && with < 1.5 * budget,
+        "{without} without, {with} with a budget of {budget}"
+    );
+    assert!(of_bounded.iter().any(|r| r.postponed > 0) && of_free.iter().all(|r| r.postponed == 0));
+    let mut empty = 0;
+    while bounded.update().unwrap().postponed > 0 || empty < 20 {
+        empty += 1;
+        assert!(empty < 3000, "variables wait for ever");
+    }
+    (0..20).for_each(|_| drop(free.update().unwrap()));
+    let (cost, expected) = (bounded.cost(), free.cost());
+    assert!((cost - expected).abs() < 1e-3 * expected, "{cost}, without a budget {expected}");
+}
+
+#[test]
+fn a_window_that_holds_all_closures_is_as_good_as_all() {
+    let Some(path) = data("g2o/sphere2500.g2o") else { return };
+    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let window = Some(Window { poses: 120, keep: vec![] });
+    let mut narrow = Session::new(Settings { window, ..Settings::default() }).unwrap();
+    let (mut all, mut steps) = (Session::new(Settings::default()).unwrap(), Replay::of(&graph));
+    let mut bytes = vec![];
+    for n in 0..500 {
+        let step = steps.step(|key| all.estimate(key)).unwrap().unwrap();
+        for session in [&mut narrow, &mut all] {
+            session.push(&step.factors, &step.values).unwrap();
+            session.update().unwrap();
+        }
+        if n % 100 == 99 {
+            bytes.push(narrow.bytes());
+        }
+    }
+    assert_eq!((narrow.variables(), all.variables()), (120, 500));
+    let [one, other] = [&narrow, &all].map(|session| session.covariance(&["x499"]).unwrap());
+    assert!((&one - &other).norm() < 0.02 * other.norm(), "{one} {other}");
+    let [one, batch]: [Se3; 2] = [&narrow, &all].map(|session| session.get("x499").unwrap());
+    let apart = batch.local(&one).component_div(&other.diagonal().map(f64::sqrt).fixed_rows::<6>(0));
+    assert!(apart.amax() < 0.5, "{apart} standard deviations");
+    assert!(bytes[4] < 2 * bytes[2], "{bytes:?}");
+    println!("{apart} {bytes:?} {}", all.bytes());
 }
 
 /// Victoria Park as a graph: poses by their numbers, trees by their ids.

@@ -1,0 +1,66 @@
+//! Factors by number. Numbers are never used again, and most factors go in the order in which they came: a page of numbers whose
+//! factors are gone takes eight bytes.
+use super::Factor;
+
+const PAGE: usize = 256;
+
+#[derive(Default)]
+struct Page {
+    factors: Vec<Option<Factor>>,
+    len: usize,
+}
+
+/// The factors that are there.
+#[derive(Default)]
+pub(super) struct Factors {
+    pages: Vec<Option<Box<Page>>>,
+    /// The number that the next new factor has.
+    pub(super) next: u32,
+}
+
+impl Factors {
+    pub(super) fn get(&self, number: u32) -> Option<&Factor> {
+        let page = self.pages.get(number as usize / PAGE)?.as_ref()?;
+        page.factors.get(number as usize % PAGE)?.as_ref()
+    }
+
+    pub(super) fn get_mut(&mut self, number: u32) -> Option<&mut Factor> {
+        let page = self.pages.get_mut(number as usize / PAGE)?.as_mut()?;
+        page.factors.get_mut(number as usize % PAGE)?.as_mut()
+    }
+
+    /// Puts a factor under a number that is unused.
+    pub(super) fn insert(&mut self, number: u32, factor: Factor) {
+        let (page, place) = (number as usize / PAGE, number as usize % PAGE);
+        if self.pages.len() <= page {
+            self.pages.resize_with(page + 1, || None);
+        }
+        let page = self.pages[page].get_or_insert_default();
+        if page.factors.len() <= place {
+            page.factors.resize_with(place + 1, || None);
+        }
+        page.len += usize::from(page.factors[place].is_none());
+        page.factors[place] = Some(factor);
+        self.next = self.next.max(number + 1);
+    }
+
+    pub(super) fn remove(&mut self, number: u32) -> Option<Factor> {
+        let slot = self.pages.get_mut(number as usize / PAGE)?;
+        let page = slot.as_mut()?;
+        let factor = page.factors.get_mut(number as usize % PAGE)?.take()?;
+        page.len -= 1;
+        if page.len == 0 {
+            *slot = None;
+        }
+        Some(factor)
+    }
+
+    /// All factors, by ascending number.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (u32, &Factor)> {
+        self.pages.iter().enumerate().flat_map(|(p, page)| {
+            page.iter()
+                .flat_map(|page| page.factors.iter().enumerate())
+                .filter_map(move |(i, factor)| Some(((p * PAGE + i) as u32, factor.as_ref()?)))
+        })
+    }
+}

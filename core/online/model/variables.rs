@@ -1,0 +1,142 @@
+//! Variables that come and go. The number of one that is gone is used again by the next of its type, so that memory stays
+//! with what is there.
+use super::{Model, Place, evaluation::plain};
+use manifactor_graph::{Key, Variable};
+use std::any::TypeId;
+
+/// A number for a new variable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct NewNumber {
+    pub number: u32,
+    /// Whether another variable had it before.
+    pub is_reused: bool,
+}
+
+/// Numbers that variables will have that are not in the model yet.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Reserved {
+    new: u32,
+    /// By type, how many numbers of those that are gone.
+    reused: Vec<(TypeId, usize)>,
+}
+
+impl Model {
+    /// The number of a variable that comes after those that are reserved.
+    pub(crate) fn reserve(&self, id: TypeId, reserved: &mut Reserved) -> NewNumber {
+        let place = reserved.reused.iter().position(|(other, _)| *other == id).unwrap_or_else(|| {
+            reserved.reused.push((id, 0));
+            reserved.reused.len() - 1
+        });
+        let unused = self.points.position(id).and_then(|column| self.unused.get(column));
+        let taken = &mut reserved.reused[place].1;
+        match unused.and_then(|unused| unused.iter().rev().nth(*taken)) {
+            Some(number) => {
+                *taken += 1;
+                NewNumber { number: *number, is_reused: true }
+            }
+            None => {
+                reserved.new += 1;
+                NewNumber { number: self.places.len() as u32 + reserved.new - 1, is_reused: false }
+            }
+        }
+    }
+
+    /// Puts a variable in, under the number that was reserved for it. It is parked until its factors are looked at.
+    pub(crate) fn push_variable(&mut self, key: Key, value: &dyn Variable, held: u32, at: NewNumber) {
+        let (id, tangent) = (value.erased().type_id(), value.erased().tangent());
+        let column = self.points.position(id).unwrap_or_else(|| {
+            self.trial.add(id, value.erased().new_column());
+            self.unused.push(vec![]);
+            self.points.add(id, value.erased().new_column())
+        });
+        let plain = plain(value);
+        let value = plain.as_deref().unwrap_or(value);
+        self.numbers.insert(key.clone(), at.number);
+        self.born += 1;
+        let mut place = Place {
+            key,
+            born: self.born,
+            is_there: true,
+            column: column as u32,
+            index: self.points.column(column).len() as u32,
+            tangent,
+            held,
+            parked: true,
+            sealed: 0,
+        };
+        if at.is_reused {
+            self.unused[column].pop();
+            place.index = self.places[at.number as usize].index;
+            self.points.column_mut(column).set(place.index as usize, value);
+            self.trial.column_mut(column).set(place.index as usize, value);
+            self.places[at.number as usize] = place;
+            self.blocks.hold(at.number, held);
+        } else {
+            self.points.column_mut(column).push(value);
+            self.trial.column_mut(column).push(value);
+            self.places.push(place);
+            self.blocks.push(tangent.len(), held);
+        }
+    }
+
+    /// Takes a variable out again that was put in under this number; the last that came goes first.
+    pub(crate) fn take_out(&mut self, at: NewNumber) {
+        self.born -= 1;
+        if at.is_reused {
+            self.forget(at.number);
+            return;
+        }
+        let Some(place) = self.places.pop() else { return };
+        self.numbers.remove(&place.key);
+        for columns in [&mut self.points, &mut self.trial] {
+            columns.column_mut(place.column as usize).truncate(place.index as usize);
+        }
+        self.blocks.truncate(self.places.len());
+    }
+
+    /// Forgets a variable, which has no factors any more.
+    pub(crate) fn forget(&mut self, variable: u32) {
+        let place = &mut self.places[variable as usize];
+        (place.is_there, place.parked) = (false, true);
+        self.numbers.remove(&place.key);
+        self.unused[place.column as usize].push(variable);
+    }
+
+    /// The variables that are there, in the order in which they came.
+    pub(crate) fn by_age(&self) -> Vec<u32> {
+        let is_there = |v: &u32| self.places[*v as usize].is_there;
+        let mut all: Vec<u32> = (0..self.places.len() as u32).filter(is_there).collect();
+        all.sort_unstable_by_key(|v| self.places[*v as usize].born);
+        all
+    }
+
+    /// How many variables have come, those that are gone among them.
+    pub(crate) fn born(&self) -> u64 {
+        self.born
+    }
+
+    /// The numbers of variables that are gone, those of one type in the order in which they were last used.
+    pub(crate) fn unused(&self) -> Vec<u32> {
+        self.unused.iter().flatten().copied().collect()
+    }
+
+    /// The state of a model that was saved: how many variables have come, and which are gone; whether that can be.
+    pub(crate) fn restore(&mut self, born: u64, unused: &[u32]) -> bool {
+        self.born = born;
+        self.numbers.clear();
+        for (v, place) in self.places.iter().enumerate().filter(|(_, place)| place.is_there) {
+            self.numbers.insert(place.key.clone(), v as u32);
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        let is_gone = |v: &u32| self.places.get(*v as usize).is_some_and(|place| !place.is_there);
+        if !unused.iter().all(|v| is_gone(v) && seen.insert(*v)) {
+            return false;
+        }
+        for v in unused {
+            let column = self.places[*v as usize].column as usize;
+            self.places[*v as usize].parked = true;
+            self.unused[column].push(*v);
+        }
+        true
+    }
+}

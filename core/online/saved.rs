@@ -1,0 +1,151 @@
+//! A session as text: a line that says what it is, and a JSON document.
+//!
+//! ```text
+//! manifactor session 1 90b4b1a3c2f0d7e1
+//! {"settings":{…},"variables":[…],"factors":[…],"fronts":[…],…}
+//! ```
+//!
+//! What is saved is what history has left: factors, linearization points, steps, and which variables are eliminated together.
+//! The numbers of the factorization are not: from the same points, in the same tree, they have the same bits again.
+use crate::gone::{GoneKeys, Runs};
+use crate::settings::Settings;
+use manifactor_graph::{FactorEntry, GraphError, Key, Variable};
+use serde::{Deserialize, Serialize};
+
+const NAME: &str = "manifactor session";
+const VERSION: u32 = 1;
+
+/// Why a session cannot be saved.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SaveError {
+    /// Changes that the next update is to make.
+    #[error("there are changes that no update has made yet; update the session, and save it then")]
+    Pending,
+    /// A value or a factor that has no text.
+    #[error("cannot write the session: {0}")]
+    Write(String),
+}
+
+/// Why a text is no session.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// Something else than a session.
+    #[error("not a saved session: expected a first line `{NAME} {VERSION} …`")]
+    Foreign,
+    /// A session that another version has saved.
+    #[error("a session of version {found}; this program reads version {VERSION}")]
+    Version {
+        /// The version of the text.
+        found: String,
+    },
+    /// A text that is not as it was saved.
+    #[error("the saved session is damaged or cut off: its checksum does not fit")]
+    Damaged,
+    /// A document that cannot be read: a type that this program does not know, say.
+    #[error("cannot read the saved session: {0}")]
+    Read(String),
+    /// Factors and values that do not fit each other.
+    #[error("the saved session contradicts itself:{}", GraphError::list(.0))]
+    Graph(Vec<GraphError>),
+    /// Something else that no session can be.
+    #[error("the saved session contradicts itself: {0}")]
+    Inconsistent(&'static str),
+}
+
+/// What is saved.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Saved {
+    pub settings: Settings,
+    pub updates: usize,
+    pub next_factor: u32,
+    pub postponed: usize,
+    /// By number.
+    pub variables: Vec<SavedVariable>,
+    /// By ascending number.
+    pub factors: Vec<SavedFactor>,
+    /// Children before parents.
+    pub fronts: Vec<SavedFront>,
+    /// Variables that have left the region of their linearization, those that have left it far, and those to be judged.
+    pub born: u64,
+    /// Numbers of variables that are gone, those that are used again first last.
+    pub unused: Vec<u32>,
+    pub priors: Vec<SavedPrior>,
+    pub gone: GoneKeys,
+    pub gone_factors: Runs,
+    pub waiting: Vec<u32>,
+    pub urgent: Vec<u32>,
+    pub doubtful: Vec<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SavedVariable {
+    pub key: Key,
+    /// How many came before it; `None` where it is gone.
+    pub born: Option<u64>,
+    /// Its linearization point, and the bits of its step from there.
+    pub point: Box<dyn Variable>,
+    pub step: Vec<u64>,
+    pub held: u32,
+    pub parked: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SavedFactor {
+    pub number: u32,
+    pub weight: f64,
+    pub entry: FactorEntry,
+}
+
+/// A linear prior, its numbers by their bits.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SavedPrior {
+    pub number: u32,
+    pub variables: Vec<u32>,
+    pub h: Vec<u64>,
+    pub g: Vec<u64>,
+    pub constant: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SavedFront {
+    pub blocks: Vec<u32>,
+    pub rows: Vec<u32>,
+    /// Its place among the fronts.
+    pub parent: Option<u32>,
+}
+
+impl Saved {
+    pub(crate) fn write(&self) -> Result<String, SaveError> {
+        let json = serde_json::to_string(self).map_err(|e| SaveError::Write(e.to_string()))?;
+        Ok(format!("{NAME} {VERSION} {:016x}\n{json}\n", checksum(json.as_bytes())))
+    }
+
+    pub(crate) fn read(text: &str) -> Result<Self, LoadError> {
+        let (first, json) = text.split_once('\n').unwrap_or((text, ""));
+        let mut words = first.strip_prefix(NAME).ok_or(LoadError::Foreign)?.split_ascii_whitespace();
+        let version = words.next().ok_or(LoadError::Foreign)?;
+        if version != VERSION.to_string() {
+            return Err(LoadError::Version { found: version.to_owned() });
+        }
+        let json = json.strip_suffix('\n').ok_or(LoadError::Damaged)?;
+        let stated = words.next().and_then(|word| u64::from_str_radix(word, 16).ok());
+        if stated != Some(checksum(json.as_bytes())) {
+            return Err(LoadError::Damaged);
+        }
+        serde_json::from_str(json).map_err(|e| LoadError::Read(e.to_string()))
+    }
+}
+
+/// FNV-1a, of 64 bits: it finds damage, not malice.
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+}

@@ -1,0 +1,188 @@
+//! A session that goes on after a restart.
+use super::Session;
+use crate::model::{Model, NewNumber, Prior};
+use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
+use crate::tree::{Couplings, Tree};
+
+impl Session {
+    /// The session as text. [`load`](Self::load) makes a session of it that goes on with the same bits, on a processor of the
+    /// same kind; on another, estimates are the same until the next update, and then up to rounding.
+    ///
+    /// # Errors
+    /// Where there are changes that no update has made yet, or a factor or value has no text.
+    pub fn save(&self) -> Result<String, SaveError> {
+        if !self.pending.is_empty() {
+            return Err(SaveError::Pending);
+        }
+        let mut variables = vec![];
+        for v in 0..self.model.variables() as u32 {
+            let Some(point) = self.model.point(v) else { continue };
+            let step = self.delta[self.model.blocks.range(v)].iter().map(|d| d.to_bits()).collect();
+            let place = self.model.place(v);
+            let (key, born) = (place.key.clone(), place.is_there.then_some(place.born));
+            let (held, parked) = (place.held, place.parked);
+            variables.push(SavedVariable { key, born, point, step, held, parked });
+        }
+        let factors = self.model.all_factors().map(|(number, factor, entry)| {
+            let entry = entry.clone();
+            SavedFactor { number, weight: factor.weight, entry }
+        });
+        let saved = Saved {
+            settings: self.settings.clone(),
+            updates: self.updates,
+            postponed: self.postponed,
+            next_factor: self.model.next_factor(),
+            variables,
+            factors: factors.collect(),
+            fronts: self.tree.save(),
+            born: self.model.born(),
+            unused: self.model.unused(),
+            priors: self.model.priors().filter_map(|f| self.save_prior(f)).collect(),
+            gone: self.gone.clone(),
+            gone_factors: self.gone_factors.clone(),
+            waiting: sorted(&self.waiting),
+            urgent: sorted(&self.urgent),
+            doubtful: self.doubtful.clone(),
+        };
+        saved.write()
+    }
+
+    /// A session as it was [saved](Self::save).
+    ///
+    /// # Errors
+    /// Where the text is none, is damaged, or is of another version; where this program does not have a type of its variables
+    /// or factors; where it contradicts itself.
+    pub fn load(text: &str) -> Result<Self, LoadError> {
+        let saved = Saved::read(text)?;
+        let mut session = Session::new(saved.settings).map_err(|e| LoadError::Read(e.to_string()))?;
+        (session.updates, session.postponed) = (saved.updates, saved.postponed);
+        for variable in &saved.variables {
+            insert(&mut session.model, variable)?;
+        }
+        let is_gone = saved.variables.iter().filter(|variable| variable.born.is_none()).count();
+        let fits = session.model.restore(saved.born, &saved.unused) && saved.unused.len() == is_gone;
+        fits.then_some(()).ok_or(LoadError::Inconsistent("variables that are gone"))?;
+        session.resize();
+        let steps = saved.variables.iter().flat_map(|variable| &variable.step);
+        session.delta.iter_mut().zip(steps).for_each(|(to, step)| *to = f64::from_bits(*step));
+        // counters that go on from there must not wrap around
+        let is_young = saved.born < 1 << 62 && saved.updates < 1 << 62 && saved.next_factor < 1 << 31;
+        is_young.then_some(()).ok_or(LoadError::Inconsistent("its counters"))?;
+        session.put_priors(&saved.priors, saved.next_factor)?;
+        session.put_factors(&saved.factors, saved.next_factor)?;
+        session.tree = Tree::load(saved.fronts, &session.model, |v| session.model.place(v).is_in_tree())
+            .ok_or(LoadError::Inconsistent("its fronts do not fit its factors"))?;
+        session.put_fronts()?;
+        let n = session.model.variables() as u32;
+        for list in [&saved.waiting, &saved.urgent, &saved.doubtful] {
+            if list.iter().any(|v| *v >= n) {
+                return Err(LoadError::Inconsistent("a number that no variable has"));
+            }
+        }
+        saved.waiting.iter().for_each(|v| session.is_waiting[*v as usize] = true);
+        (session.waiting, session.urgent, session.doubtful) = (saved.waiting, saved.urgent, saved.doubtful);
+        session.waiting.dedup();
+        (session.gone, session.gone_factors) = (saved.gone, saved.gone_factors);
+        session.model.by_age().into_iter().for_each(|v| session.note_age(v));
+        Ok(session)
+    }
+
+    fn save_prior(&self, number: u32) -> Option<SavedPrior> {
+        let Prior { variables, h, g, constant } = self.model.prior(number)?;
+        let bits = |list: Vec<f64>| list.into_iter().map(f64::to_bits).collect();
+        Some(SavedPrior { number, variables, h: bits(h), g: bits(g), constant: constant.to_bits() })
+    }
+
+    /// What variables that are gone have left behind.
+    fn put_priors(&mut self, priors: &[SavedPrior], next: u32) -> Result<(), LoadError> {
+        let n = self.model.variables() as u32;
+        for SavedPrior { number, variables, h, g, constant } in priors {
+            let ascend = variables.windows(2).all(|pair| pair[0] < pair[1]);
+            let are_there = variables.iter().all(|v| *v < n && self.model.place(*v).is_there);
+            let dim: usize = if are_there { variables.iter().map(|v| self.dim(*v)).sum() } else { 0 };
+            let numbers =
+                |bits: &[u64]| -> Vec<f64> { bits.iter().map(|bits| f64::from_bits(*bits)).collect() };
+            let prior = Prior {
+                variables: variables.clone(),
+                h: numbers(h),
+                g: numbers(g),
+                constant: f64::from_bits(*constant),
+            };
+            let is_finite = prior.h.iter().chain(&prior.g).chain([&prior.constant]).all(|x| x.is_finite());
+            let fits = h.len() == dim * (dim + 1) / 2 && g.len() == dim && *number < next;
+            if !(ascend && are_there && is_finite && fits) || self.model.factor(*number).is_some() {
+                return Err(LoadError::Inconsistent("what variables have left behind"));
+            }
+            self.model.insert_prior(*number, &prior);
+        }
+        Ok(())
+    }
+
+    /// Factors, linearized where they were.
+    fn put_factors(&mut self, factors: &[SavedFactor], next: u32) -> Result<(), LoadError> {
+        let mut errors = vec![];
+        for (i, SavedFactor { number, weight, entry }) in factors.iter().enumerate() {
+            let is_next = i == 0 || factors[i - 1].number < *number;
+            let is_taken = self.model.factor(*number).is_some();
+            if !is_next || is_taken || *number >= next || !(*weight >= 0.0 && weight.is_finite()) {
+                return Err(LoadError::Inconsistent("a factor's number or weight"));
+            }
+            if let Some(resolved) = entry.resolve(i, |key| self.find(key), &mut errors) {
+                self.model.insert(*number, entry, &resolved, *weight);
+            }
+        }
+        if !errors.is_empty() {
+            return Err(LoadError::Graph(errors));
+        }
+        self.model.skip_to(next);
+        let numbers: Vec<u32> = factors.iter().map(|factor| factor.number).collect();
+        if self.model.linearize(&numbers).not_finite.is_some() {
+            return Err(LoadError::Inconsistent("a factor that is not finite"));
+        }
+        for f in &numbers {
+            self.model.count(*f, self.model.is_whole(*f));
+        }
+        self.note_activities(&numbers);
+        self.model.sum_up();
+        Ok(())
+    }
+
+    /// The numbers of all fronts, and what hangs on them.
+    fn put_fronts(&mut self) -> Result<(), LoadError> {
+        let all: Vec<u32> = (0..self.tree.fronts.len() as u32).collect();
+        self.fronts
+            .build(&self.tree, &self.model.blocks, &all)
+            .map_err(|_| LoadError::Inconsistent("the linear system overflows"))?;
+        for f in &all {
+            self.open.extend(self.fronts.open(*f));
+        }
+        let parked = |v: &u32| self.model.place(*v).parked && self.model.place(*v).is_there;
+        self.parked = (0..self.model.variables() as u32).filter(parked).collect();
+        self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
+        Ok(())
+    }
+}
+
+fn insert(model: &mut Model, saved: &SavedVariable) -> Result<(), LoadError> {
+    let SavedVariable { key, born, point, step, held, parked } = saved;
+    let value = point.erased();
+    let dim = value.dim();
+    let is_known = born.is_some() && model.variable(key.as_str()).is_some();
+    if is_known || step.len() != dim || !value.is_finite() {
+        return Err(LoadError::Inconsistent("a variable's key, point or step"));
+    }
+    if dim < 32 && held >> dim != 0 {
+        return Err(LoadError::Inconsistent("directions that are held"));
+    }
+    let v = model.variables() as u32;
+    model.push_variable(key.clone(), &**point, *held, NewNumber { number: v, is_reused: false });
+    let place = model.place_mut(v);
+    (place.parked, place.is_there, place.born) = (*parked, born.is_some(), born.unwrap_or_default());
+    Ok(())
+}
+
+fn sorted(list: &[u32]) -> Vec<u32> {
+    let mut list = list.to_vec();
+    list.sort_unstable();
+    list
+}

@@ -1,0 +1,67 @@
+//! An update that failed leaves no trace, also not in what comes after it.
+use crate::history::{Change, History, allowed, bits, change, window};
+use crate::toy::{At, Careless, Plane};
+use manifactor_graph::{Fixed, Graph, Noise, Values};
+use manifactor_online::{Report, Settings};
+use proptest::prelude::*;
+
+/// Pushes, removes, re-weights and holds, and fails at last: by a residual that is not finite, or a sum that overflows.
+fn fail(history: &mut History, n: usize, overflows: bool) {
+    let session = &mut history.session;
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("new", Plane { x: -4.0, y: 1.0 });
+    for _ in 0..3 {
+        graph.add(["new"], At { at: [3.0, 0.0] }).noise(Noise::sigma(1e-154).unwrap());
+    }
+    if !overflows {
+        graph.add(["new"], Careless {});
+    }
+    for key in history.keys.iter().take(n % 5) {
+        allowed(session.fix(key, &Fixed::Whole(n.is_multiple_of(2))));
+        if key.as_str().starts_with('p') && session.estimate(key.as_str()).is_some() {
+            graph.add([key.clone(), "new".into()], crate::toy::Apart { by: [1.0, 0.0] });
+        }
+    }
+    session.push(&graph, &values).unwrap();
+    for id in history.ids.iter().skip(n % 7).take(n % 4) {
+        allowed(session.set_weight(*id, 0.5));
+    }
+    for id in history.ids.iter().skip(n % 3).step_by(3).take(n % 6) {
+        allowed(session.remove(&[*id]));
+    }
+    session.update().unwrap_err();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::default())]
+    #[test]
+    fn a_failed_update_leaves_no_trace(
+        before in prop::collection::vec(change(), 1..40),
+        after in prop::collection::vec(change(), 1..40),
+        n in 0..1000usize,
+        overflows in any::<bool>(),
+        every in 1..4usize,
+        budget in prop_oneof![Just(None), Just(Some(300.0))],
+        window in prop_oneof![Just(None), window().prop_map(Some)],
+    ) {
+        let settings = Settings { relinearize_every: every, budget, window, ..Settings::default() };
+        let [mut one, mut other] = std::array::from_fn(|_| History::new(settings.clone()));
+        for history in [&mut one, &mut other] {
+            history.apply_all(&before);
+            history.apply(&Change::Update);
+        }
+        fail(&mut one, n, overflows);
+        prop_assert_eq!(one.session.cost().to_bits(), other.session.cost().to_bits());
+        prop_assert_eq!(bits(&one.session), bits(&other.session));
+        for change in after.iter().chain(&[Change::Update]) {
+            // ids go on where the failed update left them
+            let [one, other] = [&mut one, &mut other].map(|history| {
+                history.apply(change).map(|report| Report { dropped: vec![], ..report })
+            });
+            prop_assert_eq!(one, other);
+        }
+        prop_assert_eq!(bits(&one.session), bits(&other.session));
+        let keys = one.present();
+        prop_assert_eq!(one.session.covariance(&keys), other.session.covariance(&keys));
+    }
+}

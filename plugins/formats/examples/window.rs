@@ -1,0 +1,85 @@
+//! A pose graph over and over, through a window that moves: what memory and time do.
+//!
+//! `cargo run --release -p manifactor-formats --example window -- [--passes N] [--poses N] GRAPH.g2o`. Each pass drives the graph
+//! again from where the last one ended, with new names; factors to poses that have left are left out. CPU time of one
+//! thread, in milliseconds.
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
+use manifactor_formats::pose_graph::{self, Options};
+use manifactor_formats::replay::{Latencies, Replay};
+use manifactor_graph::{FactorEntry, Graph, Key, Values};
+use manifactor_online::{Session, Settings, Window};
+
+/// Of this thread: what others do on the machine has no part in it.
+fn cpu_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+/// Megabytes of the process that are in memory, where the system says so.
+fn resident() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<f64>().ok()).unwrap_or_default() / 1e3
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let (mut passes, mut poses, mut path) = (10, 200, String::new());
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--passes" => passes = arguments.next().ok_or("--passes takes a number")?.parse()?,
+            "--poses" => poses = arguments.next().ok_or("--poses takes a number")?.parse()?,
+            _ => path = argument,
+        }
+    }
+    let graph = pose_graph::read(&path, &Options::default())?.graph;
+    let window = Some(Window { poses, keep: vec![] });
+    let mut session = Session::new(Settings { window, ..Settings::default() })?;
+    let name = |pass: usize, key: &Key| Key::from(format!("{pass}:{key}"));
+    let mut last: Option<Key> = None;
+    println!("| pass | left out | p50 | p99 | max | MB of fronts | MB of the process | bytes saved |");
+    println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+    for pass in 0..passes {
+        let (mut replay, mut times, mut left_out) = (Replay::of(&graph), vec![], 0);
+        // where the pass would be without a window: odometry goes on from there
+        let mut all = Values::new();
+        while let Some(step) = replay.step(|key| {
+            let now = session.estimate(name(pass, &key.into()).as_str());
+            now.or_else(|| all.variable(key).map(|value| value.erased().clone_box()))
+        })? {
+            let (mut factors, mut values) = (Graph::new(), Values::new());
+            for (key, value) in step.values.iter() {
+                all.insert_boxed(key.clone(), value.erased().clone_box());
+                // a new pass stands where the last one ended
+                let start = last.take_if(|_| pass > 0 && times.is_empty());
+                let place = start.and_then(|last| session.estimate(last.as_str()));
+                values.insert_boxed(name(pass, key), place.unwrap_or_else(|| value.erased().clone_box()));
+                last = Some(name(pass, key));
+            }
+            let is_there =
+                |key: &Key| values.contains(key.as_str()) || session.estimate(key.as_str()).is_some();
+            for entry in step.factors.factors() {
+                let keys: Vec<Key> = entry.keys.iter().map(|key| name(pass, key)).collect();
+                if keys.iter().all(is_there) {
+                    factors.push(FactorEntry { keys, ..entry.clone() });
+                } else {
+                    left_out += 1;
+                }
+            }
+            for (key, held) in step.factors.fixed() {
+                factors.set_fixed(name(pass, key), held.clone());
+            }
+            let begin = cpu_seconds();
+            session.push(&factors, &values)?;
+            session.update()?;
+            times.push(1e3 * (cpu_seconds() - begin));
+        }
+        let Latencies { p50, p99, max, .. } = Latencies::of(&times);
+        let (fronts, saved) = (session.bytes() as f64 / 1e6, session.save()?.len());
+        println!(
+            "| {pass} | {left_out} | {p50:.3} | {p99:.2} | {max:.1} | {fronts:.2} | {:.1} | {saved} |",
+            resident()
+        );
+    }
+    Ok(())
+}
