@@ -1,7 +1,8 @@
 //! A pose graph as a robot would have built it: pose by pose, each with the factors to what was there before it.
 //!
 //! Steps are the variables `x<number>`, by number. A factor belongs to the step of its latest pose; anything else, a landmark
-//! say, comes with the first factor that reaches it from what is known. Factors that nothing known reaches wait.
+//! say, comes with the first factor that reaches it from what is known. Factors that nothing known reaches wait; with the
+//! last step come those that nothing will reach, a part of the graph that hangs together with no other.
 use manifactor_geometry::{Tree, spanning_tree};
 use manifactor_graph::{FactorEntry, Graph, Key, ValueError, Values, Variable};
 use std::cmp::Reverse;
@@ -106,10 +107,10 @@ impl Replay {
     }
 
     /// Takes out the waiting factors that what is known reaches, one over the other; and the variables that are new with
-    /// them, in order. The very first are reached from nothing.
+    /// them, in order. The very first are reached from nothing, and so is what is left at the end.
     fn reach(&mut self) -> (Vec<FactorEntry>, Vec<Key>) {
         let (mut factors, mut keys) = (vec![], vec![]);
-        while let Some(entry) = self.waiting.next(self.known.is_empty()) {
+        while let Some(entry) = self.waiting.next(self.known.is_empty() || self.steps.is_empty()) {
             for key in &entry.keys {
                 if self.known.insert(key.clone()) {
                     keys.push(key.clone());
@@ -153,13 +154,12 @@ impl Waiting {
         self.reached.extend(factors.into_iter().filter(|number| self.factors.contains_key(number)));
     }
 
-    /// Takes out the first factor that is reached; the very first of all, where nothing is known.
-    fn next(&mut self, is_first: bool) -> Option<FactorEntry> {
-        let number = match is_first {
-            true => self.factors.keys().next().copied(),
-            false => self.reached.pop_first(),
-        };
-        self.factors.remove(&number?)
+    /// Takes out the first factor that is reached; or else the first of all, if it need not be reached.
+    fn next(&mut self, unreached: bool) -> Option<FactorEntry> {
+        let first = || self.factors.keys().next().copied().filter(|_| unreached);
+        let number = self.reached.first().copied().or_else(first)?;
+        self.reached.remove(&number);
+        self.factors.remove(&number)
     }
 }
 

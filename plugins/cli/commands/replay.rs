@@ -8,10 +8,12 @@ use crate::output;
 use crate::output::text::{Table, count, keys, seconds};
 use crate::status::Status;
 use clap::Args;
-use manifactor::formats::replay::{Latencies, Replay as Steps};
+use manifactor::formats::replay::{Latencies, Replay as Steps, Step};
+use manifactor::graph::{Graph, Key};
 use manifactor::online::{Finished, Report, Session};
 use manifactor::solve::{All, Interrupt, Silent};
 use serde_json::json;
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -47,6 +49,8 @@ struct Replayed {
     times: Vec<f64>,
     report: Report,
     interrupted: bool,
+    /// Factors to variables that the window had no room for any more.
+    left_out: usize,
 }
 
 impl Replay {
@@ -60,6 +64,12 @@ impl Replay {
         }
         let input = self.reading.open(&self.graph, &self.solver)?;
         input.notes.iter().for_each(|note| output::note(note));
+        let keys = input.graph.factors().iter().flat_map(|entry| &entry.keys);
+        let keys: HashSet<&str> = keys.map(Key::as_str).collect();
+        let alone = input.values.iter().filter(|(key, _)| !keys.contains(key.as_str())).count();
+        if alone > 0 {
+            output::note(&format!("{} without factors left out", count(alone, "variable")));
+        }
         let mut interrupt = interrupt::on_ctrl_c();
         let mut replayed = self.replay(&input, &interrupt)?;
         let cost = replayed.session.cost();
@@ -84,7 +94,7 @@ impl Replay {
     fn replay(&self, input: &GraphFile, interrupt: &Interrupt) -> Result<Replayed, Failure> {
         let session = Session::new(input.online.clone()).map_err(Failure::input)?;
         let report = Report::default();
-        let mut replayed = Replayed { session, times: vec![], report, interrupted: false };
+        let mut replayed = Replayed { session, times: vec![], report, interrupted: false, left_out: 0 };
         let mut steps = Steps::of(&input.graph);
         if steps.is_empty() {
             return Err(Failure::with_help(
@@ -92,10 +102,14 @@ impl Replay {
                 "poses are the variables x0, x1, …",
             ));
         }
-        while let Some(step) = steps.step(|key| replayed.session.estimate(key)).map_err(Failure::input)? {
+        let windowed = input.online.window.is_some();
+        while let Some(mut step) = steps.step(|key| replayed.session.estimate(key)).map_err(Failure::input)? {
             if interrupt.0.load(Ordering::Relaxed) {
                 replayed.interrupted = true;
                 break;
+            }
+            if windowed {
+                replayed.left_out += leave_out(&mut step, &replayed.session);
             }
             let clock = Instant::now();
             replayed.session.push(&step.factors, &step.values).map_err(Failure::input)?;
@@ -140,7 +154,7 @@ impl Replay {
     }
 
     fn tell(&self, replayed: &Replayed, cost: f64, finished: Option<&Finished>, batch: f64) {
-        let Replayed { session, times, report, interrupted } = replayed;
+        let Replayed { session, times, report, interrupted, left_out } = replayed;
         let latencies = Latencies::of(times);
         let outcome = finished.map(|finished| &finished.outcome);
         if self.json {
@@ -158,6 +172,7 @@ impl Replay {
                 "termination": outcome.map(|o| &o.termination),
                 "batch_seconds": finished.map(|_| batch),
                 "interrupted": interrupted,
+                "left_out": left_out,
             }));
             return;
         }
@@ -174,6 +189,10 @@ impl Replay {
                 outcome.termination
             );
         }
+        if *left_out > 0 {
+            text +=
+                &format!("{} left out: the window had no room for a variable\n", count(*left_out, "factor"));
+        }
         if !report.parked.is_empty() {
             text += &format!("waiting for factors that determine them: {}\n", keys(&report.parked));
         }
@@ -182,4 +201,17 @@ impl Replay {
         }
         output::print(&text);
     }
+}
+
+/// Leaves out the factors to variables that are gone; how many.
+fn leave_out(step: &mut Step, session: &Session) -> usize {
+    let is_there = |key: &Key| step.values.contains(key.as_str()) || session.estimate(key.as_str()).is_some();
+    let mut factors = Graph::new();
+    for entry in step.factors.factors().iter().filter(|entry| entry.keys.iter().all(is_there)) {
+        factors.push(entry.clone());
+    }
+    step.factors.fixed().iter().for_each(|(key, held)| factors.set_fixed(key, held.clone()));
+    let left_out = step.factors.factors().len() - factors.factors().len();
+    step.factors = factors;
+    left_out
 }

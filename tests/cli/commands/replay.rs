@@ -87,3 +87,24 @@ fn a_start_is_refused() {
     let graph = path(&folder, "square.g2o");
     manifactor(&format!("replay {graph} --start chordal")).ended(2).complains("--start has no meaning here");
 }
+
+#[test]
+fn all_parts_of_a_graph_are_replayed() {
+    let parts = "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n\
+                 EDGE_SE2 10 11 1 0 0 1 0 0 1 0 1\nEDGE_SE2 11 12 1 0 0 1 0 0 1 0 1\nVERTEX_SE2 20 0 0 0\n";
+    let folder = folder(&[("parts.g2o", parts)]);
+    let ran = manifactor(&format!("replay {} --json", path(&folder, "parts.g2o"))).ended(0);
+    assert_eq!(lines(&ran.stdout).last().unwrap()["variables"], 6);
+    ran.complains("1 variable without factors left out");
+}
+
+#[test]
+fn a_window_leaves_old_poses_behind() {
+    let folder = folder(&[("square.g2o", &square())]);
+    let graph = path(&folder, "square.g2o");
+    let ran = manifactor(&format!("replay {graph} --json --set online.window.poses=5")).ended(0);
+    let summary = lines(&ran.stdout).pop().unwrap();
+    // each closure is eight poses back
+    assert_eq!((summary["variables"].clone(), summary["left_out"].clone()), (5.into(), 8.into()));
+    manifactor(&format!("replay {graph} --set online.window.keep=1")).ended(2);
+}
