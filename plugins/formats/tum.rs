@@ -1,7 +1,7 @@
 //! Trajectories as TUM RGB-D writes them: `timestamp tx ty tz qx qy qz qw`, one pose a line.
 //!
 //! Seconds, metres and a unit quaternion; `world_from_camera`. Time has to increase, with what published
-//! files need: a line that is late by at most [`LATE`] is put where it belongs, of two lines with one
+//! files need: a line that is late by at most 0.05 s is put where it belongs, of two lines with one
 //! time stamp the first stays. Both are reported.
 use crate::error::{FormatError, Mistake, Problems};
 use crate::lines::{Fields, lines};
@@ -37,7 +37,7 @@ pub struct Trajectory {
 ///
 /// # Errors
 /// All malformed lines: fields missing, too many or not finite, a quaternion whose length differs
-/// from 1 by more than 0.001, time that runs back by more than [`LATE`]; a file without a pose.
+/// from 1 by more than 0.001, time that runs back by more than 0.05 s; a file without a pose.
 pub fn read(path: impl AsRef<Path>) -> Result<Trajectory, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path)

@@ -125,15 +125,15 @@ fn lines(frames: &[FrameRecord]) -> Result<String, WriteError> {
 /// Results as JSON, to be read by people as well. Unlike in a document, a number may be infinite or none, as a cost that
 /// overflows is: it is null.
 pub(crate) fn results(value: &impl Serialize) -> Result<String, WriteError> {
-    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(inexpressible)
+    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(|error| inexpressible(&error))
 }
 
 /// The same on one line.
 fn compact(value: &impl Serialize) -> Result<String, WriteError> {
-    serde_json::to_string(value).map_err(inexpressible)
+    serde_json::to_string(value).map_err(|error| inexpressible(&error))
 }
 
-fn inexpressible(error: serde_json::Error) -> WriteError {
+fn inexpressible(error: &serde_json::Error) -> WriteError {
     WriteError::Inexpressible { format: Format::Json, message: error.to_string() }
 }
 

@@ -92,7 +92,10 @@ impl Reading {
 /// The schema of a graph's document: of the graph, and of what the commands read beside it.
 pub(crate) fn root(definitions: &mut Definitions) -> Value {
     let mut root = graph_root(definitions);
-    root["properties"]["online"] = definitions.of::<Online>();
+    let online = definitions.of::<Online>();
+    if let Some(Value::Object(properties)) = root.get_mut("properties") {
+        properties.insert("online".to_owned(), online);
+    }
     root
 }
 
