@@ -16,6 +16,7 @@ use crate::variable::Variable;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::any::{Any, TypeId};
+use std::borrow::Cow;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -46,6 +47,9 @@ crate::kind!(dyn Factor, "factor");
 pub struct FactorEntry {
     /// The variables that it connects, in the order of the residual's arguments.
     pub keys: Vec<Key>,
+    /// What reports call it. Default: the name of its type.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<Arc<str>>,
     /// The residual and its parameters.
     pub factor: Arc<dyn Factor>,
     /// What its residual is measured in.
@@ -57,6 +61,18 @@ pub struct FactorEntry {
 }
 
 impl FactorEntry {
+    /// What reports call it: its name, or else that of its type.
+    pub fn label(&self) -> Cow<'static, str> {
+        match &self.name {
+            Some(name) => Cow::Owned((**name).to_owned()),
+            None => Cow::Borrowed(self.factor.typetag_name()),
+        }
+    }
+    /// Sets what reports call it.
+    pub fn name(&mut self, name: &str) -> &mut Self {
+        self.name = Some(name.into());
+        self
+    }
     /// Sets the noise.
     pub fn noise(&mut self, noise: Noise) -> &mut Self {
         self.noise = noise;
@@ -105,7 +121,7 @@ pub trait ErasedResidual: Send + Sync {
 /// What the catalogue says of a factor.
 pub fn signature<R: Residual>() -> Signature {
     let (variables, many) = R::Variables::types();
-    Signature { rows: Some(R::Dim::N), variables, many, tangent: &[] }
+    Signature { rows: Some(R::Dim::N), row_names: R::ROWS, variables, many, tangent: &[] }
 }
 
 /// Runs one of the two ways to linearize over blocks that are poisoned first.

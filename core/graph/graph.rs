@@ -203,7 +203,13 @@ impl Graph {
         factor: impl Factor + 'static,
     ) -> &mut FactorEntry {
         let keys = keys.into_iter().map(Into::into).collect();
-        self.push(FactorEntry { keys, factor: Arc::new(factor), noise: Noise::unit(), loss: None })
+        self.push(FactorEntry {
+            keys,
+            name: None,
+            factor: Arc::new(factor),
+            noise: Noise::unit(),
+            loss: None,
+        })
     }
     /// Adds a factor.
     pub fn push(&mut self, entry: FactorEntry) -> &mut FactorEntry {
@@ -326,7 +332,8 @@ impl FactorEntry {
                 }
             }
         }
-        match self.noise.whitener(signature.rows.unwrap_or(0)) {
+        let whitener = self.noise.whitener(signature.rows.unwrap_or(0));
+        match whitener.map_err(|error| error.with_names(signature.row_names)) {
             Ok(whitener) => (errors.len() == before).then_some(Resolved { variables, whitener }),
             Err(source) => {
                 errors.push(GraphError::Noise { factor, name, source });

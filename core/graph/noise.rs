@@ -97,16 +97,33 @@ pub enum NoiseError {
     #[error("expected one of sigma, sigmas, covariance, information; got {0}")]
     Ambiguous(String),
     /// A noise of one size for a residual of another.
-    #[error("the noise has {found} rows, the residual {expected}")]
+    #[error("the noise has {found} rows, the residual {expected}{}", in_parentheses(.names))]
     Dimension {
         /// Rows of the residual.
         expected: usize,
         /// Rows of the noise.
         found: usize,
+        /// Names of the residual's rows, where it has any.
+        names: &'static [&'static str],
     },
     /// A measurement of nothing.
     #[error("no row is observed; leave the factor out instead")]
     NothingObserved,
+}
+
+impl NoiseError {
+    /// The same, with the names of the residual's rows.
+    #[must_use]
+    pub fn with_names(self, rows: &'static [&'static str]) -> Self {
+        match self {
+            Self::Dimension { expected, found, .. } => Self::Dimension { expected, found, names: rows },
+            other => other,
+        }
+    }
+}
+
+fn in_parentheses(names: &[&str]) -> String {
+    if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) }
 }
 
 fn sigma(s: f64) -> Result<f64, NoiseError> {
@@ -212,7 +229,7 @@ impl Noise {
     pub fn whitener(&self, rows: usize) -> Result<Whitener, NoiseError> {
         let check = |found: usize| match found == rows {
             true => Ok(()),
-            false => Err(NoiseError::Dimension { expected: rows, found }),
+            false => Err(NoiseError::Dimension { expected: rows, found, names: &[] }),
         };
         match &self.model {
             Model::Diagonal(s) => check(s.len())?,

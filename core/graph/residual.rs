@@ -30,6 +30,8 @@ pub trait Residual: Debug + Clone + Send + Sync + 'static {
     type Variables: Variables;
     /// Number of rows: `U1`, `U2`, …
     type Dim: Dimension;
+    /// A name for each row, for messages. Default: none.
+    const ROWS: &'static [&'static str] = &[];
 
     /// The residual, not whitened.
     fn residual<T: Scalar>(&self, variables: Lifted<Self::Variables, T>) -> Vector<Self::Dim, T>;

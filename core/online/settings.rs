@@ -38,7 +38,7 @@ pub struct Settings {
 #[serde(deny_unknown_fields)]
 pub struct Window {
     /// Variables that stay, the newest of those whose type is not kept; at least one. Older ones leave at the end of an update,
-    /// as by [`Session::marginalize`](crate::Session::marginalize).
+    /// as `Session::marginalize` takes them out.
     pub poses: usize,
     /// Names of types whose variables never leave: `"dual_quadric"`, say. Default: none.
     #[serde(default)]

@@ -1,4 +1,5 @@
 //! Questions about an estimate: how certain it is, what holds it, and what fits badly.
+mod at_start;
 mod condition;
 mod covariance;
 mod diagnosis;
@@ -8,6 +9,7 @@ mod moving;
 pub(crate) mod null_space;
 mod untouched;
 
+pub use at_start::{AtStart, Weak};
 pub use covariance::{CovarianceError, Marginal};
 pub use diagnosis::{Diagnosis, FactorCost};
 pub use factorized::Factorized;

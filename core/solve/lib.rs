@@ -11,7 +11,7 @@ mod problem;
 mod setting;
 mod strategy;
 
-pub use inspect::{CovarianceError, Diagnosis, FactorCost, Factorized, Marginal};
+pub use inspect::{AtStart, CovarianceError, Diagnosis, FactorCost, Factorized, Marginal, Weak};
 pub use linear::memory::{Bytes, available_memory, memory_limit};
 pub use linear::settings::{ConjugateGradients, LinearSolver, Method, Ordering, Preconditioner};
 pub use linear::{BlockSystem, BlockSystemError};

@@ -5,6 +5,7 @@ mod untouched;
 
 use manifactor_graph::Key;
 use serde::Serialize;
+use std::borrow::Cow;
 
 pub use moving::Moving;
 pub use termination::{Stall, Termination, Tolerance, Undetermined};
@@ -66,8 +67,8 @@ impl Outcome {
 pub struct Rejected {
     /// Its place in the graph, from 0.
     pub factor: usize,
-    /// Its type.
-    pub name: &'static str,
+    /// Its name, or else that of its type.
+    pub name: Cow<'static, str>,
     /// Its variables.
     pub keys: Vec<Key>,
     /// How much it still counts, from 0 to 1.

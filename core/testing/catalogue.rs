@@ -5,7 +5,7 @@
 use crate::error::LawError;
 use crate::example::{example_fields, problem};
 use crate::factor_check::{FactorCheck, FactorReport, Subject};
-use crate::manifold::manifold_laws;
+use crate::manifold_check::{ManifoldCheck, ManifoldReport};
 use manifactor_graph::catalogue::{self, Entry, Kind};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Loss;
@@ -13,8 +13,6 @@ use manifactor_graph::{Factor, Variable};
 use manifactor_tree::Reader;
 
 pub use crate::example::example;
-use proptest::prelude::RngExt;
-use proptest::test_runner::{RngAlgorithm, TestRng};
 
 /// Checks that an entry has a name in snake case, a summary, an object for a schema, and an example
 /// in TOML that mentions it and can be read.
@@ -71,19 +69,33 @@ macro_rules! factor_laws {
     };
 }
 
-/// Checks [`manifold_laws`] at `cases` random points around a manifold's example.
+/// Checks a manifold at this number of pairs of points, see [`ManifoldCheck`]. Returns what was found.
 ///
 /// # Errors
 /// The law that is broken, or what the catalogue lacks.
-pub fn manifold_law(entry: &'static Entry, cases: usize) -> Result<(), LawError> {
-    let origin = example::<dyn Variable>(entry)?;
-    let mut rng = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-    for _ in 0..cases {
-        let (Some(x), Some(y)) = (around(&*origin, &mut rng), around(&*origin, &mut rng)) else { continue };
-        let delta: Vec<f64> = (0..x.erased().dim()).map(|_| rng.random_range(-1.0..1.0)).collect();
-        manifold_laws(&*x, &*y, &delta)?;
-    }
-    Ok(())
+pub fn manifold_law(entry: &'static Entry, points: usize) -> Result<ManifoldReport, LawError> {
+    let report = ManifoldCheck { points, ..ManifoldCheck::default() }.run(entry)?;
+    if report.holds() { Ok(report) } else { Err(problem(entry, report.to_string())) }
+}
+
+/// Checks [`documentation_law`] and [`manifold_law`] of a registered manifold, at 256 pairs of points, its `seed` included:
+/// what [`manifold_laws!`](crate::manifold_laws) makes a test of.
+///
+/// # Panics
+/// Where one does not hold, with what is wrong: it is an assertion for tests.
+#[track_caller]
+pub fn assert_manifold_laws(name: &str) {
+    let entry = catalogue::find(<dyn Variable as Kind>::NAME, name);
+    let entry = entry.unwrap_or_else(|| panic!(
+        "no manifold `{name}` is registered: is there a line `register_manifold!(\"{name}\", …);`, and is its module part of the crate?"
+    ));
+    documentation_law(entry).unwrap_or_else(|e| panic!("{e}"));
+    let report = manifold_law(entry, 256).unwrap_or_else(|e| panic!("{e}"));
+    assert!(
+        report.seed_error.is_some(),
+        "nothing says what the numbers of `{name}` are, so that its `seed` cannot be checked: write a line `register_quantity!(…);`, \
+         which lets formulas compute with it, too"
+    );
 }
 
 /// Checks a loss's example at many s: that its weight is the derivative of ρ, and that [tempered], once and twice, it is
@@ -125,10 +137,4 @@ pub fn loss_law(entry: &'static Entry) -> Result<(), LawError> {
         }
     }
     Ok(())
-}
-
-/// A point at most 1 away in each direction.
-fn around(x: &dyn Variable, rng: &mut TestRng) -> Option<Box<dyn Variable>> {
-    let delta: Vec<f64> = (0..x.erased().dim()).map(|_| rng.random_range(-1.0..1.0)).collect();
-    x.erased().retract(&delta)
 }

@@ -103,10 +103,21 @@ macro_rules! jacobian_laws {
     };
 }
 
-/// Tests that check [`manifold_laws`]: `manifold_laws! { name: strategy; … }`, where the strategy
-/// yields two points and a tangent vector at the first.
+/// The laws of manifolds, a test for each, by registered name: `manifold_laws! { heading, se3 }`. See
+/// [`assert_manifold_laws`](crate::catalogue::assert_manifold_laws).
+///
+/// Or [`manifold_laws`] for points of one's own: `manifold_laws! { name: strategy; … }`, where the strategy yields two
+/// points and a tangent vector at the first.
 #[macro_export]
 macro_rules! manifold_laws {
+    ($($name:ident),+ $(,)?) => {
+        mod manifold_laws {
+            $(#[test]
+            fn $name() {
+                $crate::catalogue::assert_manifold_laws(stringify!($name));
+            })+
+        }
+    };
     ($($name:ident: $cases:expr);+ $(;)?) => {
         $(#[test]
         fn $name() {

@@ -1,5 +1,6 @@
 //! Everything that can be said of a factor before a solver meets it.
 mod report;
+mod scan;
 mod subject;
 
 pub use report::{Broken, FactorReport, FreeDirections, NamedEntry, NamedKink, Unchanged};
@@ -44,7 +45,7 @@ impl FactorCheck {
     ///
     /// Its residual has to be finite, analytic, automatic and numeric Jacobian to agree, up to kinks and jumps, which
     /// are reported with their size; and what its author says leaves it unchanged has to. What directions it leaves
-    /// free is reported. The first point where something is broken is made as simple as it gets.
+    /// free is reported, and jumps along a line through each point. The first point where something is broken is made as simple as it gets.
     pub fn run(&self, subject: &Subject) -> FactorReport {
         let mut gathered = Gathered::new(subject, self.seed);
         let stated = invariances(subject.factor.erased().as_any().type_id());
@@ -113,15 +114,19 @@ impl FactorCheck {
         gathered.defined += 1;
         gathered.singular += usize::from(drawn.singular);
         self.gather(subject, drawn, examined, gathered);
+        if let Some((variable, column)) = subject.column(round) {
+            for (kink, at) in scan::jumps(factor, &point, variable, column) {
+                let at = Drawn { variables: at, singular: false };
+                gathered.kinks(subject, &[kink], &at);
+            }
+        }
         None
     }
 
     fn gather(&self, subject: &Subject, drawn: &Drawn, examined: Examined, gathered: &mut Gathered) {
         gathered.entry(subject, examined.worst, drawn);
         let smooth = examined.kinks.is_empty() && !drawn.singular;
-        for kink in &examined.kinks {
-            gathered.kink(subject, kink, drawn);
-        }
+        gathered.kinks(subject, &examined.kinks, drawn);
         if smooth && gathered.linearizations.len() < FOR_RANK {
             gathered.linearizations.push(examined.linearization);
             gathered.freedom = freedom(&gathered.linearizations);

@@ -68,9 +68,9 @@ pub struct JacobianEntry {
 }
 
 /// A factor at a point.
-struct At<'a> {
-    factor: &'a dyn Factor,
-    variables: &'a [&'a dyn Variable],
+pub(crate) struct At<'a> {
+    pub factor: &'a dyn Factor,
+    pub variables: &'a [&'a dyn Variable],
 }
 
 impl JacobianLaw {
@@ -152,14 +152,25 @@ impl JacobianLaw {
 
 impl At<'_> {
     /// The residual `h` along a tangent direction; `None` where it is not defined.
-    fn along(&self, variable: usize, column: usize, h: f64) -> Option<Vec<f64>> {
-        let mut delta = vec![0.0; self.variables[variable].erased().dim()];
-        delta[column] = h;
-        let moved = self.variables[variable].erased().retract(&delta)?;
+    pub(crate) fn along(&self, variable: usize, column: usize, h: f64) -> Option<Vec<f64>> {
+        let moved = self.step(variable, column, h)?;
         let mut variables = self.variables.to_vec();
         variables[variable] = &*moved;
         let residual = self.factor.erased();
         if residual.is_defined(&variables)? { residual.residual(&variables) } else { None }
+    }
+
+    /// The variables `h` along a tangent direction.
+    pub(crate) fn moved(&self, variable: usize, column: usize, h: f64) -> Option<Vec<Box<dyn Variable>>> {
+        let mut variables: Vec<_> = self.variables.iter().map(|x| x.erased().clone_box()).collect();
+        variables[variable] = self.step(variable, column, h)?;
+        Some(variables)
+    }
+
+    fn step(&self, variable: usize, column: usize, h: f64) -> Option<Box<dyn Variable>> {
+        let mut delta = vec![0.0; self.variables[variable].erased().dim()];
+        delta[column] = h;
+        self.variables[variable].erased().retract(&delta)
     }
 
     /// The same entry at points around, as the automatic Jacobian has it: where three pieces of a residual meet, they say

@@ -4,10 +4,11 @@
 //! them through [`jacobian_laws!`] and [`manifold_laws!`], the command line on whatever is linked
 //! (see [`catalogue`]).
 //!
-//! A plugin's test is a line. By the name of a factor, from its example in the catalogue and its manifolds' points; or
-//! for a strategy of one's own, that yields a factor and its variables:
+//! A plugin's test is a line. By the name of a factor or a manifold, from its example in the catalogue and the points that
+//! are registered; or for a strategy of one's own, that yields a factor and its variables, or two points and a tangent vector:
 //! ```text
 //! factor_laws! { rests_on }
+//! manifold_laws! { heading }
 //! jacobian_laws! { agrees_with_differences: (any_factor(), any_se3(), any_se3()) }
 //! ```
 #[allow(clippy::panic, reason = "laws are assertions: a test fails by them")]
@@ -22,6 +23,7 @@ mod freedom;
 mod invariance;
 mod jacobian;
 mod manifold;
+mod manifold_check;
 pub mod points;
 pub mod strategies;
 
@@ -35,7 +37,8 @@ pub use freedom::{Free, Freedom, freedom};
 pub use invariance::invariance_law;
 pub use jacobian::Kink;
 pub use jacobian::{Examined, JacobianEntry, JacobianLaw, jacobian_law};
-pub use manifold::manifold_laws;
+pub use manifold::{manifold_laws, seed_law};
+pub use manifold_check::{ManifoldCheck, ManifoldReport};
 
 #[doc(hidden)]
 pub mod __private {

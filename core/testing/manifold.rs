@@ -1,16 +1,22 @@
 //! The laws of a manifold.
+use crate::differences::differentiate;
 use crate::error::{LawError, json_of};
 use manifactor_graph::Variable;
+use manifactor_graph::quantity::variable_quantity;
 use serde_json::Value;
 
 /// How far two points may be apart to be the same, relative to the largest coordinate or to 1.
 const TOLERANCE: f64 = 1e-9;
+/// The longest step of differences.
+const STEP: f64 = 1e-2;
+/// How far the derivatives of `seed` may be from differences, relative to the largest or to 1.
+const SEED: f64 = 1e-6;
 
 /// Checks the laws of a manifold at two of its points, and for a tangent vector `delta` at the first
 /// that is inside of the chart (for rotations: shorter than π).
 ///
 /// `x ⊞ 0 = x`; `x ⊞ (y ⊟ x) = y`; `(x ⊞ δ) ⊟ x = δ`; everything stays finite; a name for each
-/// direction; a document of x reads back as the very same document.
+/// direction; a document of x reads back as the very same document; [`seed_law`].
 ///
 /// # Errors
 /// The first law that is broken.
@@ -58,7 +64,51 @@ pub fn manifold_laws(x: &dyn Variable, y: &dyn Variable, delta: &[f64]) -> Resul
         let read = serde_json::from_str::<Box<dyn Variable>>(&text).ok();
         require(read.is_some_and(|read| json_of(&*read) == text), law)?;
     }
-    Ok(())
+    seed_law(x).map(drop)
+}
+
+/// Checks that the derivatives of a point's `seed` are those of `retract`: by how much they differ at most, relative to the
+/// largest, or to 1. `None` where that cannot be seen, as the manifold is not registered as a quantity by
+/// [`register_quantity!`](manifactor_graph::register_quantity).
+///
+/// # Errors
+/// The direction in which they differ most, as `delta`.
+pub fn seed_law(x: &dyn Variable) -> Result<Option<f64>, LawError> {
+    let (from, law) = (x.erased(), "the derivative of x.seed() is that of x.retract(delta)");
+    let Some(quantity) = variable_quantity(from.type_id()) else { return Ok(None) };
+    let (dim, size) = (quantity.dimension, quantity.shape.size);
+    let flat = |point: &dyn Variable| {
+        let mut numbers = vec![0.0; size];
+        (quantity.values)(point.erased().as_any(), &mut numbers);
+        numbers
+    };
+    // by number of the flat form, its derivatives by each direction
+    let mut seeded = vec![0.0; size * dim];
+    (quantity.gradients)(from.as_any(), &mut seeded);
+    let scale = seeded.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
+    let mut worst = (0.0, 0);
+    for direction in 0..dim {
+        let along = |h: f64| {
+            let mut delta = vec![0.0; dim];
+            delta[direction] = h;
+            from.retract(&delta).map(|there| flat(&*there))
+        };
+        for (row, numeric) in differentiate(size, STEP, along).into_iter().flatten().enumerate() {
+            let apart = (seeded[row * dim + direction] - numeric.value).abs();
+            let error = if apart.is_nan() { f64::INFINITY } else { apart / scale };
+            if error > worst.0 && (apart > 10.0 * numeric.error || apart.is_nan()) {
+                worst = (error, direction);
+            }
+        }
+    }
+    match worst {
+        (error, _) if error <= SEED => Ok(Some(error)),
+        (error, direction) => {
+            let mut delta = vec![0.0; dim];
+            delta[direction] = 1.0;
+            Err(LawError::Manifold { law, error, x: json_of(x), y: json_of(x), delta })
+        }
+    }
 }
 
 /// Largest absolute entry; infinite where one is not a number.

@@ -1,7 +1,7 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, Completions, Evaluate, Experiment, Explain, List, Man, New, Plot, Replay, Run,
-    Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, List, Man, New, Plot,
+    Replay, Run, Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
 use crate::output::watch;
@@ -14,7 +14,7 @@ use std::num::NonZero;
 /// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 ///
 /// Exit codes: 0 done; 1 a solve ended without converging (its best values are written), nothing that was detected is mapped, or a factor
-/// breaks a law; 2 the command line or a document is wrong; 3 a file is not there, or it or standard output could not be read or written;
+/// or a type of variables breaks a law; 2 the command line or a document is wrong; 3 a file is not there, or it or standard output could not be read or written;
 /// 130 interrupted before all was done (the best values so far are written).
 #[derive(Debug, Parser)]
 #[command(name = "manifactor", version, max_term_width = 100)]
@@ -39,6 +39,7 @@ enum Command {
     Replay(Replay),
     Check(Check),
     CheckFactor(CheckFactor),
+    CheckManifold(CheckManifold),
     List(List),
     Explain(Explain),
     Graph(ShowGraph),
@@ -73,6 +74,7 @@ impl Cli {
             Command::Replay(command) => command.run(),
             Command::Check(command) => command.run(),
             Command::CheckFactor(command) => command.run(),
+            Command::CheckManifold(command) => command.run(),
             Command::List(command) => command.run(),
             Command::Explain(command) => command.run(),
             Command::Graph(command) => command.run(),
@@ -104,6 +106,7 @@ impl Cli {
             Command::Replay(command) => command.json,
             Command::Check(command) => command.json,
             Command::CheckFactor(command) => command.json,
+            Command::CheckManifold(command) => command.json,
             Command::List(command) => command.json,
             Command::Explain(command) => command.json,
             Command::Graph(command) => command.json,

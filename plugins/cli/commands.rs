@@ -1,10 +1,10 @@
 //! The commands, a file each: what it takes, and what it does.
 mod about;
 mod check;
-mod check_factor;
 mod evaluate;
 mod experiment;
 mod graph;
+mod laws;
 mod new;
 mod plot;
 mod replay;
@@ -14,10 +14,10 @@ mod solve;
 
 pub(crate) use about::{Completions, Explain, List, Man, Schema};
 pub(crate) use check::Check;
-pub(crate) use check_factor::CheckFactor;
 pub(crate) use evaluate::Evaluate;
 pub(crate) use experiment::Experiment;
 pub(crate) use graph::ShowGraph;
+pub(crate) use laws::{CheckFactor, CheckManifold};
 pub(crate) use new::New;
 pub(crate) use plot::Plot;
 pub(crate) use replay::Replay;

@@ -38,10 +38,19 @@ pub(crate) struct FactorRow {
     pub number: usize,
     #[serde(rename = "type")]
     pub of_type: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     pub keys: Vec<String>,
     pub before: State,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after: Option<State>,
+}
+
+impl FactorRow {
+    /// Its name, or else that of its type.
+    pub(crate) fn label(&self) -> &str {
+        self.name.as_deref().unwrap_or(self.of_type)
+    }
 }
 
 /// A factor at some values.
@@ -89,7 +98,8 @@ impl Inspection {
                 factors_by_key.entry(key.clone()).or_default().push(number);
             }
             let after = after.as_ref().and_then(|states| states.get(number)).cloned();
-            factors.push(FactorRow { number, of_type: entry.factor.typetag_name(), keys, before, after });
+            let (of_type, name) = (entry.factor.typetag_name(), entry.name.as_deref().map(str::to_owned));
+            factors.push(FactorRow { number, of_type, name, keys, before, after });
         }
         Ok(Self { variables: variables.collect(), factors, factors_by_key, cost })
     }
@@ -108,7 +118,7 @@ impl Inspection {
             let last = row.after.as_ref().unwrap_or(&row.before);
             let residual: Vec<_> = last.residual.iter().map(|r| format!("{r:.3}")).collect();
             table.row([
-                format!("{} {}", row.number, row.of_type),
+                format!("{} {}", row.number, row.label()),
                 row.keys.join(", "),
                 format!("{:.4}", row.before.cost),
                 row.after.as_ref().map_or_else(|| "-".into(), |s| format!("{:.4}", s.cost)),

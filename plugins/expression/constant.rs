@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// A number, a vector of two, three or six numbers, or a value of any type of variables with its `type`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, a list of 2, 3 or 6 numbers, or a value with its `type`")]
 pub enum Constant {
     /// A number.
     Number(f64),

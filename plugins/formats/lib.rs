@@ -22,7 +22,7 @@ pub mod whole;
 pub use error::{BadLine, FormatError, Malformed, Mistake};
 pub use graph_format::{GraphFormat, GraphRead, GraphWriter, Reading, Repair};
 pub use pose_graph::g2o;
-pub use text::{STDIN, read_text, words};
+pub use text::{STDIN, plausible, read_text, words};
 
 #[doc(hidden)]
 pub mod __private {

@@ -104,6 +104,8 @@ pub struct Report {
     pub equivalences_by_edge: usize,
     /// `EQUIV` lines for which a factor was added.
     pub equivalences_added: usize,
+    /// Signs of other units, or of another order of numbers, in words.
+    pub doubts: Vec<String>,
 }
 
 impl Report {
@@ -136,6 +138,7 @@ impl Report {
             let lines = count(self.equivalences_added, "EQUIV line");
             notes.push(format!("{lines} without an edge: tied by a factor"));
         }
+        notes.extend(self.doubts.iter().cloned());
         notes
     }
 }

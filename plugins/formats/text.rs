@@ -1,4 +1,5 @@
 //! Texts from files: read once, and not without end.
+pub mod plausible;
 pub mod words;
 
 use crate::error::{FormatError, Mistake, Problems, io_error};

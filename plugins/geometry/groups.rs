@@ -1,6 +1,7 @@
 //! Manifolds: vectors, rotations and poses of the plane and of space, and what Lie groups have in common.
 mod coordinates;
 mod lie_group;
+mod operators;
 mod rn;
 mod se2;
 mod se3;

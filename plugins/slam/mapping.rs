@@ -9,6 +9,7 @@ use crate::input::sequence::{ObjectId, Sequence};
 use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
 use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, unmatched};
 use crate::settings::{DetectionSettings, Settings};
+use manifactor_formats::plausible;
 use manifactor_geometry::{Between, Prior, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_quadric::{BoundingBoxFactor, DualQuadric};
@@ -110,7 +111,7 @@ impl Mapping {
             mapping.objects.push(object);
         }
         settings.own.add_to(&mut mapping.graph, &mut mapping.values);
-        mapping.warn(settings);
+        mapping.warn(sequence, settings);
         let (poses, objects, factors) =
             (poses.len(), mapping.mapped().count(), mapping.graph.factors().len());
         tracing::info!(poses, objects, factors, "mapped");
@@ -175,7 +176,10 @@ impl Mapping {
         })
     }
 
-    fn warn(&mut self, settings: &Settings) {
+    fn warn(&mut self, sequence: &Sequence, settings: &Settings) {
+        let odometry = sequence.frames.iter().map(|frame| (frame.timestamp, frame.world_from_camera));
+        let doubts = plausible::trajectory(odometry).into_iter().map(|what| Warning::Implausible { what });
+        self.warnings.extend(doubts);
         let classes = self.objects.iter().filter_map(|object| Some(object.class.as_ref()?.name.clone()));
         let mut seen: Vec<String> = classes.collect();
         seen.sort();
@@ -207,6 +211,7 @@ fn box_entry(
     let (bounding_box, camera, model) = (view.bounding_box, sequence.camera, settings.model);
     FactorEntry {
         keys: vec![pose_key(view.frame), object],
+        name: None,
         factor: Arc::new(BoundingBoxFactor { bounding_box, camera, model }),
         noise: settings.noise_of(view.inside),
         loss: settings.loss.clone(),

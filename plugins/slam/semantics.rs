@@ -136,9 +136,9 @@ impl Rule {
                 let mixture = MaxMixture::new(vec![holds, nothing]);
                 let name = || self.factor.name().to_owned();
                 let mixture = mixture.map_err(|source| RuleError::Mixture { factor: name(), source })?;
-                Ok(FactorEntry { keys, factor: Arc::new(mixture), noise: Noise::default(), loss })
+                Ok(FactorEntry { keys, name: None, factor: Arc::new(mixture), noise: Noise::default(), loss })
             }
-            _ => Ok(FactorEntry { keys, factor, noise, loss }),
+            _ => Ok(FactorEntry { keys, name: None, factor, noise, loss }),
         }
     }
 }

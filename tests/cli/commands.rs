@@ -1,9 +1,10 @@
 //! Each command: what it takes, and what it does.
-mod check_factor;
+mod check;
 mod documents;
 mod evaluate;
 pub(crate) mod experiment;
 mod graph;
+mod laws;
 mod names;
 mod new;
 mod replay;

@@ -77,6 +77,9 @@ pub(crate) struct FactorDocument {
     /// The variables that it connects.
     #[schemars(length(min = 1))]
     keys: Vec<Key>,
+    /// What reports call it. Default: the name of its type.
+    #[serde(default)]
+    name: Option<Arc<str>>,
     /// What it says of them.
     factor: Box<dyn Factor>,
     /// Of its residual.
@@ -129,10 +132,16 @@ impl<'a> Read<'a> {
 
     fn factor(&mut self, node: &'a Node, errors: &Errors) {
         let read = node.read_what_is_right(&[], errors);
-        let Some(FactorDocument { keys, factor, noise, loss }) = read else {
+        let Some(FactorDocument { keys, name, factor, noise, loss }) = read else {
             return self.unread.push(node);
         };
-        self.graph.push(FactorEntry { keys, factor: Arc::from(factor), noise, loss: loss.map(Arc::from) });
+        self.graph.push(FactorEntry {
+            keys,
+            name,
+            factor: Arc::from(factor),
+            noise,
+            loss: loss.map(Arc::from),
+        });
         self.factors.push(node);
     }
 }

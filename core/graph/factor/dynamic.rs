@@ -123,7 +123,7 @@ impl<F: DynamicResidual> ErasedResidual for Dynamic<F> {
     }
     fn signature(&self) -> Signature {
         let variables = self.0.variables().to_vec();
-        Signature { rows: Some(self.0.rows()), variables, many: false, tangent: &[] }
+        Signature { rows: Some(self.0.rows()), row_names: &[], variables, many: false, tangent: &[] }
     }
     fn new_batch(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> Box<dyn Batch> {
         with_rows!(self.0.rows(), N => Box::new(BatchOf::<Rows<F, N>>::new(noise, loss)))

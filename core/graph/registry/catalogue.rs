@@ -44,6 +44,8 @@ inventory::collect!(Entry);
 pub struct Signature {
     /// Rows of a factor's residual.
     pub rows: Option<usize>,
+    /// Names of these rows; none, where the author gave none.
+    pub row_names: &'static [&'static str],
     /// Types of a factor's variables, in order.
     pub variables: Vec<TypeId>,
     /// A factor of any number of variables, all of the one type in `variables`.

@@ -10,7 +10,7 @@ use std::any::TypeId;
 /// A change of the model; each has one that takes it back.
 #[derive(Debug, Clone)]
 pub(super) enum Change {
-    Insert { number: u32, entry: FactorEntry, resolved: Resolved, weight: f64 },
+    Insert { number: u32, entry: Box<FactorEntry>, resolved: Resolved, weight: f64 },
     Remove { number: u32 },
     Weigh { number: u32, weight: f64 },
     Hold { variable: u32, held: u32 },
@@ -75,7 +75,7 @@ impl Change {
                 touched.doubtful.extend(factor.variables());
                 touched.removed.push(number);
                 let resolved = factor.resolved()?;
-                Some(Self::Insert { number, entry: factor.entry?, resolved, weight: factor.weight })
+                Some(Self::Insert { number, entry: Box::new(factor.entry?), resolved, weight: factor.weight })
             }
             Self::Weigh { number, weight } => {
                 let before = model.weigh(number, weight)?;
@@ -168,7 +168,7 @@ impl Session {
 
     fn insert(&mut self, number: u32, entry: FactorEntry, resolved: Resolved, weight: f64) -> FactorId {
         self.pending.is_there.insert(number, Some(entry.clone()));
-        self.pending.changes.push(Change::Insert { number, entry, resolved, weight });
+        self.pending.changes.push(Change::Insert { number, entry: Box::new(entry), resolved, weight });
         FactorId(number)
     }
 

@@ -91,7 +91,13 @@ impl Session {
             let points = prior.variables.iter().filter_map(|v| self.model.point(*v)).collect();
             let keys: Vec<Key> = prior.variables.iter().map(|v| self.key(*v)).collect();
             for factor in prior::factors(&prior, points) {
-                graph.push(FactorEntry { keys: keys.clone(), factor, noise: Noise::unit(), loss: None });
+                graph.push(FactorEntry {
+                    keys: keys.clone(),
+                    name: None,
+                    factor,
+                    noise: Noise::unit(),
+                    loss: None,
+                });
             }
         }
     }

@@ -1,5 +1,6 @@
 //! How well the linear system is conditioned.
-use crate::inspect::Factorized;
+use crate::inspect::null_space::name;
+use crate::inspect::{Factorized, Weak};
 use crate::linear::system::{dot, norm};
 use crate::problem::Problem;
 
@@ -24,32 +25,45 @@ impl Problem {
 impl Factorized<'_> {
     /// See [`Problem::condition`].
     pub fn condition(&mut self) -> Option<f64> {
+        self.extremes().map(|(condition, ..)| condition)
+    }
+
+    /// The direction that is constrained least, and the condition number.
+    pub(crate) fn weakest(&mut self) -> Option<Weak> {
+        let (condition, v, diagonal) = self.extremes()?;
+        Some(Weak { condition, direction: name(&self.problem.model, &v, &diagonal) })
+    }
+
+    /// The condition number, the direction that is constrained least, and the diagonal of H.
+    fn extremes(&mut self) -> Option<(f64, Vec<f64>, Vec<f64>)> {
         let Problem { system, .. } = &mut *self.problem;
-        let mut scale: Vec<f64> = system.diagonal().copied().collect();
-        if !scale.iter().all(|d| *d > 0.0) {
+        let diagonal: Vec<f64> = system.diagonal().copied().collect();
+        if !diagonal.iter().all(|d| *d > 0.0) {
             return None;
         }
-        scale.iter_mut().for_each(|d| *d = d.sqrt());
+        let scale: Vec<f64> = diagonal.iter().map(|d| d.sqrt()).collect();
         let scaled =
             |x: &mut [f64], by: fn(f64) -> f64| x.iter_mut().zip(&scale).for_each(|(x, d)| *x *= by(*d));
-        let largest = dominant(scale.len(), |x| {
+        let (largest, _) = dominant(scale.len(), |x| {
             scaled(x, f64::recip);
             let product = system.multiply(x);
             x.copy_from_slice(&product);
             scaled(x, f64::recip);
         });
         let cholesky = system.cholesky()?;
-        let smallest = dominant(scale.len(), |x| {
+        let (smallest, mut weakest) = dominant(scale.len(), |x| {
             scaled(x, |d| d);
             cholesky.solve(x);
             scaled(x, |d| d);
         });
-        Some(largest * smallest).filter(|condition| condition.is_finite())
+        scaled(&mut weakest, f64::recip);
+        Some((largest * smallest, weakest, diagonal)).filter(|(condition, ..)| condition.is_finite())
     }
 }
 
-/// The largest eigenvalue of a symmetric positive definite matrix, from below, by Rayleigh quotients.
-fn dominant(n: usize, mut multiply: impl FnMut(&mut [f64])) -> f64 {
+/// The largest eigenvalue of a symmetric positive definite matrix, from below, by Rayleigh quotients; and nearly its
+/// eigenvector.
+fn dominant(n: usize, mut multiply: impl FnMut(&mut [f64])) -> (f64, Vec<f64>) {
     // a start with a part in every direction
     let mut x: Vec<f64> = (0..n).map(|i| ((i * 7919 % 104_729) as f64 + 1.0).sin()).collect();
     let (mut before, mut value) = (vec![], 0.0);
@@ -65,5 +79,5 @@ fn dominant(n: usize, mut multiply: impl FnMut(&mut [f64])) -> f64 {
             break;
         }
     }
-    value
+    (value, x)
 }

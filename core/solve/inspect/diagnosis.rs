@@ -7,6 +7,7 @@ use crate::problem::Problem;
 use manifactor_graph::batch::FactorState;
 use manifactor_graph::{FactorEntry, Graph, Key};
 use serde::Serialize;
+use std::borrow::Cow;
 
 /// Factors in the table of the worst.
 const WORST: usize = 10;
@@ -30,8 +31,8 @@ pub struct Diagnosis {
 pub struct FactorCost {
     /// Its place in the graph, from 0.
     pub factor: usize,
-    /// Its type.
-    pub name: &'static str,
+    /// Its name, or else that of its type.
+    pub name: Cow<'static, str>,
     /// Its variables.
     pub keys: Vec<Key>,
     /// Its residual, not whitened.
@@ -70,7 +71,7 @@ impl Solution {
         costly.sort_by(|a, b| b.cost.total_cmp(&a.cost));
         let row = |(state, entry): (&FactorState, &FactorEntry)| FactorCost {
             factor: state.entry,
-            name: entry.factor.typetag_name(),
+            name: entry.label(),
             keys: entry.keys.clone(),
             residual: state.residual.clone(),
             cost: state.cost,

@@ -15,7 +15,7 @@ impl Problem {
         let named = factors.into_iter().take(NAMED);
         let describe = |factor| InactiveFactor {
             factor,
-            name: self.model.factors[factor].name,
+            name: self.model.factors[factor].label(),
             keys: self.model.keys(factor),
         };
         named.map(describe).collect()

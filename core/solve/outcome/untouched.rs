@@ -1,6 +1,7 @@
 //! What takes no part in a solve: factors that are not defined, and variables that no other factor touches.
 use manifactor_graph::Key;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::fmt;
 
 /// A factor that is not defined at the final values.
@@ -8,8 +9,8 @@ use std::fmt;
 pub struct InactiveFactor {
     /// Its place in the graph, from 0.
     pub factor: usize,
-    /// Its type.
-    pub name: &'static str,
+    /// Its name, or else that of its type.
+    pub name: Cow<'static, str>,
     /// Its variables.
     pub keys: Vec<Key>,
 }

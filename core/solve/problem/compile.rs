@@ -222,7 +222,9 @@ fn batches(
         });
         let (name, all_rows) =
             (factor.factor.typetag_name(), factor.factor.erased().signature().rows.unwrap_or(0) as u32);
-        let mut place = FactorPlace { variables: ids, name, all_rows, rows: all_rows, batch, index: at };
+        let own_name = factor.name.clone();
+        let mut place =
+            FactorPlace { variables: ids, name, own_name, all_rows, rows: all_rows, batch, index: at };
         place.observe(&factor.noise);
         factors.push(place);
     }

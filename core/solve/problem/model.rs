@@ -3,6 +3,8 @@ use manifactor_graph::batch::{Batch, Evaluation, FactorRows, FactorState};
 use manifactor_graph::column::Columns;
 use manifactor_graph::normal_equations::NormalEquations;
 use manifactor_graph::{Key, Noise, Values, VariableIndices};
+use std::borrow::Cow;
+use std::sync::Arc;
 
 /// A variable in a problem.
 #[derive(Debug, Clone)]
@@ -30,8 +32,9 @@ impl Place {
 #[derive(Debug, Clone)]
 pub(crate) struct FactorPlace {
     pub variables: VariableIndices,
-    /// Its type's name.
+    /// Its type's name; and its own, where it has one.
     pub name: &'static str,
+    pub own_name: Option<Arc<str>>,
     /// Rows of its residual, and those that were observed.
     pub all_rows: u32,
     pub rows: u32,
@@ -41,6 +44,10 @@ pub(crate) struct FactorPlace {
 }
 
 impl FactorPlace {
+    /// What reports call it.
+    pub(crate) fn label(&self) -> Cow<'static, str> {
+        self.own_name.as_ref().map_or(Cow::Borrowed(self.name), |name| Cow::Owned((**name).to_owned()))
+    }
     /// Counts the rows that such noise says were observed.
     pub(crate) fn observe(&mut self, noise: &Noise) {
         self.rows = noise.observed().map_or(self.all_rows, |all| all.iter().filter(|o| **o).count() as u32);

@@ -125,7 +125,11 @@ fn a_variable_without_a_factor_that_takes_part_is_named() {
         };
         assert_eq!(untouched.keys, ["loose".into(), "behind".into()], "{name}");
         let inactive = &outcome.inactive_factors;
-        assert_eq!((inactive[0].factor, inactive[0].name, inactive.len()), (1, "toy_logarithm", 1), "{name}");
+        assert_eq!(
+            (inactive[0].factor, &*inactive[0].name, inactive.len()),
+            (1, "toy_logarithm", 1),
+            "{name}"
+        );
         // the rest is solved, and what nothing touches stays where it is
         let at = |key| values.get::<Plane>(key).unwrap();
         assert!((at("p").x - 2.0).abs() + (at("p").y - 3.0).abs() < 1e-6, "{name}");

@@ -63,7 +63,7 @@ fn factors_of_one_variable_and_odometry_are_trusted() {
     let solution = run(&ladder(12, 3), "");
     assert_eq!(rejected(&solution), [11, 12, 13]);
     let first = &solution.outcome.rejected[0];
-    assert_eq!((first.name, first.keys[0].as_str(), first.keys[1].as_str()), ("toy_apart", "p0", "p3"));
+    assert_eq!((&*first.name, first.keys[0].as_str(), first.keys[1].as_str()), ("toy_apart", "p0", "p3"));
     assert!(first.weight == 0.0 && first.cost > 100.0 && solution.outcome.final_cost < 1e-12);
 }
 

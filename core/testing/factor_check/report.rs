@@ -9,6 +9,8 @@ use manifactor_graph::Linearization;
 use manifactor_graph::invariance::invariances;
 use serde::Serialize;
 use serde_json::Value;
+use std::cmp::Ordering;
+use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
 
 /// What a check found.
@@ -32,7 +34,7 @@ pub struct FactorReport {
     pub rank: usize,
     /// Directions that the residual does not see, to first order.
     pub free: Vec<FreeDirections>,
-    /// Where the residual has no derivative, the largest for each entry.
+    /// Where the residual has no derivative, jumps first.
     pub kinks: Vec<NamedKink>,
     /// What its author says leaves it unchanged, and did.
     pub unchanged: Vec<Unchanged>,
@@ -66,14 +68,14 @@ pub struct FreeDirections {
     pub among: Vec<String>,
 }
 
-/// A kink or a jump.
+/// A kink or a jump: entries of the Jacobian that have no derivative at the same points.
 #[derive(Debug, Clone, Serialize)]
 pub struct NamedKink {
-    /// Variable and direction: `q0.rx`.
-    pub direction: String,
-    /// The row, from 0.
-    pub row: usize,
-    /// The derivative from below.
+    /// Variables and directions: `q0.rx`.
+    pub directions: Vec<String>,
+    /// The rows, from 0.
+    pub rows: Vec<usize>,
+    /// Of the entry where it is largest: the derivative from below.
     pub before: f64,
     /// The derivative from above.
     pub after: f64,
@@ -81,7 +83,7 @@ pub struct NamedKink {
     pub jump: f64,
     /// At how many points it was met.
     pub points: usize,
-    /// One of them, as a literal graph.
+    /// The one where it is largest, as a literal graph.
     pub at: Value,
 }
 
@@ -110,6 +112,33 @@ impl FactorReport {
     }
 }
 
+/// Kinks, or jumps, that were met at points which have an entry in common.
+pub(super) struct Met {
+    /// Variable, direction and row.
+    entries: BTreeSet<(usize, usize, usize)>,
+    largest: Kink,
+    points: usize,
+    at: Value,
+}
+
+impl Met {
+    fn size(kink: &Kink) -> (f64, f64) {
+        (kink.jump, kink.size())
+    }
+    fn is_jump(&self) -> bool {
+        self.largest.jump != 0.0
+    }
+    fn named(&self, subject: &Subject) -> NamedKink {
+        let mut directions: Vec<String> =
+            self.entries.iter().map(|(v, c, _)| subject.direction(*v, *c)).collect();
+        directions.dedup();
+        let rows: BTreeSet<usize> = self.entries.iter().map(|(.., row)| *row).collect();
+        let Kink { before, after, jump, .. } = self.largest;
+        let (rows, at) = (rows.into_iter().collect(), self.at.clone());
+        NamedKink { directions, rows, before, after, jump, points: self.points, at }
+    }
+}
+
 /// What a check has found so far.
 pub(super) struct Gathered {
     pub seed: u64,
@@ -117,7 +146,7 @@ pub(super) struct Gathered {
     pub defined: usize,
     pub singular: usize,
     pub worst: Option<NamedEntry>,
-    pub kinks: Vec<NamedKink>,
+    pub kinks: Vec<Met>,
     pub unchanged: Vec<Unchanged>,
     pub linearizations: Vec<Linearization>,
     pub freedom: Option<Freedom>,
@@ -150,23 +179,26 @@ impl Gathered {
         }
     }
 
-    /// Keeps a kink, if it is the largest of its entry.
-    pub(super) fn kink(&mut self, subject: &Subject, kink: &Kink, drawn: &Drawn) {
-        let &Kink { variable, column, row, before, after, jump } = kink;
-        let direction = subject.direction(variable, column);
-        let size = |before: f64, after: f64, jump: f64| (jump, (after - before).abs());
-        match self.kinks.iter_mut().find(|k| k.direction == direction && k.row == row) {
-            None => {
-                let at = subject.graph(&drawn.variables);
-                self.kinks.push(NamedKink { direction, row, before, after, jump, points: 1, at });
-            }
-            Some(known) => {
-                known.points += 1;
-                if size(before, after, jump) > size(known.before, known.after, known.jump) {
-                    (known.before, known.after, known.jump) = (before, after, jump);
-                    known.at = subject.graph(&drawn.variables);
+    /// Keeps the kinks and jumps of one point. What has an entry in common with some that were met before is the same.
+    pub(super) fn kinks(&mut self, subject: &Subject, kinks: &[Kink], drawn: &Drawn) {
+        let (jumps, kinks): (Vec<&Kink>, Vec<&Kink>) = kinks.iter().partition(|kink| kink.jump != 0.0);
+        for kinks in [jumps, kinks] {
+            let by_size =
+                |a: &&&Kink, b: &&&Kink| Met::size(a).partial_cmp(&Met::size(b)).unwrap_or(Ordering::Equal);
+            let Some(&&largest) = kinks.iter().max_by(by_size) else { continue };
+            let entries = kinks.iter().map(|kink| (kink.variable, kink.column, kink.row)).collect();
+            let mut met = Met { entries, largest, points: 1, at: subject.graph(&drawn.variables) };
+            let is_same = |other: &mut Met| {
+                other.is_jump() == met.is_jump() && !other.entries.is_disjoint(&met.entries)
+            };
+            for other in self.kinks.extract_if(.., is_same).collect::<Vec<_>>() {
+                met.entries.extend(other.entries);
+                met.points += other.points;
+                if Met::size(&other.largest) >= Met::size(&met.largest) {
+                    (met.largest, met.at) = (other.largest, other.at);
                 }
             }
+            self.kinks.push(met);
         }
     }
 
@@ -196,6 +228,9 @@ impl Gathered {
             .free
             .iter()
             .map(|f| FreeDirections { count: f.count, among: f.among.iter().map(named).collect() });
+        let (mut kinks, others): (Vec<_>, Vec<_>) =
+            self.kinks.iter().map(|met| met.named(subject)).partition(|kink| kink.jump != 0.0);
+        kinks.extend(others);
         FactorReport {
             factor: serde_json::to_value(&*subject.factor).unwrap_or_default(),
             seed: self.seed,
@@ -206,7 +241,7 @@ impl Gathered {
             directions: freedom.directions,
             rank: freedom.rank,
             free: free.collect(),
-            kinks: self.kinks,
+            kinks,
             unchanged: self.unchanged,
             broken: None,
         }
@@ -242,23 +277,22 @@ impl Display for FactorReport {
         let free: usize = self.free.iter().map(|f| f.count).sum();
         match self.rank {
             0 => writeln!(f, "Free: not known, as every point was singular or at a kink")?,
-            _ => writeln!(
-                f,
-                "Free: {free} of {} directions{}",
-                self.directions,
-                list(&self.free, self.directions)
-            )?,
+            _ => writeln!(f, "Free: {free} of {} directions{}", self.directions, list(&self.free))?,
         }
         for Unchanged { motion, points } in &self.unchanged {
             writeln!(f, "Unchanged by {motion}: at {}", points_in_words(*points))?;
         }
         for kink in &self.kinks {
-            let NamedKink { direction, row, before, after, jump, points, .. } = kink;
-            let what = match *jump {
-                0.0 => format!("the derivative goes from {before:.3} to {after:.3}"),
-                jump => format!("the residual jumps by {jump:.3}"),
-            };
-            writeln!(f, "Kink: row {row} by {direction}: {what} (at {})", points_in_words(*points))?;
+            let NamedKink { directions, rows, before, after, jump, points, .. } = kink;
+            let (row, rows) = (if rows.len() == 1 { "row" } else { "rows" }, and(rows));
+            let (directions, points) = (by_variable(directions), points_in_words(*points));
+            match *jump {
+                0.0 => writeln!(
+                    f,
+                    "Kink: {row} {rows} by {directions}: the derivative goes from {before:.3} to {after:.3} (at {points})"
+                )?,
+                jump => writeln!(f, "Jump: {row} {rows} by {directions}: by {jump:.3} (at {points})")?,
+            }
         }
         Ok(())
     }
@@ -274,20 +308,44 @@ fn digits(x: f64) -> String {
     rounded.to_string()
 }
 
-/// `: q0.x, q0.y, 2 combinations of (q0.rx, q0.ry, q0.rz)`.
-fn list(free: &[FreeDirections], directions: usize) -> String {
-    let part = |f: &FreeDirections| match f.count == f.among.len() {
-        true => f.among.join(", "),
-        false => {
-            let noun = if f.count == 1 { "combination" } else { "combinations" };
-            match f.among.len() == directions {
-                true => format!("{} {noun} of all", f.count),
-                false => format!("{} {noun} of ({})", f.count, f.among.join(", ")),
-            }
+/// `0, 1 and 2`.
+fn and(numbers: &[usize]) -> String {
+    let words: Vec<String> = numbers.iter().map(ToString::to_string).collect();
+    match words.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, first)) => format!("{} and {last}", first.join(", ")),
+        None => String::new(),
+    }
+}
+
+/// `x0.rx, x0.ry, l0.x`, each variable's directions together: `x0.(rx, ry), l0.x`.
+fn by_variable(directions: &[String]) -> String {
+    let parts = directions.iter().map(|direction| direction.rsplit_once('.').unwrap_or(("", direction)));
+    let mut groups: Vec<(&str, Vec<&str>)> = vec![];
+    for (key, name) in parts {
+        match groups.last_mut().filter(|(last, _)| *last == key) {
+            Some((_, names)) => names.push(name),
+            None => groups.push((key, vec![name])),
         }
+    }
+    let group = |(key, names): &(&str, Vec<&str>)| match names.as_slice() {
+        [name] => format!("{key}.{name}"),
+        names => format!("{key}.({})", names.join(", ")),
     };
-    let parts: Vec<_> = free.iter().map(part).collect();
-    if parts.is_empty() { String::new() } else { format!(": {}", parts.join(", ")) }
+    groups.iter().map(group).collect::<Vec<_>>().join(", ")
+}
+
+/// `: q0.(x, y), 2 combinations of q0.(rx, ry, rz)`.
+fn list(free: &[FreeDirections]) -> String {
+    let (alone, mixed): (Vec<_>, Vec<_>) = free.iter().partition(|f| f.count == f.among.len());
+    let alone: Vec<String> = alone.iter().flat_map(|f| f.among.iter().cloned()).collect();
+    let part = |f: &&FreeDirections| {
+        let noun = if f.count == 1 { "combination" } else { "combinations" };
+        format!("{} {noun} of {}", f.count, by_variable(&f.among))
+    };
+    let alone = (!alone.is_empty()).then(|| by_variable(&alone));
+    let parts: Vec<_> = alone.into_iter().chain(mixed.iter().map(part)).collect();
+    if parts.is_empty() { String::new() } else { format!(": {}", parts.join("; ")) }
 }
 
 /// A literal graph in TOML, to paste into a file.

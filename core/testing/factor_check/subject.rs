@@ -53,6 +53,13 @@ impl Subject {
         format!("{key}.{}", tangent.get(column).copied().unwrap_or("?"))
     }
 
+    /// A direction by its number, of all variables, over and over: variable and column. `None` where there is none.
+    pub(super) fn column(&self, number: usize) -> Option<(usize, usize)> {
+        let columns = |v: usize| (0..self.around[v].erased().dim()).map(move |c| (v, c));
+        let all: Vec<_> = (0..self.around.len()).flat_map(columns).collect();
+        all.get(number % all.len().max(1)).copied()
+    }
+
     /// The names of all directions of all variables.
     pub(super) fn directions(&self) -> Vec<String> {
         let columns = |v: usize| self.around[v].erased().dim();

@@ -5,15 +5,26 @@ use crate::input::graph_file::{self, GraphFile, Reading};
 use crate::input::run_file::RunArguments;
 use crate::input::solver::SolverArguments;
 use crate::output;
-use crate::output::text::count;
+use crate::output::report;
+use crate::output::text::{count, list};
 use crate::status::Status;
 use clap::Args;
 use manifactor::config::{Document, Value};
+use manifactor::graph::{Graph, Key, Values};
+use manifactor::quadric::DualQuadric;
+use manifactor::slam::experiment::Experiment;
 use manifactor::slam::mapping::Mapping;
 use manifactor::slam::run::Run as Running;
+use manifactor::solve::Problem;
 use serde_json::json;
 
-/// Check a run or a graph without solving it: everything that is wrong, each at its line.
+/// Half the length of an object, in metres, from which on it is more likely to be in millimetres.
+const LARGE: f64 = 30.0;
+
+/// Check a run, an experiment or a graph without solving it: everything that is wrong, each at its line.
+///
+/// Of a graph, and with --load of a run, its values are looked at too: factors that are not defined or not finite there,
+/// variables that nothing touches, directions that nothing or next to nothing constrains, signs of other units.
 #[derive(Debug, Args)]
 pub(crate) struct Check {
     #[command(flatten)]
@@ -28,36 +39,65 @@ pub(crate) struct Check {
     pub(crate) json: bool,
 }
 
+/// What there is, and what stands out.
+#[derive(Default)]
+struct Found {
+    lines: Vec<String>,
+    warnings: Vec<String>,
+    /// Whether a factor is not finite where a solve is to begin.
+    is_broken: bool,
+}
+
 impl Check {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         let path = &self.run.config;
         let solver = SolverArguments::set_only(&self.run.set);
         let found = match Content::open(path)? {
-            Content::Graph(text, format) => graph(&self.reading.plain(path, &text, format, &solver)?),
+            Content::Graph(text, format) => graph(&self.reading.plain(path, &text, format, &solver)?)?,
             Content::Document(document) if is_graph(&document) => {
-                graph(&graph_file::literal(document, &solver)?)
+                graph(&graph_file::literal(document, &solver)?)?
             }
+            Content::Document(document) if is_experiment(&document) => self.experiment(document)?,
             Content::Document(document) => self.document(document)?,
         };
+        let Found { lines, warnings, is_broken } = &found;
+        let lines = lines.join("\n");
         if self.json {
-            output::json(&json!({ "errors": [], "found": found }));
+            output::json(&json!({ "errors": [], "warnings": warnings, "found": lines }));
         } else {
-            output::print(&format!("{}: nothing wrong.\n{found}\n", path.display()));
+            warnings.iter().for_each(|warning| output::say(&format!("warning: {warning}")));
+            let verdict = match warnings.len() {
+                0 => "nothing wrong".to_owned(),
+                n => format!("nothing wrong with the document; {}", count(n, "warning")),
+            };
+            output::print(&format!("{}: {verdict}.\n{lines}\n", path.display()));
         }
-        Ok(Status::Done)
+        Ok(if *is_broken { Status::Broken } else { Status::Done })
     }
 
-    fn document(&self, document: Document) -> Result<String, Failure> {
+    /// The settings of every trial are read; --load has no meaning here.
+    fn experiment(&self, mut document: Document) -> Result<Found, Failure> {
+        document.set(&self.run.set)?;
+        let sweep = Experiment::read(&document)?;
+        let (trials, columns) = (count(sweep.trials.len(), "trial"), sweep.columns.join(", "));
+        Ok(Found { lines: vec![format!("An experiment of {trials}, by {columns}.")], ..Found::default() })
+    }
+
+    fn document(&self, document: Document) -> Result<Found, Failure> {
         let document = self.run.read(document)?;
-        let mut lines = vec![format!("A run of {}.", count(document.variants.len(), "variant"))];
+        let mut found = Found::default();
+        found.lines.push(format!("A run of {}.", count(document.variants.len(), "variant")));
         let mut run = Running::new(&document, self.run.data());
         for variant in document.variants.iter().filter(|_| self.load) {
             let sequence = run.sequence(variant)?;
             let mapping = Mapping::new(&sequence, &variant.settings).map_err(Failure::input)?;
-            for warning in &mapping.warnings {
-                output::say(&format!("warning: {}: {warning}", variant.name));
-            }
-            lines.push(format!(
+            let mut of_this = Found::default();
+            of_this.warnings.extend(mapping.warnings.iter().map(ToString::to_string));
+            of_this.look(&mapping.graph, &mapping.values)?;
+            found.is_broken |= of_this.is_broken;
+            let named = of_this.warnings.iter().map(|warning| format!("{}: {warning}", variant.name));
+            found.warnings.extend(named);
+            found.lines.push(format!(
                 "{}: {}, {}, {}, {} of which {} mapped, {}",
                 variant.name,
                 count(sequence.frames.len(), "frame"),
@@ -68,19 +108,60 @@ impl Check {
                 count(mapping.graph.factors().len(), "factor"),
             ));
         }
-        Ok(lines.join("\n"))
+        Ok(found)
+    }
+}
+
+impl Found {
+    /// Looks at a graph where a solve of it would begin.
+    fn look(&mut self, graph: &Graph, values: &Values) -> Result<(), Failure> {
+        let huge = |(key, value): (&Key, &dyn manifactor::graph::Variable)| {
+            let quadric = value.erased().as_any().downcast_ref::<DualQuadric>()?;
+            (quadric.semi_axes.max() > LARGE).then(|| key.to_string())
+        };
+        let huge: Vec<String> = values.iter().filter_map(huge).collect();
+        if !huge.is_empty() {
+            let keys = list(huge.iter());
+            self.warnings.push(format!(
+                "longer than {} m: {keys}; semi-axes are metres here; are these millimetres?",
+                2.0 * LARGE
+            ));
+        }
+        if graph.factors().is_empty() || values.is_empty() {
+            return Ok(());
+        }
+        let mut problem = Problem::compile(graph, values).map_err(Failure::input)?;
+        let at_start = problem.at_start();
+        self.is_broken |= at_start.not_finite.is_some();
+        self.warnings.extend(report::at_start(&at_start, graph.factors().len()));
+        if at_start.not_finite.is_none() {
+            self.lines.push(format!("cost {:.6} at these values", at_start.cost));
+        }
+        Ok(())
     }
 }
 
 /// What a graph has, with what the reader had to decide on stderr.
-fn graph(input: &GraphFile) -> String {
+fn graph(input: &GraphFile) -> Result<Found, Failure> {
     for note in &input.notes {
         output::note(note);
     }
-    graph_file::summary(input).trim_end().to_owned()
+    let mut found = Found::default();
+    found.lines.push(graph_file::summary(input).trim_end().to_owned());
+    found.look(&input.graph, &input.values)?;
+    Ok(found)
 }
 
 /// Whether a document is a literal graph. A run may have variables of its own, and has a source.
 fn is_graph(document: &Document) -> bool {
-    matches!(&document.root().value, Value::Table(t) if t.contains_key("variables") && !t.contains_key("source"))
+    has(document, "variables") && !has(document, "source")
+}
+
+/// Whether it is an experiment: a run has no axes.
+fn is_experiment(document: &Document) -> bool {
+    has(document, "axes") && !has(document, "source")
+}
+
+fn has(document: &Document, field: &str) -> bool {
+    matches!(&document.root().value, Value::Table(table) if table.contains_key(field))
 }

@@ -22,9 +22,9 @@ pub(super) fn write(inspection: &Inspection) -> String {
         let last = row.after.as_ref().unwrap_or(&row.before);
         let label = match &row.after {
             Some(after) => {
-                format!("{} {}\n{:.3} -> {:.3}", row.number, row.of_type, row.before.cost, after.cost)
+                format!("{} {}\n{:.3} -> {:.3}", row.number, row.label(), row.before.cost, after.cost)
             }
-            None => format!("{} {}\n{:.3}", row.number, row.of_type, row.before.cost),
+            None => format!("{} {}\n{:.3}", row.number, row.label(), row.before.cost),
         };
         let name = format!("factor {}", row.number);
         let _ = writeln!(out, "  {} [label = {}, shape = box];", quoted(&name), quoted(&label));

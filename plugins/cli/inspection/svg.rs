@@ -65,7 +65,7 @@ pub(super) fn write(inspection: &Inspection) -> String {
 fn title(inspection: &Inspection, factor: usize) -> String {
     let row = &inspection.factors[factor];
     let after = row.after.as_ref().map(|s| format!(" -> {:.4}", s.cost)).unwrap_or_default();
-    format!("{} {} ({}): {:.4}{after}", row.number, row.of_type, row.keys.join(", "), row.before.cost)
+    format!("{} {} ({}): {:.4}{after}", row.number, row.label(), row.keys.join(", "), row.before.cost)
 }
 
 /// Where variables are that have a position; the others beside those that they share a factor with.

@@ -1,6 +1,6 @@
 //! What a solve has to tell, for people.
 use crate::output::text::{self, Table, count, list, seconds};
-use manifactor::solve::{Diagnosis, FactorCost, Marginal, Outcome};
+use manifactor::solve::{AtStart, Diagnosis, FactorCost, InactiveFactor, Marginal, Outcome, Weak};
 
 /// A few lines: how it ended, what it cost, where the time went.
 pub(crate) fn outcome(outcome: &Outcome) -> String {
@@ -13,14 +13,8 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
         count(outcome.iterations, "iteration")
     );
     if outcome.inactive > 0 {
-        let (inactive, all) = (outcome.inactive, count(outcome.factors, "factor"));
-        let named = outcome.inactive_factors.iter();
-        let named: Vec<_> =
-            named.map(|f| format!("{} {} ({})", f.factor, f.name, text::keys(&f.keys))).collect();
-        let more = if inactive > named.len() { ", …" } else { "" };
-        let named = named.join(", ");
-        out +=
-            &format!("{inactive} of {all} are not defined at these values and take no part: {named}{more}\n");
+        out += &inactive(outcome.inactive, outcome.factors, &outcome.inactive_factors);
+        out += "\n";
     }
     if let Some(moving) = &outcome.moving {
         out += &format!("{moving}\n");
@@ -44,6 +38,39 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
         seconds(times.diagnose + times.other)
     );
     out
+}
+
+/// Factors that are not defined, the first of them by name.
+fn inactive(inactive: usize, factors: usize, first: &[InactiveFactor]) -> String {
+    let named: Vec<_> = first.iter().map(factor).collect();
+    let more = if inactive > named.len() { ", …" } else { "" };
+    let (all, named) = (count(factors, "factor"), named.join(", "));
+    format!("{inactive} of {all} are not defined at these values and take no part: {named}{more}")
+}
+
+/// `3 between_se2 (x0, x1)`: its place, its type and its variables.
+fn factor(factor: &InactiveFactor) -> String {
+    format!("{} {} ({})", factor.factor, factor.name, text::keys(&factor.keys))
+}
+
+/// What stands out at the values that a solve is to begin with, a line each.
+pub(crate) fn at_start(found: &AtStart, factors: usize) -> Vec<String> {
+    let mut lines = vec![];
+    if let Some(bad) = &found.not_finite {
+        lines.push(format!("factor {} is not finite at these values: begin elsewhere", factor(bad)));
+    }
+    if found.inactive > 0 {
+        lines.push(inactive(found.inactive, factors, &found.inactive_factors));
+    }
+    lines.extend(found.untouched.iter().map(ToString::to_string));
+    lines.extend(found.undetermined.iter().map(|open| format!("at these values, {open}")));
+    if let Some(Weak { condition, direction }) = &found.weak {
+        lines.push(format!(
+            "at these values, next to {direction}: the condition number is {condition:.0e}, so about {:.0} of 16 digits are lost",
+            condition.log10()
+        ));
+    }
+    lines
 }
 
 /// The factors that cost the most, and the condition of the linear system.

@@ -60,7 +60,7 @@ fn diagnosis(variant: &VariantReport) -> String {
         line += &format!(", {} rejected as outliers", text::count(variant.solve.rejected.len(), "factor"));
     }
     if let Some(worst) = diagnosis.worst.first() {
-        let (name, keys) = (worst.name, text::keys(&worst.keys));
+        let (name, keys) = (&worst.name, text::keys(&worst.keys));
         line += &format!(", costs the most: factor {} {name} ({keys}) with {:.3}", worst.factor, worst.cost);
     }
     text::wrap(&line) + "\n"

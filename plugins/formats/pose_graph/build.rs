@@ -4,6 +4,7 @@ use super::information::{Outcome, noise};
 use super::record::{Edge, Measurement, Record, Vertex, VertexType};
 use super::{Options, PoseGraph, Report};
 use crate::error::{Mistake, Problems};
+use crate::text::plausible;
 use manifactor_geometry::{Between, Coordinates, Landmark, Point3, Se2, Se3, spanning_tree};
 use manifactor_graph::{Factor, FactorEntry, Graph, Key, Noise, ValueError, Values};
 use nalgebra::DMatrix;
@@ -222,12 +223,24 @@ impl<'a> Builder<'a> {
 
     fn finish(mut self) -> Result<PoseGraph, ValueError> {
         self.fill()?;
+        let steps = self.graph.factors().iter().filter(|entry| are_consecutive(&entry.keys));
+        let steps = steps.filter_map(|entry| entry.factor.erased().as_any().downcast_ref::<Between<Se3>>());
+        self.report.doubts = plausible::relative_poses(steps.map(|step| &step.relative));
         if self.options.anchor {
             let is_pose = |key: &Key| key.as_str().starts_with('x');
             self.report.anchored = anchors(&self.graph, &self.values, is_pose);
             self.report.anchored.iter().for_each(|key| self.graph.fix(key));
         }
         Ok(PoseGraph { graph: self.graph, values: self.values, report: self.report })
+    }
+}
+
+/// Whether these are two poses, one right after the other.
+fn are_consecutive(keys: &[Key]) -> bool {
+    let number = |key: &Key| key.as_str().strip_prefix('x').and_then(|number| number.parse::<u64>().ok());
+    match keys {
+        [a, b] => number(a).zip(number(b)).is_some_and(|(a, b)| b.checked_sub(a) == Some(1)),
+        _ => false,
     }
 }
 
@@ -238,5 +251,5 @@ fn entry(keys: [Key; 2], measurement: Measurement) -> Result<FactorEntry, Mistak
         Measurement::Point2(p) => Arc::new(Landmark { position: Coordinates::new(p.0)? }),
         Measurement::Point3 { position: p, .. } => Arc::new(Landmark { position: Coordinates::new(p.0)? }),
     };
-    Ok(FactorEntry { keys: keys.into(), factor, noise: Noise::unit(), loss: None })
+    Ok(FactorEntry { keys: keys.into(), name: None, factor, noise: Noise::unit(), loss: None })
 }

@@ -30,6 +30,7 @@ const MARGIN: f64 = 1e-6;
 impl Residual for Projection {
     type Variables = (Se3, Point3);
     type Dim = U2;
+    const ROWS: &'static [&'static str] = &["u", "v"];
 
     #[inline]
     fn residual<T: Scalar>(&self, (pose, point): Lifted<Self::Variables, T>) -> Vector2<T> {

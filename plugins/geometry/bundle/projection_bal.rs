@@ -25,6 +25,7 @@ pub struct ProjectionBal {
 impl Residual for ProjectionBal {
     type Variables = (BalCamera, Point3);
     type Dim = U2;
+    const ROWS: &'static [&'static str] = &["u", "v"];
 
     #[inline]
     fn residual<T: Scalar>(&self, (camera, point): Lifted<Self::Variables, T>) -> Vector2<T> {

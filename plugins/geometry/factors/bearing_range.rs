@@ -42,6 +42,7 @@ impl BearingRange2 {
 impl Residual for BearingRange2 {
     type Variables = (Se2, Point2);
     type Dim = U2;
+    const ROWS: &'static [&'static str] = &["bearing", "range"];
 
     fn residual<T: Scalar>(&self, (x, p): Lifted<Self::Variables, T>) -> Vector2<T> {
         let seen = x.inverse_act(&p);

@@ -29,6 +29,7 @@ fn description<G: LieGroup>() -> String {
 impl<G: LieGroup> Residual for Between<G> {
     type Variables = (G, G);
     type Dim = G::Dim;
+    const ROWS: &'static [&'static str] = G::TANGENT;
 
     #[inline]
     fn residual<T: Scalar>(&self, (a, b): Lifted<Self::Variables, T>) -> Vector<G::Dim, T> {

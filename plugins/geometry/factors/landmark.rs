@@ -24,6 +24,7 @@ fn description(n: usize) -> String {
 impl Residual for Landmark<2> {
     type Variables = (Se2, Point2);
     type Dim = U2;
+    const ROWS: &'static [&'static str] = &["x", "y"];
 
     fn residual<T: Scalar>(&self, (x, p): Lifted<Self::Variables, T>) -> Vector2<T> {
         x.inverse_act(&p) - self.position.lift::<T>()
@@ -46,6 +47,7 @@ register_factor!("landmark_se2", Landmark<2>);
 impl Residual for Landmark<3> {
     type Variables = (Se3, Point3);
     type Dim = U3;
+    const ROWS: &'static [&'static str] = &["x", "y", "z"];
 
     fn residual<T: Scalar>(&self, (x, p): Lifted<Self::Variables, T>) -> Vector3<T> {
         x.inverse_act(&p) - self.position.lift::<T>()

@@ -32,6 +32,7 @@ fn description(n: usize) -> String {
 impl Residual for Position<2> {
     type Variables = (Se2,);
     type Dim = U2;
+    const ROWS: &'static [&'static str] = &["x", "y"];
 
     fn residual<T: Scalar>(&self, (x,): Lifted<Self::Variables, T>) -> Vector2<T> {
         x.act(&self.lever_arm.lift()) - self.position.lift::<T>()
@@ -53,6 +54,7 @@ register_factor!("position_se2", Position<2>);
 impl Residual for Position<3> {
     type Variables = (Se3,);
     type Dim = U3;
+    const ROWS: &'static [&'static str] = &["x", "y", "z"];
 
     fn residual<T: Scalar>(&self, (x,): Lifted<Self::Variables, T>) -> Vector3<T> {
         x.act(&self.lever_arm.lift()) - self.position.lift::<T>()

@@ -29,6 +29,7 @@ fn description<G: LieGroup>() -> String {
 impl<G: LieGroup> Residual for Prior<G> {
     type Variables = (G,);
     type Dim = G::Dim;
+    const ROWS: &'static [&'static str] = G::TANGENT;
 
     #[inline]
     fn residual<T: Scalar>(&self, (x,): Lifted<Self::Variables, T>) -> Vector<G::Dim, T> {

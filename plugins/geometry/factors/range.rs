@@ -46,6 +46,7 @@ impl<A: Located, B: Located<Space = A::Space>> Range<A, B> {
 impl<A: Located, B: Located<Space = A::Space>> Residual for Range<A, B> {
     type Variables = (A, B);
     type Dim = U1;
+    const ROWS: &'static [&'static str] = &["range"];
 
     fn residual<T: Scalar>(&self, (x, y): Lifted<Self::Variables, T>) -> Vector1<T> {
         Vector1::new(Self::squared_distance(&x, &y).sqrt() - self.range.get())

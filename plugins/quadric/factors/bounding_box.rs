@@ -100,6 +100,7 @@ impl BoundingBoxFactor {
 impl Residual for BoundingBoxFactor {
     type Variables = (Se3, DualQuadric);
     type Dim = U4;
+    const ROWS: &'static [&'static str] = &["left", "top", "right", "bottom"];
 
     #[inline]
     fn residual<T: Scalar>(&self, (camera, quadric): Lifted<Self::Variables, T>) -> Vector4<T> {

@@ -26,6 +26,7 @@ pub struct QuadricPrior {
 impl Residual for QuadricPrior {
     type Variables = (DualQuadric,);
     type Dim = U9;
+    const ROWS: &'static [&'static str] = DualQuadric::TANGENT;
 
     fn residual<T: Scalar>(&self, (quadric,): Lifted<Self::Variables, T>) -> SVector<T, 9> {
         let xi = self.value.pose.lift::<T>().between(&quadric.pose).log();

@@ -9,6 +9,7 @@ use manifactor_graph::{Jet, JetOf, Lift, Manifold, Scalar, register_manifold};
 use nalgebra::{Matrix4, SVector, U9, Vector3, Vector6};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// An object as an ellipsoid: Q* = Z diag(a², b², c², -1) Zᵀ with the pose Z.
 ///
@@ -120,6 +121,15 @@ impl Quantity for DualQuadric {
     fn write<T: Scalar>(x: &DualQuadric<T>, to: &mut [T]) {
         Se3::write(&x.pose, &mut to[..7]);
         Vector3::<f64>::write(&x.semi_axes, &mut to[7..]);
+    }
+}
+
+/// `(1.000, 0.000, 0.500) m, 90.000° about (0.000, 0.000, 1.000), semi-axes (0.100, 0.200, 0.300) m`.
+impl fmt::Display for DualQuadric {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ([a, b, c], decimals): ([f64; 3], usize) = (self.semi_axes.into(), f.precision().unwrap_or(3));
+        self.pose.fmt(f)?;
+        write!(f, ", semi-axes ({a:.decimals$}, {b:.decimals$}, {c:.decimals$}) m")
     }
 }
 

@@ -14,7 +14,7 @@ fn every_entry_is_documented_and_keeps_its_laws() {
         documentation_law(entry).unwrap();
         match entry.kind {
             "factor" => assert!(factor_law(entry, 256).unwrap().defined >= 48, "{}", entry.name),
-            "variable" => manifold_law(entry, 256).unwrap(),
+            "variable" => drop(manifold_law(entry, 256).unwrap()),
             _ => {}
         }
     }

@@ -15,6 +15,11 @@ pub enum Warning {
         /// The classes that objects have.
         seen: Vec<String>,
     },
+    /// A sign of other units, or of another order of numbers.
+    Implausible {
+        /// Which.
+        what: String,
+    },
     /// A map without objects.
     NoObjects {
         /// Objects that were detected.
@@ -75,6 +80,7 @@ impl fmt::Display for Warning {
             ),
             Self::NotConverged { termination } => f.write_str(termination),
             Self::Undetermined { what } => f.write_str(what),
+            Self::Implausible { what } => write!(f, "odometry: {what}"),
             Self::WorseThanOdometry { alignment, odometry, estimate } => write!(
                 f,
                 "the trajectory is worse than the odometry that came in: ATE ({alignment}) {odometry:.5} m before, \

@@ -213,7 +213,7 @@ impl<'a> Graduation<'a> {
         let beyond = |i: &usize| self.excess(*i).is_some_and(|u| u > 1.0);
         let one = |factor: usize| Rejected {
             factor,
-            name: self.problem.model.factors[factor].name,
+            name: self.problem.model.factors[factor].label(),
             keys: self.problem.model.keys(factor),
             weight: self.weights[factor],
             cost: self.costs[factor],

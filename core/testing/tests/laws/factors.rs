@@ -101,11 +101,23 @@ fn what_is_free_and_what_jumps_is_named_by_variable_and_direction() {
 }
 
 #[test]
+fn a_jump_is_found_where_no_point_was_drawn() {
+    let report = factor_law(find("factor", "step").unwrap(), 64).unwrap();
+    let [jump] = report.kinks.as_slice() else { panic!("{report}") };
+    assert!(
+        (jump.jump - 0.25).abs() < 1e-6 && jump.rows == [0] && jump.directions == ["spot_0.x"],
+        "{report}"
+    );
+    let x = jump.at.pointer("/variables/0/value/x").and_then(serde_json::Value::as_f64);
+    assert!((x.unwrap() - 2.0).abs() < 1e-6, "{}", jump.at);
+}
+
+#[test]
 fn the_catalogue_is_enough_to_check_a_type() {
     let factor = |name| find("factor", name).unwrap();
     assert_eq!(factor_law(factor("area"), 32).unwrap().defined, 32);
     assert_eq!(factor_law(factor("spread"), 32).unwrap().defined, 32);
-    manifold_law(find("variable", "spot").unwrap(), 32).unwrap();
+    assert!(manifold_law(find("variable", "spot").unwrap(), 32).unwrap().seed_error < Some(1e-9));
     documentation_law(factor("area")).unwrap();
     // the flawed ones share a doc comment, whose example names another
     let error = documentation_law(factor("area_of_wrong_sign")).unwrap_err().to_string();

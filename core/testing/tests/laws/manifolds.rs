@@ -9,6 +9,7 @@ fn spot<const F: u8>() -> impl Strategy<Value = Spot<F>> {
 }
 
 manifold_laws! { a_sound_manifold_keeps_the_laws: (spot::<SOUND>(), spot::<SOUND>(), vector::<2>(3.0)) }
+manifold_laws! { spot }
 
 fn broken<const F: u8>() -> String
 where
@@ -29,6 +30,7 @@ fn each_flaw_breaks_its_law() {
     assert_eq!(broken::<UNEVEN_NAMES>(), "each tangent direction has a name of its own");
     assert_eq!(broken::<ROUNDED_DOCUMENT>(), "a document reads back as the same document");
     assert_eq!(broken::<INFINITE>(), "x.retract(x.local(y)) is y");
+    assert_eq!(broken::<DOUBLED_SEED>(), "the derivative of x.seed() is that of x.retract(delta)");
 }
 
 #[test]
@@ -37,4 +39,10 @@ fn points_and_tangents_of_other_manifolds_are_refused() {
     assert!(manifold_laws(&x, &y, &[0.0, 0.0]).is_err());
     assert!(manifold_laws(&x, &x, &[0.0]).is_err());
     assert!(manifold_laws(&x, &x, &[0.0, 0.0]).is_ok());
+}
+
+#[test]
+#[should_panic(expected = "no manifold `blot` is registered")]
+fn a_name_that_none_has_is_told() {
+    manifactor_testing::catalogue::assert_manifold_laws("blot");
 }

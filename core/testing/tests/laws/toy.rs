@@ -1,6 +1,7 @@
 //! Variables and factors that are right, and the same with one flaw each.
 use manifactor_graph::{
-    Jacobians, Jet, JetOf, Lifted, Manifold, Many, Refs, Residual, Scalar, register_factor, register_manifold,
+    Jacobians, Jet, JetOf, Lifted, Manifold, Many, Refs, Residual, Scalar, register_factor,
+    register_manifold, register_quantity,
 };
 use nalgebra::{Matrix2, U1, U2, Vector1, Vector2};
 use schemars::JsonSchema;
@@ -79,6 +80,8 @@ register_manifold!("spot_with_uneven_names", Spot<UNEVEN_NAMES>);
 register_manifold!("spot_with_rounded_document", Spot<ROUNDED_DOCUMENT>);
 register_manifold!("spot_with_doubled_seed", Spot<DOUBLED_SEED>);
 register_manifold!("infinite_spot", Spot<INFINITE>);
+register_quantity!(Spot<SOUND> as Vector2<f64>);
+register_quantity!(Spot<DOUBLED_SEED> as Vector2<f64>);
 
 /// Twice the area of a triangle with the origin, and the first spot's distance from an axis; with the
 /// flaw `F`, on spots with the flaw `S`.
@@ -146,3 +149,23 @@ impl Residual for Spread {
     }
 }
 register_factor!("spread", Spread);
+
+/// A residual that is another beyond x = 2.
+///
+/// ```toml
+/// factor = { type = "step" }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Step {}
+
+impl Residual for Step {
+    type Variables = (Spot,);
+    type Dim = U2;
+
+    fn residual<T: Scalar>(&self, (spot,): Lifted<Self::Variables, T>) -> Vector2<T> {
+        let above = if spot.x.re() > 2.0 { 0.25 } else { 0.0 };
+        Vector2::new(spot.x + above, spot.y)
+    }
+}
+register_factor!("step", Step);

@@ -2,7 +2,10 @@
 use super::SourceError;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{self, IntoDeserializer, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt;
 use std::path::Path;
 
 /// The cameras of TUM RGB-D, 640 × 480; distortion is ignored, as in the paper.
@@ -13,7 +16,7 @@ const PRESETS: [(&str, [f64; 4]); 3] = [
 ];
 
 /// A camera by its numbers or by its name.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum CameraChoice {
     /// `freiburg1`, `freiburg2` or `freiburg3`: those of TUM RGB-D.
@@ -32,6 +35,26 @@ pub enum CameraName {
     Freiburg2,
     /// fx 535.4, fy 539.2, cx 320.1, cy 247.6
     Freiburg3,
+}
+
+// serde's own for untagged forms would only say that none fits, and not what is wrong with a table's field
+impl<'de> Deserialize<'de> for CameraChoice {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = CameraChoice;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a camera, or a table of its fx, fy, cx, cy, width and height")
+            }
+            fn visit_str<E: de::Error>(self, name: &str) -> Result<CameraChoice, E> {
+                CameraName::deserialize(name.into_deserializer()).map(CameraChoice::Named)
+            }
+            fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<CameraChoice, A::Error> {
+                Camera::deserialize(MapAccessDeserializer::new(table)).map(CameraChoice::Camera)
+            }
+        }
+        from.deserialize_any(Either)
+    }
 }
 
 impl CameraChoice {

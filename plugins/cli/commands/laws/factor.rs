@@ -1,12 +1,12 @@
 //! `manifactor check-factor`: whether a factor keeps the laws, before a solver meets it.
+use super::linked;
 use crate::failure::Failure;
 use crate::input::choice::named;
 use crate::output;
 use crate::status::Status;
 use clap::Args;
-use manifactor::config::{Document, Errors, Format, nearest, read_graph};
+use manifactor::config::{Document, Errors, Format, read_graph};
 use manifactor::graph::Factor;
-use manifactor::graph::catalogue::{Entry, entries, find};
 use manifactor::testing::{FactorCheck, Subject};
 use serde_json::json;
 use std::path::PathBuf;
@@ -59,7 +59,7 @@ impl CheckFactor {
 
     /// By name, with the parameters of the command line or of its docs.
     fn alone(&self, name: &str) -> Result<Subject, Failure> {
-        let entry = known(name)?;
+        let entry = linked("factor", name, "register_factor!(…)")?;
         let Some(text) = &self.parameters else { return Subject::example(entry).map_err(Failure::input) };
         let document = Document::parse("--parameters", text.as_str(), Format::Json)?;
         let errors = Errors::new();
@@ -68,17 +68,6 @@ impl CheckFactor {
         let factor = errors.finish(factor)?;
         Subject::around_examples(entry, factor.into()).map_err(Failure::input)
     }
-}
-
-fn known(name: &str) -> Result<&'static Entry, Failure> {
-    find("factor", name).ok_or_else(|| {
-        let names = entries("factor");
-        let meant = nearest(name, names.iter().map(|e| e.name));
-        let meant = meant.map(|m| format!("did you mean `{m}`? ")).unwrap_or_default();
-        let help = "`manifactor list factors` prints all that are linked. One of your own needs its line \
-                    `register_factor!(…)`, and a binary that links its crate: `use my_plugin as _;`";
-        Failure::with_help(format!("no factor is called `{name}`"), meant + help)
-    })
 }
 
 /// The factors of a graph, each different one once, around the graph's values.

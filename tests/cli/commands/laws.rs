@@ -5,7 +5,7 @@ fn a_sound_factor_is_told_what_it_leaves_free() {
     let ran = manifactor("check-factor vertical_orientation").ended(0);
     let text = &ran.stdout;
     assert!(text.contains("Free: 8 of 9 directions: "), "{text}");
-    assert!(text.contains("2 combinations of (q0.rx, q0.ry, q0.rz), q0.x, q0.y, q0.z, q0.log_a"), "{text}");
+    assert!(text.contains("q0.(x, y, z, log_a, log_b, log_c); 2 combinations of q0.(rx, ry, rz)"), "{text}");
     // |m · up| has a kink where the axis lies flat, and its own jump where another becomes the longest
     assert!(text.contains("Kink: row 0 by q0.r"), "{text}");
     assert!(
@@ -68,4 +68,15 @@ fn parameters_are_checked_like_those_of_a_document() {
     check(r#"{ "up": [0, 1, 0] }"#).ended(0);
     check(r#"{ "upp": [0, 1, 0] }"#).ended(2).complains("did you mean `up`?");
     check(r#"{ "up": [0, 0, 0] }"#).ended(2).complains("expected a direction");
+}
+
+#[test]
+fn a_type_of_variables_is_checked_by_its_name() {
+    let ran = manifactor("check-manifold se3 --points 64").ended(0);
+    assert!(ran.stdout.contains("se3: the laws hold at 64 pairs of points (seed 0)"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("Tangent: 6 (rx, ry, rz, x, y, z)"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("Seed: right"), "{}", ran.stdout);
+    let report = manifactor("check-manifold dual_quadric --points 32 --json").ended(0).json();
+    assert!(report["seed_error"].as_f64().unwrap() < 1e-6, "{report}");
+    manifactor("check-manifold se4").ended(2).complains("did you mean `se");
 }

@@ -1,0 +1,24 @@
+//! Whether what a plugin adds keeps its laws.
+mod factor;
+mod manifold;
+
+use crate::failure::Failure;
+use manifactor::config::nearest;
+use manifactor::graph::catalogue::{Entry, entries, find};
+
+pub(crate) use factor::CheckFactor;
+pub(crate) use manifold::CheckManifold;
+
+/// The entry of a kind that has this name.
+fn linked(kind: &'static str, name: &str, register: &str) -> Result<&'static Entry, Failure> {
+    find(kind, name).ok_or_else(|| {
+        let names = entries(kind);
+        let meant = nearest(name, names.iter().map(|e| e.name));
+        let meant = meant.map(|m| format!("did you mean `{m}`? ")).unwrap_or_default();
+        let help = format!(
+            "`manifactor list {kind}s` prints all that are linked. One of your own needs its line `{register}`, and a binary \
+             that links its crate: `use my_plugin as _;`"
+        );
+        Failure::with_help(format!("no {kind} is called `{name}`"), meant + &help)
+    })
+}

@@ -1,0 +1,118 @@
+//! Signs of other units, or of another order of numbers, than a file is read in: what no robot does.
+use manifactor_geometry::Se3;
+
+/// Steps between poses from which on a median says something.
+const ENOUGH: usize = 3;
+/// Metres from one pose to the next.
+const FAR: f64 = 100.0;
+/// Metres a second.
+const FAST: f64 = 50.0;
+/// Seconds from one frame to the next.
+const SLOW: f64 = 10.0;
+/// The first entry of a quaternion that turns by nearly half a turn about x.
+const HALF_TURN: f64 = 0.9;
+
+/// What is doubtful of poses relative to the one before each, in words.
+pub fn relative_poses<'a>(relative: impl Iterator<Item = &'a Se3>) -> Vec<String> {
+    let (lengths, turned): (Vec<f64>, Vec<bool>) =
+        relative.map(|step| (step.translation.norm(), is_turned(step))).unzip();
+    let mut doubts = vec![];
+    if lengths.len() < ENOUGH {
+        return doubts;
+    }
+    if 2 * turned.iter().filter(|turned| **turned).count() > turned.len() {
+        doubts.push(
+            "most poses are half a turn about x from the one before, as 1 0 0 0 reads: quaternions are x y z w here; are these \
+             w x y z?"
+                .to_owned(),
+        );
+    }
+    let length = median(lengths);
+    if length > FAR {
+        doubts.push(format!(
+            "by the median, a pose is {length:.0} m from the one before: lengths are metres here; are these millimetres?"
+        ));
+    }
+    doubts
+}
+
+/// What is doubtful of a trajectory by time, in seconds, in words.
+pub fn trajectory(poses: impl Iterator<Item = (f64, Se3)>) -> Vec<String> {
+    let poses: Vec<(f64, Se3)> = poses.collect();
+    let mut doubts = vec![];
+    if poses.len() <= ENOUGH {
+        return doubts;
+    }
+    // odometry begins at its origin, as a rule, with a quaternion of no rotation
+    if poses.first().is_some_and(|(_, pose)| pose.rotation.quaternion_xyzw()[0].abs() == 1.0) {
+        doubts.push(
+            "the first pose is turned by half a turn about x, as 1 0 0 0 reads: quaternions are x y z w here; are these \
+             w x y z?"
+                .to_owned(),
+        );
+    }
+    let steps = poses.windows(2).filter_map(|pair| match pair {
+        [(t, a), (next, b)] => Some((next - t, (b.translation - a.translation).norm())),
+        _ => None,
+    });
+    let (times, speeds): (Vec<f64>, Vec<f64>) = steps.map(|(t, length)| (t, length / t)).unzip();
+    let (time, speed) = (median(times), median(speeds));
+    if time > SLOW {
+        doubts.push(format!(
+            "by the median, a frame is {time:.3e} s after the one before: time stamps are seconds here; are these milli- or \
+             nanoseconds?"
+        ));
+    }
+    if speed > FAST {
+        doubts.push(format!(
+            "by the median, the camera moves at {speed:.0} m/s: lengths are metres here; are these millimetres?"
+        ));
+    }
+    doubts
+}
+
+fn is_turned(step: &Se3) -> bool {
+    step.rotation.quaternion_xyzw()[0].abs() > HALF_TURN
+}
+
+/// The middle of a list; 0 of none.
+fn median(mut list: Vec<f64>) -> f64 {
+    list.sort_unstable_by(f64::total_cmp);
+    list.get(list.len() / 2).copied().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_geometry::So3;
+    use nalgebra::Vector3;
+
+    fn walk(xyzw: [f64; 4], unit: f64, second: f64) -> Vec<(f64, Se3)> {
+        let rotation = So3::from_quaternion_xyzw(xyzw).unwrap();
+        let at = |i: f64| (i * second / 30.0, Se3::new(rotation, Vector3::new(0.01 * i * unit, 0.0, 0.0)));
+        (0..9).map(|i| at(f64::from(i))).collect()
+    }
+    fn doubts(xyzw: [f64; 4], unit: f64, second: f64) -> String {
+        trajectory(walk(xyzw, unit, second).into_iter()).join("; ")
+    }
+
+    #[test]
+    fn other_units_and_another_order_are_told_and_usual_ones_are_not() {
+        const NONE: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+        assert_eq!(doubts(NONE, 1.0, 1.0), "");
+        assert_eq!(doubts([0.6, 0.0, 0.0, 0.8], 100.0, 1.0), "");
+        assert!(doubts(NONE, 1000.0, 1.0).contains("moves at 300 m/s"));
+        assert!(doubts([1.0, 0.0, 0.0, 0.0], 1.0, 1.0).contains("are these w x y z?"));
+        assert!(doubts(NONE, 1.0, 1e9).contains("seconds here"));
+    }
+
+    #[test]
+    fn steps_are_looked_at_without_time_too() {
+        let step = |xyzw, length| Se3::new(So3::from_quaternion_xyzw(xyzw).unwrap(), Vector3::x() * length);
+        let steps = |xyzw, length| relative_poses([step(xyzw, length); 5].iter()).join("; ");
+        assert_eq!(steps([0.1, 0.0, 0.0, 0.995], 1.0), "");
+        assert!(steps([0.995, 0.1, 0.0, 0.0], 1.0).contains("are these w x y z?"));
+        assert!(steps([0.0, 0.0, 0.0, 1.0], 1000.0).contains("are these millimetres?"));
+        assert_eq!(relative_poses([].iter()), Vec::<String>::new());
+    }
+}
