@@ -97,7 +97,7 @@ pub enum NoiseError {
     #[error("expected one of sigma, sigmas, covariance, information; got {0}")]
     Ambiguous(String),
     /// A noise of one size for a residual of another.
-    #[error("the noise has {found} rows, the residual {expected}{}", in_parentheses(.names))]
+    #[error("the noise has {found} row{}, the residual {expected}{}", if *.found == 1 { "" } else { "s" }, in_parentheses(.names))]
     Dimension {
         /// Rows of the residual.
         expected: usize,

@@ -4,6 +4,7 @@
 //! All of it is drawn from the [record](manifactor_slam::record) of a run, so that it can be drawn again.
 mod canvas;
 mod drawing;
+mod latencies;
 mod pages;
 mod ply;
 mod run;
@@ -11,6 +12,7 @@ mod xml;
 
 pub use canvas::Theme;
 pub use drawing::{NotDrawn, Picture};
+pub use latencies::latencies;
 pub use pages::{experiment_page, experiment_pictures, run_page};
 pub use ply::ply;
 pub use run::run_pictures;

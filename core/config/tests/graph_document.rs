@@ -149,7 +149,7 @@ factor = { type = "offset", measured = [0.5, 1] }
          graph:48:1: missing field `keys`\n\
          graph:49:19: `plane` is a variable, not a factor (there are `balance`, `height` and `offset`)\n\
          graph:52:14: expected a text, found the number 3\n\
-         graph:54:1: unknown field `sigma` (there are `keys`, `factor`, `noise` and `loss`)\n\
+         graph:54:1: unknown field `sigma` (there are `keys`, `name`, `factor`, `noise` and `loss`)\n\
          graph:57:15: `offset` connects `x3` to itself (a factor's variables have to be different ones)\n\
          graph:60:2: unknown field `solver` (there are `variables` and `factors`)"
     );

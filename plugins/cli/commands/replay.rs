@@ -2,6 +2,7 @@
 use crate::failure::Failure;
 use crate::input::destination::Destination;
 use crate::input::graph_file::{self, GraphFile};
+use crate::input::pictures::Look;
 use crate::input::solver::SolverArguments;
 use crate::interrupt;
 use crate::output;
@@ -11,7 +12,9 @@ use clap::Args;
 use manifactor::formats::replay::{Latencies, Replay as Steps, Step};
 use manifactor::graph::{Graph, Key};
 use manifactor::online::{Finished, Report, Session};
+use manifactor::slam::output::OutputFolder;
 use manifactor::solve::{All, Interrupt, Silent};
+use manifactor::viz::latencies;
 use serde_json::json;
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -38,6 +41,9 @@ pub(crate) struct Replay {
     gap: bool,
     #[command(flatten)]
     destination: Destination,
+    /// Draw the latency of each update into this folder: latency.svg and latency.png.
+    #[arg(long, value_name = "DIR")]
+    plot: Option<PathBuf>,
     /// Print lines of JSON: poses, then a summary.
     #[arg(long)]
     pub(crate) json: bool,
@@ -56,6 +62,8 @@ struct Replayed {
 impl Replay {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
         self.destination.check(&self.graph)?;
+        let claim = |folder| OutputFolder::claim(folder, "replay", &self.graph, false);
+        let _claimed = self.plot.as_deref().map(claim).transpose()?;
         if self.solver.names_a_start() {
             return Err(Failure::with_help(
                 "a replay begins each pose where odometry leads: --start has no meaning here",
@@ -83,6 +91,12 @@ impl Replay {
         if self.destination.is_given() {
             let values = finished.as_ref().map_or_else(|| replayed.session.estimates(), |f| f.values.clone());
             self.destination.write(&replayed.session.graph().0, &values)?;
+        }
+        if let Some(folder) = &self.plot {
+            let title = format!("{}: latency of each update", self.graph.display());
+            let look = Look::default();
+            let picture = latencies(&title, &replayed.times, look.width());
+            look.write(folder, picture.as_slice())?;
         }
         self.tell(&replayed, cost, finished.as_ref(), batch);
         Ok(match finished {

@@ -26,7 +26,7 @@ fn a_gauge_that_nothing_holds_and_a_variable_that_nothing_touches_are_told() {
     let ran = check("pair.toml", PAIR).ended(0);
     assert!(ran.stdout.contains("nothing wrong with the document; 1 warning"), "{}", ran.stdout);
     ran.complains("at these values, nothing constrains x");
-    let alone = "[[variables]]\nkey = \"l\"\nvalue = { type = \"point2\", coordinates = [0.0, 0.0] }\n";
+    let alone = "[[variables]]\nkey = \"l\"\nvalue = { type = \"point2\", position = [0.0, 0.0] }\n";
     check("alone.toml", &(PAIR.to_owned() + alone)).ended(0).complains("no factor that takes part touches l");
     let held =
         PAIR.replacen("angle = 0.0 }\n\n[[variables]]", "angle = 0.0 }\nfixed = true\n\n[[variables]]", 1);
@@ -45,7 +45,7 @@ fn a_point_that_is_seen_from_one_place_is_told() {
              {{ fx = 500.0, fy = 500.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }} }}\n"
         );
     }
-    text += "[[variables]]\nkey = \"l0\"\nvalue = { type = \"point3\", coordinates = [0.0, 0.0, 4.0] }\n";
+    text += "[[variables]]\nkey = \"l0\"\nvalue = { type = \"point3\", position = [0.0, 0.0, 4.0] }\n";
     check("point.toml", &text).ended(0).complains("at these values, nothing constrains l0.z");
 }
 
@@ -53,7 +53,7 @@ fn a_point_that_is_seen_from_one_place_is_told() {
 fn what_is_not_finite_or_not_defined_at_the_start_is_told() {
     let formula = |residual: &str| {
         format!(
-            "[[variables]]\nkey = \"p\"\nvalue = {{ type = \"point1\", coordinates = [-1.0] }}\n[[factors]]\nkeys = [\"p\"]\n\
+            "[[variables]]\nkey = \"p\"\nvalue = {{ type = \"point1\", position = [-1.0] }}\n[[factors]]\nkeys = [\"p\"]\n\
              name = \"the root\"\nfactor = {{ type = \"expression\", variables = {{ p = \"point1\" }}, residual = [\"{residual}\"] }}\n"
         )
     };
@@ -82,7 +82,7 @@ fn other_units_and_another_order_of_quaternions_are_told() {
 fn an_experiment_is_known_and_its_trials_are_counted() {
     let ran = manifactor("check examples/experiments/simulation/choices.toml").ended(0);
     assert!(ran.stdout.contains("An experiment of "), "{}", ran.stdout);
-    manifactor("check examples/experiments/simulation/choices.toml --set base=\"nowhere.toml\"").ended(2);
+    manifactor("check examples/experiments/simulation/choices.toml --set base=\"nowhere.toml\"").ended(3);
 }
 
 #[test]

@@ -108,3 +108,13 @@ fn a_window_leaves_old_poses_behind() {
     assert_eq!((summary["variables"].clone(), summary["left_out"].clone()), (5.into(), 8.into()));
     manifactor(&format!("replay {graph} --set online.window.keep=1")).ended(2);
 }
+
+#[test]
+fn latencies_are_drawn_into_a_folder() {
+    let folder = folder(&[("graph.g2o", &square())]);
+    let (graph, pictures) = (path(&folder, "graph.g2o"), path(&folder, "pictures"));
+    manifactor(&format!("replay {graph} --plot {pictures}")).ended(0);
+    let svg = std::fs::read_to_string(format!("{pictures}/latency.svg")).unwrap();
+    assert!(svg.contains("p99: "), "{svg}");
+    assert_eq!(&std::fs::read(format!("{pictures}/latency.png")).unwrap()[..4], b"\x89PNG");
+}
