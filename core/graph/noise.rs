@@ -97,7 +97,7 @@ pub enum NoiseError {
     #[error("expected one of sigma, sigmas, covariance, information; got {0}")]
     Ambiguous(String),
     /// A noise of one size for a residual of another.
-    #[error("the noise has {found} row{}, the residual {expected}{}", if *.found == 1 { "" } else { "s" }, in_parentheses(.names))]
+    #[error("the noise has {}, the residual {expected}{}", rows(.found), in_parentheses(.names))]
     Dimension {
         /// Rows of the residual.
         expected: usize,
@@ -120,6 +120,10 @@ impl NoiseError {
             other => other,
         }
     }
+}
+
+fn rows(n: &usize) -> String {
+    format!("{n} row{}", if *n == 1 { "" } else { "s" })
 }
 
 fn in_parentheses(names: &[&str]) -> String {
