@@ -3,13 +3,18 @@
 /// How many names a message lists before it stops.
 const LISTED: usize = 30;
 
-/// The known name most like `name`, if one is alike enough to be what was meant.
+/// Letters that make a beginning.
+const BEGINNING: usize = 3;
+
+/// The known name most like `name`, if one is alike enough to be what was meant, or begins with it.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted = normal(name);
+    let letters = wanted.chars().count();
+    let begins = |k: &str| letters >= BEGINNING && normal(k).starts_with(&wanted);
     known
         .into_iter()
         .map(|k| (strsim::damerau_levenshtein(&wanted, &normal(k)), k))
-        .filter(|(distance, k)| *distance <= k.chars().count().max(wanted.chars().count()) / 3)
+        .filter(|(distance, k)| *distance <= k.chars().count().max(letters) / 3 || begins(k))
         .min_by(|a, b| a.0.cmp(&b.0).then_with(|| a.1.cmp(b.1)))
         .map(|(_, k)| k)
 }
@@ -53,6 +58,7 @@ mod tests {
         assert_eq!(nearest("boundingbox", known), Some("bounding_box"));
         assert_eq!(nearest("betwen_se3", known), Some("between_se3"));
         assert_eq!(nearest("Between_SE2", known), Some("between_se2"));
+        assert_eq!(nearest("levenberg", ["dogleg", "levenberg_marquardt"]), Some("levenberg_marquardt"));
     }
 
     #[test]

@@ -3,6 +3,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::status::Status;
 use clap::{Args, Subcommand};
+use manifactor::graph::catalogue::find;
 use manifactor::slam::output::write_whole;
 use std::path::{Path, PathBuf};
 
@@ -52,6 +53,12 @@ impl Plugin {
         let folder = Path::new(&self.name);
         let crate_name = folder.file_name().and_then(|n| n.to_str()).unwrap_or_default();
         let names = Names::of(crate_name)?;
+        if find("factor", &names.factor).is_some() {
+            return Err(Failure::with_help(
+                format!("there is a factor `{}` already: see `manifactor explain {0}`", names.factor),
+                "choose another name: two factors of one name cannot be linked together",
+            ));
+        }
         let (source, cli_source) = self.sources()?;
         // a link that leads nowhere is something too
         if folder.symlink_metadata().is_ok() {

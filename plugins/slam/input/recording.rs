@@ -1,11 +1,14 @@
 //! A sequence as files: what [`Recorded`](crate::input::source::Recorded) reads.
-use crate::input::sequence::{Sequence, TrueObject};
+use crate::input::sequence::Sequence;
 use manifactor_formats::FormatError;
 use manifactor_formats::detections::{self, Detection};
 use manifactor_formats::tum::{self, StampedPose};
 use manifactor_formats::whole::write_whole;
 use serde_json::json;
 use std::path::Path;
+
+/// The file of the true objects.
+pub(crate) const OBJECTS: &str = "objects.json";
 
 /// Writes `odometry.txt` and `detections.csv`, and where the truth is known `groundtruth.txt` and
 /// `objects.json`, into a folder, which is made where it is not there.
@@ -25,9 +28,8 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
     detections::write(folder.join("detections.csv"), &rows(sequence))?;
     if let Some(truth) = &sequence.ground_truth {
         tum::write(folder.join("groundtruth.txt"), &truth.trajectory)?;
-        let objects: Vec<_> = truth.objects.iter().map(document).collect();
-        let path = folder.join("objects.json");
-        write_whole(&path, format!("{:#}\n", json!(objects)).as_bytes()).map_err(io(&path))?;
+        let path = folder.join(OBJECTS);
+        write_whole(&path, format!("{:#}\n", json!(truth.objects)).as_bytes()).map_err(io(&path))?;
     }
     Ok(())
 }
@@ -55,17 +57,6 @@ fn rows(sequence: &Sequence) -> Vec<Detection> {
     sequence.detections.iter().filter_map(row).collect()
 }
 
-fn document(object: &TrueObject) -> serde_json::Value {
-    let half: [f64; 3] = object.half_extents.into();
-    json!({
-        "id": object.id,
-        "class": object.class,
-        "world_from_object": object.world_from_object,
-        "half_extents": half,
-        "bounding_box": object.bounding_box,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,5 +81,14 @@ mod tests {
             assert_eq!((a.frame, a.object, &a.scores), (b.frame, b.object, &b.scores));
             assert_eq!(a.bounding_box, b.bounding_box);
         }
+        let (found, truth) = (read.ground_truth.unwrap(), sequence.ground_truth.unwrap());
+        assert_eq!(found.objects, truth.objects);
+        let nothing = json!([{ "id": 1, "class": "cup", "world_from_object": truth.objects[0].world_from_object,
+            "half_extents": [0.1, 0.0, 0.1], "bounding_box": truth.objects[0].bounding_box }]);
+        std::fs::write(folder.join(OBJECTS), nothing.to_string()).unwrap();
+        let error = recorded.load(&Folders::default()).unwrap_err().to_string();
+        assert!(error.contains("object 1: half_extents must be three finite numbers above zero"), "{error}");
+        std::fs::write(folder.join(OBJECTS), "[{}]").unwrap();
+        assert!(recorded.load(&Folders::default()).unwrap_err().to_string().contains("missing field"));
     }
 }

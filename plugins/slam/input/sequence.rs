@@ -107,7 +107,8 @@ pub struct GroundTruth {
 }
 
 /// An object as it is.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct TrueObject {
     /// Its number.
     pub id: ObjectId,

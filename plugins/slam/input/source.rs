@@ -1,5 +1,6 @@
 //! Where sequences come from, chosen by name in a run's `[source]`.
-use crate::input::sequence::Sequence;
+use crate::input::sequence::{ObjectId, Sequence};
+use manifactor_config::Diagnostics;
 use manifactor_formats::FormatError;
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
@@ -78,6 +79,17 @@ pub enum SourceError {
     /// A file that cannot be read, or that is not what it should be.
     #[error(transparent)]
     Format(#[from] FormatError),
+    /// A document in a data set that cannot be read.
+    #[error(transparent)]
+    Document(#[from] Diagnostics),
+    /// A true object with a length that nothing has.
+    #[error("{}: object {object}: half_extents must be three finite numbers above zero", file.display())]
+    NoObject {
+        /// The file.
+        file: PathBuf,
+        /// The object.
+        object: ObjectId,
+    },
     /// A sequence with an unknown camera.
     #[error(
         "the camera of `{}` is not known by the name of its folder: set `camera` to \
@@ -91,8 +103,8 @@ pub enum SourceError {
     },
     /// Detections of which none belongs to a frame.
     #[error(
-        "{}: none of {detections} detections was made within {within} s of a pose in {}: \
-         do the two belong to the same sequence?", file.display(), odometry.display()
+        "{}: none of {detections} detections was made within {within} s of a pose in {}{}: do the two belong to the same \
+         sequence? `max_time_difference` allows for more", file.display(), odometry.display(), closest(*nearest)
     )]
     NothingMatches {
         /// The file of detections.
@@ -103,10 +115,17 @@ pub enum SourceError {
         detections: usize,
         /// Seconds.
         within: f64,
+        /// Of the detection that is closest to a pose: its time stamp, and how far the pose is away, in seconds.
+        nearest: Option<(f64, f64)>,
     },
     /// A simulation that cannot be run.
     #[error("the simulation cannot be run: {0}")]
     Simulation(String),
+}
+
+fn closest(nearest: Option<(f64, f64)>) -> String {
+    let told = |(at, away)| format!(" (the closest, at {at} s, is {away:.6} s away)");
+    nearest.map(told).unwrap_or_default()
 }
 
 fn no_folder(name: &Path, tried: &[PathBuf], no_data_folder: bool) -> String {

@@ -23,9 +23,7 @@ fn a_new_plugin_compiles_and_passes_outside_of_the_workspace() {
         .current_dir(&name)
         .env("CARGO_TARGET_DIR", target());
     // all of ours are built anew for a crate outside: quickly, rather than well
-    cargo.env("CARGO_INCREMENTAL", "0").args(["--config", "profile.dev.opt-level=0"]);
-    // with it, the dependencies would not be those that are built already
-    cargo.args(["--config", "profile.dev.debug=false"]);
+    cargo.env("CARGO_INCREMENTAL", "0");
     for part in
         ["", "-tree", "-graph", "-solve", "-config", "-testing", "-cli", "-geometry", "-quadric", "-semantic"]
             .iter()
@@ -50,4 +48,9 @@ fn a_plugin_is_not_written_over_another_nor_under_a_bad_name() {
     run(["new", "plugin", &path("new_one"), "--manifactor", &nowhere], &[]).ended(2).complains("no checkout");
     assert!(!folder.path().join("new_one").exists());
     manifactor("new").ended(2).complains("plugin");
+    let taken = path("vertical-orientation");
+    run(["new", "plugin", &taken], &[])
+        .ended(2)
+        .complains("there is a factor `vertical_orientation` already");
+    assert!(!Path::new(&taken).exists());
 }

@@ -1,6 +1,8 @@
 //! Frames and detections put together by time.
 use super::SourceError;
-use crate::input::sequence::{ClassScores, Detection, Frame, GroundTruth, ObjectId};
+use crate::input::recording::OBJECTS;
+use crate::input::sequence::{ClassScores, Detection, Frame, GroundTruth, ObjectId, TrueObject};
+use manifactor_config::{Document, Errors};
 use manifactor_formats::tum::{StampedPose, Trajectory};
 use manifactor_formats::{detections, tum};
 use manifactor_quadric::BoundingBox;
@@ -18,13 +20,15 @@ pub(super) fn read_matched(odometry: &Path, file: &Path, within: f64) -> Result<
     let rows = detections::read(file)?;
     let mut matched = vec![];
     for row in &rows {
-        if let Some(frame) = nearest(&frames, row.timestamp, within) {
+        if let Some((frame, _)) = nearest(&frames, row.timestamp).filter(|(_, away)| *away <= within) {
             matched.push(detection(frame, row)?);
         }
     }
     if matched.is_empty() && !rows.is_empty() {
         let (file, odometry) = (file.to_owned(), odometry.to_owned());
-        return Err(SourceError::NothingMatches { file, odometry, detections: rows.len(), within });
+        let away = |at: f64| nearest(&frames, at).map(|(_, away)| (at, away));
+        let nearest = rows.iter().filter_map(|row| away(row.timestamp)).min_by(|a, b| a.1.total_cmp(&b.1));
+        return Err(SourceError::NothingMatches { file, odometry, detections: rows.len(), within, nearest });
     }
     // stable: the order of a file decides between duplicates
     matched.sort_by_key(|detection| detection.frame);
@@ -41,13 +45,12 @@ fn read_poses(file: &Path) -> Result<Vec<StampedPose>, SourceError> {
     Ok(poses)
 }
 
-/// The frame nearest in time, if it is near enough.
-fn nearest(frames: &[Frame], timestamp: f64, within: f64) -> Option<usize> {
+/// The frame nearest in time, and how far it is away, in seconds.
+fn nearest(frames: &[Frame], timestamp: f64) -> Option<(usize, f64)> {
     let after = frames.partition_point(|frame| frame.timestamp < timestamp);
     let candidates = [after.checked_sub(1), Some(after)].into_iter().flatten();
     let away = candidates.filter_map(|i| Some((i, (frames.get(i)?.timestamp - timestamp).abs())));
-    let nearest = away.min_by(|a, b| a.1.total_cmp(&b.1));
-    nearest.filter(|(_, away)| *away <= within).map(|(i, _)| i)
+    away.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, SourceError> {
@@ -62,6 +65,23 @@ fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, Sou
         scores,
         bounding_box: BoundingBox { xmin: row.xmin, ymin: row.ymin, xmax: row.xmax, ymax: row.ymax },
     })
+}
+
+/// The true objects that are named, or those that lie there, as `simulate` writes them.
+pub(super) fn read_objects(folder: &Path, named: Option<&Path>) -> Result<Vec<TrueObject>, SourceError> {
+    let file = folder.join(named.unwrap_or(Path::new(OBJECTS)));
+    if named.is_none() && !file.is_file() {
+        return Ok(vec![]);
+    }
+    let document = Document::open(&file)?;
+    let errors = Errors::new();
+    let objects = document.root().read::<Vec<TrueObject>>(&errors);
+    let objects = errors.finish(objects)?;
+    let is_sound = |object: &&TrueObject| object.half_extents.iter().all(|x| *x > 0.0 && x.is_finite());
+    match objects.iter().find(|object| !is_sound(object)) {
+        Some(object) => Err(SourceError::NoObject { file, object: object.id }),
+        None => Ok(objects),
+    }
 }
 
 /// The ground truth that is named, or the one that lies there.
@@ -89,11 +109,10 @@ mod tests {
 
     #[test]
     fn the_nearest_frame_is_taken_if_it_is_near() {
-        assert_eq!(nearest(&frames(), 2.4, 0.5), Some(1));
-        assert_eq!(nearest(&frames(), 2.6, 0.5), Some(2));
-        assert_eq!(nearest(&frames(), 2.4, 0.3), None);
-        assert_eq!(nearest(&frames(), 0.9, 0.2), Some(0));
-        assert_eq!(nearest(&frames(), 9.0, 1.0), None);
-        assert_eq!(nearest(&[], 1.0, 1.0), None);
+        let found =
+            |timestamp| nearest(&frames(), timestamp).map(|(frame, away)| (frame, (10.0 * away).round()));
+        assert_eq!([found(2.4), found(2.6), found(0.9)], [Some((1, 4.0)), Some((2, 4.0)), Some((0, 1.0))]);
+        assert_eq!(found(9.0), Some((2, 60.0)));
+        assert_eq!(nearest(&[], 1.0), None);
     }
 }

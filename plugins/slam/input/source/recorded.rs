@@ -1,4 +1,4 @@
-use super::assemble::{read_ground_truth, read_matched};
+use super::assemble::{read_ground_truth, read_matched, read_objects};
 use super::camera::CameraChoice;
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::Sequence;
@@ -11,7 +11,8 @@ use std::path::PathBuf;
 /// Odometry and detections from files of one's own.
 ///
 /// `folder` is found as that of `tum` is. In it lie `odometry.txt` and `detections.csv`, and where there is one, a
-/// `groundtruth.txt`: poses `timestamp tx ty tz qx qy qz qw`, and boxes by column names.
+/// `groundtruth.txt` and `objects.json`: poses `timestamp tx ty tz qx qy qz qw`, boxes by column names, and true objects
+/// as `manifactor simulate` writes them.
 ///
 /// ```toml
 /// source = { type = "recorded", folder = "my_recording", camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
@@ -32,6 +33,10 @@ pub struct Recorded {
     /// The ground truth in the folder. Default: `groundtruth.txt`, if there is such a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
+    /// The true objects in the folder, in the ground truth's frame. Default: `objects.json`, if there is such a file and a
+    /// ground truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objects: Option<PathBuf>,
     /// Up in the odometry's frame, where it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<Direction>,
@@ -57,7 +62,11 @@ impl Source for Recorded {
         let folder = folders.data_set(&self.folder)?;
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
         let (frames, detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
-        let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
+        let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
+        if self.objects.is_some() || truth.is_some() {
+            let objects = read_objects(&folder, self.objects.as_deref())?;
+            truth.get_or_insert_default().objects = objects;
+        }
         Ok(Sequence {
             camera: self.camera.camera(),
             frames,
