@@ -112,7 +112,7 @@ impl FactorReport {
     }
 }
 
-/// Kinks, or jumps, that were met at points which have an entry in common.
+/// Kinks, or jumps, of rows that they have in common.
 pub(super) struct Met {
     /// Variable, direction and row.
     entries: BTreeSet<(usize, usize, usize)>,
@@ -127,6 +127,9 @@ impl Met {
     }
     fn is_jump(&self) -> bool {
         self.largest.jump != 0.0
+    }
+    fn has_row_of(&self, other: &Self) -> bool {
+        self.entries.iter().any(|(.., row)| other.entries.iter().any(|(.., of_other)| of_other == row))
     }
     fn named(&self, subject: &Subject) -> NamedKink {
         let mut directions: Vec<String> =
@@ -179,7 +182,7 @@ impl Gathered {
         }
     }
 
-    /// Keeps the kinks and jumps of one point. What has an entry in common with some that were met before is the same.
+    /// Keeps the kinks and jumps of one point. What has a row in common with some that were met before is the same.
     pub(super) fn kinks(&mut self, subject: &Subject, kinks: &[Kink], drawn: &Drawn) {
         let (jumps, kinks): (Vec<&Kink>, Vec<&Kink>) = kinks.iter().partition(|kink| kink.jump != 0.0);
         for kinks in [jumps, kinks] {
@@ -188,9 +191,7 @@ impl Gathered {
             let Some(&&largest) = kinks.iter().max_by(by_size) else { continue };
             let entries = kinks.iter().map(|kink| (kink.variable, kink.column, kink.row)).collect();
             let mut met = Met { entries, largest, points: 1, at: subject.graph(&drawn.variables) };
-            let is_same = |other: &mut Met| {
-                other.is_jump() == met.is_jump() && !other.entries.is_disjoint(&met.entries)
-            };
+            let is_same = |other: &mut Met| other.is_jump() == met.is_jump() && other.has_row_of(&met);
             for other in self.kinks.extract_if(.., is_same).collect::<Vec<_>>() {
                 met.entries.extend(other.entries);
                 met.points += other.points;
