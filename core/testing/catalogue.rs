@@ -79,7 +79,7 @@ pub fn manifold_law(entry: &'static Entry, points: usize) -> Result<ManifoldRepo
 }
 
 /// Checks [`documentation_law`] and [`manifold_law`] of a registered manifold, at 256 pairs of points, its `seed` included:
-/// what [`manifold_laws!`](crate::manifold_laws) makes a test of.
+/// what [`manifold_laws!`](crate::manifold_laws!) makes a test of.
 ///
 /// # Panics
 /// Where one does not hold, with what is wrong: it is an assertion for tests.
