@@ -33,5 +33,5 @@ pub use error::{ChangeError, UpdateError};
 pub use factor_id::FactorId;
 pub use report::{Report, Shared};
 pub use saved::{LoadError, SaveError};
-pub use session::{CovarianceError, Finished, Session};
-pub use settings::{Settings, Window};
+pub use session::{CovarianceError, Finished, Rejection, Session};
+pub use settings::{Outliers, Settings, Window};

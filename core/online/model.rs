@@ -1,5 +1,6 @@
 //! What is estimated, and from what: variables at their linearization points, and factors with their parts of H and g.
 mod blocks;
+mod counting;
 mod evaluation;
 mod factors;
 mod regions;
@@ -25,8 +26,9 @@ use std::collections::HashMap;
 #[derive(Debug, Clone)]
 pub(crate) struct Place {
     pub key: Key,
-    /// How many came before it; and whether it is there still.
+    /// How many came before it, and how many of its type; and whether it is there still.
     pub born: u64,
+    pub ordinal: u64,
     pub is_there: bool,
     /// Which column, and where in it.
     pub column: u32,
@@ -65,14 +67,29 @@ pub(crate) struct Factor {
     /// Where its region is.
     region: u32,
     pub weight: f64,
+    /// How much of that counts while it is in doubt.
+    pub share: f64,
     /// What a prior costs at the linearization points.
     pub constant: f64,
+    /// Whether it is left out as an outlier: it couples nothing, and is in no sum.
+    pub rejected: bool,
 }
 
 impl Factor {
     fn prior(members: SmallVec<[(u32, u32); 2]>, region: u32, constant: f64) -> Self {
         let variables = VariableIndices::new();
-        Self { entry: None, variables, members, batch: 0, index: 0, region, weight: 1.0, constant }
+        Self {
+            entry: None,
+            variables,
+            members,
+            batch: 0,
+            index: 0,
+            region,
+            weight: 1.0,
+            share: 1.0,
+            constant,
+            rejected: false,
+        }
     }
     /// Its variables and its noise, as they were looked up; `None` where that is not possible any more.
     pub(crate) fn resolved(&self) -> Option<Resolved> {
@@ -95,6 +112,8 @@ pub(crate) struct Model {
     /// By column, numbers of variables that are gone.
     unused: Vec<Vec<u32>>,
     born: u64,
+    /// By column, how many variables have come.
+    ordinals: Vec<u64>,
     /// Linearization points; and where variables are about to be linearized: the same, but during an update.
     points: Columns,
     pub trial: Columns,
@@ -229,7 +248,9 @@ impl Model {
     /// Takes a factor out.
     pub(crate) fn remove(&mut self, number: u32) -> Option<Factor> {
         let factor = self.factors.remove(number)?;
-        self.blocks.disconnect(number, &factor.members);
+        if !factor.rejected {
+            self.blocks.disconnect(number, &factor.members);
+        }
         self.regions.give(factor.region);
         if factor.entry.is_none() {
             factor.members.iter().for_each(|(v, _)| self.places[*v as usize].sealed -= 1);
@@ -242,46 +263,6 @@ impl Model {
             moved.index = factor.index;
         }
         Some(factor)
-    }
-
-    /// Makes a factor count so many times; returns how many times it did.
-    pub(crate) fn weigh(&mut self, number: u32, weight: f64) -> Option<f64> {
-        let factor = self.factors.get_mut(number)?;
-        self.batches.as_mut_slice()[factor.batch as usize].set_weight(factor.index as usize, weight);
-        Some(std::mem::replace(&mut factor.weight, weight))
-    }
-
-    /// Sets what is held of a variable; returns what was. Its factors are to be linearized after that.
-    pub(crate) fn hold(&mut self, variable: u32, held: u32) -> u32 {
-        let before = std::mem::replace(&mut self.places[variable as usize].held, held);
-        self.blocks.hold(variable, held);
-        for f in self.blocks.factors(variable).collect::<Vec<_>>() {
-            let Some(factor) = self.factors.get(f).filter(|factor| factor.entry.is_some()) else { continue };
-            let (starts, held) = self.starts(factor, self.regions[factor.region]);
-            self.batches.as_mut_slice()[factor.batch as usize].hold(factor.index as usize, &starts, &held);
-        }
-        before
-    }
-
-    /// Whether a factor takes part: it is defined where it was last linearized, and counts.
-    pub(crate) fn takes_part(&self, number: u32) -> bool {
-        self.factor(number).is_some_and(|factor| {
-            let batch = || &self.batches.as_slice()[factor.batch as usize];
-            factor.entry.is_none() || (factor.weight != 0.0 && batch().is_active(factor.index as usize))
-        })
-    }
-
-    /// Whether none of a factor's variables is parked.
-    pub(crate) fn is_whole(&self, number: u32) -> bool {
-        self.factor(number).is_some_and(|factor| factor.variables().all(|v| !self.place(v).parked))
-    }
-
-    /// Says whether a factor's part counts in the sums.
-    pub(crate) fn count(&mut self, number: u32, counts: bool) {
-        let Some(factor) = self.factors.get(number) else { return };
-        if self.regions.count(factor.region, counts) != counts {
-            self.blocks.mark_factor(&factor.members);
-        }
     }
 }
 

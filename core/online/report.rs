@@ -34,6 +34,12 @@ pub struct Report {
     pub sealed: Vec<Key>,
     /// Factors that were dropped with them, as they took no part.
     pub dropped: Vec<FactorId>,
+    /// Factors that this update has rejected as outliers.
+    pub rejected: Vec<FactorId>,
+    /// Factors that were rejected by an update before, and count again.
+    pub readmitted: Vec<FactorId>,
+    /// Trials of rejected factors: whether these are right, and what counts is wrong.
+    pub trials: usize,
     /// Factors that are not defined where they were last linearized, and take no part.
     pub inactive: usize,
 }

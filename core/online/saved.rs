@@ -1,19 +1,21 @@
 //! A session as text: a line that says what it is, and a JSON document.
 //!
 //! ```text
-//! manifactor session 1 90b4b1a3c2f0d7e1
+//! manifactor session 2 90b4b1a3c2f0d7e1
 //! {"settings":{…},"variables":[…],"factors":[…],"fronts":[…],…}
 //! ```
 //!
 //! What is saved is what history has left: factors, linearization points, steps, and which variables are eliminated together.
 //! The numbers of the factorization are not: from the same points, in the same tree, they have the same bits again.
 use crate::gone::{GoneKeys, Runs};
+use crate::session::Suspect;
 use crate::settings::Settings;
 use manifactor_graph::{FactorEntry, GraphError, Key, Variable};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 const NAME: &str = "manifactor session";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Why a session cannot be saved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -70,6 +72,8 @@ pub(crate) struct Saved {
     pub fronts: Vec<SavedFront>,
     /// Variables that have left the region of their linearization, those that have left it far, and those to be judged.
     pub born: u64,
+    /// By column, how many variables have come.
+    pub ordinals: Vec<u64>,
     /// Numbers of variables that are gone, those that are used again first last.
     pub unused: Vec<u32>,
     pub priors: Vec<SavedPrior>,
@@ -78,14 +82,16 @@ pub(crate) struct Saved {
     pub waiting: Vec<u32>,
     pub urgent: Vec<u32>,
     pub doubtful: Vec<u32>,
+    /// Variables that have moved since factors that may be wrong were looked at.
+    pub shaken: BTreeSet<u32>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SavedVariable {
     pub key: Key,
-    /// How many came before it; `None` where it is gone.
-    pub born: Option<u64>,
+    /// How many came before it, and how many of its type; `None` where it is gone.
+    pub born: Option<[u64; 2]>,
     /// Its linearization point, and the bits of its step from there.
     pub point: Box<dyn Variable>,
     pub step: Vec<u64>,
@@ -99,6 +105,9 @@ pub(crate) struct SavedFactor {
     pub number: u32,
     pub weight: f64,
     pub entry: FactorEntry,
+    /// What is known of a factor that may be an outlier.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub suspect: Option<Suspect>,
 }
 
 /// A linear prior, its numbers by their bits.

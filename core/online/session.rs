@@ -2,6 +2,7 @@
 mod changes;
 mod covariance;
 mod finish;
+mod outliers;
 mod parking;
 mod relinearization;
 mod saving;
@@ -20,11 +21,13 @@ use changes::Pending;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
 use manifactor_solve::SettingError;
 use std::any::TypeId;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
 
 pub use covariance::CovarianceError;
 pub use finish::Finished;
+pub use outliers::Rejection;
+pub(crate) use outliers::Suspect;
 
 /// A factor graph that grows while it is solved. See the [crate](crate).
 ///
@@ -60,6 +63,11 @@ pub struct Session {
     doubtful: Vec<u32>,
     /// Of a window: the variables that it holds and when they came, the oldest first.
     ages: VecDeque<(u32, u64)>,
+    /// Factors that may be wrong, by number; and those of them that are rejected.
+    suspects: BTreeMap<u32, Suspect>,
+    rejected: BTreeSet<u32>,
+    /// Variables that this update has moved, where there are such factors.
+    shaken: BTreeSet<u32>,
     gone: GoneKeys,
     gone_factors: Runs,
     /// The keys of those that are parked, for reports.
@@ -100,6 +108,9 @@ impl Session {
             inactive: BTreeSet::new(),
             doubtful: vec![],
             ages: VecDeque::new(),
+            suspects: BTreeMap::new(),
+            rejected: BTreeSet::new(),
+            shaken: BTreeSet::new(),
             gone: GoneKeys::default(),
             gone_factors: Runs::default(),
             waiting_keys: Shared::default(),

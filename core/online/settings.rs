@@ -1,6 +1,6 @@
 //! How a session trades time for accuracy.
 use manifactor_graph::checked::not_negative;
-use manifactor_solve::SettingError;
+use manifactor_solve::{FactorType, Probability, SettingError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,32 @@ pub struct Settings {
     pub budget: Option<f64>,
     /// What stays of a graph that grows without end. Default: all of it.
     pub window: Option<Window>,
+    /// Which factors may be wrong, and are tested before they count. Default: none.
+    pub outliers: Option<Outliers>,
+}
+
+/// The test that a factor has to pass: what it costs on top of what is known must be below the χ² quantile for its rows.
+///
+/// Candidates are those of [`Gnc`](manifactor_solve::Gnc): factors that couple variables, but for odometry, between variables of one type
+/// that came one after the other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Outliers {
+    /// Share of the right ones that the test keeps. Default: 0.99.
+    pub probability: Probability,
+    /// Nats for each row by which a factor alone may narrow down where its variables are. What says more is hardly tested by what is
+    /// known, and waits for another that bears it out. Default: 1.5.
+    #[serde(deserialize_with = "not_negative")]
+    pub gain: f64,
+    /// Of the candidates only the factors of these types. Default: all of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub types: Vec<FactorType>,
+}
+
+impl Default for Outliers {
+    fn default() -> Self {
+        Self { probability: Probability::default(), gain: 1.5, types: vec![] }
+    }
 }
 
 /// A window that moves with the newest variables.
@@ -55,6 +81,7 @@ impl Default for Settings {
             passes: 1,
             budget: None,
             window: None,
+            outliers: None,
         }
     }
 }
@@ -67,7 +94,8 @@ impl Settings {
     pub fn check(&self) -> Result<(), SettingError> {
         let all = [("bend", self.bend), ("deviation", self.deviation), ("urgent", self.urgent)];
         let budget = self.budget.map(|budget| ("budget", budget));
-        match all.into_iter().chain(budget).find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
+        let gain = self.outliers.as_ref().map(|outliers| ("outliers.gain", outliers.gain));
+        match all.into_iter().chain(budget).chain(gain).find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
             Some((setting, got)) => Err(SettingError { setting, expected: "0 or more", got }),
             None => Ok(()),
         }

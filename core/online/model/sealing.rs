@@ -4,6 +4,7 @@
 //! eliminating it leaves the Schur complement H_BB − H_BL H_LL⁻¹ H_LB, and g and c in the same way.
 use super::{Factor, Model};
 use manifactor_graph::batch::Evaluation;
+use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
 
 /// A linear prior: ½ δᵀHδ + gᵀδ + constant, δ the steps of its variables from their linearization points.
@@ -38,8 +39,10 @@ impl Model {
         others.sort_unstable();
         others.dedup();
         let mut constant = self.cost(factors, None).cost;
-        let mut dense = self.gather(variable, &others, factors);
         let own = self.blocks.dim(variable);
+        others.insert(0, variable);
+        let mut dense = self.gather(&others, factors);
+        others.remove(0);
         let before: Vec<f64> = (own..dense.n).map(|i| dense.h[i * (dense.n + 1)]).collect();
         let least: Vec<f64> = (0..own).map(|k| OPEN * dense.h[k * (dense.n + 1)]).collect();
         for (k, least) in least.into_iter().enumerate() {
@@ -58,18 +61,16 @@ impl Model {
         (is_small && says_something).then_some(Prior { variables: others, h, g, constant })
     }
 
-    /// The sum of factors, the variable first.
-    fn gather(&self, variable: u32, others: &[u32], factors: &[u32]) -> Dense {
-        let mut n = self.blocks.dim(variable);
+    /// The sum of factors over these variables, in their order; others are left out.
+    fn gather(&self, variables: &[u32], factors: &[u32]) -> Dense {
+        let mut n = 0;
         let first = |v: &u32| {
             n += self.blocks.dim(*v);
             (*v, n - self.blocks.dim(*v))
         };
-        let first: Vec<(u32, usize)> = others.iter().map(first).collect();
-        let place = |v: u32| match v == variable {
-            true => Some(0),
-            false => first.binary_search_by_key(&v, |(v, _)| *v).ok().map(|i| first[i].1),
-        };
+        let mut first: Vec<(u32, usize)> = variables.iter().map(first).collect();
+        first.sort_unstable();
+        let place = |v: u32| first.binary_search_by_key(&v, |(v, _)| *v).ok().map(|i| first[i].1);
         let mut dense = Dense { n, h: vec![0.0; n * n], g: vec![0.0; n] };
         let mut to: Vec<Option<usize>> = vec![];
         for factor in factors.iter().filter_map(|f| self.factor(*f)) {
@@ -91,6 +92,12 @@ impl Model {
             }
         }
         dense
+    }
+
+    /// H and g of factors over these variables, in their order.
+    pub(crate) fn sums(&self, variables: &[u32], factors: &[u32]) -> (DMatrix<f64>, DVector<f64>) {
+        let Dense { n, h, g } = self.gather(variables, factors);
+        (DMatrix::from_fn(n, n, |r, c| h[r.min(c) * n + r.max(c)]), DVector::from_vec(g))
     }
 
     /// The value of a prior at these steps, by scalar of all variables.

@@ -47,15 +47,18 @@ impl Model {
         let column = self.points.position(id).unwrap_or_else(|| {
             self.trial.add(id, value.erased().new_column());
             self.unused.push(vec![]);
+            self.ordinals.push(0);
             self.points.add(id, value.erased().new_column())
         });
         let plain = plain(value);
         let value = plain.as_deref().unwrap_or(value);
         self.numbers.insert(key.clone(), at.number);
         self.born += 1;
+        self.ordinals[column] += 1;
         let mut place = Place {
             key,
             born: self.born,
+            ordinal: self.ordinals[column],
             is_there: true,
             column: column as u32,
             index: self.points.column(column).len() as u32,
@@ -82,6 +85,7 @@ impl Model {
     /// Takes a variable out again that was put in under this number; the last that came goes first.
     pub(crate) fn take_out(&mut self, at: NewNumber) {
         self.born -= 1;
+        self.ordinals[self.places[at.number as usize].column as usize] -= 1;
         if at.is_reused {
             self.forget(at.number);
             return;
@@ -115,14 +119,23 @@ impl Model {
         self.born
     }
 
+    /// The same by column.
+    pub(crate) fn ordinals(&self) -> &[u64] {
+        &self.ordinals
+    }
+
     /// The numbers of variables that are gone, those of one type in the order in which they were last used.
     pub(crate) fn unused(&self) -> Vec<u32> {
         self.unused.iter().flatten().copied().collect()
     }
 
-    /// The state of a model that was saved: how many variables have come, and which are gone; whether that can be.
-    pub(crate) fn restore(&mut self, born: u64, unused: &[u32]) -> bool {
+    /// The state of a model that was saved: how many variables have come, by column too, and which are gone; whether that can be.
+    pub(crate) fn restore(&mut self, born: u64, ordinals: &[u64], unused: &[u32]) -> bool {
+        if ordinals.len() != self.ordinals.len() {
+            return false;
+        }
         self.born = born;
+        self.ordinals.copy_from_slice(ordinals);
         self.numbers.clear();
         for (v, place) in self.places.iter().enumerate().filter(|(_, place)| place.is_there) {
             self.numbers.insert(place.key.clone(), v as u32);

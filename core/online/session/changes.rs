@@ -1,20 +1,15 @@
 //! Changes of a session: checked when they are asked for, made by the next update, and taken back where that fails.
+mod change;
+
+pub(super) use change::{Change, Touched};
+
 use super::Session;
 use crate::error::ChangeError;
 use crate::factor_id::FactorId;
-use crate::model::{Model, NewNumber, Reserved};
+use crate::model::{NewNumber, Reserved};
 use indexmap::IndexMap;
 use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values, Variable};
 use std::any::TypeId;
-
-/// A change of the model; each has one that takes it back.
-#[derive(Debug, Clone)]
-pub(super) enum Change {
-    Insert { number: u32, entry: Box<FactorEntry>, resolved: Resolved, weight: f64 },
-    Remove { number: u32 },
-    Weigh { number: u32, weight: f64 },
-    Hold { variable: u32, held: u32 },
-}
 
 /// A variable that comes with the next update.
 pub(super) struct NewVariable {
@@ -39,63 +34,6 @@ pub(super) struct Pending {
 impl Pending {
     pub(super) fn is_empty(&self) -> bool {
         self.variables.is_empty() && self.changes.is_empty() && self.leaving.is_empty()
-    }
-}
-
-/// What changes have touched.
-#[derive(Debug, Default)]
-pub(super) struct Touched {
-    /// Variables whose blocks of H have changed.
-    pub(super) variables: Vec<u32>,
-    /// Factors that are to be linearized.
-    pub(super) factors: Vec<u32>,
-    /// Factors that were taken out; some may be back.
-    pub(super) removed: Vec<u32>,
-    /// Variables that may have lost what determined them, or have gained it.
-    pub(super) doubtful: Vec<u32>,
-    /// Variables of which other directions are held now.
-    pub(super) held: Vec<u32>,
-}
-
-impl Change {
-    /// Makes the change; returns the one that takes it back.
-    pub(super) fn apply(self, model: &mut Model, touched: &mut Touched) -> Option<Self> {
-        match self {
-            Self::Insert { number, entry, resolved, weight } => {
-                model.insert(number, &entry, &resolved, weight);
-                touched.variables.extend(&resolved.variables);
-                touched.factors.push(number);
-                let parked = resolved.variables.iter().filter(|v| model.place(**v).parked);
-                touched.doubtful.extend(parked);
-                Some(Self::Remove { number })
-            }
-            Self::Remove { number } => {
-                let factor = model.remove(number)?;
-                touched.variables.extend(factor.variables());
-                touched.doubtful.extend(factor.variables());
-                touched.removed.push(number);
-                let resolved = factor.resolved()?;
-                Some(Self::Insert { number, entry: Box::new(factor.entry?), resolved, weight: factor.weight })
-            }
-            Self::Weigh { number, weight } => {
-                let before = model.weigh(number, weight)?;
-                touched.factors.push(number);
-                let variables: Vec<u32> = model.factor(number)?.variables().collect();
-                touched.variables.extend(&variables);
-                touched.doubtful.extend(&variables);
-                Some(Self::Weigh { number, weight: before })
-            }
-            Self::Hold { variable, held } => {
-                let before = model.hold(variable, held);
-                let neighbours: Vec<u32> = model.blocks.coupled(variable).iter().map(|c| c.other).collect();
-                touched.factors.extend(model.blocks.factors(variable));
-                for all in [&mut touched.variables, &mut touched.doubtful] {
-                    all.extend(neighbours.iter().copied().chain([variable]));
-                }
-                touched.held.push(variable);
-                Some(Self::Hold { variable, held: before })
-            }
-        }
     }
 }
 
@@ -168,7 +106,8 @@ impl Session {
 
     fn insert(&mut self, number: u32, entry: FactorEntry, resolved: Resolved, weight: f64) -> FactorId {
         self.pending.is_there.insert(number, Some(entry.clone()));
-        self.pending.changes.push(Change::Insert { number, entry: Box::new(entry), resolved, weight });
+        let entry = Box::new(entry);
+        self.pending.changes.push(Change::Insert { number, entry, resolved, weight, rejected: false });
         FactorId(number)
     }
 

@@ -56,16 +56,25 @@ impl Session {
                 return Err(CovarianceError::Undetermined { key: self.key(*v), direction });
             }
         }
+        Ok(self.along(&path, &variables))
+    }
+
+    /// The same of variables by their numbers, where directions that nothing constrains are held: a gauge, as a rule.
+    pub(super) fn joint(&self, variables: &[u32]) -> DMatrix<f64> {
+        self.along(&self.path(variables), variables)
+    }
+
+    fn along(&self, path: &Path, variables: &[u32]) -> DMatrix<f64> {
         let mut columns = vec![];
-        for v in &variables {
+        for v in variables {
             let held = self.model.place(*v).held;
             for d in 0..self.dim(*v) {
                 let is_free = held >> d & 1 == 0;
-                columns.push(if is_free { self.column(&path, *v, d) } else { vec![0.0; path.scalars] });
+                columns.push(if is_free { self.column(path, *v, d) } else { vec![0.0; path.scalars] });
             }
         }
         let dot = |r: usize, c: usize| columns[r].iter().zip(&columns[c]).map(|(a, b)| a * b).sum::<f64>();
-        Ok(DMatrix::from_fn(columns.len(), columns.len(), |r, c| dot(r.max(c), r.min(c))))
+        DMatrix::from_fn(columns.len(), columns.len(), |r, c| dot(r.max(c), r.min(c)))
     }
 
     /// The fronts on the way from variables to their roots.

@@ -19,13 +19,13 @@ impl Session {
             let Some(point) = self.model.point(v) else { continue };
             let step = self.delta[self.model.blocks.range(v)].iter().map(|d| d.to_bits()).collect();
             let place = self.model.place(v);
-            let (key, born) = (place.key.clone(), place.is_there.then_some(place.born));
+            let (key, born) = (place.key.clone(), place.is_there.then_some([place.born, place.ordinal]));
             let (held, parked) = (place.held, place.parked);
             variables.push(SavedVariable { key, born, point, step, held, parked });
         }
         let factors = self.model.all_factors().map(|(number, factor, entry)| {
             let entry = entry.clone();
-            SavedFactor { number, weight: factor.weight, entry }
+            SavedFactor { number, weight: factor.weight, entry, suspect: self.suspects.get(&number).copied() }
         });
         let saved = Saved {
             settings: self.settings.clone(),
@@ -36,6 +36,7 @@ impl Session {
             factors: factors.collect(),
             fronts: self.tree.save(),
             born: self.model.born(),
+            ordinals: self.model.ordinals().to_vec(),
             unused: self.model.unused(),
             priors: self.model.priors().filter_map(|f| self.save_prior(f)).collect(),
             gone: self.gone.clone(),
@@ -43,6 +44,7 @@ impl Session {
             waiting: sorted(&self.waiting),
             urgent: sorted(&self.urgent),
             doubtful: self.doubtful.clone(),
+            shaken: self.shaken.clone(),
         };
         saved.write()
     }
@@ -60,7 +62,8 @@ impl Session {
             insert(&mut session.model, variable)?;
         }
         let is_gone = saved.variables.iter().filter(|variable| variable.born.is_none()).count();
-        let fits = session.model.restore(saved.born, &saved.unused) && saved.unused.len() == is_gone;
+        let fits = session.model.restore(saved.born, &saved.ordinals, &saved.unused)
+            && saved.unused.len() == is_gone;
         fits.then_some(()).ok_or(LoadError::Inconsistent("variables that are gone"))?;
         session.resize();
         let steps = saved.variables.iter().flat_map(|variable| &variable.step);
@@ -74,14 +77,14 @@ impl Session {
             .ok_or(LoadError::Inconsistent("its fronts do not fit its factors"))?;
         session.put_fronts()?;
         let n = session.model.variables() as u32;
-        for list in [&saved.waiting, &saved.urgent, &saved.doubtful] {
-            if list.iter().any(|v| *v >= n) {
-                return Err(LoadError::Inconsistent("a number that no variable has"));
-            }
+        let lists = [&saved.waiting, &saved.urgent, &saved.doubtful].into_iter().flatten();
+        if lists.chain(&saved.shaken).any(|v| *v >= n) {
+            return Err(LoadError::Inconsistent("a number that no variable has"));
         }
         saved.waiting.iter().for_each(|v| session.is_waiting[*v as usize] = true);
         (session.waiting, session.urgent, session.doubtful) = (saved.waiting, saved.urgent, saved.doubtful);
         session.waiting.dedup();
+        session.shaken = saved.shaken;
         (session.gone, session.gone_factors) = (saved.gone, saved.gone_factors);
         session.model.by_age().into_iter().for_each(|v| session.note_age(v));
         Ok(session)
@@ -121,7 +124,7 @@ impl Session {
     /// Factors, linearized where they were.
     fn put_factors(&mut self, factors: &[SavedFactor], next: u32) -> Result<(), LoadError> {
         let mut errors = vec![];
-        for (i, SavedFactor { number, weight, entry }) in factors.iter().enumerate() {
+        for (i, SavedFactor { number, weight, entry, suspect }) in factors.iter().enumerate() {
             let is_next = i == 0 || factors[i - 1].number < *number;
             let is_taken = self.model.factor(*number).is_some();
             if !is_next || is_taken || *number >= next || !(*weight >= 0.0 && weight.is_finite()) {
@@ -129,6 +132,13 @@ impl Session {
             }
             if let Some(resolved) = entry.resolve(i, |key| self.find(key), &mut errors) {
                 self.model.insert(*number, entry, &resolved, *weight);
+            }
+            if let Some(suspect) = suspect {
+                self.suspects.insert(*number, *suspect);
+                if suspect.since.is_some() {
+                    self.rejected.insert(*number);
+                    self.model.reject(*number);
+                }
             }
         }
         if !errors.is_empty() {
@@ -177,7 +187,8 @@ fn insert(model: &mut Model, saved: &SavedVariable) -> Result<(), LoadError> {
     let v = model.variables() as u32;
     model.push_variable(key.clone(), &**point, *held, NewNumber { number: v, is_reused: false });
     let place = model.place_mut(v);
-    (place.parked, place.is_there, place.born) = (*parked, born.is_some(), born.unwrap_or_default());
+    (place.parked, place.is_there) = (*parked, born.is_some());
+    [place.born, place.ordinal] = born.unwrap_or_default();
     Ok(())
 }
 

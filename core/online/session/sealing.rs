@@ -119,11 +119,13 @@ impl Session {
             // the numbers of priors too: no one holds them, and the runs have no gaps
             self.gone_factors.insert(u64::from(f));
             self.inactive.remove(&f);
+            self.forget_suspect(f);
         }
         touched.variables.push(variable);
         for f in dropped {
             report.dropped.push(FactorId(f));
         }
+        self.drop_rejected(variable, report);
         if let Some(prior) = prior {
             self.model.insert_prior(self.model.next_factor(), &prior);
         }
@@ -158,6 +160,7 @@ impl Session {
             list.retain(|v| *v != variable);
         }
         self.parked.remove(&variable);
+        self.shaken.remove(&variable);
         self.gone.insert(self.model.place(variable).key.as_str());
         self.model.forget(variable);
     }

@@ -17,20 +17,25 @@ impl Session {
     /// Looks whether long steps have raised the cost of the factors around; only where a step is far out of the region of its
     /// linearization, as others cannot do harm.
     pub(super) fn control_step(&mut self, report: &mut Report) {
+        if !self.steady(report) {
+            report.solved_batch = self.settle(report);
+        }
+    }
+
+    /// Shortens long steps that have raised the cost; whether it has ceased to rise.
+    pub(super) fn steady(&mut self, report: &mut Report) -> bool {
         for _ in 0..ROUNDS {
             if !self.is_urgent() || !self.shorten(report) {
-                return;
+                return true;
             }
             // from the shorter step, linearized there
             let moved: Vec<u32> = self.moved.iter().map(|(v, _)| *v).collect();
             let held = Touched { held: moved, ..Touched::default() };
             if self.pass(&held, &Moves::default(), false, report).is_err() {
-                return;
+                return true;
             }
         }
-        if self.is_urgent() && self.shorten(report) {
-            report.solved_batch = self.settle(report);
-        }
+        !(self.is_urgent() && self.shorten(report))
     }
 
     /// Halves the last step until it lowers the cost of the factors around; whether it had to be.

@@ -44,6 +44,9 @@ impl Session {
             }
         }
         let solved = front.blocks.len();
+        if !self.suspects.is_empty() {
+            self.shaken.extend(self.moved[first..].iter().map(|(v, _)| *v));
+        }
         for i in first..self.moved.len() {
             self.note_excess(self.moved[i].0);
         }

@@ -10,10 +10,11 @@ use crate::report::Report;
 use crate::tree::{Affected, Couplings, Redone};
 
 /// What takes changes back.
-struct Undo {
-    variables: Vec<NewNumber>,
-    changes: Vec<Change>,
-    moves: Moves,
+#[derive(Default)]
+pub(super) struct Undo {
+    pub(super) variables: Vec<NewNumber>,
+    pub(super) changes: Vec<Change>,
+    pub(super) moves: Moves,
 }
 
 impl Session {
@@ -26,7 +27,7 @@ impl Session {
         let pending = std::mem::take(&mut self.pending);
         let mut report = Report::default();
         let mut touched = Touched::default();
-        let mut undo = Undo { variables: vec![], changes: vec![], moves: Moves::default() };
+        let mut undo = Undo::default();
         for (key, NewVariable { value, held, at }) in pending.variables {
             self.model.push_variable(key, &*value, held, at);
             undo.variables.push(at);
@@ -34,7 +35,14 @@ impl Session {
         }
         touched.doubtful.extend(&self.doubtful);
         self.resize();
-        for change in pending.changes {
+        let mut suspects = vec![];
+        for mut change in pending.changes {
+            if let Change::Insert { number, entry, resolved, rejected, .. } = &mut change
+                && let Some(suspect) = self.suspect(entry, resolved)
+            {
+                *rejected = true;
+                suspects.push((*number, suspect));
+            }
             undo.changes.extend(change.apply(&mut self.model, &mut touched));
         }
         self.sort(&mut touched.factors);
@@ -58,6 +66,8 @@ impl Session {
         }
         self.updates += 1;
         self.follow_up(&mut report);
+        let new = self.enter(&suspects, &touched.removed);
+        self.test_outliers(&new, &mut report);
         undo.variables.iter().for_each(|at| self.note_age(at.number));
         let leaving = self.leaving(&pending.leaving);
         if let Err(Overflow(variable)) = self.seal(&leaving, &mut report) {
@@ -69,7 +79,7 @@ impl Session {
 
     /// Shortens steps that are too long, and takes those passes that cannot wait. What the changes need has been done: a pass
     /// that fails leaves that as it is.
-    fn follow_up(&mut self, report: &mut Report) {
+    pub(super) fn follow_up(&mut self, report: &mut Report) {
         self.control_step(report);
         for _ in 0..self.settings.passes {
             if !self.is_urgent() || self.pass(&Touched::default(), &Moves::default(), true, report).is_err() {
@@ -90,14 +100,14 @@ impl Session {
     }
 
     /// The factors of a list that are there, each once.
-    fn sort(&self, factors: &mut Vec<u32>) {
+    pub(super) fn sort(&self, factors: &mut Vec<u32>) {
         factors.retain(|f| self.model.factor(*f).is_some());
         factors.sort_unstable();
         factors.dedup();
     }
 
     /// Takes changes back, the last first.
-    fn take_back(&mut self, undo: Undo) {
+    pub(super) fn take_back(&mut self, undo: Undo) {
         self.unpark(&undo.moves);
         let mut touched = Touched::default();
         for change in undo.changes.into_iter().rev() {
@@ -139,7 +149,8 @@ impl Session {
 
     /// Notes whether a factor takes part where it was linearized; whether it has just ceased to.
     pub(super) fn note_activity(&mut self, factor: u32) -> bool {
-        match self.model.takes_part(factor) {
+        let is_rejected = self.model.factor(factor).is_some_and(|factor| factor.rejected);
+        match is_rejected || self.model.takes_part(factor) {
             true => {
                 self.inactive.remove(&factor);
                 false

@@ -3,6 +3,7 @@
 mod errors;
 mod failures;
 mod history;
+mod outliers;
 mod parking;
 mod saving;
 mod steps;

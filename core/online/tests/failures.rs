@@ -1,5 +1,5 @@
 //! An update that failed leaves no trace, also not in what comes after it.
-use crate::history::{Change, History, allowed, bits, change, window};
+use crate::history::{Change, History, allowed, bits, change, outliers, window};
 use crate::toy::{At, Careless, Plane};
 use manifactor_graph::{Fixed, Graph, Noise, Values};
 use manifactor_online::{Report, Settings};
@@ -43,8 +43,9 @@ proptest! {
         every in 1..4usize,
         budget in prop_oneof![Just(None), Just(Some(300.0))],
         window in prop_oneof![Just(None), window().prop_map(Some)],
+        outliers in outliers(),
     ) {
-        let settings = Settings { relinearize_every: every, budget, window, ..Settings::default() };
+        let settings = Settings { relinearize_every: every, budget, window, outliers, ..Settings::default() };
         let [mut one, mut other] = std::array::from_fn(|_| History::new(settings.clone()));
         for history in [&mut one, &mut other] {
             history.apply_all(&before);
@@ -56,7 +57,7 @@ proptest! {
         for change in after.iter().chain(&[Change::Update]) {
             // ids go on where the failed update left them
             let [one, other] = [&mut one, &mut other].map(|history| {
-                history.apply(change).map(|report| Report { dropped: vec![], ..report })
+                history.apply(change).map(|report| Report { dropped: vec![], rejected: vec![], readmitted: vec![], ..report })
             });
             prop_assert_eq!(one, other);
         }

@@ -1,5 +1,5 @@
 //! A session that was saved goes on as if nothing had been.
-use crate::history::{Change, History, bits, change, window};
+use crate::history::{Change, History, bits, change, outliers, window};
 use crate::toy::Plane;
 use manifactor_graph::{Graph, Values};
 use manifactor_online::{LoadError, SaveError, Session, Settings, Window};
@@ -14,8 +14,9 @@ proptest! {
         bend in prop_oneof![Just(0.1), Just(0.001)],
         budget in prop_oneof![Just(None), Just(Some(300.0))],
         window in prop_oneof![Just(None), window().prop_map(Some)],
+        outliers in outliers(),
     ) {
-        let settings = Settings { relinearize_every: every, bend, budget, window, ..Settings::default() };
+        let settings = Settings { relinearize_every: every, bend, budget, window, outliers, ..Settings::default() };
         let mut history = History::new(settings);
         history.apply_all(&before);
         history.apply(&Change::Update);
@@ -47,8 +48,8 @@ fn what_is_no_session_is_refused_with_a_reason() {
     let text = session(None).save().unwrap();
     assert_eq!(Session::load("").unwrap_err(), LoadError::Foreign);
     assert_eq!(Session::load("{\"factors\": []}").unwrap_err(), LoadError::Foreign);
-    let later = text.replacen("session 1 ", "session 2 ", 1);
-    assert_eq!(Session::load(&later).unwrap_err(), LoadError::Version { found: "2".to_owned() });
+    let later = text.replacen("session 2 ", "session 3 ", 1);
+    assert_eq!(Session::load(&later).unwrap_err(), LoadError::Version { found: "3".to_owned() });
     for end in (0..text.len()).step_by(97) {
         assert!(Session::load(&text[..end]).is_err());
     }
@@ -71,7 +72,7 @@ fn changes_that_no_update_has_made_are_not_lost_silently() {
 fn resealed(json: &str) -> String {
     let fnv = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     let checksum = json.bytes().fold(0xcbf2_9ce4_8422_2325, fnv);
-    format!("manifactor session 1 {checksum:016x}\n{json}\n")
+    format!("manifactor session 2 {checksum:016x}\n{json}\n")
 }
 
 proptest! {

@@ -44,7 +44,8 @@ impl From<FactorType> for String {
 }
 
 impl FactorType {
-    pub(crate) fn as_str(&self) -> &str {
+    /// The name.
+    pub fn as_str(&self) -> &str {
         &self.0
     }
 }

@@ -23,7 +23,7 @@ pub struct Probability(f64);
 
 impl Probability {
     /// The squared norm that as many standard normal numbers as there are `rows` stay below with this probability.
-    pub(super) fn chi_squared(self, rows: usize) -> f64 {
+    pub fn chi_squared(self, rows: usize) -> f64 {
         // with the number of rows above zero there is a distribution
         ChiSquared::new(rows.max(1) as f64).map_or(f64::INFINITY, |chi| chi.inverse_cdf(self.0))
     }

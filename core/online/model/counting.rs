@@ -1,0 +1,85 @@
+//! Which factors count, and how much.
+use super::{Factor, Model};
+
+impl Model {
+    /// Makes a factor count so many times; returns how many times it did.
+    pub(crate) fn weigh(&mut self, number: u32, weight: f64) -> Option<f64> {
+        let factor = self.factors.get_mut(number)?;
+        self.batches.as_mut_slice()[factor.batch as usize].set_weight(factor.index as usize, weight);
+        Some(std::mem::replace(&mut factor.weight, weight))
+    }
+
+    /// Lets a factor count by a share of its weight alone.
+    pub(crate) fn attenuate(&mut self, number: u32, share: f64) {
+        let Some(factor) = self.factors.get_mut(number) else { return };
+        factor.share = share;
+        let batch = &mut self.batches.as_mut_slice()[factor.batch as usize];
+        batch.set_weight(factor.index as usize, share * factor.weight);
+    }
+
+    /// Leaves a factor out as an outlier: it couples its variables no more. Returns whether it was in.
+    pub(crate) fn reject(&mut self, number: u32) -> bool {
+        let Some(factor) = self.factors.get_mut(number).filter(|factor| !factor.rejected) else {
+            return false;
+        };
+        factor.rejected = true;
+        self.blocks.disconnect(number, &factor.members);
+        true
+    }
+
+    /// Takes a factor in again that was left out; returns whether it was. It is to be linearized after that.
+    pub(crate) fn readmit(&mut self, number: u32) -> bool {
+        let Some(factor) = self.factors.get_mut(number).filter(|factor| factor.rejected) else {
+            return false;
+        };
+        factor.rejected = false;
+        self.blocks.connect(number, factor.region, &factor.members);
+        // what is held of its variables may have changed since
+        self.hold_in(number);
+        true
+    }
+
+    /// Tells a factor what is held of its variables.
+    pub(crate) fn hold_in(&mut self, number: u32) {
+        let Some(factor) = self.factors.get(number).filter(|factor| factor.entry.is_some()) else { return };
+        let (starts, held) = self.starts(factor, self.regions[factor.region]);
+        self.batches.as_mut_slice()[factor.batch as usize].hold(factor.index as usize, &starts, &held);
+    }
+
+    /// Sets what is held of a variable; returns what was. Its factors are to be linearized after that.
+    pub(crate) fn hold(&mut self, variable: u32, held: u32) -> u32 {
+        let before = std::mem::replace(&mut self.places[variable as usize].held, held);
+        self.blocks.hold(variable, held);
+        for f in self.blocks.factors(variable).collect::<Vec<_>>() {
+            self.hold_in(f);
+        }
+        before
+    }
+
+    /// Whether a factor was defined where it was last linearized.
+    pub(crate) fn is_defined(&self, number: u32) -> bool {
+        self.factor(number).is_some_and(|factor| {
+            let batch = || &self.batches.as_slice()[factor.batch as usize];
+            factor.entry.is_none() || batch().is_active(factor.index as usize)
+        })
+    }
+
+    /// Whether a factor takes part: it is defined where it was last linearized, and counts.
+    pub(crate) fn takes_part(&self, number: u32) -> bool {
+        self.is_defined(number) && self.factor(number).is_some_and(|factor| factor.weight != 0.0)
+    }
+
+    /// Whether a factor is no outlier, and none of its variables is parked.
+    pub(crate) fn is_whole(&self, number: u32) -> bool {
+        let is_in = |factor: &Factor| factor.variables().all(|v| !self.place(v).parked);
+        self.factor(number).is_some_and(|factor| !factor.rejected && is_in(factor))
+    }
+
+    /// Says whether a factor's part counts in the sums.
+    pub(crate) fn count(&mut self, number: u32, counts: bool) {
+        let Some(factor) = self.factors.get(number) else { return };
+        if self.regions.count(factor.region, counts) != counts {
+            self.blocks.mark_factor(&factor.members);
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! One change of the model, and what it touches.
+use crate::model::Model;
+use manifactor_graph::{FactorEntry, Resolved};
+
+/// A change of the model; each has one that takes it back.
+#[derive(Debug, Clone)]
+pub(in crate::session) enum Change {
+    /// An outlier, or what may be one, is inserted without being taken in.
+    Insert {
+        number: u32,
+        entry: Box<FactorEntry>,
+        resolved: Resolved,
+        weight: f64,
+        rejected: bool,
+    },
+    Remove {
+        number: u32,
+    },
+    Weigh {
+        number: u32,
+        weight: f64,
+    },
+    Hold {
+        variable: u32,
+        held: u32,
+    },
+    Reject {
+        number: u32,
+    },
+    Readmit {
+        number: u32,
+    },
+}
+
+/// What changes have touched.
+#[derive(Debug, Default)]
+pub(in crate::session) struct Touched {
+    /// Variables whose blocks of H have changed.
+    pub(in crate::session) variables: Vec<u32>,
+    /// Factors that are to be linearized.
+    pub(in crate::session) factors: Vec<u32>,
+    /// Factors that were taken out; some may be back.
+    pub(in crate::session) removed: Vec<u32>,
+    /// Variables that may have lost what determined them, or have gained it.
+    pub(in crate::session) doubtful: Vec<u32>,
+    /// Variables of which other directions are held now.
+    pub(in crate::session) held: Vec<u32>,
+}
+
+impl Touched {
+    /// Notes that a factor says something else now.
+    pub(in crate::session) fn change(&mut self, model: &Model, factor: u32) {
+        self.factors.push(factor);
+        for v in model.factor(factor).into_iter().flat_map(|factor| factor.variables()) {
+            self.variables.push(v);
+            self.doubtful.push(v);
+        }
+    }
+}
+
+impl Change {
+    /// Makes the change; returns the one that takes it back.
+    pub(in crate::session) fn apply(self, model: &mut Model, touched: &mut Touched) -> Option<Self> {
+        match self {
+            Self::Insert { number, entry, resolved, weight, rejected } => {
+                model.insert(number, &entry, &resolved, weight);
+                touched.factors.push(number);
+                match rejected {
+                    true => _ = model.reject(number),
+                    false => touched.variables.extend(&resolved.variables),
+                }
+                let parked = resolved.variables.iter().filter(|v| model.place(**v).parked);
+                touched.doubtful.extend(parked);
+                Some(Self::Remove { number })
+            }
+            Self::Remove { number } => {
+                let factor = model.remove(number)?;
+                touched.variables.extend(factor.variables());
+                touched.doubtful.extend(factor.variables());
+                touched.removed.push(number);
+                let resolved = factor.resolved()?;
+                let (weight, rejected) = (factor.weight, factor.rejected);
+                Some(Self::Insert { number, entry: Box::new(factor.entry?), resolved, weight, rejected })
+            }
+            Self::Weigh { number, weight } => {
+                let before = model.weigh(number, weight)?;
+                touched.change(model, number);
+                Some(Self::Weigh { number, weight: before })
+            }
+            Self::Hold { variable, held } => {
+                let before = model.hold(variable, held);
+                let neighbours: Vec<u32> = model.blocks.coupled(variable).iter().map(|c| c.other).collect();
+                touched.factors.extend(model.blocks.factors(variable));
+                for all in [&mut touched.variables, &mut touched.doubtful] {
+                    all.extend(neighbours.iter().copied().chain([variable]));
+                }
+                touched.held.push(variable);
+                Some(Self::Hold { variable, held: before })
+            }
+            Self::Reject { number } => model.reject(number).then(|| {
+                touched.change(model, number);
+                Self::Readmit { number }
+            }),
+            Self::Readmit { number } => model.readmit(number).then(|| {
+                touched.change(model, number);
+                Self::Reject { number }
+            }),
+        }
+    }
+}

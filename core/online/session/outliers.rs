@@ -1,0 +1,223 @@
+//! Factors that may be wrong, loop closures above all: they are tested before they count.
+//!
+//! A candidate comes in rejected. Once the other factors have been taken in, it is asked what it would cost on top of them:
+//! min ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ over its own variables, with their joint covariance Σ. That is the squared Mahalanobis distance of
+//! its innovation, and has the χ² distribution where the factor is right. What is above the quantile stays out; it comes back
+//! as soon as it fits the estimate. What counts and does not fit any more goes out, the worst first.
+//!
+//! This trusts what came first. Where a rejected factor is borne out by others that were rejected, or fails by little, a
+//! [`trial`] asks whether they are right and what counts is wrong.
+mod fit;
+mod trial;
+
+use super::Session;
+use super::changes::{Change, Touched};
+use super::update::Undo;
+use crate::factor_id::FactorId;
+use crate::report::Report;
+use manifactor_graph::{FactorEntry, Resolved};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// What is known of a factor that may be wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Suspect {
+    /// What ‖r‖² of a right one stays below: the χ² quantile for its rows.
+    pub(crate) bound: f64,
+    /// Nats by which it may narrow down alone where its variables are.
+    pub(crate) gain: f64,
+    /// The update that rejected it; `None` where it counts.
+    pub(crate) since: Option<usize>,
+}
+
+/// A factor that is rejected as an outlier.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Rejection {
+    /// The factor.
+    pub factor: FactorId,
+    /// The update that rejected it, the first being 1.
+    pub since: usize,
+    /// ½ρ(‖r‖²) at the estimate; `None` where it is not defined there.
+    pub cost: Option<f64>,
+}
+
+/// Factors that may go out after one update, as they do not fit any more.
+const DROPS: usize = 4;
+
+impl Session {
+    /// The factors that are rejected as outliers, in the order of their ids; see [`Outliers`](crate::Outliers).
+    pub fn rejections(&mut self) -> Vec<Rejection> {
+        let rejected: Vec<u32> = self.rejected.iter().copied().collect();
+        let one = |f: u32| {
+            let cost = self.square(f).map(|square| 0.5 * square);
+            Some(Rejection { factor: FactorId(f), since: self.suspects[&f].since?, cost })
+        };
+        rejected.into_iter().filter_map(one).collect()
+    }
+
+    /// What a new factor has to keep to, where it may be wrong.
+    pub(super) fn suspect(&self, entry: &FactorEntry, resolved: &Resolved) -> Option<Suspect> {
+        let outliers = self.settings.outliers.as_ref()?;
+        let name = entry.factor.typetag_name();
+        let is_named = outliers.types.is_empty() || outliers.types.iter().any(|t| t.as_str() == name);
+        let follows = |pair: &[u32]| {
+            let (a, b) = (self.model.place(pair[0]), self.model.place(pair[1]));
+            a.column == b.column && a.ordinal.abs_diff(b.ordinal) == 1
+        };
+        let variables = &resolved.variables;
+        let couples = variables.len() > 1 && !variables.windows(2).all(follows);
+        let rows = entry.factor.erased().signature().rows.filter(|rows| *rows > 0)?;
+        let (bound, gain) = (outliers.probability.chi_squared(rows), outliers.gain * rows as f64);
+        (is_named && couples).then_some(Suspect { bound, gain, since: Some(self.updates + 1) })
+    }
+
+    /// Notes new factors that may be wrong, and forgets those that are gone; returns which of the new are still there.
+    pub(super) fn enter(&mut self, new: &[(u32, Suspect)], removed: &[u32]) -> Vec<u32> {
+        removed.iter().for_each(|f| self.forget_suspect(*f));
+        for (f, suspect) in new.iter().filter(|(f, _)| self.model.factor(*f).is_some()) {
+            self.suspects.insert(*f, *suspect);
+            self.rejected.insert(*f);
+        }
+        let mut new: Vec<u32> =
+            new.iter().map(|(f, _)| *f).filter(|f| self.suspects.contains_key(f)).collect();
+        new.sort_unstable();
+        new.dedup();
+        new
+    }
+
+    /// Tests the factors that are new, and those whose variables have moved.
+    pub(super) fn test_outliers(&mut self, new: &[u32], report: &mut Report) {
+        if self.suspects.is_empty() {
+            return;
+        }
+        let (mut fitting, mut failing) = (vec![], vec![]);
+        for f in new {
+            let Suspect { bound, gain, .. } = self.suspects[f];
+            match self.surprise(&[*f]) {
+                Some(surprise) if surprise.square > bound || surprise.gain > gain => {
+                    failing.push((*f, surprise))
+                }
+                // what nothing is known of, or what is not defined, contradicts nothing
+                _ => fitting.push(*f),
+            }
+        }
+        self.admit(&fitting, report);
+        report.rejected.extend(failing.iter().map(|(f, _)| FactorId(*f)));
+        let moved = std::mem::take(&mut self.shaken);
+        let returning = self.returning(new, &moved);
+        self.admit(&returning, report);
+        report.readmitted.extend(returning.iter().map(|f| FactorId(*f)));
+        fitting.extend(returning);
+        self.drop_unfit(&moved, &fitting, report);
+        self.try_rejected(&failing, report);
+    }
+
+    /// Lets rejected factors count.
+    fn admit(&mut self, factors: &[u32], report: &mut Report) {
+        let changes = factors.iter().map(|f| Change::Readmit { number: *f }).collect();
+        if !factors.is_empty() && self.turn_over(changes, Touched::default(), false, report).is_ok() {
+            self.note(factors, None);
+            self.follow_up(report);
+        }
+    }
+
+    /// Notes when factors were rejected, or that they count.
+    fn note(&mut self, factors: &[u32], since: Option<usize>) {
+        for f in factors {
+            let Some(suspect) = self.suspects.get_mut(f) else { continue };
+            suspect.since = since;
+            match since {
+                Some(_) => self.rejected.insert(*f),
+                None => self.rejected.remove(f),
+            };
+        }
+    }
+
+    pub(super) fn forget_suspect(&mut self, factor: u32) {
+        self.suspects.remove(&factor);
+        self.rejected.remove(&factor);
+    }
+
+    /// Rejected factors that fit the estimate itself, where their variables have moved. That Σ allows for it is not enough: who
+    /// asks often enough is let in by chance.
+    fn returning(&mut self, new: &[u32], moved: &BTreeSet<u32>) -> Vec<u32> {
+        let old = self.rejected.iter().copied().filter(|f| !new.contains(f));
+        let has_moved = |f: u32| {
+            let mut variables = self.model.factor(f).into_iter().flat_map(|f| f.variables());
+            variables.any(|v| moved.contains(&v))
+        };
+        let mut old: Vec<u32> = old.filter(|f| has_moved(*f)).collect();
+        old.retain(|f| {
+            let bound = self.suspects[f].bound;
+            self.square(*f).is_some_and(|square| square <= bound)
+        });
+        old
+    }
+
+    /// Rejects what counts and does not fit any more, the worst first.
+    fn drop_unfit(&mut self, moved: &BTreeSet<u32>, admitted: &[u32], report: &mut Report) {
+        let mut around = self.model.factors_of(&moved.iter().copied().collect::<Vec<_>>());
+        around.extend(admitted);
+        around.retain(|f| self.suspects.get(f).is_some_and(|suspect| suspect.since.is_none()));
+        for _ in 0..DROPS {
+            let Some((worst, excess)) = self.worst(&around) else { return };
+            let rejected = vec![Change::Reject { number: worst }];
+            if excess <= 1.0 || self.turn_over(rejected, Touched::default(), false, report).is_err() {
+                return;
+            }
+            self.note(&[worst], Some(self.updates));
+            report.rejected.push(FactorId(worst));
+            around.retain(|f| *f != worst);
+            self.follow_up(report);
+        }
+    }
+
+    /// Of factors that count, the one with the largest share of its bound at the estimate.
+    fn worst(&mut self, factors: &[u32]) -> Option<(u32, f64)> {
+        let share = |f: &u32| (*f, 2.0 * self.cost_of(&[*f]).cost / self.suspects[f].bound);
+        factors.iter().map(share).max_by(|(f, a), (g, b)| a.total_cmp(b).then(g.cmp(f)))
+    }
+
+    /// Drops the rejected factors of a variable that leaves.
+    pub(super) fn drop_rejected(&mut self, variable: u32, report: &mut Report) {
+        let is_of = |f: &u32| {
+            self.model.factor(*f).is_some_and(|f| f.rejected && f.variables().any(|v| v == variable))
+        };
+        let rejected: Vec<u32> = self.rejected.iter().copied().filter(is_of).collect();
+        for f in rejected {
+            self.model.remove(f);
+            self.forget_suspect(f);
+            self.gone_factors.insert(u64::from(f));
+            report.dropped.push(FactorId(f));
+        }
+    }
+
+    /// Makes changes of what counts, and redoes what they touch; what takes them back. Where that fails, all is as it was.
+    fn turn_over(
+        &mut self,
+        changes: Vec<Change>,
+        mut touched: Touched,
+        is_turn: bool,
+        report: &mut Report,
+    ) -> Result<Vec<Change>, Failed> {
+        let changes: Vec<Change> =
+            changes.into_iter().filter_map(|change| change.apply(&mut self.model, &mut touched)).collect();
+        self.sort(&mut touched.factors);
+        let is_finite = self.model.linearize(&touched.factors).not_finite.is_none();
+        let mut undo = Undo { changes, ..Undo::default() };
+        if is_finite {
+            self.doubt_inactive(&mut touched);
+            undo.moves = self.park(&mut touched);
+            if self.pass(&touched, &undo.moves, is_turn, report).is_ok() {
+                return Ok(undo.changes);
+            }
+        }
+        self.take_back(undo);
+        Err(Failed)
+    }
+}
+
+/// A pass that did not come to an end.
+#[derive(Debug)]
+struct Failed;

@@ -1,0 +1,103 @@
+//! What factors cost on top of what is known.
+use super::super::Session;
+use nalgebra::{DMatrix, DVector};
+
+/// Steps of Gauss-Newton at most: the first is the innovation's, others follow what is not linear.
+const STEPS: usize = 10;
+/// Halvings of such a step.
+const HALVINGS: usize = 5;
+
+/// What factors say on top of what is known.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Surprise {
+    /// min Σ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ.
+    pub(super) square: f64,
+    /// ½ ln det(I + HΣ): by how many nats they narrow down where their variables are.
+    pub(super) gain: f64,
+}
+
+impl Session {
+    /// ‖r‖² of a rejected factor at the estimate; `None` where it is not defined or finite there.
+    pub(super) fn square(&mut self, factor: u32) -> Option<f64> {
+        let variables = self.look_at(&[factor]);
+        let zeros = DVector::zeros(variables.iter().map(|v| self.dim(*v)).sum());
+        let square = self.square_at(&[factor], &variables, &zeros);
+        variables.iter().for_each(|v| self.model.reset_trial(*v));
+        square
+    }
+
+    /// min Σ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ over the variables of some rejected factors, of which Σ is the joint covariance. `None` where
+    /// that cannot be told: a variable is parked, nothing constrains one of its directions, or a factor is not defined.
+    pub(super) fn surprise(&mut self, factors: &[u32]) -> Option<Surprise> {
+        let variables = self.look_at(factors);
+        let is_open = |v: &u32| {
+            self.model.place(*v).parked || self.open.range((*v, 0)..=(*v, u32::MAX)).next().is_some()
+        };
+        if variables.iter().any(is_open) {
+            return None;
+        }
+        let zeros = DVector::zeros(variables.iter().map(|v| self.dim(*v)).sum());
+        let square = self.square_at(factors, &variables, &zeros);
+        let least = square.and_then(|square| self.descend(factors, &variables, square));
+        variables.iter().for_each(|v| self.model.reset_trial(*v));
+        least
+    }
+
+    fn descend(&mut self, factors: &[u32], variables: &[u32], square: f64) -> Option<Surprise> {
+        let sigma = self.joint(variables);
+        let n = sigma.nrows();
+        // δ = Σy throughout: no inverse of Σ, which need not have one, and δᵀΣ⁻¹δ = yᵀδ
+        let (mut least, mut y, mut gain) = (square, DVector::zeros(n), 0.0);
+        for _ in 0..STEPS {
+            let delta = &sigma * &y;
+            let (h, g) = self.model.sums(variables, factors);
+            // the minimum of the quadratic: (I + HΣ) y = Hδ − g
+            let matrix = (DMatrix::identity(n, n) + &h * &sigma).lu();
+            gain = 0.5 * matrix.u().diagonal().iter().map(|x| x.abs().ln()).sum::<f64>();
+            let aim = matrix.solve(&(&h * &delta - g))?;
+            let mut step = aim - &y;
+            let lower = (0..HALVINGS).find_map(|_| {
+                let delta = &sigma * (&y + &step);
+                let square = self.square_at(factors, variables, &delta);
+                let total =
+                    square.map(|square| square + (&y + &step).dot(&delta)).filter(|total| *total < least);
+                step *= if total.is_none() { 0.5 } else { 1.0 };
+                total
+            });
+            let Some(total) = lower else { break };
+            y += &step;
+            let is_last = total > least * (1.0 - 1e-3);
+            least = total;
+            if is_last {
+                break;
+            }
+        }
+        Some(Surprise { square: least, gain })
+    }
+
+    /// The sum of ‖r‖² of factors at a step from the estimate, where they are left linearized.
+    fn square_at(&mut self, factors: &[u32], variables: &[u32], step: &DVector<f64>) -> Option<f64> {
+        let mut first = 0;
+        for v in variables {
+            let dim = self.dim(*v);
+            let from = &self.delta[self.model.blocks.range(*v)];
+            let step: Vec<f64> = from.iter().zip(step.rows(first, dim).iter()).map(|(a, b)| a + b).collect();
+            self.model.try_step(*v, &step);
+            first += dim;
+        }
+        let evaluation = self.model.linearize(factors);
+        let is_defined = factors.iter().all(|f| self.model.is_defined(*f));
+        let square = 2.0 * evaluation.cost;
+        (is_defined && evaluation.not_finite.is_none() && square.is_finite()).then_some(square)
+    }
+
+    /// The variables of some rejected factors, ascending. These are told what is held of them, as they hang on none.
+    fn look_at(&mut self, factors: &[u32]) -> Vec<u32> {
+        factors.iter().for_each(|f| self.model.hold_in(*f));
+        let all = factors.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables());
+        let mut variables: Vec<u32> = all.collect();
+        variables.sort_unstable();
+        variables.dedup();
+        variables
+    }
+}
