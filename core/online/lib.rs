@@ -31,7 +31,7 @@ mod tree;
 
 pub use error::{ChangeError, UpdateError};
 pub use factor_id::FactorId;
-pub use report::{Report, Shared};
+pub use report::{Rejection, Report, Shared};
 pub use saved::{LoadError, SaveError};
-pub use session::{CovarianceError, Finished, Rejection, Session};
+pub use session::{CovarianceError, Finished, Session};
 pub use settings::{Outliers, Settings, Window};

@@ -44,6 +44,17 @@ pub struct Report {
     pub inactive: usize,
 }
 
+/// A factor that is rejected as an outlier.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Rejection {
+    /// The factor.
+    pub factor: FactorId,
+    /// The update that rejected it, the first being 1.
+    pub since: usize,
+    /// ½ρ(‖r‖²) at the estimate; `None` where it is not defined there.
+    pub cost: Option<f64>,
+}
+
 /// A list that reports share until it changes: it may be long, and most updates leave it as it is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]

@@ -8,7 +8,6 @@
 //! What is saved is what history has left: factors, linearization points, steps, and which variables are eliminated together.
 //! The numbers of the factorization are not: from the same points, in the same tree, they have the same bits again.
 use crate::gone::{GoneKeys, Runs};
-use crate::session::Suspect;
 use crate::settings::Settings;
 use manifactor_graph::{FactorEntry, GraphError, Key, Variable};
 use serde::{Deserialize, Serialize};
@@ -108,6 +107,18 @@ pub(crate) struct SavedFactor {
     /// What is known of a factor that may be an outlier.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub suspect: Option<Suspect>,
+}
+
+/// What is known of a factor that may be wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Suspect {
+    /// What ‖r‖² of a right one stays below: the χ² quantile for its rows.
+    pub(crate) bound: f64,
+    /// Nats by which it may narrow down alone where its variables are.
+    pub(crate) gain: f64,
+    /// The update that rejected it; `None` where it counts.
+    pub(crate) since: Option<usize>,
 }
 
 /// A linear prior, its numbers by their bits.

@@ -15,6 +15,7 @@ use crate::fronts::{Fronts, Scalar};
 use crate::gone::{GoneKeys, Runs};
 use crate::model::Model;
 use crate::report::{Report, Shared};
+use crate::saved::Suspect;
 use crate::settings::Settings;
 use crate::tree::{Couplings, Tree};
 use changes::Pending;
@@ -26,8 +27,6 @@ use std::fmt;
 
 pub use covariance::CovarianceError;
 pub use finish::Finished;
-pub use outliers::Rejection;
-pub(crate) use outliers::Suspect;
 
 /// A factor graph that grows while it is solved. See the [crate](crate).
 ///

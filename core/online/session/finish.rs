@@ -71,7 +71,8 @@ impl Session {
             solved_for.insert_boxed(key.clone(), value.erased().clone_box());
         }
         let mut problem = Problem::compile_for(&graph, &solved_for, &optimizer.linear())?;
-        let weights = factors.iter().map(|f| self.model.factor(f.0).map_or(1.0, |factor| factor.weight));
+        let weights =
+            factors.iter().map(|f| self.model.factor(f.0).map_or(1.0, |factor| factor.weight * factor.share));
         let of_priors = std::iter::repeat_n(1.0, graph.factors().len() - factors.len());
         let weights: Vec<f64> = weights.chain(of_priors).collect();
         if weights.iter().any(|weight| *weight != 1.0) {

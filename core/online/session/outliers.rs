@@ -14,33 +14,10 @@ use super::Session;
 use super::changes::{Change, Touched};
 use super::update::Undo;
 use crate::factor_id::FactorId;
-use crate::report::Report;
+use crate::report::{Rejection, Report};
+use crate::saved::Suspect;
 use manifactor_graph::{FactorEntry, Resolved};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-
-/// What is known of a factor that may be wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Suspect {
-    /// What ‖r‖² of a right one stays below: the χ² quantile for its rows.
-    pub(crate) bound: f64,
-    /// Nats by which it may narrow down alone where its variables are.
-    pub(crate) gain: f64,
-    /// The update that rejected it; `None` where it counts.
-    pub(crate) since: Option<usize>,
-}
-
-/// A factor that is rejected as an outlier.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rejection {
-    /// The factor.
-    pub factor: FactorId,
-    /// The update that rejected it, the first being 1.
-    pub since: usize,
-    /// ½ρ(‖r‖²) at the estimate; `None` where it is not defined there.
-    pub cost: Option<f64>,
-}
 
 /// Factors that may go out after one update, as they do not fit any more.
 const DROPS: usize = 4;
@@ -96,7 +73,7 @@ impl Session {
             let Suspect { bound, gain, .. } = self.suspects[f];
             match self.surprise(&[*f]) {
                 Some(surprise) if surprise.square > bound || surprise.gain > gain => {
-                    failing.push((*f, surprise))
+                    failing.push((*f, surprise));
                 }
                 // what nothing is known of, or what is not defined, contradicts nothing
                 _ => fitting.push(*f),

@@ -89,7 +89,7 @@ impl Session {
     }
 
     /// Solves all of it as one batch from the estimate, and goes on from there; whether the cost has fallen.
-    fn settle(&mut self, report: &mut Report) -> bool {
+    pub(super) fn settle(&mut self, report: &mut Report) -> bool {
         let Ok(finished) = self.finish(&LevenbergMarquardt::default(), &mut Silent) else { return false };
         finished.outcome.final_cost < finished.outcome.initial_cost
             && self.adopt(&finished.values, report).is_ok()

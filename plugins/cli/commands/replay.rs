@@ -11,7 +11,7 @@ use crate::status::Status;
 use clap::Args;
 use manifactor::formats::replay::{Latencies, Replay as Steps, Step};
 use manifactor::graph::{Graph, Key};
-use manifactor::online::{Finished, Report, Session};
+use manifactor::online::{Finished, Rejection, Report, Session};
 use manifactor::slam::output::OutputFolder;
 use manifactor::solve::{All, Interrupt, Silent};
 use manifactor::viz::latencies;
@@ -48,6 +48,9 @@ pub(crate) struct Replay {
     #[arg(long)]
     pub(crate) json: bool,
 }
+
+/// Rejected factors that are named.
+const NAMED: usize = 6;
 
 /// What a replay came to.
 struct Replayed {
@@ -98,7 +101,7 @@ impl Replay {
             let picture = latencies(&title, &replayed.times, look.width());
             look.write(folder, picture.as_slice())?;
         }
-        self.tell(&replayed, cost, finished.as_ref(), batch);
+        self.tell(&mut replayed, cost, finished.as_ref(), batch);
         Ok(match finished {
             Some(finished) => Status::from(&finished.outcome.termination),
             None => Status::Interrupted,
@@ -167,8 +170,9 @@ impl Replay {
         Ok(())
     }
 
-    fn tell(&self, replayed: &Replayed, cost: f64, finished: Option<&Finished>, batch: f64) {
+    fn tell(&self, replayed: &mut Replayed, cost: f64, finished: Option<&Finished>, batch: f64) {
         let Replayed { session, times, report, interrupted, left_out } = replayed;
+        let rejections = session.rejections();
         let latencies = Latencies::of(times);
         let outcome = finished.map(|finished| &finished.outcome);
         if self.json {
@@ -185,6 +189,9 @@ impl Replay {
                 "final_cost": outcome.map(|o| o.final_cost),
                 "termination": outcome.map(|o| &o.termination),
                 "batch_seconds": finished.map(|_| batch),
+                "rejected": rejections.iter().map(|r| json!({
+                    "keys": session.entry(r.factor).map(|entry| &entry.keys), "since": r.since, "cost": r.cost,
+                })).collect::<Vec<_>>(),
                 "interrupted": interrupted,
                 "left_out": left_out,
             }));
@@ -206,6 +213,17 @@ impl Replay {
         if *left_out > 0 {
             text +=
                 &format!("{} left out: the window had no room for a variable\n", count(*left_out, "factor"));
+        }
+        if !rejections.is_empty() {
+            text += &format!("{} rejected as outliers: ", count(rejections.len(), "factor"));
+            let name = |r: &Rejection| {
+                let entry = session.entry(r.factor)?;
+                let keys: Vec<&str> = entry.keys.iter().map(Key::as_str).collect();
+                Some(format!("{} (update {})", keys.join("-"), r.since))
+            };
+            let first: Vec<String> = rejections.iter().take(NAMED).filter_map(name).collect();
+            let more = if rejections.len() > NAMED { ", …; see --json" } else { "" };
+            text += &format!("{}{more}\n", first.join(", "));
         }
         if !report.parked.is_empty() {
             text += &format!("waiting for factors that determine them: {}\n", keys(&report.parked));

@@ -1,6 +1,6 @@
 //! Replays pose graphs with false loop closures among the true ones: what a session rejects, beside batch graduated non-convexity.
 //!
-//! `cargo run --release -p manifactor-formats --example outliers -- [--share PERCENT]… [--seeds N] [--clusters N] [--batch] GRAPH.g2o…`.
+//! `cargo run --release -p manifactor-formats --example outliers -- [--share PERCENT]… [--seeds N] [--first SEED] [--clusters N] [--batch] GRAPH.g2o…`.
 //! False closures are so many for each hundred true ones; they lie between poses drawn at random, and say that these are up to
 //! 10 m and 3.1 rad apart. With `--clusters N` they come in runs of N that agree with each other, as where two places look alike. Precision and
 //! recall are of rejections: how many of those rejected are false, and how many of the false are rejected. CPU time of one thread, in
@@ -146,12 +146,14 @@ fn batch(truth: &Graph, misled: &Misled, from: &Values) -> Line {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let (mut shares, mut seeds, mut cluster, mut with_batch, mut files) = (vec![], 1, 1, false, vec![]);
+    let (mut shares, mut first, mut seeds, mut cluster, mut with_batch, mut files) =
+        (vec![], 1, 1, 1, false, vec![]);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut next = || arguments.next().ok_or(format!("{argument} takes a number"));
         match argument.as_str() {
             "--share" => shares.push(next()?.parse::<usize>()?),
+            "--first" => first = next()?.parse()?,
             "--seeds" => seeds = next()?.parse()?,
             "--clusters" => cluster = next()?.parse()?,
             "--batch" => with_batch = true,
@@ -167,7 +169,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let best = solve(&loaded.graph, &loaded.values, &manifactor_solve::Auto::default(), &mut Silent)?;
         let name = std::path::Path::new(&path).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for share in &shares {
-            for seed in 1..=seeds {
+            for seed in first..first + seeds {
                 let misled = mislead(&loaded.graph, &best.values, *share, cluster, seed);
                 let mut lines = vec![online(&loaded.graph, &misled)];
                 if with_batch {

@@ -48,6 +48,22 @@ fn a_replay_without_json_ends_in_a_table() {
 }
 
 #[test]
+fn a_false_closure_is_rejected_and_named() {
+    let graph = square() + "EDGE_SE2 15 3 4.0 -2.0 1.0 100 0 0 100 0 400\n";
+    let folder = folder(&[("square.g2o", &graph)]);
+    let replay = format!("replay {} --set online.outliers.probability=0.99", path(&folder, "square.g2o"));
+    let ran = manifactor(&replay).ended(0);
+    assert!(ran.stdout.contains("1 factor rejected as outliers: x15-x3 (update 16)"), "{}", ran.stdout);
+    let ran = manifactor(&format!("{replay} --json")).ended(0);
+    let summary = lines(&ran.stdout).pop().unwrap();
+    assert_eq!(summary["rejected"][0]["keys"], serde_json::json!(["x15", "x3"]));
+    assert!(
+        summary["rejected"][0]["cost"].as_f64().unwrap() > 100.0
+            && summary["final_cost"].as_f64().unwrap() < 10.0
+    );
+}
+
+#[test]
 fn a_graph_without_poses_is_refused() {
     let graph = "[[variables]]\nkey = \"p\"\nvalue = { type = \"point1\", position = [0.0] }\n\n[[factors]]\nkeys = [\"p\"]\nfactor = { type = \"prior_point1\", value = { position = [0.0] } }\n";
     let folder = folder(&[("graph.toml", graph)]);

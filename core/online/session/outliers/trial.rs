@@ -5,10 +5,11 @@
 //! McClure's. The outcome stays where it lowers the truncated cost ½ Σ min(‖r‖², c²); otherwise all goes back.
 use super::super::Session;
 use super::super::changes::{Change, Touched};
+use super::Failed;
 use super::fit::Surprise;
-use super::{Failed, Suspect};
 use crate::factor_id::FactorId;
 use crate::report::Report;
+use crate::saved::Suspect;
 use crate::tree::NONE;
 use manifactor_graph::Values;
 use std::collections::BTreeSet;
@@ -23,6 +24,8 @@ const ALIKE: f64 = 0.5;
 const NEAR: f64 = 3.0;
 /// Rounds after the last μ, until no factor changes sides.
 const ROUNDS: usize = 4;
+/// Steps at most after each change of sides, until nothing has left the region of its linearization.
+const STEPS: usize = 6;
 /// Shares that differ by less are the same.
 const SAME: f64 = 0.02;
 
@@ -211,10 +214,17 @@ impl Session {
             }
         }
         trial.undo.extend(self.turn_over(changes, touched, true, report)?);
-        match self.steady(report) {
-            true => Ok(()),
-            false => Err(Failed),
+        for _ in 0..STEPS {
+            if !self.steady(report) && !self.settle(report) {
+                return Err(Failed);
+            }
+            // what is far out says nothing of who is right
+            if !self.waiting.iter().any(|v| self.is_out(*v)) {
+                break;
+            }
+            self.turn_over(vec![], Touched::default(), true, report)?;
         }
+        Ok(())
     }
 
     /// Takes a trial back: what counted counts again, and the estimate is what it was.
