@@ -44,8 +44,9 @@ pub struct Settings {
 pub struct Outliers {
     /// Share of the right ones that the test keeps. Default: 0.99.
     pub probability: Probability,
-    /// Nats for each row by which a factor alone may narrow down where its variables are. What says more is hardly tested by what is
-    /// known, and waits for another that bears it out. Default: 1.5.
+    /// Nats for each row by which a factor alone may narrow down where its variables are, where as many candidates count as are rejected;
+    /// the logarithm of that ratio is added. What says more is hardly tested by what is known, and waits for another that bears it
+    /// out. Default: 1.5.
     #[serde(deserialize_with = "not_negative")]
     pub gain: f64,
     /// Of the candidates only the factors of these types. Default: all of them.

@@ -68,11 +68,15 @@ impl Session {
         if self.suspects.is_empty() {
             return;
         }
+        // the fewer were wrong so far, the more is believed of one alone: by Bayes' rule, odds are nats as gain is
+        let out = self.rejected.iter().filter(|f| !new.contains(f)).count();
+        let counted = self.suspects.len() - self.rejected.len();
+        let odds = ((counted + 1) as f64 / (out + 1) as f64).ln();
         let (mut fitting, mut failing) = (vec![], vec![]);
         for f in new {
             let Suspect { bound, gain, .. } = self.suspects[f];
             match self.surprise(&[*f]) {
-                Some(surprise) if surprise.square > bound || surprise.gain > gain => {
+                Some(surprise) if surprise.square > bound || surprise.gain > gain + odds => {
                     failing.push((*f, surprise));
                 }
                 // what nothing is known of, or what is not defined, contradicts nothing
