@@ -69,7 +69,7 @@ impl Session {
             return;
         }
         // the fewer were wrong so far, the more is believed of one alone: by Bayes' rule, odds are nats as gain is
-        let out = self.rejected.iter().filter(|f| !new.contains(f)).count();
+        let out = self.rejected.len() - new.len();
         let counted = self.suspects.len() - self.rejected.len();
         let odds = ((counted + 1) as f64 / (out + 1) as f64).ln();
         let (mut fitting, mut failing) = (vec![], vec![]);
@@ -83,24 +83,32 @@ impl Session {
                 _ => fitting.push(*f),
             }
         }
-        self.admit(&fitting, report);
+        if !self.admit(&fitting, report) {
+            report.rejected.extend(fitting.drain(..).map(FactorId));
+        }
         report.rejected.extend(failing.iter().map(|(f, _)| FactorId(*f)));
         let moved = std::mem::take(&mut self.shaken);
         let returning = self.returning(new, &moved);
-        self.admit(&returning, report);
-        report.readmitted.extend(returning.iter().map(|f| FactorId(*f)));
-        fitting.extend(returning);
+        if self.admit(&returning, report) {
+            report.readmitted.extend(returning.iter().map(|f| FactorId(*f)));
+            fitting.extend(returning);
+        }
         self.drop_unfit(&moved, &fitting, report);
         self.try_rejected(&failing, report);
     }
 
-    /// Lets rejected factors count.
-    fn admit(&mut self, factors: &[u32], report: &mut Report) {
+    /// Lets rejected factors count; whether they do. Where the linear system overflows with them, they stay out.
+    fn admit(&mut self, factors: &[u32], report: &mut Report) -> bool {
         let changes = factors.iter().map(|f| Change::Readmit { number: *f }).collect();
-        if !factors.is_empty() && self.turn_over(changes, Touched::default(), false, report).is_ok() {
-            self.note(factors, None);
-            self.follow_up(report);
+        if factors.is_empty() {
+            return true;
         }
+        if self.turn_over(changes, Touched::default(), false, report).is_err() {
+            return false;
+        }
+        self.note(factors, None);
+        self.follow_up(report);
+        true
     }
 
     /// Notes when factors were rejected, or that they count.

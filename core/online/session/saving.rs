@@ -69,7 +69,9 @@ impl Session {
         let steps = saved.variables.iter().flat_map(|variable| &variable.step);
         session.delta.iter_mut().zip(steps).for_each(|(to, step)| *to = f64::from_bits(*step));
         // counters that go on from there must not wrap around
-        let is_young = saved.born < 1 << 62 && saved.updates < 1 << 62 && saved.next_factor < 1 << 31;
+        let is_young = saved.ordinals.iter().chain([&saved.born]).all(|count| *count < 1 << 62)
+            && saved.updates < 1 << 62
+            && saved.next_factor < 1 << 31;
         is_young.then_some(()).ok_or(LoadError::Inconsistent("its counters"))?;
         session.put_priors(&saved.priors, saved.next_factor)?;
         session.put_factors(&saved.factors, saved.next_factor)?;

@@ -96,3 +96,12 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn counters_that_would_wrap_around_are_refused() {
+    let text = session(None).save().unwrap();
+    let json = text.split_once('\n').unwrap().1.trim_end();
+    let other = json.replacen("\"ordinals\":[6,6]", "\"ordinals\":[6,18446744073709551615]", 1);
+    assert_ne!(other, json);
+    assert_eq!(Session::load(&resealed(&other)).unwrap_err(), LoadError::Inconsistent("its counters"));
+}
