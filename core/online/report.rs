@@ -20,7 +20,9 @@ pub struct Report {
     pub operations: f64,
     /// Passes: one, and one more for each time that something could not wait.
     pub passes: usize,
-    /// Where the cost would have risen: steps that were halved.
+    /// Where the cost would have risen: variables whose steps were damped, one that was damped twice counting twice.
+    pub damped: usize,
+    /// Where that did not help: steps that were halved.
     pub halved: usize,
     /// Whether the update ended in a batch solve, as halved steps did not help.
     pub solved_batch: bool,

@@ -54,6 +54,8 @@ pub struct Session {
     /// Steps that the last pass changed, as they were before: to go back half the way.
     moved: Vec<(u32, usize)>,
     before: Vec<f64>,
+    /// Variables whose steps are damped.
+    damped: BTreeSet<u32>,
     /// Directions that nothing constrains, and variables that are parked.
     open: BTreeSet<Scalar>,
     parked: BTreeSet<u32>,
@@ -102,6 +104,7 @@ impl Session {
             urgent: vec![],
             moved: vec![],
             before: vec![],
+            damped: BTreeSet::new(),
             open: BTreeSet::new(),
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),

@@ -137,8 +137,19 @@ impl Estimate {
         settings: &Settings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
-        let most = settings.objects.refinements;
         let start = mapping.values.clone();
+        Self::from_start(sequence, mapping, start, settings, observer)
+    }
+
+    /// The same, from other values than those of the mapping.
+    pub(crate) fn from_start(
+        sequence: Arc<Sequence>,
+        mapping: Mapping,
+        start: Values,
+        settings: &Settings,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, EstimateError> {
+        let most = settings.objects.refinements;
         let mut estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
         let Some(variance) = &settings.variance_components else { return Ok(estimate) };
         let (mut components, mut settled): (Vec<Components>, bool) = (vec![], false);

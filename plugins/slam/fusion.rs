@@ -48,19 +48,24 @@ impl Fusion {
         }
     }
 
+    /// The class with the largest sum of scores, the first seen of equals, and that sum.
+    pub(crate) fn leading(&self) -> Option<(&str, f64)> {
+        let best = self.sums.iter().reduce(|best, next| if next.1 > best.1 { next } else { best });
+        best.map(|(name, sum)| (name.as_str(), *sum))
+    }
+
     /// The best class, the first seen of equals; `None` where no detection named any.
     pub fn best(&self) -> Option<FusedClass> {
-        let best = self.sums.iter().reduce(|best, next| if next.1 > best.1 { next } else { best });
         let total: f64 = self.sums.values().sum();
         let share = |sum: f64| if total > 0.0 { sum / total } else { 0.0 };
-        best.map(|(name, sum)| {
+        self.leading().map(|(name, sum)| {
             let others =
                 self.sums.iter().filter(|(other, sum)| *other != name && share(**sum) >= LEAST_SHARE);
             let mut others: IndexMap<_, _> =
                 others.map(|(other, sum)| (other.clone(), share(*sum))).collect();
             others.sort_by(|_, a, _, b| b.total_cmp(a));
             let score = sum / self.detections.max(1) as f64;
-            FusedClass { name: name.clone(), score, share: share(*sum), others }
+            FusedClass { name: name.to_owned(), score, share: share(sum), others }
         })
     }
 }

@@ -24,6 +24,11 @@ pub trait Gravity: Debug + Send + Sync {
     /// # Errors
     /// Where the sequence does not have what this needs.
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError>;
+
+    /// In a stream: seconds after the first frame from which on nothing that comes makes a difference.
+    fn settled_after(&self) -> f64 {
+        0.0
+    }
 }
 
 manifactor_graph::kind!(dyn Gravity, "gravity");

@@ -7,17 +7,18 @@ use crate::fusion::FusedClass;
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::sequence::{ObjectId, Sequence};
 use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
-use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, unmatched};
-use crate::settings::{DetectionSettings, Settings};
+use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, Verdict, unmatched};
+use crate::settings::{DetectionSettings, OdometrySettings, Settings};
 use manifactor_formats::plausible;
 use manifactor_geometry::{Between, Prior, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_quadric::{BoundingBoxFactor, DualQuadric};
+use manifactor_quadric::{BoundingBoxFactor, Camera, DualQuadric};
 use serde::Serialize;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 pub mod measurements;
-mod rejection;
+pub(crate) mod rejection;
 mod warning;
 
 pub use rejection::Rejection;
@@ -96,24 +97,49 @@ impl Mapping {
     pub fn new(sequence: &Sequence, settings: &Settings) -> Result<Self, MappingError> {
         let frame = settings.gravity.locate(sequence)?;
         let measurements = Measurements::gather(sequence, &settings.detections, &settings.aliases);
+        let all = &measurements.objects;
+        let pose =
+            |i: usize| Some(frame.map_from_odometry.compose(&sequence.frames.get(i)?.world_from_camera));
+        let start = |measured| rejection::start(measured, pose, sequence.camera, &settings.objects);
+        let starts: Vec<_> = all.iter().map(start).collect();
+        let candidates = all.iter().zip(&starts).filter_map(|(object, start)| candidate(object, start));
+        let mut judge = Judge::new(
+            &settings.semantics,
+            &settings.aliases,
+            frame.up,
+            candidates.collect(),
+            HashSet::new(),
+        );
+        let mut decisions = vec![];
+        for (measured, start) in all.iter().zip(starts) {
+            let candidate = candidate(measured, &start);
+            let verdict = candidate.map(|candidate| judge.judge(&candidate)).transpose()?;
+            decisions.push(Decision { start, verdict: verdict.unwrap_or_default() });
+        }
+        Self::assemble(sequence, settings, frame, measurements, decisions)
+    }
+
+    /// Puts together what was measured and what was decided of it: a decision for each object, in their order.
+    pub(crate) fn assemble(
+        sequence: &Sequence,
+        settings: &Settings,
+        frame: MapFrame,
+        measurements: Measurements,
+        decisions: Vec<Decision>,
+    ) -> Result<Self, MappingError> {
         let (graph, values) = (Graph::new(), Values::new());
         let (objects, warnings) = (vec![], vec![]);
         let mut mapping = Self { graph, values, frame, objects, measurements, warnings };
-        let poses = mapping.add_poses(sequence, settings)?;
+        mapping.add_poses(sequence, settings)?;
         let all = mapping.measurements.objects.clone();
-        let start = |measured: &Measured| rejection::start(measured, &poses, sequence, &settings.objects);
-        let starts: Vec<_> = all.iter().map(start).collect();
-        let mapped = all.iter().zip(&starts).filter_map(|(object, start)| candidate(object, start));
-        let up = mapping.frame.up;
-        let mut judge = Judge::new(&settings.semantics, &settings.aliases, up, mapped.collect());
-        for (measured, start) in all.iter().zip(starts) {
-            let object = mapping.add_object(measured, start, &mut judge, sequence, settings)?;
+        for (measured, decision) in all.iter().zip(decisions) {
+            let object = mapping.add_object(measured, decision, sequence.camera, settings);
             mapping.objects.push(object);
         }
         settings.own.add_to(&mut mapping.graph, &mut mapping.values);
         mapping.warn(sequence, settings);
         let (poses, objects, factors) =
-            (poses.len(), mapping.mapped().count(), mapping.graph.factors().len());
+            (sequence.frames.len(), mapping.mapped().count(), mapping.graph.factors().len());
         tracing::info!(poses, objects, factors, "mapped");
         Ok(mapping)
     }
@@ -123,57 +149,51 @@ impl Mapping {
         self.objects.iter().filter(|object| object.rejected.is_none())
     }
 
-    fn add_poses(&mut self, sequence: &Sequence, settings: &Settings) -> Result<Vec<Se3>, MappingError> {
-        let odometry = sequence.frames.iter().map(|frame| frame.world_from_camera);
-        let poses: Vec<Se3> = odometry.map(|pose| self.frame.map_from_odometry.compose(&pose)).collect();
-        let first = poses.first().ok_or(MappingError::NoFrames)?;
-        for (i, pose) in poses.iter().enumerate() {
-            self.values.insert(pose_key(i), *pose);
+    fn add_poses(&mut self, sequence: &Sequence, settings: &Settings) -> Result<(), MappingError> {
+        let first = sequence.frames.first().ok_or(MappingError::NoFrames)?;
+        for (i, frame) in sequence.frames.iter().enumerate() {
+            let pose = self.frame.map_from_odometry.compose(&frame.world_from_camera);
+            self.values.insert(pose_key(i), pose);
         }
-        let prior = self.graph.add([pose_key(0)], Prior { value: *first });
-        prior.noise(settings.prior.noise.clone());
+        let first = self.frame.map_from_odometry.compose(&first.world_from_camera);
+        self.graph.push(prior_entry(first, settings));
         let pairs = sequence.frames.iter().zip(sequence.frames.iter().skip(1));
         for (i, (here, next)) in pairs.enumerate() {
             let relative = here.world_from_camera.between(&next.world_from_camera);
-            let between = self.graph.add([pose_key(i), pose_key(i + 1)], Between { relative });
-            between.noise(settings.odometry.noise.clone());
-            between.loss.clone_from(&settings.odometry.loss);
+            self.graph.push(odometry_entry([i, i + 1], relative, &settings.odometry));
         }
-        Ok(poses)
+        Ok(())
     }
 
     fn add_object(
         &mut self,
         measured: &Measured,
-        start: Result<DualQuadric, Rejection>,
-        judge: &mut Judge<'_>,
-        sequence: &Sequence,
+        decision: Decision,
+        camera: Camera,
         settings: &Settings,
-    ) -> Result<MappedObject, MappingError> {
+    ) -> MappedObject {
         let key = object_key(measured.id);
-        if let Err(rejection) = &start {
-            tracing::info!(object = %measured.id, "not mapped: {rejection}");
+        let Decision { start, verdict } = decision;
+        match &start {
+            Err(rejection) => tracing::info!(object = %measured.id, "not mapped: {rejection}"),
+            Ok(start) => {
+                let boxes = measured.views.iter();
+                let boxes = boxes.map(|view| box_entry(view, key.clone(), camera, &settings.detections));
+                self.graph.factors_mut().extend(boxes);
+                self.graph.factors_mut().extend(verdict.entries);
+                self.values.insert(key.clone(), *start);
+            }
         }
-        let (mut semantic_factors, mut left_out) = (vec![], vec![]);
-        if let Some(candidate) = candidate(measured, &start) {
-            let boxes = measured.views.iter();
-            let boxes = boxes.map(|view| box_entry(view, key.clone(), sequence, &settings.detections));
-            self.graph.factors_mut().extend(boxes);
-            let verdict = judge.judge(&candidate)?;
-            self.graph.factors_mut().extend(verdict.entries);
-            self.values.insert(key.clone(), candidate.start);
-            (semantic_factors, left_out) = (verdict.applied, verdict.left_out);
-        }
-        Ok(MappedObject {
+        MappedObject {
             id: measured.id,
             key,
-            class: measured.class.clone(),
+            class: measured.class(),
             detections: measured.detections,
             boxes: measured.views.len(),
             rejected: start.err(),
-            semantic_factors,
-            left_out,
-        })
+            semantic_factors: verdict.applied,
+            left_out: verdict.left_out,
+        }
     }
 
     fn warn(&mut self, sequence: &Sequence, settings: &Settings) {
@@ -196,19 +216,51 @@ impl Mapping {
     }
 }
 
+/// What was decided of an object.
+#[derive(Debug, Clone)]
+pub(crate) struct Decision {
+    /// Where it begins, or why it is not mapped.
+    pub start: Result<DualQuadric, Rejection>,
+    /// What the rules have for it; nothing, where it is not mapped.
+    pub verdict: Verdict,
+}
+
 /// A measured object as rules look at it; `None`, where it is not mapped.
 fn candidate(measured: &Measured, start: &Result<DualQuadric, Rejection>) -> Option<Candidate> {
     let start = *start.as_ref().ok()?;
-    Some(Candidate { key: object_key(measured.id), class: measured.class.clone(), start })
+    Some(Candidate { key: object_key(measured.id), class: measured.class(), start })
 }
 
-fn box_entry(
+/// The factor that holds the first pose.
+pub(crate) fn prior_entry(value: Se3, settings: &Settings) -> FactorEntry {
+    FactorEntry {
+        keys: vec![pose_key(0)],
+        name: None,
+        factor: Arc::new(Prior { value }),
+        noise: settings.prior.noise.clone(),
+        loss: None,
+    }
+}
+
+/// A factor of odometry between two frames.
+pub(crate) fn odometry_entry(frames: [usize; 2], relative: Se3, settings: &OdometrySettings) -> FactorEntry {
+    FactorEntry {
+        keys: frames.map(pose_key).to_vec(),
+        name: None,
+        factor: Arc::new(Between { relative }),
+        noise: settings.noise.clone(),
+        loss: settings.loss.clone(),
+    }
+}
+
+/// The factor of a box.
+pub(crate) fn box_entry(
     view: &ObjectBox,
     object: Key,
-    sequence: &Sequence,
+    camera: Camera,
     settings: &DetectionSettings,
 ) -> FactorEntry {
-    let (bounding_box, camera, model) = (view.bounding_box, sequence.camera, settings.model);
+    let (bounding_box, model) = (view.bounding_box, settings.model);
     FactorEntry {
         keys: vec![pose_key(view.frame), object],
         name: None,

@@ -1,12 +1,14 @@
 //! A run from its document to its report.
 use crate::estimate::{Estimate, EstimateError};
-use crate::input::sequence::Sequence;
+use crate::input::sequence::{Detection, Sequence};
 use crate::input::source::{Folders, SourceError};
 use crate::mapping::{Mapping, MappingError};
-use crate::output::report::{RunReport, VariantReport};
+use crate::online::{FinishError, FrameError, FrameReport, Mapper};
+use crate::output::report::{OnlineReport, RunReport, VariantReport};
 use crate::settings::Settings;
 use crate::settings::run_document::{RunDocument, Variant};
-use manifactor_solve::{Observer, Termination};
+use manifactor_solve::{Observer, SettingError, Termination};
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -24,6 +26,12 @@ pub enum RunError {
     /// The graph cannot be solved.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
+    /// A setting of the session is outside its domain.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A map that came frame by frame has no end.
+    #[error(transparent)]
+    Finish(#[from] FinishError),
 }
 
 /// Maps, solves and evaluates a sequence.
@@ -42,6 +50,57 @@ pub fn estimate(
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))
+}
+
+/// Maps a sequence frame by frame, solves all of it at the end, and evaluates. `watch` is told of each frame, with the map and
+/// the seconds that it took; it can end the stream there.
+///
+/// # Errors
+/// Where the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
+pub fn online(
+    name: &str,
+    sequence: Arc<Sequence>,
+    settings: &Settings,
+    watch: &mut dyn Watch,
+    observer: &mut dyn Observer,
+) -> Result<(Estimate, VariantReport), RunError> {
+    let clock = Instant::now();
+    let mut mapper = Mapper::new(sequence.opening(), settings)?;
+    let mut progress = OnlineReport::default();
+    let mut taken = Sequence { frames: vec![], detections: vec![], ..(*sequence).clone() };
+    for observation in sequence.observations() {
+        let began = Instant::now();
+        let report = mapper.take(&observation);
+        let seconds = began.elapsed().as_secs_f64();
+        progress.count(report.as_ref(), seconds);
+        if let Ok(report) = &report {
+            taken.frames.push(observation.frame);
+            let detections = observation.detections.into_iter();
+            taken.detections.extend(detections.map(|d| Detection { frame: report.frame, ..d }));
+        }
+        if watch.frame(report, &mut mapper, seconds).is_break() {
+            break;
+        }
+    }
+    progress.end(&mut mapper);
+    let live = mapper.live().to_vec();
+    let estimate = mapper.finish(Arc::new(taken), observer)?;
+    progress.compare(live, &estimate, &settings.evaluation);
+    let mut report = VariantReport::new(name, &estimate, settings, 0.0);
+    report.online = Some(progress);
+    report.seconds = clock.elapsed().as_secs_f64();
+    Ok((estimate, report))
+}
+
+/// Watches frames as they come in.
+pub trait Watch {
+    /// After each frame: what came of it, the map, and the seconds that it took.
+    fn frame(
+        &mut self,
+        report: Result<FrameReport, FrameError>,
+        mapper: &mut Mapper,
+        seconds: f64,
+    ) -> ControlFlow<()>;
 }
 
 /// A run under way: sequences are loaded once for all variants that share them.
@@ -90,11 +149,36 @@ impl<'a> Run<'a> {
     ) -> Result<(Estimate, VariantReport), RunError> {
         let clock = Instant::now();
         let sequence = self.sequence(variant)?;
-        let (estimate, mut report) = estimate(&variant.name, sequence, &variant.settings, observer)?;
+        let done = estimate(&variant.name, sequence, &variant.settings, observer)?;
+        Ok(self.keep(variant, done, clock))
+    }
+
+    /// The same, frame by frame; see [`online`].
+    ///
+    /// # Errors
+    /// Where there is no data, or no graph can be made of it.
+    pub fn variant_online(
+        &mut self,
+        variant: &Variant,
+        watch: &mut dyn Watch,
+        observer: &mut dyn Observer,
+    ) -> Result<(Estimate, VariantReport), RunError> {
+        let clock = Instant::now();
+        let sequence = self.sequence(variant)?;
+        let done = online(&variant.name, sequence, &variant.settings, watch, observer)?;
+        Ok(self.keep(variant, done, clock))
+    }
+
+    fn keep(
+        &mut self,
+        variant: &Variant,
+        (estimate, mut report): (Estimate, VariantReport),
+        clock: Instant,
+    ) -> (Estimate, VariantReport) {
         report.about.clone_from(&variant.about);
         report.seconds = clock.elapsed().as_secs_f64();
         self.reports.push(report.clone());
-        Ok((estimate, report))
+        (estimate, report)
     }
 
     /// The report over all variants that were run.

@@ -35,7 +35,7 @@ mod rule_factor;
 mod tests;
 
 pub use apply::{Applied, LeftOut};
-pub(crate) use apply::{Candidate, Judge};
+pub(crate) use apply::{Candidate, Connected, Judge, Verdict};
 pub use condition::Near;
 pub(crate) use read::{RulesDocument, SemanticsDocument, read_semantics};
 pub use rule_factor::{RuleError, RuleFactor};

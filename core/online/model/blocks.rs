@@ -50,6 +50,8 @@ struct Variable {
     diagonal: usize,
     /// A bit for each direction that is held.
     held: u32,
+    /// What is added to the diagonal of its block, so that steps are shorter.
+    damping: f64,
     factors: Vec<Part>,
     coupled: Vec<Coupling>,
     is_dirty: bool,
@@ -136,6 +138,15 @@ impl Blocks {
     pub(crate) fn hold(&mut self, variable: u32, held: u32) {
         self.variables[variable as usize].held = held;
         self.mark(variable);
+    }
+
+    /// Damps the steps of a variable by this much, in units of H; 0 for not at all.
+    pub(crate) fn damp(&mut self, variable: u32, damping: f64) {
+        self.variables[variable as usize].damping = damping;
+        self.mark(variable);
+    }
+    pub(crate) fn damping(&self, variable: u32) -> f64 {
+        self.variables[variable as usize].damping
     }
 
     fn pair(&self, a: u32, b: u32) -> Option<u32> {
@@ -261,6 +272,7 @@ impl Blocks {
                 h[c * d + c] = 1.0;
             }
             self.precision[v.start + c] = h[c * d + c].sqrt();
+            h[c * d + c] += v.damping;
         }
     }
 

@@ -50,6 +50,10 @@ impl Session {
         let mut chosen: Vec<u32> = held.to_vec();
         if is_turn {
             let mut out: Vec<u32> = self.waiting.iter().copied().filter(|v| self.is_out(*v)).collect();
+            // a step that is damped is no step to the minimum, however short
+            out.extend(self.damped.iter().copied().filter(|v| self.may_move(*v)));
+            out.sort_unstable();
+            out.dedup();
             if let Some(budget) = self.settings.budget {
                 self.postponed = out.len();
                 self.afford(&mut out, budget - spent, spent == 0.0 && held.is_empty(), affected);

@@ -161,6 +161,8 @@ impl Session {
         }
         self.parked.remove(&variable);
         self.shaken.remove(&variable);
+        self.damped.remove(&variable);
+        self.model.blocks.damp(variable, 0.0);
         self.gone.insert(self.model.place(variable).key.as_str());
         self.model.forget(variable);
     }

@@ -5,11 +5,22 @@ use super::parking::Moves;
 use crate::report::Report;
 use manifactor_graph::batch::Evaluation;
 use manifactor_solve::{LevenbergMarquardt, Silent};
+use smallvec::SmallVec;
+use std::collections::BTreeMap;
 
 /// Halvings of a step.
 const HALVINGS: usize = 6;
-/// Damped steps before a batch solve.
+/// Rounds of such halvings before a batch solve.
 const ROUNDS: usize = 3;
+/// Rounds of damping.
+const DAMPINGS: usize = 6;
+/// The least damping of a variable, as a share of the largest entry of its diagonal of H; and by how much it grows.
+const LEAST_DAMPING: f64 = 1e-3;
+const STRONGER: f64 = 10.0;
+/// What becomes of it each time that the variable is linearized anew.
+const WEAKER: f64 = 0.25;
+/// Damping that is as good as none, as a share of that entry.
+const NO_DAMPING: f64 = 1e-6;
 /// A rise of the cost by less than this share of it is rounding, or what was not passed on.
 const RISE: f64 = 1e-3;
 
@@ -22,8 +33,11 @@ impl Session {
         }
     }
 
-    /// Shortens long steps that have raised the cost; whether it has ceased to rise.
+    /// Damps, then shortens long steps that have raised the cost; whether it has ceased to rise.
     pub(super) fn steady(&mut self, report: &mut Report) -> bool {
+        if self.damp(report) {
+            return true;
+        }
         for _ in 0..ROUNDS {
             if !self.is_urgent() || !self.shorten(report) {
                 return true;
@@ -36,6 +50,57 @@ impl Session {
             }
         }
         !(self.is_urgent() && self.shorten(report))
+    }
+
+    /// Damps variables whose steps are far too long, as long as the cost of the factors around has risen since before; whether
+    /// it has ceased to.
+    fn damp(&mut self, report: &mut Report) -> bool {
+        if !self.is_urgent() {
+            return true;
+        }
+        let mut before: BTreeMap<u32, SmallVec<[f64; 9]>> = BTreeMap::new();
+        for _ in 0..DAMPINGS {
+            for (v, first) in &self.moved {
+                let old = &self.before[*first..*first + self.model.blocks.dim(*v)];
+                before.entry(*v).or_insert_with(|| SmallVec::from_slice(old));
+            }
+            if !self.has_risen(&before) {
+                return true;
+            }
+            if !self.is_urgent() {
+                return false;
+            }
+            let urgent = self.urgent.clone();
+            for v in &urgent {
+                let precision = self.model.blocks.precision(*v).iter().copied().fold(0.0, f64::max);
+                let least = LEAST_DAMPING * precision * precision;
+                self.model.blocks.damp(*v, (STRONGER * self.model.blocks.damping(*v)).max(least));
+                self.damped.insert(*v);
+            }
+            report.damped += urgent.len();
+            let touched = Touched { variables: urgent, ..Touched::default() };
+            if self.pass(&touched, &Moves::default(), false, report).is_err() {
+                return true;
+            }
+        }
+        !self.has_risen(&before)
+    }
+
+    /// Whether the factors around some variables cost more than with these steps.
+    fn has_risen(&mut self, before: &BTreeMap<u32, SmallVec<[f64; 9]>>) -> bool {
+        let moved: Vec<u32> = before.keys().copied().collect();
+        let mut factors = self.model.factors_of(&moved);
+        factors.retain(|f| self.model.is_whole(*f));
+        let after = self.cost_of(&factors);
+        let mut now = before.clone();
+        for (v, step) in &mut now {
+            self.delta[self.model.blocks.range(*v)].swap_with_slice(step);
+        }
+        let cost = self.cost_of(&factors);
+        for (v, step) in &mut now {
+            self.delta[self.model.blocks.range(*v)].swap_with_slice(step);
+        }
+        rises(&cost, &after)
     }
 
     /// Halves the last step until it lowers the cost of the factors around; whether it had to be.
@@ -88,9 +153,22 @@ impl Session {
         cost
     }
 
+    /// Damps less those variables that are linearized anew; what they were damped by.
+    pub(super) fn relax(&mut self, variables: &[u32]) -> Vec<(u32, f64)> {
+        let damped = variables.iter().filter(|v| self.damped.contains(v));
+        let before: Vec<(u32, f64)> = damped.map(|v| (*v, self.model.blocks.damping(*v))).collect();
+        for (v, damping) in &before {
+            let precision = self.model.blocks.precision(*v).iter().copied().fold(0.0, f64::max);
+            let weaker = WEAKER * damping;
+            let goes_on = weaker > NO_DAMPING * precision * precision;
+            self.model.blocks.damp(*v, if goes_on { weaker } else { 0.0 });
+        }
+        before
+    }
+
     /// Solves all of it as one batch from the estimate, and goes on from there; whether the cost has fallen.
     pub(super) fn settle(&mut self, report: &mut Report) -> bool {
-        let Ok(finished) = self.finish(&LevenbergMarquardt::default(), &mut Silent) else { return false };
+        let Ok(finished) = self.finish(&batch_solver(), &mut Silent) else { return false };
         finished.outcome.final_cost < finished.outcome.initial_cost
             && self.adopt(&finished.values, report).is_ok()
     }
@@ -100,4 +178,10 @@ fn rises(before: &Evaluation, after: &Evaluation) -> bool {
     let is_lower = after.cost <= before.cost * (1.0 + RISE);
     // not a number is not lower either
     after.left > before.left || !is_lower
+}
+
+/// Damping of one size for all directions, as above: in proportion to the diagonal of H, a direction that has all but lost its
+/// derivative would go for good.
+fn batch_solver() -> LevenbergMarquardt {
+    LevenbergMarquardt { diagonal: [1.0, 1.0], ..LevenbergMarquardt::default() }
 }

@@ -183,6 +183,7 @@ impl Session {
         for v in &relinearized.variables {
             self.touch_around(*v, &mut affected);
         }
+        let damping = if is_turn { self.relax(&relinearized.variables) } else { vec![] };
         self.model.sum_up();
         let redone = self.redo(&affected, moves, &last);
         let finite = self.check_finite(&redone);
@@ -190,11 +191,14 @@ impl Session {
         if let Err(overflow) = built {
             self.tree.drop_new(&affected, &redone);
             self.take_back_points(&relinearized);
+            damping.iter().for_each(|(v, damping)| self.model.blocks.damp(*v, *damping));
             self.postponed = postponed;
             self.model.sum_up();
             return Err(overflow);
         }
         self.exchange(&affected, &redone, moves);
+        let blocks = &self.model.blocks;
+        self.damped.retain(|v| blocks.damping(*v) > 0.0);
         self.doubt_parked(&relinearized.factors);
         report.relinearized += relinearized.variables.len();
         self.accept_points(&relinearized, is_turn);

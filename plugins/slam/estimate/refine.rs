@@ -19,8 +19,7 @@ const ELONGATION: f64 = 1.5;
 #[derive(Debug)]
 pub(crate) struct Refiner<'a> {
     objects: Vec<(Key, Vec<&'a FactorEntry>)>,
-    /// Axes like the world's, one of them up.
-    upright: So3,
+    up: Option<Direction>,
 }
 
 impl<'a> Refiner<'a> {
@@ -36,70 +35,76 @@ impl<'a> Refiner<'a> {
                 }
             }
         }
-        Self { objects: objects.into_iter().collect(), upright: upright(mapping.frame.up) }
+        Self { objects: objects.into_iter().collect(), up: mapping.frame.up }
     }
 
     /// Puts each object where it costs the least, as far as any of the starts leads there.
     pub(crate) fn refine(&self, values: &mut Values) {
         for (key, entries) in &self.objects {
             if let Ok(start) = values.get::<DualQuadric>(key).copied() {
-                let better = self.better(key, start, entries, values);
+                let better = refined(key, start, entries, values, self.up);
                 values.insert(key.clone(), better);
             }
         }
     }
-
-    /// The quadric among those that the starts lead to that leaves the fewest factors undefined, and then costs the
-    /// least; `start` itself, where none is better.
-    fn better(&self, key: &Key, start: DualQuadric, entries: &[&FactorEntry], poses: &Values) -> DualQuadric {
-        let (mut graph, mut values) = (Graph::new(), Values::new());
-        for entry in entries {
-            for pose in entry.keys.iter().filter(|pose| *pose != key) {
-                if let (false, Some(value)) = (values.contains(pose.as_str()), poses.variable(pose.as_str()))
-                {
-                    values.insert_boxed(pose.clone(), value.erased().clone_box());
-                    graph.fix(pose.clone());
-                }
-            }
-            graph.push((*entry).clone());
-        }
-        values.insert(key.clone(), start);
-        // what cannot be compiled is reported by the joint solve
-        let Ok(mut problem) = Problem::compile(&graph, &values) else { return start };
-        let mut best = (rank(&problem), start);
-        for candidate in self.starts(&start) {
-            values.insert(key.clone(), candidate);
-            if problem.set_values(&values).is_err() {
-                continue;
-            }
-            solver().descend(&mut problem, &mut Silent);
-            let found = problem.values().get::<DualQuadric>(key).copied();
-            if let (Ok(found), rank) = (found, rank(&problem))
-                && rank < best.0
-            {
-                best = (rank, found);
-            }
-        }
-        best.1
-    }
-
-    /// The start itself; a ball; and ellipsoids that are longest along each axis of the world.
-    fn starts(&self, start: &DualQuadric) -> Vec<DualQuadric> {
-        let s = start.semi_axes;
-        // the middle one is the least likely to be far off
-        let radius = (s.sum() - s.min() - s.max()).max(SHORTEST);
-        let pose = Se3::new(self.upright, start.centroid());
-        let along_world = |semi_axes| DualQuadric { pose, semi_axes };
-        let mut starts = vec![*start, along_world(Vector3::repeat(radius))];
-        for longest in 0..3 {
-            let mut semi_axes = Vector3::repeat(radius);
-            semi_axes[longest] *= ELONGATION;
-            starts.push(along_world(semi_axes));
-        }
-        starts
-    }
 }
 
+/// The quadric among those that several starts lead to that leaves the fewest of its factors undefined, and then costs the
+/// least; `start` itself, where none is better. Other variables are held where `others` has them.
+pub(crate) fn refined(
+    key: &Key,
+    start: DualQuadric,
+    entries: &[&FactorEntry],
+    others: &Values,
+    up: Option<Direction>,
+) -> DualQuadric {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    for entry in entries {
+        for other in entry.keys.iter().filter(|other| *other != key) {
+            if let (false, Some(value)) = (values.contains(other.as_str()), others.variable(other.as_str())) {
+                values.insert_boxed(other.clone(), value.erased().clone_box());
+                graph.fix(other.clone());
+            }
+        }
+        graph.push((*entry).clone());
+    }
+    values.insert(key.clone(), start);
+    // what cannot be compiled is reported by the joint solve
+    let Ok(mut problem) = Problem::compile(&graph, &values) else { return start };
+    let mut best = (rank(&problem), start);
+    for candidate in starts(&start, upright(up)) {
+        values.insert(key.clone(), candidate);
+        if problem.set_values(&values).is_err() {
+            continue;
+        }
+        solver().descend(&mut problem, &mut Silent);
+        let found = problem.values().get::<DualQuadric>(key).copied();
+        if let (Ok(found), rank) = (found, rank(&problem))
+            && rank < best.0
+        {
+            best = (rank, found);
+        }
+    }
+    best.1
+}
+
+/// The start itself; a ball; and ellipsoids that are longest along each of these axes.
+fn starts(start: &DualQuadric, axes: So3) -> Vec<DualQuadric> {
+    let s = start.semi_axes;
+    // the middle one is the least likely to be far off
+    let radius = (s.sum() - s.min() - s.max()).max(SHORTEST);
+    let pose = Se3::new(axes, start.centroid());
+    let along_axes = |semi_axes| DualQuadric { pose, semi_axes };
+    let mut starts = vec![*start, along_axes(Vector3::repeat(radius))];
+    for longest in 0..3 {
+        let mut semi_axes = Vector3::repeat(radius);
+        semi_axes[longest] *= ELONGATION;
+        starts.push(along_axes(semi_axes));
+    }
+    starts
+}
+
+/// Axes of which one is up.
 fn upright(up: Option<Direction>) -> So3 {
     let rotation = Rotation3::rotation_between(&Vector3::z(), &up.unwrap_or_default());
     // there is none for exactly upside down, which is as good as upright

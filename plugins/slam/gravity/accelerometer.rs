@@ -74,6 +74,10 @@ impl Gravity for Accelerometer {
             .sum();
         Ok(MapFrame::of_odometry(Some(Direction::new(up)?)))
     }
+
+    fn settled_after(&self) -> f64 {
+        self.window
+    }
 }
 register!(dyn Gravity, "accelerometer", Accelerometer);
 

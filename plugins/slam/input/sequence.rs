@@ -29,6 +29,62 @@ pub struct Sequence {
     pub ground_truth: Option<GroundTruth>,
 }
 
+/// What is known of a recording before its first frame.
+#[derive(Debug, Clone)]
+pub struct Opening {
+    /// The camera; the same for all frames.
+    pub camera: Camera,
+    /// Up in the frame of the odometry, where the source knows it.
+    pub up: Option<Direction>,
+    /// What the estimate can be compared with.
+    pub ground_truth: Option<GroundTruth>,
+}
+
+/// What comes with one image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observation {
+    /// The image's time and its pose by odometry.
+    pub frame: Frame,
+    /// The boxes in it.
+    pub detections: Vec<Detection>,
+    /// Readings of the accelerometer since the frame before.
+    pub accelerometer: Vec<Acceleration>,
+}
+
+impl Opening {
+    /// Nothing but a camera.
+    pub fn new(camera: Camera) -> Self {
+        Self { camera, up: None, ground_truth: None }
+    }
+
+    /// A sequence without frames.
+    pub fn into_sequence(self) -> Sequence {
+        let Self { camera, up, ground_truth } = self;
+        Sequence { camera, frames: vec![], detections: vec![], up, accelerometer: vec![], ground_truth }
+    }
+}
+
+impl Sequence {
+    /// What is known before the first frame.
+    pub fn opening(&self) -> Opening {
+        Opening { camera: self.camera, up: self.up, ground_truth: self.ground_truth.clone() }
+    }
+
+    /// Frame after frame, as they came. Readings of the accelerometer come with the first frame that is not before them.
+    pub fn observations(&self) -> impl Iterator<Item = Observation> {
+        let (mut boxes, mut readings) = (0, 0);
+        self.frames.iter().enumerate().map(move |(i, frame)| {
+            let own = self.detections.get(boxes..).unwrap_or_default();
+            let own = &own[..own.partition_point(|detection| detection.frame <= i)];
+            boxes += own.len();
+            let felt = self.accelerometer.get(readings..).unwrap_or_default();
+            let felt = &felt[..felt.partition_point(|reading| reading.timestamp <= frame.timestamp)];
+            readings += felt.len();
+            Observation { frame: frame.clone(), detections: own.to_vec(), accelerometer: felt.to_vec() }
+        })
+    }
+}
+
 /// One image, with a pose by odometry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {

@@ -4,10 +4,9 @@
 //! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
 use crate::fusion::{FusedClass, Fusion};
 use crate::input::class::Aliases;
-use crate::input::sequence::{ObjectId, Sequence};
+use crate::input::sequence::{Detection, ObjectId, Sequence};
 use crate::settings::DetectionSettings;
-use manifactor_quadric::BoundingBox;
-use std::collections::BTreeMap;
+use manifactor_quadric::{BoundingBox, Camera};
 
 /// One box of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,8 +24,7 @@ pub struct ObjectBox {
 pub struct Measured {
     /// Its number.
     pub id: ObjectId,
-    /// Its class; `None` where no detection named one.
-    pub class: Option<FusedClass>,
+    fusion: Fusion,
     /// Detections that are associated with it.
     pub detections: usize,
     /// Its boxes that are left, one a frame at most, in order of frames.
@@ -48,41 +46,56 @@ pub struct Measurements {
     pub duplicates: usize,
 }
 
-#[derive(Default)]
-struct Gathered {
-    fusion: Fusion,
-    detections: usize,
-    views: BTreeMap<usize, ObjectBox>,
-}
-
 impl Measurements {
     /// Sorts the detections of a sequence by object.
     pub fn gather(sequence: &Sequence, settings: &DetectionSettings, aliases: &Aliases) -> Self {
         let mut all = Self::default();
-        let mut objects: BTreeMap<ObjectId, Gathered> = BTreeMap::new();
         for detection in &sequence.detections {
-            let Some(id) = detection.object else {
-                all.unassociated += 1;
-                continue;
-            };
-            if detection.scores.best().is_some_and(|(_, score)| score < settings.min_score) {
-                all.low_score += 1;
-                continue;
-            }
-            let object = objects.entry(id).or_default();
-            object.detections += 1;
-            object.fusion.add(&detection.scores, aliases);
-            let (bounding_box, camera) = (detection.bounding_box, &sequence.camera);
-            let inside = bounding_box.sides_inside(camera.width, camera.height, settings.border_px);
-            if !settings.cut_sides.accepts(inside) {
-                all.cut += 1;
-                continue;
-            }
-            let view = ObjectBox { frame: detection.frame, bounding_box, inside };
-            all.duplicates += usize::from(object.views.insert(view.frame, view).is_some());
+            all.add(detection, &sequence.camera, settings, aliases);
         }
-        all.objects = objects.into_iter().map(|(id, object)| object.measured(id)).collect();
         all
+    }
+
+    /// Sorts one detection in: the place of its object among all, and its box, where it passed the filters.
+    pub(crate) fn add(
+        &mut self,
+        detection: &Detection,
+        camera: &Camera,
+        settings: &DetectionSettings,
+        aliases: &Aliases,
+    ) -> Option<(usize, ObjectBox)> {
+        let Some(id) = detection.object else {
+            self.unassociated += 1;
+            return None;
+        };
+        if detection.scores.best().is_some_and(|(_, score)| score < settings.min_score) {
+            self.low_score += 1;
+            return None;
+        }
+        let place = self.objects.binary_search_by_key(&id, |object| object.id);
+        let place = place.unwrap_or_else(|place| {
+            self.objects.insert(place, Measured::new(id));
+            place
+        });
+        let object = self.objects.get_mut(place)?;
+        object.detections += 1;
+        object.fusion.add(&detection.scores, aliases);
+        let bounding_box = detection.bounding_box;
+        let inside = bounding_box.sides_inside(camera.width, camera.height, settings.border_px);
+        if !settings.cut_sides.accepts(inside) {
+            self.cut += 1;
+            return None;
+        }
+        let view = ObjectBox { frame: detection.frame, bounding_box, inside };
+        self.duplicates += usize::from(object.see(view));
+        Some((place, view))
+    }
+
+    /// Forgets the boxes of the last frame, which could not be taken.
+    pub(crate) fn forget(&mut self, frame: usize) {
+        for object in &mut self.objects {
+            object.views.pop_if(|view| view.frame == frame);
+        }
     }
 
     /// All boxes that are left.
@@ -91,14 +104,31 @@ impl Measurements {
     }
 }
 
-impl Gathered {
-    fn measured(self, id: ObjectId) -> Measured {
-        let views = self.views.into_values().collect();
-        Measured { id, class: self.fusion.best(), detections: self.detections, views }
-    }
-}
-
 impl Measured {
+    fn new(id: ObjectId) -> Self {
+        Self { id, fusion: Fusion::default(), detections: 0, views: vec![] }
+    }
+
+    /// Adds a box; whether it takes the place of another of its frame.
+    fn see(&mut self, view: ObjectBox) -> bool {
+        let place = self.views.binary_search_by_key(&view.frame, |view| view.frame);
+        match place {
+            Ok(place) => self.views[place] = view,
+            Err(place) => self.views.insert(place, view),
+        }
+        place.is_ok()
+    }
+
+    /// The name of its class; `None` where no detection named one.
+    pub fn class_name(&self) -> Option<&str> {
+        self.fusion.leading().map(|(name, _)| name)
+    }
+
+    /// Its class; `None` where no detection named one.
+    pub fn class(&self) -> Option<FusedClass> {
+        self.fusion.best()
+    }
+
     /// The larger of the standard deviations of the boxes' widths and heights, in pixels; 0 for no box.
     pub fn box_deviation(&self) -> f64 {
         let of = |size: fn(&BoundingBox) -> f64| {
@@ -115,7 +145,7 @@ impl Measured {
 mod tests {
     use super::*;
     use crate::gravity::tests::sequence;
-    use crate::input::sequence::{ClassScores, Detection};
+    use crate::input::sequence::ClassScores;
     use crate::settings::CutSides;
 
     fn detection(frame: usize, object: u32, class: &str, score: f64, bounds: [f64; 4]) -> Detection {
@@ -156,7 +186,7 @@ mod tests {
         let boxes = vec![detection(0, 1, "cup", 0.5, INSIDE), detection(0, 1, "bowl", 0.9, CUT)];
         let all = gather(boxes, &with(CutSides::Drop));
         assert_eq!((all.cut, all.duplicates, all.boxes()), (1, 0, 1));
-        assert_eq!(all.objects[0].class.as_ref().unwrap().name, "bowl");
+        assert_eq!(all.objects[0].class().unwrap().name, "bowl");
         assert_eq!(all.objects[0].detections, 2);
     }
 

@@ -1,10 +1,9 @@
 //! Which objects are mapped, and where they begin.
-use crate::input::sequence::Sequence;
-use crate::mapping::measurements::Measured;
+use crate::mapping::measurements::{Measured, ObjectBox};
 use crate::settings::ObjectSettings;
 use manifactor_geometry::Se3;
-use manifactor_quadric::DualQuadric;
 use manifactor_quadric::initialise::{View, parallax};
+use manifactor_quadric::{Camera, DualQuadric};
 use serde::Serialize;
 use std::fmt;
 
@@ -59,22 +58,19 @@ impl fmt::Display for Rejection {
     }
 }
 
-/// The ellipsoid that an object begins with, in the frame of the poses.
-pub(super) fn start(
+/// The ellipsoid that an object begins with, in the frame of the poses; `pose` gives that of a frame.
+pub(crate) fn start(
     measured: &Measured,
-    poses: &[Se3],
-    sequence: &Sequence,
+    pose: impl Fn(usize) -> Option<Se3>,
+    camera: Camera,
     settings: &ObjectSettings,
 ) -> Result<DualQuadric, Rejection> {
-    let views = measured.views.len();
-    if views < settings.min_views {
-        return Err(Rejection::Views { views, least: settings.min_views });
-    }
-    let deviation_px = measured.box_deviation();
-    if deviation_px >= settings.max_box_deviation_px {
-        return Err(Rejection::BoxDeviation { deviation_px, limit_px: settings.max_box_deviation_px });
-    }
-    let views: Vec<View> = measured.views.iter().filter_map(|view| seen(view, poses, sequence)).collect();
+    sound(measured, settings)?;
+    let seen = |view: &ObjectBox| {
+        let pose = pose(view.frame)?;
+        Some(View { observed: view.inside, ..View::new(pose, camera, view.bounding_box) })
+    };
+    let views: Vec<View> = measured.views.iter().filter_map(seen).collect();
     // over all pairs of views, so it is left out where any will do
     let parallax_deg = if settings.min_parallax_deg > 0.0 { parallax(&views) } else { 0.0 };
     if parallax_deg < settings.min_parallax_deg {
@@ -84,7 +80,15 @@ pub(super) fn start(
     started.map_err(|error| Rejection::Initialisation { message: error.to_string() })
 }
 
-fn seen(view: &crate::mapping::measurements::ObjectBox, poses: &[Se3], sequence: &Sequence) -> Option<View> {
-    let pose = *poses.get(view.frame)?;
-    Some(View { observed: view.inside, ..View::new(pose, sequence.camera, view.bounding_box) })
+/// Whether an object has boxes enough, and such as one object has.
+pub(crate) fn sound(measured: &Measured, settings: &ObjectSettings) -> Result<(), Rejection> {
+    let views = measured.views.len();
+    if views < settings.min_views {
+        return Err(Rejection::Views { views, least: settings.min_views });
+    }
+    let deviation_px = measured.box_deviation();
+    if deviation_px >= settings.max_box_deviation_px {
+        return Err(Rejection::BoxDeviation { deviation_px, limit_px: settings.max_box_deviation_px });
+    }
+    Ok(())
 }

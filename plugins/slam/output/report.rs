@@ -10,10 +10,12 @@ use manifactor_solve::{Diagnosis, Outcome, Rejected, Termination, Times};
 use serde::Serialize;
 
 mod landmarks;
+mod online;
 mod table;
 mod trajectory;
 
 pub use landmarks::LandmarkReport;
+pub use online::OnlineReport;
 pub use table::Row;
 pub(crate) use trajectory::name as alignment_name;
 pub use trajectory::{TrajectoryError, TrajectoryReport};
@@ -50,6 +52,9 @@ pub struct VariantReport {
     /// The noise as it was estimated, round by round.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub variance_components: Vec<Components>,
+    /// How the stream went, where frames came one by one: the solve is then what followed it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub online: Option<OnlineReport>,
     /// How the solve went.
     pub solve: SolveReport,
     /// The trajectory against the truth, where there is one: once for each alignment.
@@ -141,7 +146,9 @@ impl VariantReport {
         let mapping = &estimate.mapping;
         let mut warnings = mapping.warnings.clone();
         let solve = SolveReport::new(estimate, &mut warnings);
-        let trajectory = trajectory::compare(estimate, &settings.evaluation, &mut warnings);
+        let truth = estimate.sequence.ground_truth.as_ref();
+        let poses = [estimate.odometry(), estimate.trajectory()];
+        let trajectory = trajectory::compare(truth, &poses, &settings.evaluation, &mut warnings);
         let after = landmarks::in_truth_frame(estimate, estimate.landmarks());
         let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
         let objects = objects(estimate, &after);
@@ -153,6 +160,7 @@ impl VariantReport {
             counts: Counts::of(estimate),
             up: mapping.frame.up,
             variance_components: estimate.components.clone(),
+            online: None,
             solve,
             trajectory,
             landmarks,

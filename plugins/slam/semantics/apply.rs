@@ -67,19 +67,27 @@ pub(crate) struct Judge<'a> {
     up: Option<Direction>,
     /// All objects that are mapped.
     objects: Vec<Candidate>,
-    /// Which objects a rule has connected: two that are near each other are so from both sides.
-    connected: HashSet<(usize, Vec<Key>)>,
+    connected: Connected,
 }
 
+/// Which objects a rule has connected, by the rule's place: two that are near each other are so from both sides.
+pub(crate) type Connected = HashSet<(usize, Vec<Key>)>;
+
 impl<'a> Judge<'a> {
-    /// Over all objects that are mapped.
+    /// Over all objects that are mapped; `connected` are those that rules have connected before.
     pub(crate) fn new(
         rules: &'a [Rule],
         aliases: &'a Aliases,
         up: Option<Direction>,
         objects: Vec<Candidate>,
+        connected: Connected,
     ) -> Self {
-        Self { rules, aliases, up, objects, connected: HashSet::new() }
+        Self { rules, aliases, up, objects, connected }
+    }
+
+    /// What it has connected.
+    pub(crate) fn into_connected(self) -> Connected {
+        self.connected
     }
 
     /// What all rules have for an object.

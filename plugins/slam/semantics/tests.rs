@@ -76,7 +76,7 @@ fn object(number: usize, class: &str, score: f64, x: f64) -> Candidate {
 /// What a rule has for each of these objects.
 fn judged(semantics: &str, objects: &[Candidate]) -> Vec<Verdict> {
     let (rules, aliases) = (rules(semantics).unwrap_or_else(|e| panic!("{e}")), Aliases::default());
-    let mut judge = Judge::new(&rules, &aliases, Some(Direction::Z), objects.to_vec());
+    let mut judge = Judge::new(&rules, &aliases, Some(Direction::Z), objects.to_vec(), Connected::default());
     objects.iter().map(|object| judge.judge(object).unwrap()).collect()
 }
 

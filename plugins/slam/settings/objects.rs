@@ -20,6 +20,11 @@ pub struct ObjectSettings {
     #[serde(deserialize_with = "within::<0, 180, _>")]
     #[schemars(range(min = 0, max = 180))]
     pub min_parallax_deg: f64,
+    /// In a stream: an object is placed as soon as it is seen under this angle between two views, in degrees, though not under less
+    /// than `min_parallax_deg`. What is never seen so is tried once more at the end, with all boxes.
+    #[serde(deserialize_with = "within::<0, 180, _>")]
+    #[schemars(range(min = 0, max = 180))]
+    pub birth_parallax_deg: f64,
     /// How an object's first estimate is made of its boxes.
     pub initialiser: Arc<dyn Initialiser>,
     /// How many times, at most, each object is fitted alone to its own factors, from several places, before all is
@@ -33,6 +38,7 @@ impl Default for ObjectSettings {
             min_views: 3,
             max_box_deviation_px: 50.0,
             min_parallax_deg: 0.0,
+            birth_parallax_deg: 10.0,
             initialiser: Arc::new(Svd::default()),
             refinements: 5,
         }

@@ -1,4 +1,4 @@
-use crate::estimate::Estimate;
+use crate::input::sequence::GroundTruth;
 use crate::mapping::Warning;
 use crate::metrics::{
     Alignment, MetricsError, Pairing, RelativeError, Statistics, absolute_error, align, associate,
@@ -28,14 +28,14 @@ pub struct TrajectoryError {
     pub rpe: Option<RelativeError>,
 }
 
-/// One report for each alignment. An error that grew is a warning, and so is a truth that cannot be used.
+/// One report for each alignment, of the trajectory by odometry and the one that is estimated. An error that grew is a warning, and so is a truth that cannot be used.
 pub(super) fn compare(
-    estimate: &Estimate,
+    truth: Option<&GroundTruth>,
+    [before, after]: &[Vec<StampedPose>; 2],
     settings: &EvaluationSettings,
     warnings: &mut Vec<Warning>,
 ) -> Vec<TrajectoryReport> {
-    let Some(truth) = &estimate.sequence.ground_truth else { return vec![] };
-    let (before, after) = (estimate.odometry(), estimate.trajectory());
+    let Some(truth) = truth else { return vec![] };
     let error = |trajectory: &[StampedPose], alignment| -> Result<TrajectoryError, MetricsError> {
         let pairs = associate(&truth.trajectory, trajectory, settings.max_time_difference)?;
         let (_, aligned) = align(&pairs, alignment)?;
@@ -45,8 +45,8 @@ pub(super) fn compare(
     let report = |alignment: Alignment| -> Result<TrajectoryReport, MetricsError> {
         Ok(TrajectoryReport {
             alignment,
-            odometry: error(&before, alignment)?,
-            estimate: error(&after, alignment)?,
+            odometry: error(before, alignment)?,
+            estimate: error(after, alignment)?,
         })
     };
     let mut reports = vec![];

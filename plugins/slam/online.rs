@@ -1,0 +1,191 @@
+//! Mapping frame by frame, as they come.
+//!
+//! A [`Mapper`] takes a frame with its boxes and has the pose and the map up to date before the next one. What
+//! [`Mapping`](crate::mapping::Mapping) decides with all boxes in view is decided here when an object is *born*, which is as soon as it
+//! can be placed, and decided again where later boxes say otherwise.
+mod frame;
+mod gravity;
+mod object;
+mod revision;
+mod rules;
+
+use crate::estimate::{Estimate, EstimateError};
+use crate::gravity::GravityError;
+use crate::input::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
+use crate::mapping::measurements::{Measured, Measurements};
+use crate::mapping::{Mapping, MappingError, object_key, pose_key, rejection};
+use crate::semantics::RuleError;
+use crate::settings::Settings;
+use gravity::Up;
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
+use manifactor_online::{ChangeError, Session, UpdateError};
+use manifactor_quadric::{Camera, DualQuadric};
+use manifactor_solve::{Observer, SettingError};
+use object::Tracked;
+use rules::Ledger;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+pub use frame::FrameReport;
+
+/// A map that grows with each frame.
+///
+/// It keeps what a batch solve at the end needs: some 70 bytes for each frame, and 50 for each box. Everything else is bounded by
+/// the window of the session, where there is one.
+#[derive(Debug)]
+pub struct Mapper {
+    settings: Arc<Settings>,
+    camera: Camera,
+    session: Session,
+    up: Up,
+    measurements: Measurements,
+    objects: BTreeMap<ObjectId, Tracked>,
+    ledger: Ledger,
+    /// The last frame that was taken.
+    last: Option<Frame>,
+    /// Each pose as it was estimated when its frame came.
+    live: Vec<StampedPose>,
+}
+
+/// Why a frame is refused. The map is as it was; the next frame is tied to the last one that was taken.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// A time stamp that does not come after the one before.
+    #[error("the frame at {timestamp} s is left out: it does not come after the one before, at {before} s")]
+    Time {
+        /// In seconds.
+        timestamp: f64,
+        /// In seconds.
+        before: f64,
+    },
+    /// A pose or a time stamp that is not a number.
+    #[error("the frame at {timestamp} s is left out: its pose by odometry, or its time stamp, is not finite")]
+    NotFinite {
+        /// In seconds.
+        timestamp: f64,
+    },
+    /// Up is unknown.
+    #[error(transparent)]
+    Gravity(#[from] GravityError),
+    /// A semantic rule that cannot be applied.
+    #[error(transparent)]
+    Rule(#[from] RuleError),
+    /// Factors that do not fit.
+    #[error(transparent)]
+    Change(#[from] ChangeError),
+    /// A pose that cannot be taken in.
+    #[error(transparent)]
+    Update(#[from] UpdateError),
+}
+
+/// Why a map could not be finished.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FinishError {
+    /// There is no graph.
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
+    /// The graph cannot be solved.
+    #[error(transparent)]
+    Estimate(#[from] EstimateError),
+}
+
+impl Mapper {
+    /// An empty map.
+    ///
+    /// # Errors
+    /// Where a setting of the session is outside its domain.
+    pub fn new(opening: Opening, settings: &Settings) -> Result<Self, SettingError> {
+        Ok(Self {
+            settings: Arc::new(settings.clone()),
+            camera: opening.camera,
+            session: Session::new(settings.online.clone())?,
+            up: Up::new(opening),
+            measurements: Measurements::default(),
+            objects: BTreeMap::new(),
+            ledger: Ledger::default(),
+            last: None,
+            live: vec![],
+        })
+    }
+
+    /// Takes a frame in: its pose, and its boxes of objects that are in the map; then objects that it completes.
+    ///
+    /// # Errors
+    /// Where the pose cannot be taken. Boxes that cannot be taken are no error: the report tells of them.
+    pub fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
+        let mut report = FrameReport::new(self.live.len(), observation.frame.timestamp);
+        let seen = self.take_pose(observation, &mut report)?;
+        self.revise(&seen, &mut report);
+        report.pose = self.pose(report.frame).unwrap_or(report.pose);
+        self.live.push(StampedPose { timestamp: report.timestamp, pose: report.pose });
+        Ok(report)
+    }
+
+    /// The graph so far, with its estimate.
+    pub fn session(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
+    /// Objects that are in the map.
+    pub fn mapped(&self) -> usize {
+        self.objects.values().filter(|object| object.is_mapped()).count()
+    }
+
+    /// Each pose as it was estimated when its frame came.
+    pub fn live(&self) -> &[StampedPose] {
+        &self.live
+    }
+
+    /// Solves all of it as one batch, from the estimate. Objects that were never seen from far enough apart to be placed as
+    /// they came have another chance, with all their boxes: what is mapped in the end is what a batch maps.
+    ///
+    /// # Errors
+    /// Where `sequence`, all frames that were taken, has none, or the graph cannot be solved.
+    pub fn finish(
+        self,
+        sequence: Arc<Sequence>,
+        observer: &mut dyn Observer,
+    ) -> Result<Estimate, FinishError> {
+        let frame = self.up.frame().ok_or(MappingError::NoFrames)?;
+        let poses = self.live.iter().enumerate();
+        let poses: Vec<Se3> = poses.map(|(i, live)| self.pose(i).unwrap_or(live.pose)).collect();
+        let start = |measured: &Measured| match self.objects.get(&measured.id).and_then(Tracked::born_as) {
+            Some(start) => Ok(start),
+            None => {
+                let pose = |i: usize| poses.get(i).copied();
+                rejection::start(measured, pose, self.camera, &self.settings.objects)
+            }
+        };
+        let starts = self.measurements.objects.iter().map(start).collect();
+        let decisions = self.ledger.complete(&self.measurements, starts, &self.settings, frame.up);
+        let decisions = decisions.map_err(MappingError::from)?;
+        let mapping = Mapping::assemble(&sequence, &self.settings, frame, self.measurements, decisions)?;
+        let mut values = mapping.values.clone();
+        for (i, pose) in poses.into_iter().enumerate() {
+            values.insert(pose_key(i), pose);
+        }
+        for (key, value) in self.session.estimates().iter() {
+            if values.contains(key.as_str()) {
+                values.insert_boxed(key.clone(), value.erased().clone_box());
+            }
+        }
+        Ok(Estimate::from_start(sequence, mapping, values, &self.settings, observer)?)
+    }
+
+    /// The estimate of a pose; `None`, where it is not there, or not any more.
+    fn pose(&self, frame: usize) -> Option<Se3> {
+        self.session.get(pose_key(frame).as_str()).ok()
+    }
+
+    fn measured(&self, id: ObjectId) -> Option<&Measured> {
+        let place = self.measurements.objects.binary_search_by_key(&id, |object| object.id);
+        self.measurements.objects.get(place.ok()?)
+    }
+
+    fn quadric(&self, id: ObjectId) -> Option<DualQuadric> {
+        self.session.get(object_key(id).as_str()).ok()
+    }
+}

@@ -1,0 +1,173 @@
+//! One frame: its pose and its boxes, then what they change in the map.
+use super::object::Tracked;
+use super::{FrameError, Mapper};
+use crate::gravity::MapFrame;
+use crate::input::sequence::{Detection, ObjectId, Observation};
+use crate::mapping::measurements::ObjectBox;
+use crate::mapping::{box_entry, object_key, odometry_entry, pose_key, prior_entry};
+use crate::semantics::RuleError;
+use manifactor_geometry::Se3;
+use manifactor_graph::{Direction, Graph, Key, Manifold, Values};
+use manifactor_online::Report;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What a frame came to.
+#[derive(Debug, Clone, Serialize)]
+pub struct FrameReport {
+    /// Counts the frames that were taken, from 0.
+    pub frame: usize,
+    /// In seconds.
+    pub timestamp: f64,
+    /// The pose as it is estimated now, in the map's frame.
+    pub pose: Se3,
+    /// Boxes that passed the filters.
+    pub boxes: usize,
+    /// Objects that came into the map.
+    pub born: Vec<Key>,
+    /// Objects that left it: their boxes turned out to be those of several things.
+    pub withdrawn: Vec<Key>,
+    /// Objects that rules were asked about again, as their class has changed.
+    pub revised: Vec<Key>,
+    /// What could not be taken, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub refused: Vec<String>,
+    /// What the session did: once for the frame, and once more where the map has changed.
+    pub updates: Vec<Report>,
+}
+
+/// What a frame shows.
+pub(super) struct Seen {
+    /// Boxes that passed the filters, by object.
+    pub boxes: BTreeMap<ObjectId, ObjectBox>,
+    /// Whether up is another than it was.
+    pub up_moved: bool,
+}
+
+impl FrameReport {
+    pub(super) fn new(frame: usize, timestamp: f64) -> Self {
+        Self {
+            frame,
+            timestamp,
+            pose: Se3::identity(),
+            boxes: 0,
+            born: vec![],
+            withdrawn: vec![],
+            revised: vec![],
+            refused: vec![],
+            updates: vec![],
+        }
+    }
+}
+
+impl Mapper {
+    /// Takes in a pose, with the boxes of objects that are mapped; where these cannot be taken, the pose alone.
+    pub(super) fn take_pose(
+        &mut self,
+        observation: &Observation,
+        report: &mut FrameReport,
+    ) -> Result<Seen, FrameError> {
+        let frame = &observation.frame;
+        let timestamp = frame.timestamp;
+        if !(timestamp.is_finite() && frame.world_from_camera.is_finite()) {
+            return Err(FrameError::NotFinite { timestamp });
+        }
+        if let Some(before) = self.last.as_ref().map(|last| last.timestamp).filter(|t| *t >= timestamp) {
+            return Err(FrameError::Time { timestamp, before });
+        }
+        let up_moved = self.up.look(observation, &*self.settings.gravity)?;
+        let map = self.up.frame().unwrap_or_else(|| MapFrame::of_odometry(None));
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        report.pose = match &self.last {
+            Some(last) => {
+                let relative = last.world_from_camera.between(&frame.world_from_camera);
+                graph.push(odometry_entry(
+                    [report.frame - 1, report.frame],
+                    relative,
+                    &self.settings.odometry,
+                ));
+                self.pose(report.frame - 1).unwrap_or_else(Se3::identity).compose(&relative)
+            }
+            None => {
+                self.check_rules(map.up)?;
+                let first = map.map_from_odometry.compose(&frame.world_from_camera);
+                graph.push(prior_entry(first, &self.settings));
+                self.settings.own.add_to(&mut graph, &mut values);
+                first
+            }
+        };
+        values.insert(pose_key(report.frame), report.pose);
+        let seen = Seen { boxes: self.measure(&observation.detections, report.frame), up_moved };
+        report.boxes = seen.boxes.len();
+        let alone = graph.clone();
+        let mut owners = vec![];
+        for (id, view) in
+            seen.boxes.iter().filter(|(id, _)| self.objects.get(id).is_some_and(Tracked::is_mapped))
+        {
+            graph.push(box_entry(view, object_key(*id), self.camera, &self.settings.detections));
+            owners.push(*id);
+        }
+        let pushed = self.push_frame(&graph, &values, &mut owners, &alone, report);
+        if let Err(error) = pushed {
+            self.measurements.forget(report.frame);
+            return Err(error);
+        }
+        self.last = Some(frame.clone());
+        Ok(seen)
+    }
+
+    /// Pushes a frame's factors, of which the last are the boxes of `owners`; where these cannot be taken, `alone`.
+    fn push_frame(
+        &mut self,
+        graph: &Graph,
+        values: &Values,
+        owners: &mut Vec<ObjectId>,
+        alone: &Graph,
+        report: &mut FrameReport,
+    ) -> Result<(), FrameError> {
+        let ids = self.session.push(graph, values)?;
+        match self.session.update() {
+            Ok(update) => {
+                report.updates.push(update);
+                let first = ids.len() - owners.len();
+                for (owner, id) in owners.drain(..).zip(ids.into_iter().skip(first)) {
+                    if let Some(Tracked::Mapped(mapped)) = self.objects.get_mut(&owner) {
+                        mapped.boxes.push(id);
+                    }
+                }
+                Ok(())
+            }
+            Err(error) if !owners.is_empty() => {
+                self.session.push(alone, values)?;
+                report.updates.push(self.session.update()?);
+                report.refused.push(format!("the boxes at {} s: {error}", report.timestamp));
+                Ok(())
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// That rules which need to know up do.
+    fn check_rules(&self, up: Option<Direction>) -> Result<(), RuleError> {
+        let waiting = self.settings.semantics.iter().find(|rule| up.is_none() && rule.factor.wants_up());
+        match waiting {
+            Some(rule) => Err(RuleError::NoUp { factor: rule.factor.name().to_owned() }),
+            None => Ok(()),
+        }
+    }
+
+    /// Sorts the detections of a frame in; of several boxes of an object the last stays.
+    fn measure(&mut self, detections: &[Detection], frame: usize) -> BTreeMap<ObjectId, ObjectBox> {
+        let mut seen = BTreeMap::new();
+        for detection in detections {
+            let detection = Detection { frame, ..detection.clone() };
+            let settings = &self.settings;
+            let added =
+                self.measurements.add(&detection, &self.camera, &settings.detections, &settings.aliases);
+            if let (Some((_, view)), Some(id)) = (added, detection.object) {
+                seen.insert(id, view);
+            }
+        }
+        seen
+    }
+}

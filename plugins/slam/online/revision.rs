@@ -1,0 +1,247 @@
+//! What the boxes of a frame change in the map: objects that are born or withdrawn, rules that are asked again.
+use super::Mapper;
+use super::frame::{FrameReport, Seen};
+use super::object::{Mapped, Tracked};
+use super::rules::candidate;
+use crate::estimate::refine::refined;
+use crate::input::sequence::ObjectId;
+use crate::mapping::measurements::ObjectBox;
+use crate::mapping::{Rejection, box_entry, object_key, rejection};
+use crate::semantics::Candidate;
+use manifactor_graph::{FactorEntry, Graph, Key, Values};
+use manifactor_online::FactorId;
+use manifactor_quadric::DualQuadric;
+use std::sync::Arc;
+
+/// What becomes of an object.
+enum Due {
+    /// It is taken out of the map.
+    Withdrawal(Rejection),
+    /// It has another class now.
+    Revision(Option<String>),
+    /// It can be placed.
+    Birth,
+}
+
+impl Mapper {
+    /// Makes the changes that the boxes of a frame call for: objects that are withdrawn, whose class is another, that are born.
+    pub(super) fn revise(&mut self, seen: &Seen, report: &mut FrameReport) {
+        let Some(pose) = self.pose(report.frame) else { return };
+        for (id, view) in &seen.boxes {
+            if let Tracked::Waiting(sights) = self.objects.entry(*id).or_default() {
+                sights.add(view, &pose, &self.camera);
+            }
+        }
+        let due: Vec<(ObjectId, Due)> =
+            seen.boxes.keys().filter_map(|id| Some((*id, self.due(*id)?))).collect();
+        if due.is_empty() && !seen.up_moved {
+            return;
+        }
+        let (objects, ledger) = (self.objects.clone(), self.ledger.clone());
+        if seen.up_moved {
+            self.ask_all_again(report);
+        }
+        for (id, due) in due {
+            match due {
+                Due::Withdrawal(rejection) => self.withdraw(id, &rejection, report),
+                Due::Revision(class) => self.ask_again(id, class, report),
+                Due::Birth => self.bear(id, report),
+            }
+        }
+        if report.born.is_empty() && report.withdrawn.is_empty() && report.revised.is_empty() {
+            return;
+        }
+        match self.session.update() {
+            Ok(update) => report.updates.push(update),
+            Err(error) => {
+                let keys = [&report.born, &report.withdrawn, &report.revised];
+                let keys: Vec<&str> = keys.into_iter().flatten().map(Key::as_str).collect();
+                report.refused.push(format!("changes of {}: {error}", keys.join(", ")));
+                (self.objects, self.ledger) = (objects, ledger);
+                for list in [&mut report.born, &mut report.withdrawn, &mut report.revised] {
+                    list.clear();
+                }
+            }
+        }
+    }
+
+    /// What the boxes of an object call for, after another one of them.
+    fn due(&self, id: ObjectId) -> Option<Due> {
+        let (measured, settings) = (self.measured(id)?, &self.settings.objects);
+        match self.objects.get(&id)? {
+            Tracked::Waiting(sights) => {
+                let degrees = settings.birth_parallax_deg.max(settings.min_parallax_deg);
+                let is_due =
+                    sights.are_enough(measured, degrees) && rejection::sound(measured, settings).is_ok();
+                is_due.then_some(Due::Birth)
+            }
+            Tracked::Mapped(mapped) => match rejection::sound(measured, settings) {
+                Err(rejection) => Some(Due::Withdrawal(rejection)),
+                Ok(()) if measured.class_name() != mapped.class.as_deref() => {
+                    Some(Due::Revision(measured.class_name().map(str::to_owned)))
+                }
+                Ok(()) => None,
+            },
+            Tracked::Withdrawn => None,
+        }
+    }
+
+    /// Takes an object out of the map.
+    fn withdraw(&mut self, id: ObjectId, rejection: &Rejection, report: &mut FrameReport) {
+        let key = object_key(id);
+        let (mut factors, _) = self.ledger.revoke(|other| *other == key);
+        if let Some(Tracked::Mapped(mapped)) = self.objects.insert(id, Tracked::Withdrawn) {
+            factors.extend(mapped.boxes);
+        }
+        self.remove(&factors, report);
+        let left = self.session.marginalize(&[&key]);
+        report.refused.extend(left.err().map(|error| error.to_string()));
+        tracing::info!(object = %id, "taken out of the map: {rejection}");
+        report.withdrawn.push(key);
+    }
+
+    /// Asks the rules again about an object whose class has changed, and about those that they connect with it.
+    fn ask_again(&mut self, id: ObjectId, class: Option<String>, report: &mut FrameReport) {
+        if let Some(Tracked::Mapped(mapped)) = self.objects.get_mut(&id) {
+            mapped.class = class;
+        }
+        let key = object_key(id);
+        let (ids, mut owners) = self.ledger.revoke(|other| *other == key);
+        owners.push(id);
+        self.remove(&ids, report);
+        self.ask(&owners, report);
+        report.revised.push(key);
+    }
+
+    /// Makes all semantic factors again.
+    fn ask_all_again(&mut self, report: &mut FrameReport) {
+        let (ids, owners) = self.ledger.revoke(|_| true);
+        self.remove(&ids, report);
+        self.ask(&owners, report);
+        report.revised.extend(owners.into_iter().map(object_key));
+    }
+
+    /// Puts an object into the map that can be placed now.
+    fn bear(&mut self, id: ObjectId, report: &mut FrameReport) {
+        let Some(measured) = self.measured(id) else { return };
+        let started = rejection::start(measured, |i| self.pose(i), self.camera, &self.settings.objects);
+        let (views, class) = (measured.views.clone(), measured.class_name().map(str::to_owned));
+        let born = started.map_err(|rejection| rejection.to_string());
+        let born = born.and_then(|start| Ok((start, self.push_object(id, start, &views)?)));
+        let (start, boxes) = match born {
+            Ok(born) => born,
+            Err(why) => {
+                tracing::info!(object = %id, "not placed yet: {why}");
+                if let Some(Tracked::Waiting(sights)) = self.objects.get_mut(&id) {
+                    sights.note_try(views.len());
+                }
+                return;
+            }
+        };
+        self.objects.insert(id, Tracked::Mapped(Mapped { start, boxes, class }));
+        report.born.push(object_key(id));
+        // it may be what a rule misses near another
+        if self.settings.semantics.iter().any(|rule| rule.near.is_some()) {
+            let mapped = self.objects.iter().filter(|(_, object)| object.is_mapped());
+            let mapped: Vec<ObjectId> = mapped.map(|(id, _)| *id).collect();
+            self.ask(&mapped, report);
+        }
+    }
+
+    /// Pushes an object with its boxes and what the rules have for it, fitted alone to these before.
+    fn push_object(
+        &mut self,
+        id: ObjectId,
+        start: DualQuadric,
+        views: &[ObjectBox],
+    ) -> Result<Vec<FactorId>, String> {
+        let key = object_key(id);
+        let settings = Arc::clone(&self.settings);
+        let there = views.iter().filter(|view| self.pose(view.frame).is_some());
+        let boxes: Vec<FactorEntry> =
+            there.map(|view| box_entry(view, key.clone(), self.camera, &settings.detections)).collect();
+        let before = self.ledger.clone();
+        let mut all = self.candidates();
+        if let Some(measured) = self.measured(id) {
+            all.push(candidate(measured, start));
+        }
+        let up = self.up.frame().and_then(|frame| frame.up);
+        let ruled = self.ledger.ask(&[id], all, &settings, up).map_err(|error| error.to_string())?;
+        let entries: Vec<FactorEntry> = ruled.iter().map(|ruled| ruled.entry.clone()).collect();
+        let all: Vec<&FactorEntry> = boxes.iter().chain(&entries).collect();
+        let start = match settings.objects.refinements {
+            0 => start,
+            _ => refined(&key, start, &all, &self.around(&all, &key), up),
+        };
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        for entry in all {
+            graph.push(entry.clone());
+        }
+        values.insert(key, start);
+        match self.session.push(&graph, &values) {
+            Ok(mut ids) => {
+                let of_rules = ids.split_off(boxes.len());
+                self.ledger.name(of_rules);
+                Ok(ids)
+            }
+            Err(error) => {
+                self.ledger = before;
+                Err(error.to_string())
+            }
+        }
+    }
+
+    /// The estimates of all variables of some factors, but one.
+    fn around(&self, entries: &[&FactorEntry], but: &Key) -> Values {
+        let mut values = Values::new();
+        for key in entries.iter().flat_map(|entry| &entry.keys).filter(|key| *key != but) {
+            if let (false, Some(value)) = (values.contains(key.as_str()), self.session.estimate(key.as_str()))
+            {
+                values.insert_boxed(key.clone(), value);
+            }
+        }
+        values
+    }
+
+    /// All objects that are mapped, as rules look at them.
+    fn candidates(&self) -> Vec<Candidate> {
+        let mapped = self.objects.iter().filter(|(_, object)| object.is_mapped());
+        mapped
+            .filter_map(|(id, object)| {
+                let now = self.quadric(*id).or(object.born_as())?;
+                Some(candidate(self.measured(*id)?, now))
+            })
+            .collect()
+    }
+
+    /// Asks the rules about some objects, and pushes the factors that are new.
+    fn ask(&mut self, about: &[ObjectId], report: &mut FrameReport) {
+        let (all, before) = (self.candidates(), self.ledger.clone());
+        let up = self.up.frame().and_then(|frame| frame.up);
+        let pushed = match self.ledger.ask(about, all, &self.settings, up) {
+            Ok(ruled) if ruled.is_empty() => return,
+            Ok(ruled) => {
+                let mut graph = Graph::new();
+                for ruled in ruled {
+                    graph.push(ruled.entry.clone());
+                }
+                self.session.push(&graph, &Values::new()).map_err(|error| error.to_string())
+            }
+            Err(error) => Err(error.to_string()),
+        };
+        match pushed {
+            Ok(ids) => self.ledger.name(ids),
+            Err(why) => {
+                self.ledger = before;
+                report.refused.push(why);
+            }
+        }
+    }
+
+    /// Removes those factors that are still there.
+    fn remove(&mut self, factors: &[FactorId], report: &mut FrameReport) {
+        let there = factors.iter().copied().filter(|id| self.session.entry(*id).is_some());
+        let removed = self.session.remove(&there.collect::<Vec<_>>());
+        report.refused.extend(removed.err().map(|error| error.to_string()));
+    }
+}

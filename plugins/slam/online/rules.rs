@@ -1,0 +1,127 @@
+//! Semantic factors in a map that grows: what rules have brought, and to whom.
+use crate::input::sequence::ObjectId;
+use crate::mapping::measurements::{Measured, Measurements};
+use crate::mapping::{Decision, Rejection, object_key};
+use crate::semantics::{Applied, Candidate, Connected, Judge, LeftOut, RuleError, Verdict};
+use crate::settings::Settings;
+use manifactor_graph::{Direction, FactorEntry, Key};
+use manifactor_online::FactorId;
+use manifactor_quadric::DualQuadric;
+use std::collections::BTreeMap;
+
+/// All semantic factors that count.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ledger {
+    factors: Vec<Ruled>,
+    connected: Connected,
+    left_out: BTreeMap<ObjectId, Vec<LeftOut>>,
+}
+
+/// One of them.
+#[derive(Debug, Clone)]
+pub(super) struct Ruled {
+    /// The object that the rule was applied to.
+    owner: ObjectId,
+    applied: Applied,
+    /// As it was made.
+    pub entry: FactorEntry,
+    /// Its name in the session, once it has one.
+    id: Option<FactorId>,
+}
+
+impl Ledger {
+    /// Asks the rules about some of all objects, and returns the factors that are new.
+    ///
+    /// # Errors
+    /// Where a rule cannot be applied.
+    pub(super) fn ask(
+        &mut self,
+        about: &[ObjectId],
+        all: Vec<Candidate>,
+        settings: &Settings,
+        up: Option<Direction>,
+    ) -> Result<&mut [Ruled], RuleError> {
+        let before = self.factors.len();
+        let connected = std::mem::take(&mut self.connected);
+        let mut judge = Judge::new(&settings.semantics, &settings.aliases, up, all.clone(), connected);
+        for owner in about {
+            let key = object_key(*owner);
+            let Some(candidate) = all.iter().find(|candidate| candidate.key == key) else { continue };
+            let Verdict { entries, applied, left_out } = judge.judge(candidate)?;
+            self.left_out.insert(*owner, left_out);
+            for (entry, applied) in entries.into_iter().zip(applied) {
+                let mut of_owner = self.factors.iter().filter(|factor| factor.owner == *owner);
+                if !of_owner.any(|f| f.applied.rule == applied.rule && f.applied.keys == applied.keys) {
+                    self.factors.push(Ruled { owner: *owner, applied, entry, id: None });
+                }
+            }
+        }
+        self.connected = judge.into_connected();
+        Ok(&mut self.factors[before..])
+    }
+
+    /// Notes the names in the session of those factors that have none yet, in their order.
+    pub(super) fn name(&mut self, ids: Vec<FactorId>) {
+        for (factor, id) in self.factors.iter_mut().filter(|factor| factor.id.is_none()).zip(ids) {
+            factor.id = Some(id);
+        }
+    }
+
+    /// Forgets the factors of some objects: their names in the session, and the objects that the rules were applied to.
+    pub(super) fn revoke(&mut self, of: impl Fn(&Key) -> bool) -> (Vec<FactorId>, Vec<ObjectId>) {
+        let (mut ids, mut owners) = (vec![], vec![]);
+        let connected = &mut self.connected;
+        self.factors.retain(|factor| {
+            let Applied { rule, keys, .. } = &factor.applied;
+            if !keys.iter().any(&of) {
+                return true;
+            }
+            connected.retain(|(place, objects)| {
+                place + 1 != *rule || !objects.iter().all(|key| keys.contains(key))
+            });
+            ids.extend(factor.id);
+            owners.push(factor.owner);
+            false
+        });
+        owners.sort_unstable();
+        owners.dedup();
+        (ids, owners)
+    }
+
+    /// What the rules have for an object.
+    fn verdict(&self, owner: ObjectId) -> Verdict {
+        let own = || self.factors.iter().filter(|factor| factor.owner == owner);
+        Verdict {
+            entries: own().map(|factor| factor.entry.clone()).collect(),
+            applied: own().map(|factor| factor.applied.clone()).collect(),
+            left_out: self.left_out.get(&owner).cloned().unwrap_or_default(),
+        }
+    }
+
+    /// The decisions for a batch: rules are asked about those objects that were not asked about before.
+    ///
+    /// # Errors
+    /// Where a rule cannot be applied.
+    pub(super) fn complete(
+        mut self,
+        measurements: &Measurements,
+        starts: Vec<Result<DualQuadric, Rejection>>,
+        settings: &Settings,
+        up: Option<Direction>,
+    ) -> Result<Vec<Decision>, RuleError> {
+        let all = measurements.objects.iter().zip(&starts);
+        let candidates =
+            all.clone().filter_map(|(measured, start)| Some(candidate(measured, *start.as_ref().ok()?)));
+        let new = all.filter(|(measured, start)| start.is_ok() && !self.left_out.contains_key(&measured.id));
+        let new: Vec<ObjectId> = new.map(|(measured, _)| measured.id).collect();
+        self.ask(&new, candidates.collect(), settings, up)?;
+        let decide =
+            |(measured, start): (&Measured, _)| Decision { start, verdict: self.verdict(measured.id) };
+        Ok(measurements.objects.iter().zip(starts).map(decide).collect())
+    }
+}
+
+/// An object as rules look at it.
+pub(super) fn candidate(measured: &Measured, start: DualQuadric) -> Candidate {
+    Candidate { key: object_key(measured.id), class: measured.class(), start }
+}

@@ -1,0 +1,82 @@
+//! How a stream went.
+use super::trajectory::{self, TrajectoryReport};
+use crate::estimate::Estimate;
+use crate::online::{FrameError, FrameReport, Mapper};
+use crate::settings::EvaluationSettings;
+use manifactor_formats::replay::Latencies;
+use manifactor_formats::tum::StampedPose;
+use serde::Serialize;
+
+/// A stream, from its first frame to its last.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct OnlineReport {
+    /// How long frames took, from when they were there to the new estimate.
+    pub latencies: Latencies,
+    /// Seconds, frame by frame.
+    #[serde(skip)]
+    pub seconds: Vec<f64>,
+    /// Objects that came into the map.
+    pub born: usize,
+    /// Objects that were taken out again.
+    pub withdrawn: usize,
+    /// Times that rules were asked about an object again, as its class had changed.
+    pub revised: usize,
+    /// Frames that were left out, and what else could not be taken; the first of them in words.
+    pub refused: Vec<String>,
+    /// How many these are.
+    pub refusals: usize,
+    /// Updates that ended in a batch solve, as shorter steps did not help.
+    pub solved_batch: usize,
+    /// Objects in the map after the last frame.
+    pub objects: usize,
+    /// ½ Σ ρ after the last frame.
+    pub cost: f64,
+    /// Bytes of the factorization.
+    pub bytes: usize,
+    /// The poses as they were estimated when their frames came, against the truth: once for each alignment.
+    pub trajectory: Vec<TrajectoryReport>,
+}
+
+/// Refusals that are told in words.
+const TOLD: usize = 20;
+
+impl OnlineReport {
+    /// Counts a frame in.
+    pub(crate) fn count(&mut self, report: Result<&FrameReport, &FrameError>, seconds: f64) {
+        self.seconds.push(seconds);
+        let refused = match report {
+            Ok(report) => {
+                self.born += report.born.len();
+                self.withdrawn += report.withdrawn.len();
+                self.revised += report.revised.len();
+                self.solved_batch += report.updates.iter().filter(|update| update.solved_batch).count();
+                report.refused.clone()
+            }
+            Err(error) => vec![error.to_string()],
+        };
+        self.refusals += refused.len();
+        let room = TOLD.saturating_sub(self.refused.len());
+        self.refused.extend(refused.into_iter().take(room));
+    }
+
+    /// What there is to tell after the last frame.
+    pub(crate) fn end(&mut self, mapper: &mut Mapper) {
+        self.latencies = Latencies::of(&self.seconds);
+        self.objects = mapper.mapped();
+        self.cost = mapper.session().cost();
+        self.bytes = mapper.session().bytes();
+    }
+
+    /// Compares the poses as they were estimated when their frames came with the truth.
+    pub(crate) fn compare(
+        &mut self,
+        live: Vec<StampedPose>,
+        estimate: &Estimate,
+        settings: &EvaluationSettings,
+    ) {
+        let poses = [estimate.odometry(), live];
+        // the report of the estimate tells what keeps it from being compared
+        self.trajectory =
+            trajectory::compare(estimate.sequence.ground_truth.as_ref(), &poses, settings, &mut vec![]);
+    }
+}
