@@ -38,25 +38,19 @@ impl Session {
         !self.urgent.is_empty()
     }
 
-    /// The variables to relinearize: those whose held directions have changed, and in turn those that wait, as far as the
-    /// budget goes. `spent` are the operations of the update so far.
+    /// The variables to relinearize: those that are due, and in turn those that wait, as far as the budget goes. `spent` are the operations of the update so far.
     pub(super) fn choose(
         &mut self,
-        held: &[u32],
+        mut chosen: Vec<u32>,
         is_turn: bool,
         affected: &mut Affected,
         spent: f64,
     ) -> Vec<u32> {
-        let mut chosen: Vec<u32> = held.to_vec();
         if is_turn {
             let mut out: Vec<u32> = self.waiting.iter().copied().filter(|v| self.is_out(*v)).collect();
-            // a step that is damped is no step to the minimum, however short
-            out.extend(self.damped.iter().copied().filter(|v| self.may_move(*v)));
-            out.sort_unstable();
-            out.dedup();
             if let Some(budget) = self.settings.budget {
                 self.postponed = out.len();
-                self.afford(&mut out, budget - spent, spent == 0.0 && held.is_empty(), affected);
+                self.afford(&mut out, budget - spent, spent == 0.0 && chosen.is_empty(), affected);
                 self.postponed -= out.len();
             }
             chosen.append(&mut out);
@@ -100,7 +94,7 @@ impl Session {
     }
 
     /// Whether a variable may be linearized anew: it is solved for, and no prior holds its point.
-    fn may_move(&self, variable: u32) -> bool {
+    pub(super) fn may_move(&self, variable: u32) -> bool {
         self.tree.front_of(variable) != NONE && self.model.place(variable).sealed == 0
     }
 

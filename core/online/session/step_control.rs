@@ -19,8 +19,9 @@ const LEAST_DAMPING: f64 = 1e-3;
 const STRONGER: f64 = 10.0;
 /// What becomes of it each time that the variable is linearized anew.
 const WEAKER: f64 = 0.25;
-/// Damping that is as good as none, as a share of that entry.
-const NO_DAMPING: f64 = 1e-6;
+/// The damping that stays, as a share of that entry: an axis that has all but vanished has next to no derivative, and without
+/// damping its steps would be as long as ever.
+const WEAK: f64 = 1e-6;
 /// A rise of the cost by less than this share of it is rounding, or what was not passed on.
 const RISE: f64 = 1e-3;
 
@@ -72,8 +73,7 @@ impl Session {
             }
             let urgent = self.urgent.clone();
             for v in &urgent {
-                let precision = self.model.blocks.precision(*v).iter().copied().fold(0.0, f64::max);
-                let least = LEAST_DAMPING * precision * precision;
+                let least = LEAST_DAMPING * self.largest(*v);
                 self.model.blocks.damp(*v, (STRONGER * self.model.blocks.damping(*v)).max(least));
                 self.damped.insert(*v);
             }
@@ -84,6 +84,12 @@ impl Session {
             }
         }
         !self.has_risen(&before)
+    }
+
+    /// The largest entry of a variable's diagonal of H.
+    fn largest(&self, variable: u32) -> f64 {
+        let precision = self.model.blocks.precision(variable).iter().copied().fold(0.0, f64::max);
+        precision * precision
     }
 
     /// Whether the factors around some variables cost more than with these steps.
@@ -158,10 +164,12 @@ impl Session {
         let damped = variables.iter().filter(|v| self.damped.contains(v));
         let before: Vec<(u32, f64)> = damped.map(|v| (*v, self.model.blocks.damping(*v))).collect();
         for (v, damping) in &before {
-            let precision = self.model.blocks.precision(*v).iter().copied().fold(0.0, f64::max);
-            let weaker = WEAKER * damping;
-            let goes_on = weaker > NO_DAMPING * precision * precision;
-            self.model.blocks.damp(*v, if goes_on { weaker } else { 0.0 });
+            let weak = std::env::var("WEAK").map_or(WEAK, |x| x.parse().unwrap_or(WEAK)) * self.largest(*v);
+            let weaker = std::env::var("WEAKER").map_or(WEAKER, |x| x.parse().unwrap_or(WEAKER)) * damping;
+            if weaker <= weak {
+                self.damped.remove(v);
+            }
+            self.model.blocks.damp(*v, weaker.max(weak));
         }
         before
     }

@@ -8,6 +8,7 @@ use crate::fronts::Overflow;
 use crate::model::NewNumber;
 use crate::report::Report;
 use crate::tree::{Affected, Couplings, Redone};
+use std::cmp::Reverse;
 
 /// What takes changes back.
 #[derive(Default)]
@@ -16,6 +17,10 @@ pub(super) struct Undo {
     pub(super) changes: Vec<Change>,
     pub(super) moves: Moves,
 }
+
+/// Touched variables that are eliminated last; where there are more, so many of them.
+const MANY: usize = 32;
+const NEWEST: usize = 8;
 
 impl Session {
     /// Makes the changes since the last update, and brings the estimate up to date. Then those variables leave that are to.
@@ -26,7 +31,7 @@ impl Session {
     pub fn update(&mut self) -> Result<Report, UpdateError> {
         let pending = std::mem::take(&mut self.pending);
         let mut report = Report::default();
-        let mut touched = Touched::default();
+        let mut touched = Touched { steps: true, ..Touched::default() };
         let mut undo = Undo::default();
         for (key, NewVariable { value, held, at }) in pending.variables {
             self.model.push_variable(key, &*value, held, at);
@@ -174,16 +179,17 @@ impl Session {
         for v in &moves.leaving {
             self.touch_around(*v, &mut affected);
         }
-        let mut last = touched.variables.clone();
-        last.sort_unstable();
-        last.dedup();
+        let last = self.last(touched);
         let postponed = self.postponed;
-        let chosen = self.choose(&touched.held, is_turn, &mut affected, report.operations);
+        let mut due = touched.held.clone();
+        // a step that is damped is no step to the minimum, however short
+        due.extend(self.damped.iter().copied().filter(|v| touched.steps && self.may_move(*v)));
+        let chosen = self.choose(due, is_turn, &mut affected, report.operations);
         let relinearized = self.relinearize(chosen, &touched.held);
         for v in &relinearized.variables {
             self.touch_around(*v, &mut affected);
         }
-        let damping = if is_turn { self.relax(&relinearized.variables) } else { vec![] };
+        let damping = if touched.steps || is_turn { self.relax(&relinearized.variables) } else { vec![] };
         self.model.sum_up();
         let redone = self.redo(&affected, moves, &last);
         let finite = self.check_finite(&redone);
@@ -191,14 +197,15 @@ impl Session {
         if let Err(overflow) = built {
             self.tree.drop_new(&affected, &redone);
             self.take_back_points(&relinearized);
-            damping.iter().for_each(|(v, damping)| self.model.blocks.damp(*v, *damping));
+            for (v, damping) in damping {
+                self.model.blocks.damp(v, damping);
+                self.damped.insert(v);
+            }
             self.postponed = postponed;
             self.model.sum_up();
             return Err(overflow);
         }
         self.exchange(&affected, &redone, moves);
-        let blocks = &self.model.blocks;
-        self.damped.retain(|v| blocks.damping(*v) > 0.0);
         self.doubt_parked(&relinearized.factors);
         report.relinearized += relinearized.variables.len();
         self.accept_points(&relinearized, is_turn);
@@ -209,6 +216,20 @@ impl Session {
         }
         report.solved += self.solve(&redone);
         Ok(())
+    }
+
+    /// The variables to eliminate last: those that are touched will be touched again. Where that is many, an object with all
+    /// poses that have seen it, they would fill the root: then the newest of them.
+    fn last(&self, touched: &Touched) -> Vec<u32> {
+        let mut last = touched.variables.clone();
+        last.sort_unstable();
+        last.dedup();
+        if last.len() > MANY {
+            last.sort_unstable_by_key(|v| Reverse(self.model.place(*v).born));
+            last.truncate(NEWEST);
+            last.sort_unstable();
+        }
+        last
     }
 
     /// Touches a variable's front and those of its neighbours: all fronts that have it among their rows are above those.

@@ -45,6 +45,8 @@ pub(in crate::session) struct Touched {
     pub(in crate::session) doubtful: Vec<u32>,
     /// Variables of which other directions are held now.
     pub(in crate::session) held: Vec<u32>,
+    /// Whether variables that are damped take another step.
+    pub(in crate::session) steps: bool,
 }
 
 impl Touched {
