@@ -58,6 +58,20 @@ pub enum ChangeError {
         /// Its variables.
         expected: Vec<Key>,
     },
+    /// A time that cannot come after the one before.
+    #[error("time {time} s: expected a finite number{}", not_before(.last))]
+    Time {
+        /// What was given.
+        time: f64,
+        /// The one that was set before.
+        last: Option<f64>,
+    },
+    /// A window by seconds without a clock.
+    #[error(
+        "the window is by seconds, and the session does not know the time; call `set_time` before the first `push`, or use \
+         `window.poses`"
+    )]
+    NoTime,
     /// A weight that no factor can have.
     #[error("factor {factor}: expected a finite weight, 0 or more, got {weight}")]
     Weight {
@@ -88,6 +102,10 @@ pub enum UpdateError {
         /// A variable that is part of it.
         key: Key,
     },
+}
+
+fn not_before(last: &Option<f64>) -> String {
+    last.map_or_else(String::new, |last| format!(", {last} s or later: the time that was set before"))
 }
 
 fn names(keys: &[Key]) -> String {

@@ -1,7 +1,7 @@
 //! A session as text: a line that says what it is, and a JSON document.
 //!
 //! ```text
-//! manifactor session 2 90b4b1a3c2f0d7e1
+//! manifactor session 3 90b4b1a3c2f0d7e1
 //! {"settings":{…},"variables":[…],"factors":[…],"fronts":[…],…}
 //! ```
 //!
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
 const NAME: &str = "manifactor session";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Why a session cannot be saved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -81,6 +81,10 @@ pub(crate) struct Saved {
     pub waiting: Vec<u32>,
     pub urgent: Vec<u32>,
     pub doubtful: Vec<u32>,
+    /// The bits of the time that was set last.
+    pub time: Option<u64>,
+    /// Of a window by seconds, by variable that it holds, the oldest first: the bits of the time when it came.
+    pub times: Vec<u64>,
     /// Variables that have moved since factors that may be wrong were looked at.
     pub shaken: BTreeSet<u32>,
 }

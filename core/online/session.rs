@@ -10,6 +10,7 @@ mod sealing;
 mod step_control;
 mod substitution;
 mod update;
+mod window;
 
 use crate::fronts::{Fronts, Scalar};
 use crate::gone::{GoneKeys, Runs};
@@ -24,6 +25,7 @@ use manifactor_solve::SettingError;
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
+use window::Held;
 
 pub use covariance::CovarianceError;
 pub use finish::Finished;
@@ -62,8 +64,10 @@ pub struct Session {
     inactive: BTreeSet<u32>,
     /// Parked variables whose factors were linearized anew since they were judged.
     doubtful: Vec<u32>,
-    /// Of a window: the variables that it holds and when they came, the oldest first.
-    ages: VecDeque<(u32, u64)>,
+    /// The time that was set last, by the updates that were made.
+    time: Option<f64>,
+    /// Of a window: the variables that it holds, the oldest first.
+    ages: VecDeque<Held>,
     /// Factors that may be wrong, by number; and those of them that are rejected.
     suspects: BTreeMap<u32, Suspect>,
     rejected: BTreeSet<u32>,
@@ -109,6 +113,7 @@ impl Session {
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),
             doubtful: vec![],
+            time: None,
             ages: VecDeque::new(),
             suspects: BTreeMap::new(),
             rejected: BTreeSet::new(),

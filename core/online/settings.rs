@@ -1,8 +1,12 @@
 //! How a session trades time for accuracy.
+mod window;
+
 use manifactor_graph::checked::not_negative;
 use manifactor_solve::{FactorType, Probability, SettingError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+pub use window::{ManifoldType, NotOneSpan, Span, UnknownManifold, Window};
 
 /// Settings of a session. The defaults are meant for any graph: thresholds are in units of the estimate's own precision.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -58,18 +62,6 @@ impl Default for Outliers {
     fn default() -> Self {
         Self { probability: Probability::default(), gain: 1.5, types: vec![] }
     }
-}
-
-/// A window that moves with the newest variables.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Window {
-    /// Variables that stay, the newest of those whose type is not kept; at least one. Older ones leave at the end of an update,
-    /// as `Session::marginalize` takes them out.
-    pub poses: usize,
-    /// Names of types whose variables never leave: `"dual_quadric"`, say. Default: none.
-    #[serde(default)]
-    pub keep: Vec<String>,
 }
 
 impl Default for Settings {

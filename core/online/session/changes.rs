@@ -16,6 +16,8 @@ pub(super) struct NewVariable {
     pub(super) value: Box<dyn Variable>,
     pub(super) held: u32,
     pub(super) at: NewNumber,
+    /// When it comes, by the time that is set.
+    pub(super) time: f64,
 }
 
 /// What the next update is to do.
@@ -23,6 +25,8 @@ pub(super) struct NewVariable {
 pub(super) struct Pending {
     pub(super) variables: IndexMap<Key, NewVariable>,
     reserved: Reserved,
+    /// The time that was set since the last update.
+    pub(super) time: Option<f64>,
     /// Variables that are to leave.
     pub(super) leaving: Vec<Key>,
     pub(super) changes: Vec<Change>,
@@ -33,7 +37,7 @@ pub(super) struct Pending {
 
 impl Pending {
     pub(super) fn is_empty(&self) -> bool {
-        self.variables.is_empty() && self.changes.is_empty() && self.leaving.is_empty()
+        self.variables.is_empty() && self.changes.is_empty() && self.leaving.is_empty() && self.time.is_none()
     }
 }
 
@@ -45,8 +49,10 @@ impl Session {
     /// and the report names it.
     ///
     /// # Errors
-    /// Where a variable is there already, or factors do not fit: everything that is wrong with them. Nothing is added then.
+    /// Where a variable is there already, or factors do not fit: everything that is wrong with them; where the window is by seconds,
+    /// and no time is set. Nothing is added then.
     pub fn push(&mut self, factors: &Graph, values: &Values) -> Result<Vec<FactorId>, ChangeError> {
+        let time = self.time_of_new()?;
         let is_known = |key: &Key| {
             self.model.variable(key.as_str()).is_some() || self.pending.variables.contains_key(key)
         };
@@ -90,7 +96,7 @@ impl Session {
         self.pending.reserved = reserved;
         for ((key, value), at) in values.iter().zip(at) {
             let held = factors.fixed().get(key).map_or(0, |fixed| fixed.bits(value.erased().tangent()));
-            let new = NewVariable { value: value.erased().clone_box(), held, at };
+            let new = NewVariable { value: value.erased().clone_box(), held, at, time };
             self.pending.variables.insert(key.clone(), new);
         }
         for (key, fixed) in factors.fixed().iter().filter(|(key, _)| !values.contains(key.as_str())) {

@@ -44,6 +44,8 @@ impl Session {
             waiting: sorted(&self.waiting),
             urgent: sorted(&self.urgent),
             doubtful: self.doubtful.clone(),
+            time: self.time.map(f64::to_bits),
+            times: self.times(),
             shaken: self.shaken.clone(),
         };
         saved.write()
@@ -88,7 +90,8 @@ impl Session {
         session.waiting.dedup();
         session.shaken = saved.shaken;
         (session.gone, session.gone_factors) = (saved.gone, saved.gone_factors);
-        session.model.by_age().into_iter().for_each(|v| session.note_age(v));
+        let fits = session.put_times(saved.time, &saved.times);
+        fits.then_some(()).ok_or(LoadError::Inconsistent("times"))?;
         Ok(session)
     }
 

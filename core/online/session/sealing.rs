@@ -48,33 +48,6 @@ impl Session {
         }
     }
 
-    /// Whether the window holds a variable: it is of a type that leaves.
-    pub(super) fn note_age(&mut self, variable: u32) {
-        let Some(window) = &self.settings.window else { return };
-        let name = self.model.point(variable).map_or("", |point| point.typetag_name());
-        if !window.keep.iter().any(|keep| keep == name) {
-            self.ages.push_back((variable, self.model.place(variable).born));
-        }
-    }
-
-    /// The variables that leave at the end of an update: those that were asked to, and those that the window has no room for.
-    pub(super) fn leaving(&mut self, asked: &[Key]) -> Vec<u32> {
-        let mut leaving: Vec<u32> =
-            asked.iter().filter_map(|key| self.model.variable(key.as_str())).collect();
-        if let Some(window) = &self.settings.window {
-            let model = &self.model;
-            self.ages.retain(|(v, born)| {
-                let place = model.place(*v);
-                place.is_there && place.born == *born && !leaving.contains(v)
-            });
-            let more = self.ages.len().saturating_sub(window.poses.max(1));
-            leaving.extend(self.ages.drain(..more).map(|(v, _)| v));
-        }
-        let mut seen = std::collections::BTreeSet::new();
-        leaving.retain(|v| seen.insert(*v));
-        leaving
-    }
-
     /// Seals what these variables leave behind, one after the other, and solves again.
     pub(super) fn seal(&mut self, leaving: &[u32], report: &mut Report) -> Result<(), Overflow> {
         if leaving.is_empty() {

@@ -33,8 +33,10 @@ impl Session {
         let mut report = Report::default();
         let mut touched = Touched { steps: true, ..Touched::default() };
         let mut undo = Undo::default();
-        for (key, NewVariable { value, held, at }) in pending.variables {
+        let mut came = vec![];
+        for (key, NewVariable { value, held, at, time }) in pending.variables {
             self.model.push_variable(key, &*value, held, at);
+            came.push((at.number, time));
             undo.variables.push(at);
             touched.doubtful.push(at.number);
         }
@@ -73,7 +75,8 @@ impl Session {
         self.follow_up(&mut report);
         let new = self.enter(&suspects, &touched.removed);
         self.test_outliers(&new, &mut report);
-        undo.variables.iter().for_each(|at| self.note_age(at.number));
+        self.time = pending.time.or(self.time);
+        came.into_iter().for_each(|(variable, time)| self.note_age(variable, time));
         let leaving = self.leaving(&pending.leaving);
         if let Err(Overflow(variable)) = self.seal(&leaving, &mut report) {
             return Err(UpdateError::Overflow { key: self.key(variable) });

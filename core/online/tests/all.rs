@@ -1,5 +1,6 @@
 //! Sessions against fresh builds.
 #![allow(missing_docs, clippy::unwrap_used)]
+mod clocks;
 mod errors;
 mod failures;
 mod history;

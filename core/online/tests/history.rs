@@ -3,7 +3,7 @@ use crate::toy::{Apart, At, Centre, Distance, Plane};
 use crate::world::{Beyond, Near, Shadow, Space};
 use manifactor_graph::loss::Huber;
 use manifactor_graph::{Fixed, Graph, Key, Noise, Values, Variable};
-use manifactor_online::{ChangeError, FactorId, Outliers, Report, Session, Settings, Window};
+use manifactor_online::{ChangeError, FactorId, Outliers, Report, Session, Settings, Span, Window};
 use manifactor_solve::{GaussNewton, Silent};
 use proptest::prelude::*;
 
@@ -38,8 +38,8 @@ pub(crate) fn change() -> impl Strategy<Value = Change> {
 }
 
 pub(crate) fn window() -> impl Strategy<Value = Window> {
-    let keep = prop_oneof![Just(vec![]), Just(vec!["toy_space".to_owned()])];
-    (1..6usize, keep).prop_map(|(poses, keep)| Window { poses, keep })
+    let keep = prop_oneof![Just(vec![]), Just(vec!["toy_space".to_owned().try_into().unwrap()])];
+    (1..6usize, keep).prop_map(|(poses, keep)| Window { span: Span::Poses(poses), keep })
 }
 
 pub(crate) fn outliers() -> impl Strategy<Value = Option<Outliers>> {

@@ -48,8 +48,8 @@ fn what_is_no_session_is_refused_with_a_reason() {
     let text = session(None).save().unwrap();
     assert_eq!(Session::load("").unwrap_err(), LoadError::Foreign);
     assert_eq!(Session::load("{\"factors\": []}").unwrap_err(), LoadError::Foreign);
-    let later = text.replacen("session 2 ", "session 3 ", 1);
-    assert_eq!(Session::load(&later).unwrap_err(), LoadError::Version { found: "3".to_owned() });
+    let later = text.replacen("session 3 ", "session 4 ", 1);
+    assert_eq!(Session::load(&later).unwrap_err(), LoadError::Version { found: "4".to_owned() });
     for end in (0..text.len()).step_by(97) {
         assert!(Session::load(&text[..end]).is_err());
     }
@@ -69,10 +69,10 @@ fn changes_that_no_update_has_made_are_not_lost_silently() {
 }
 
 /// The same text with another document, and the checksum that fits it.
-fn resealed(json: &str) -> String {
+pub(crate) fn resealed(json: &str) -> String {
     let fnv = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     let checksum = json.bytes().fold(0xcbf2_9ce4_8422_2325, fnv);
-    format!("manifactor session 2 {checksum:016x}\n{json}\n")
+    format!("manifactor session 3 {checksum:016x}\n{json}\n")
 }
 
 proptest! {

@@ -3,7 +3,7 @@ use crate::history::{Change, History, change};
 use crate::toy::{Apart, At, Distance, Logarithm, Plane};
 use crate::world::Ahead;
 use manifactor_graph::{Fixed, Graph, Key, Values, Variable};
-use manifactor_online::{ChangeError, Session, Settings, Window};
+use manifactor_online::{ChangeError, Session, Settings, Span, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent};
 use proptest::prelude::*;
 
@@ -52,7 +52,7 @@ proptest! {
 }
 
 /// x0 at the origin, and steps of one.
-fn step(i: usize) -> (Graph, Values) {
+pub(crate) fn step(i: usize) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let key = Key::indexed("x", i);
     values.insert(key.clone(), Plane { x: i as f64 + 0.1, y: 0.0 });
@@ -64,8 +64,9 @@ fn step(i: usize) -> (Graph, Values) {
 }
 
 fn windowed(poses: usize, keep: &[&str]) -> Session {
-    let keep = keep.iter().map(|name| (*name).to_owned()).collect();
-    Session::new(Settings { window: Some(Window { poses, keep }), ..Settings::default() }).unwrap()
+    let keep = keep.iter().map(|name| (*name).to_owned().try_into().unwrap()).collect();
+    let window = Some(Window { span: Span::Poses(poses), keep });
+    Session::new(Settings { window, ..Settings::default() }).unwrap()
 }
 
 #[test]

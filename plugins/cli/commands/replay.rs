@@ -11,7 +11,7 @@ use crate::status::Status;
 use clap::Args;
 use manifactor::formats::replay::{Latencies, Replay as Steps, Step};
 use manifactor::graph::{Graph, Key};
-use manifactor::online::{Finished, Rejection, Report, Session};
+use manifactor::online::{Finished, Rejection, Report, Session, Span};
 use manifactor::slam::output::OutputFolder;
 use manifactor::solve::{All, Interrupt, Silent};
 use manifactor::viz::latencies;
@@ -74,6 +74,15 @@ impl Replay {
             ));
         }
         let input = self.reading.open(&self.graph, &self.solver)?;
+        if matches!(&input.online.window, Some(window) if matches!(window.span, Span::Seconds(_))) {
+            return Err(Failure::with_help(
+                format!(
+                    "{}: its poses have no times, so `online.window.seconds` has no meaning",
+                    self.graph.display()
+                ),
+                "use `window.poses`: --set online.window.poses=200",
+            ));
+        }
         input.notes.iter().for_each(|note| output::note(note));
         let keys = input.graph.factors().iter().flat_map(|entry| &entry.keys);
         let keys: HashSet<&str> = keys.map(Key::as_str).collect();

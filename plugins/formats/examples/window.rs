@@ -7,7 +7,7 @@
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_formats::replay::{Latencies, Replay};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_online::{Session, Settings, Window};
+use manifactor_online::{Session, Settings, Span, Window};
 
 /// Of this thread: what others do on the machine has no part in it.
 fn cpu_seconds() -> f64 {
@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let graph = pose_graph::read(&path, &Options::default())?.graph;
-    let window = Some(Window { poses, keep: vec![] });
+    let window = Some(Window::from(Span::Poses(poses)));
     let mut session = Session::new(Settings { window, ..Settings::default() })?;
     let name = |pass: usize, key: &Key| Key::from(format!("{pass}:{key}"));
     let mut last: Option<Key> = None;

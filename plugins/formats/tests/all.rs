@@ -9,6 +9,7 @@
 )]
 mod auto;
 mod bal;
+mod barcodes;
 mod gnc;
 mod online;
 mod pose_graphs;

@@ -5,12 +5,12 @@ use manifactor_geometry::{Between, Coordinates, Landmark, Point2, Range, Se2, Se
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
-use manifactor_online::{Report, Session, Settings, Window};
+use manifactor_online::{Report, Session, Settings, Span, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{DMatrix, Vector2, Vector3};
 use std::path::PathBuf;
 
-fn data(path: &str) -> Option<PathBuf> {
+pub(crate) fn data(path: &str) -> Option<PathBuf> {
     let file = std::env::var_os("MANIFACTOR_DATA").map(|root| PathBuf::from(root).join(path));
     let file = file.filter(|file| file.exists());
     if file.is_none() {
@@ -146,7 +146,7 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
 fn a_window_that_holds_all_closures_is_as_good_as_all() {
     let Some(path) = data("g2o/sphere2500.g2o") else { return };
     let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
-    let window = Some(Window { poses: 120, keep: vec![] });
+    let window = Some(Window::from(Span::Poses(120)));
     let mut narrow = Session::new(Settings { window, ..Settings::default() }).unwrap();
     let (mut all, mut steps) = (Session::new(Settings::default()).unwrap(), Replay::of(&graph));
     let mut bytes = vec![];
@@ -208,10 +208,11 @@ fn victoria_park_is_mapped_by_the_ids_of_its_trees() {
     assert!(cost <= 1.01 * best, "{cost}, the optimum is {best}");
 }
 
-/// The rows of a table of numbers.
-fn rows(path: PathBuf) -> Vec<Vec<f64>> {
+/// The rows of a table of numbers, without comments.
+pub(crate) fn rows(path: PathBuf) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(path).unwrap();
-    text.lines().map(|line| line.split_whitespace().map(|field| field.parse().unwrap()).collect()).collect()
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    lines.map(|line| line.split_whitespace().map(|field| field.parse().unwrap()).collect()).collect()
 }
 
 #[test]

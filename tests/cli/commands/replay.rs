@@ -123,6 +123,13 @@ fn a_window_leaves_old_poses_behind() {
     // each closure is eight poses back
     assert_eq!((summary["variables"].clone(), summary["left_out"].clone()), (5.into(), 8.into()));
     manifactor(&format!("replay {graph} --set online.window.keep=1")).ended(2);
+    let by_time = manifactor(&format!("replay {graph} --set online.window.seconds=5")).ended(2);
+    by_time.complains("use `window.poses`");
+    let both = format!("replay {graph} --set online.window.poses=5 --set online.window.seconds=5");
+    manifactor(&both).ended(2).complains("found both");
+    let keeps =
+        format!("replay {graph} --set online.window.poses=5 --set online.window.keep=[\"dual_quadrik\"]");
+    manifactor(&keeps).ended(2).complains("did you mean `dual_quadric`?");
 }
 
 #[test]
