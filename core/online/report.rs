@@ -22,9 +22,9 @@ pub struct Report {
     pub passes: usize,
     /// Where the cost would have risen: variables whose steps were damped, one that was damped twice counting twice.
     pub damped: usize,
-    /// Where that did not help: steps that were halved.
+    /// Where many variables had to be: steps that were halved.
     pub halved: usize,
-    /// Whether the update ended in a batch solve, as halved steps did not help.
+    /// Whether the update ended in a batch solve, as neither helped.
     pub solved_batch: bool,
     /// Variables that wait for factors to determine them. Their own block of H has no full rank, so that they and their
     /// factors take no part yet.

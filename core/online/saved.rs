@@ -98,8 +98,15 @@ pub(crate) struct SavedVariable {
     /// Its linearization point, and the bits of its step from there.
     pub point: Box<dyn Variable>,
     pub step: Vec<u64>,
+    /// The bits of what its steps are damped by, and whether it still takes a step at each update.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub damping: (u64, bool),
     pub held: u32,
     pub parked: bool,
+}
+
+fn is_none(damping: &(u64, bool)) -> bool {
+    *damping == (0, false)
 }
 
 #[derive(Serialize, Deserialize)]

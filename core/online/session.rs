@@ -165,22 +165,6 @@ impl Session {
     /// ½ Σ ρ at the estimate, over all factors that took part where they were last linearized and whose variables are not
     /// parked; of variables that have left, what their linear priors say. It looks at every factor.
     pub fn cost(&mut self) -> f64 {
-        if std::env::var("DEBUGD").is_ok() {
-            for v in &self.damped {
-                let p = self.model.blocks.precision(*v).iter().copied().fold(0.0, f64::max);
-                let least = self.model.blocks.precision(*v).iter().copied().fold(1e99, f64::min);
-                let d: Vec<f64> = self.delta[self.model.blocks.range(*v)].to_vec();
-                eprint!(
-                    "[{} {:.0e} min {:.0e} excess {:.1e} {:.1?}] ",
-                    self.key(*v),
-                    self.model.blocks.damping(*v) / p / p,
-                    least * least / p / p,
-                    self.excess(*v).sqrt(),
-                    d.iter().map(|x| x.abs()).fold(0.0, f64::max)
-                );
-            }
-            eprintln!("waiting {}", self.waiting.len());
-        }
         let factors: Vec<u32> = self.counted().chain(self.model.priors()).collect();
         self.cost_of(&factors).cost
     }

@@ -21,7 +21,8 @@ impl Session {
             let place = self.model.place(v);
             let (key, born) = (place.key.clone(), place.is_there.then_some([place.born, place.ordinal]));
             let (held, parked) = (place.held, place.parked);
-            variables.push(SavedVariable { key, born, point, step, held, parked });
+            let damping = (self.model.blocks.damping(v).to_bits(), self.damped.contains(&v));
+            variables.push(SavedVariable { key, born, point, step, damping, held, parked });
         }
         let factors = self.model.all_factors().map(|(number, factor, entry)| {
             let entry = entry.clone();
@@ -70,6 +71,14 @@ impl Session {
         session.resize();
         let steps = saved.variables.iter().flat_map(|variable| &variable.step);
         session.delta.iter_mut().zip(steps).for_each(|(to, step)| *to = f64::from_bits(*step));
+        for (v, variable) in saved.variables.iter().enumerate() {
+            let (damping, takes_steps) = (f64::from_bits(variable.damping.0), variable.damping.1);
+            if !(damping >= 0.0 && damping.is_finite()) {
+                return Err(LoadError::Inconsistent("what steps are damped by"));
+            }
+            session.model.blocks.damp(v as u32, damping);
+            session.damped.extend(takes_steps.then_some(v as u32));
+        }
         // counters that go on from there must not wrap around
         let is_young = saved.ordinals.iter().chain([&saved.born]).all(|count| *count < 1 << 62)
             && saved.updates < 1 << 62
@@ -179,7 +188,7 @@ impl Session {
 }
 
 fn insert(model: &mut Model, saved: &SavedVariable) -> Result<(), LoadError> {
-    let SavedVariable { key, born, point, step, held, parked } = saved;
+    let SavedVariable { key, born, point, step, held, parked, .. } = saved;
     let value = point.erased();
     let dim = value.dim();
     let is_known = born.is_some() && model.variable(key.as_str()).is_some();

@@ -1,4 +1,9 @@
-//! Steps that are too long: where the true cost rises, half the way is tried, and then half of that; at last, a batch solve.
+//! Steps that are too long, so that the true cost rises. Where a few variables step far, what is known of them is little: they are
+//! damped one by one, as Levenberg and Marquardt damp all. Where many do, a loop moves as a whole: half the way is tried, and half
+//! of that. At last, a batch solve.
+//!
+//! A variable is damped by λ on the diagonal of its block of H, a prior at its linearization point. That moves no minimum: each update
+//! linearizes the variable anew, with less damping.
 use super::Session;
 use super::changes::Touched;
 use super::parking::Moves;
@@ -8,20 +13,21 @@ use manifactor_solve::{LevenbergMarquardt, Silent};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
+/// Variables that are damped at most; more are a loop.
+const FEW: usize = 16;
 /// Halvings of a step.
 const HALVINGS: usize = 6;
-/// Rounds of such halvings before a batch solve.
+/// Rounds of such halvings before a batch solve, and rounds of damping.
 const ROUNDS: usize = 3;
-/// Rounds of damping.
 const DAMPINGS: usize = 6;
 /// The least damping of a variable, as a share of the largest entry of its diagonal of H; and by how much it grows.
 const LEAST_DAMPING: f64 = 1e-3;
 const STRONGER: f64 = 10.0;
 /// What becomes of it each time that the variable is linearized anew.
-const WEAKER: f64 = 0.25;
-/// The damping that stays, as a share of that entry: an axis that has all but vanished has next to no derivative, and without
-/// damping its steps would be as long as ever.
-const WEAK: f64 = 1e-6;
+const WEAKER: f64 = 0.1;
+/// Damping that is as good as none, as a share of that entry. It stays where a direction has less of H than that: an axis that has all
+/// but vanished has next to no derivative, and without damping its steps would be as long as ever.
+const WEAK: f64 = 1e-5;
 /// A rise of the cost by less than this share of it is rounding, or what was not passed on.
 const RISE: f64 = 1e-3;
 
@@ -34,11 +40,13 @@ impl Session {
         }
     }
 
-    /// Damps, then shortens long steps that have raised the cost; whether it has ceased to rise.
+    /// Shortens long steps that have raised the cost; whether it has ceased to rise.
     pub(super) fn steady(&mut self, report: &mut Report) -> bool {
-        if self.damp(report) {
-            return true;
-        }
+        !self.is_urgent() || if self.urgent.len() > FEW { self.halve(report) } else { self.damp(report) }
+    }
+
+    /// Halves the last step, and linearizes there.
+    fn halve(&mut self, report: &mut Report) -> bool {
         for _ in 0..ROUNDS {
             if !self.is_urgent() || !self.shorten(report) {
                 return true;
@@ -65,11 +73,8 @@ impl Session {
                 let old = &self.before[*first..*first + self.model.blocks.dim(*v)];
                 before.entry(*v).or_insert_with(|| SmallVec::from_slice(old));
             }
-            if !self.has_risen(&before) {
+            if !self.is_urgent() || !self.has_risen(&before) {
                 return true;
-            }
-            if !self.is_urgent() {
-                return false;
             }
             let urgent = self.urgent.clone();
             for v in &urgent {
@@ -83,13 +88,22 @@ impl Session {
                 return true;
             }
         }
-        !self.has_risen(&before)
+        !(self.is_urgent() && self.has_risen(&before))
     }
 
     /// The largest entry of a variable's diagonal of H.
     fn largest(&self, variable: u32) -> f64 {
         let precision = self.model.blocks.precision(variable).iter().copied().fold(0.0, f64::max);
         precision * precision
+    }
+
+    /// The smallest entry of those directions that are not held.
+    fn smallest(&self, variable: u32) -> f64 {
+        let held = self.model.place(variable).held;
+        let precision = self.model.blocks.precision(variable).iter().enumerate();
+        let free = precision.filter(|(d, _)| held >> d & 1 == 0).map(|(_, precision)| *precision);
+        let least = free.fold(f64::INFINITY, f64::min);
+        least * least
     }
 
     /// Whether the factors around some variables cost more than with these steps.
@@ -164,12 +178,13 @@ impl Session {
         let damped = variables.iter().filter(|v| self.damped.contains(v));
         let before: Vec<(u32, f64)> = damped.map(|v| (*v, self.model.blocks.damping(*v))).collect();
         for (v, damping) in &before {
-            let weak = std::env::var("WEAK").map_or(WEAK, |x| x.parse().unwrap_or(WEAK)) * self.largest(*v);
-            let weaker = std::env::var("WEAKER").map_or(WEAKER, |x| x.parse().unwrap_or(WEAKER)) * damping;
-            if weaker <= weak {
+            let (weak, weaker) = (WEAK * self.largest(*v), WEAKER * damping);
+            if weaker > weak {
+                self.model.blocks.damp(*v, weaker);
+            } else {
                 self.damped.remove(v);
+                self.model.blocks.damp(*v, if self.smallest(*v) < weak { weak } else { 0.0 });
             }
-            self.model.blocks.damp(*v, weaker.max(weak));
         }
         before
     }

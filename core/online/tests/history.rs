@@ -214,10 +214,13 @@ proptest! {
         let mut history = History::new(Settings { outliers, ..exact() });
         history.apply_all(&changes);
         let mut report = history.session.update().unwrap();
+        let mut quiet = 0;
         for _ in 0..20 {
             report = history.session.update().unwrap();
+            quiet = if report.damped + report.halved == 0 { quiet + 1 } else { 0 };
         }
-        prop_assume!(report.undetermined.is_empty());
+        // a few updates after the last, nothing is damped any more
+        prop_assume!(report.undetermined.is_empty() && quiet > 4);
         let (graph, _) = history.session.graph();
         let mut values = history.session.estimates();
         for key in &report.parked {
@@ -233,8 +236,8 @@ proptest! {
         let anew = fresh.update().unwrap();
         prop_assert!(anew.undetermined.is_empty() && anew.parked.is_empty());
         let last = history.session.update().unwrap();
-        // rounding can tip the balance where a step has to be shortened, or a factor fits by a hair
-        prop_assume!(last.halved == 0 && anew.halved == 0);
+        // rounding can tip the balance where a step has to be damped, or a factor fits by a hair
+        prop_assume!(last.damped + last.halved + anew.damped + anew.halved == 0);
         prop_assume!(last.rejected.is_empty() && last.readmitted.is_empty());
         let now = history.session.estimates();
         let apart = difference(&fresh.estimates(), &now);

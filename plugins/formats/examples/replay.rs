@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     if !json {
         println!(
-            "| graph | steps | total s | p50 | p99 | max | gap, median | gap, max | halved | batches | cost | after finish | MB |"
+            "| graph | steps | total s | p50 | p99 | max | gap, median | gap, max | damped | batches | cost | after finish | MB |"
         );
         println!(
             "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let graph = pose_graph::read(&path, &options)?.graph;
         let mut session = Session::new(Settings::default())?;
         let (mut times, mut differences) = (vec![], vec![]);
-        let (mut halved, mut batches) = (0, 0);
+        let (mut damped, mut batches) = (0, 0);
         let mut replay = Replay::of(&graph);
         while let Some(step) = replay.step(|key| session.estimate(key))? {
             let begin = cpu_seconds();
@@ -47,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let report = session.update()?;
             let _newest = step.values.iter().last().and_then(|(key, _)| session.estimate(key.as_str()));
             times.push(cpu_seconds() - begin);
-            halved += report.halved;
+            damped += report.damped;
             batches += usize::from(report.solved_batch);
             if gaps > 0 && times.len() % gaps == 0 {
                 let best = session.finish(&LevenbergMarquardt::default(), &mut Silent)?.outcome.final_cost;
@@ -61,14 +61,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let latencies = Latencies::of(&times);
             let told = serde_json::json!({
                 "latencies": latencies, "steps": times.len(), "cost": cost, "finished": finished, "gaps": differences,
-                "halved": halved, "batches": batches, "bytes": session.bytes(),
+                "damped": damped, "batches": batches, "bytes": session.bytes(),
             });
             println!("{told}");
             continue;
         }
         let (table, gap) = (Latencies::of(&times), Latencies::of(&differences));
         println!(
-            "| {name} | {} | {:.3} | {:.3} | {:.2} | {:.1} | {:.1e} | {:.1e} | {halved} | {batches} | {cost:.6} | {finished:.6} | {:.1} |",
+            "| {name} | {} | {:.3} | {:.3} | {:.2} | {:.1} | {:.1e} | {:.1e} | {damped} | {batches} | {cost:.6} | {finished:.6} | {:.1} |",
             times.len(),
             table.total,
             1e3 * table.p50,
