@@ -1,7 +1,7 @@
 //! The command line.
 use crate::commands::{
-    Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, List, Man, New, Plot,
-    Replay, Run, Schema, ShowGraph, Simulate, Solve,
+    Check, CheckFactor, CheckManifold, Completions, Evaluate, Experiment, Explain, List, Man, New, Online,
+    Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
 use crate::output::watch;
@@ -33,6 +33,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(Run),
+    Online(Online),
     Plot(Plot),
     Experiment(Experiment),
     Solve(Solve),
@@ -68,6 +69,7 @@ impl Cli {
         check_names(&all()).map_err(Failure::input)?;
         match &self.command {
             Command::Run(command) => command.run(self.verbose),
+            Command::Online(command) => command.run(self.verbose),
             Command::Plot(command) => command.run(),
             Command::Experiment(command) => command.run(),
             Command::Solve(command) => command.run(self.verbose),
@@ -100,7 +102,8 @@ impl Cli {
     /// Whether results are to be JSON.
     pub fn json(&self) -> bool {
         match &self.command {
-            Command::Run(command) => command.json,
+            Command::Run(command) => command.options.json,
+            Command::Online(command) => command.options.json,
             Command::Experiment(command) => command.json,
             Command::Solve(command) => command.json,
             Command::Replay(command) => command.json,

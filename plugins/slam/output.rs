@@ -1,7 +1,7 @@
 //! The files that a run leaves.
 //!
 //! `report.json` and `record.json` (all that there is to draw) for the run as a whole, and a folder for each variant with
-//! `config.toml` (all settings, ready to be run again), `trajectory.txt` (TUM's format), `objects.json`, `frames.jsonl` (poses
+//! `config.toml` (all settings, ready to be run again), `trajectory.txt` (TUM's format; `live.txt` as it was when each frame came, where they came one by one), `objects.json`, `frames.jsonl` (poses
 //! and boxes, a frame a line), `graph.json` (the literal graph at the estimate), `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
 //! into an [`OutputFolder`].
 use crate::estimate::Estimate;
@@ -98,6 +98,9 @@ pub fn write_variant(
     let file = |name: &str| folder.join(name);
     write_document(&file("config.toml"), resolved(run, variant))?;
     write_whole(&file("trajectory.txt"), tum::format(&estimate.trajectory()))?;
+    if let Some(online) = &report.online {
+        write_whole(&file("live.txt"), tum::format(&online.live))?;
+    }
     write_document(&file("objects.json"), results(&report.objects))?;
     write_document(&file("frames.jsonl"), lines(&record.frames))?;
     let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);

@@ -69,6 +69,7 @@ pub fn online(
     let mut progress = OnlineReport::default();
     let mut taken = Sequence { frames: vec![], detections: vec![], ..(*sequence).clone() };
     for observation in sequence.observations() {
+        watch.wait(observation.frame.timestamp);
         let began = Instant::now();
         let report = mapper.take(&observation);
         let seconds = began.elapsed().as_secs_f64();
@@ -78,14 +79,13 @@ pub fn online(
             let detections = observation.detections.into_iter();
             taken.detections.extend(detections.map(|d| Detection { frame: report.frame, ..d }));
         }
-        if watch.frame(report, &mut mapper, seconds).is_break() {
+        if watch.frame(report.as_ref(), &mut mapper, seconds).is_break() {
             break;
         }
     }
     progress.end(&mut mapper);
-    let live = mapper.live().to_vec();
     let estimate = mapper.finish(Arc::new(taken), observer)?;
-    progress.compare(live, &estimate, &settings.evaluation);
+    progress.compare(&estimate, &settings.evaluation);
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.online = Some(progress);
     report.seconds = clock.elapsed().as_secs_f64();
@@ -94,10 +94,13 @@ pub fn online(
 
 /// Watches frames as they come in.
 pub trait Watch {
+    /// Before each frame, with its time stamp in seconds: returns when it is there.
+    fn wait(&mut self, _timestamp: f64) {}
+
     /// After each frame: what came of it, the map, and the seconds that it took.
     fn frame(
         &mut self,
-        report: Result<FrameReport, FrameError>,
+        report: Result<&FrameReport, &FrameError>,
         mapper: &mut Mapper,
         seconds: f64,
     ) -> ControlFlow<()>;

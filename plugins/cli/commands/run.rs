@@ -7,13 +7,16 @@ use crate::output::watch::Watch;
 use crate::output::{self, table};
 use crate::status::Status;
 use clap::Args;
+use manifactor::slam::estimate::Estimate;
 use manifactor::slam::output::{OutputFolder, write_report, write_variant, write_whole};
 use manifactor::slam::record::{RunRecord, VariantRecord};
-use manifactor::slam::run::Run as Running;
+use manifactor::slam::report::VariantReport;
+use manifactor::slam::run::{Run as Running, RunError};
+use manifactor::slam::run_document::Variant;
 use manifactor::solve::All;
-use manifactor::viz::{ply, run_page, run_pictures};
+use manifactor::viz::{latencies, ply, run_page, run_pictures};
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Build, solve, evaluate and write what a document describes.
 ///
@@ -23,6 +26,13 @@ use std::sync::atomic::Ordering;
 /// pictures again.
 #[derive(Debug, Args)]
 pub(crate) struct Run {
+    #[command(flatten)]
+    pub(crate) options: RunOptions,
+}
+
+/// What commands take that write the results of a run.
+#[derive(Debug, Args)]
+pub(crate) struct RunOptions {
     #[command(flatten)]
     run: RunArguments,
     /// The folder for the results. Default: the one that the document names.
@@ -38,26 +48,44 @@ pub(crate) struct Run {
 
 impl Run {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
+        let mut interrupt = interrupt::on_ctrl_c();
+        let flag = interrupt.0.clone();
+        self.options.run_as("run", &flag, |run, variant| {
+            let mut watch = Watch::new(verbose, &variant.name);
+            run.variant(variant, &mut All(vec![&mut watch, &mut interrupt]))
+        })
+    }
+}
+
+impl RunOptions {
+    /// Estimates each variant, until `interrupted`, and writes all that there is to write.
+    pub(super) fn run_as(
+        &self,
+        command: &str,
+        interrupted: &AtomicBool,
+        mut estimate: impl FnMut(&mut Running<'_>, &Variant) -> Result<(Estimate, VariantReport), RunError>,
+    ) -> Result<Status, Failure> {
         let mut document = self.run.open()?;
         if let Some(out) = &self.out {
             document.output.clone_from(out);
         }
         // held to the end
-        let _claimed = OutputFolder::claim(&document.output, "run", &self.run.config, self.force)?;
-        let mut interrupt = interrupt::on_ctrl_c();
+        let _claimed = OutputFolder::claim(&document.output, command, &self.run.config, self.force)?;
         let (mut records, mut configs) = (vec![], vec![]);
+        let look = Look::default();
         let mut run = Running::new(&document, self.run.data());
         for variant in &document.variants {
             tracing::info!("variant {}", variant.name);
-            let mut watch = Watch::new(verbose, &variant.name);
-            let mut observer = All(vec![&mut watch, &mut interrupt]);
-            let (estimate, report) = run.variant(variant, &mut observer)?;
-            drop(watch);
+            let (estimate, report) = estimate(&mut run, variant)?;
             let record = VariantRecord::new(variant, &estimate);
             let folder = write_variant(&document, variant, &estimate, &report, &record)?;
+            if let Some(online) = &report.online {
+                let title = format!("{}: latency of each frame", variant.name);
+                look.write(&folder, latencies(&title, &online.seconds, look.width()).as_slice())?;
+            }
             configs.push(std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?);
             records.push(record);
-            if interrupt.0.load(Ordering::Relaxed) {
+            if interrupted.load(Ordering::Relaxed) {
                 break;
             }
         }
@@ -65,7 +93,6 @@ impl Run {
         let record = RunRecord::new(&document.title, records);
         write_report(&document.output, &report, &record)?;
         write_whole(&document.output.join("report.html"), run_page(&report, &record, &configs))?;
-        let look = Look::default();
         for variant in &record.variants {
             let folder = document.output.join(&variant.folder);
             look.write(&folder, &run_pictures(&record, variant, look.width()))?;

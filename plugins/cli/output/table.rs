@@ -30,6 +30,9 @@ pub(crate) fn of_run(report: &RunReport) -> String {
         out += "!: ended without converging; a warning below says how.\n";
     }
     for variant in &report.variants {
+        out += &stream(variant);
+    }
+    for variant in &report.variants {
         out += &diagnosis(variant);
     }
     for variant in &report.variants {
@@ -47,6 +50,27 @@ const LANDMARKS: &str = "Position, shape, quality of the objects against the tru
 
 /// Columns that a narrow terminal keeps, before all others.
 const KEPT: [&str; 7] = ["ATE (m)", "position (m)", "shape", "quality", "cost", "iterations", "objects"];
+
+/// Where frames came one by one: how long they took, and what the map was after the last.
+fn stream(variant: &VariantReport) -> String {
+    let Some(online) = &variant.online else { return String::new() };
+    let name = on_one_line(&variant.name);
+    let [p50, p99, max] = [online.latencies.p50, online.latencies.p99, online.latencies.max].map(seconds);
+    let mut text = format!(
+        "{name}: {} as they came, p50 {p50}, p99 {p99}, at most {max}; {} born, {} withdrawn, cost {:.3} after the last",
+        text::count(online.seconds.len(), "frame"),
+        text::count(online.born, "object"),
+        online.withdrawn,
+        online.cost
+    );
+    if let Some(trajectory) = online.trajectory.first() {
+        text += &format!(", ATE of poses as their frames came {} m", metres(trajectory.estimate.ate.rmse));
+    }
+    if online.refusals > 0 {
+        text += &format!(", {} refused", text::count(online.refusals, "frame or change"));
+    }
+    text::wrap(&text) + "\n"
+}
 
 /// A line: the condition, what is rejected, and the factor that costs the most. The report has the whole table.
 fn diagnosis(variant: &VariantReport) -> String {

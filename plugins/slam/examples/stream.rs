@@ -25,12 +25,12 @@ struct Gaps {
 impl Watch for Gaps {
     fn frame(
         &mut self,
-        report: Result<FrameReport, FrameError>,
+        report: Result<&FrameReport, &FrameError>,
         mapper: &mut Mapper,
         seconds: f64,
     ) -> ControlFlow<()> {
         self.frames += 1;
-        if let Ok(report) = &report {
+        if let Ok(report) = report {
             if report.updates.iter().any(|u| u.solved_batch) {
                 self.batches.push(report.frame);
             }

@@ -15,6 +15,9 @@ pub struct OnlineReport {
     /// Seconds, frame by frame.
     #[serde(skip)]
     pub seconds: Vec<f64>,
+    /// The poses as they were estimated when their frames came.
+    #[serde(skip)]
+    pub live: Vec<StampedPose>,
     /// Objects that came into the map.
     pub born: usize,
     /// Objects that were taken out again.
@@ -33,7 +36,7 @@ pub struct OnlineReport {
     pub cost: f64,
     /// Bytes of the factorization.
     pub bytes: usize,
-    /// The poses as they were estimated when their frames came, against the truth: once for each alignment.
+    /// These poses against the truth: once for each alignment.
     pub trajectory: Vec<TrajectoryReport>,
 }
 
@@ -65,16 +68,12 @@ impl OnlineReport {
         self.objects = mapper.mapped();
         self.cost = mapper.session().cost();
         self.bytes = mapper.session().bytes();
+        self.live = mapper.live().to_vec();
     }
 
     /// Compares the poses as they were estimated when their frames came with the truth.
-    pub(crate) fn compare(
-        &mut self,
-        live: Vec<StampedPose>,
-        estimate: &Estimate,
-        settings: &EvaluationSettings,
-    ) {
-        let poses = [estimate.odometry(), live];
+    pub(crate) fn compare(&mut self, estimate: &Estimate, settings: &EvaluationSettings) {
+        let poses = [estimate.odometry(), self.live.clone()];
         // the report of the estimate tells what keeps it from being compared
         self.trajectory =
             trajectory::compare(estimate.sequence.ground_truth.as_ref(), &poses, settings, &mut vec![]);

@@ -1,0 +1,118 @@
+//! `manifactor online`: a run frame by frame, as they come.
+use super::run::RunOptions;
+use crate::failure::Failure;
+use crate::interrupt;
+use crate::output;
+use crate::output::text::{count, seconds};
+use crate::output::watch::Watch as Progress;
+use crate::status::Status;
+use clap::Args;
+use manifactor::slam::online::{FrameError, FrameReport, Mapper};
+use manifactor::slam::run::Watch;
+use manifactor::solve::{All, Interrupt};
+use serde_json::json;
+use std::ops::ControlFlow;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// Map frame by frame, as they come, then solve all of it as one batch.
+///
+/// The document is that of `manifactor run`, and so are the results; `live.txt` has the poses as they were estimated when their
+/// frames came, and latency.svg how long each frame took. An object is mapped as soon as it can be placed. Noise is as given until the
+/// end. The table `online` of the document has the settings of the smoother.
+#[derive(Debug, Args)]
+pub(crate) struct Online {
+    #[command(flatten)]
+    pub(crate) options: RunOptions,
+    /// Wait for each frame's time: 1 is as fast as it was recorded, 2 twice as fast. Default: no waiting.
+    #[arg(long, value_name = "X", value_parser = faster)]
+    rate: Option<f64>,
+    /// Tell of every N-th frame on stderr; with --json, in a line of JSON each.
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
+    every: u64,
+}
+
+fn faster(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok().filter(|rate: &f64| *rate > 0.0 && rate.is_finite());
+    rate.ok_or_else(|| "expected a number above 0: 1 is as fast as it was recorded".to_owned())
+}
+
+impl Online {
+    pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
+        let mut interrupt = interrupt::on_ctrl_c();
+        let flag = interrupt.0.clone();
+        self.options.run_as("online", &flag, |run, variant| {
+            let mut frames = Frames { command: self, interrupt: interrupt.clone(), frames: 0, begun: None };
+            let mut progress = Progress::new(verbose, &variant.name);
+            run.variant_online(variant, &mut frames, &mut All(vec![&mut progress, &mut interrupt]))
+        })
+    }
+}
+
+/// Tells of frames, and keeps their time.
+struct Frames<'a> {
+    command: &'a Online,
+    interrupt: Interrupt,
+    frames: u64,
+    /// When the first frame came, and its time stamp.
+    begun: Option<(Instant, f64)>,
+}
+
+/// While it waits, it looks this often whether somebody has interrupted it.
+const NAP: Duration = Duration::from_millis(50);
+
+impl Frames<'_> {
+    fn is_interrupted(&self) -> bool {
+        self.interrupt.0.load(Ordering::Relaxed)
+    }
+
+    fn tell(&self, report: &FrameReport, mapper: &Mapper, took: f64) {
+        let (objects, undetermined) =
+            (mapper.mapped(), report.updates.last().map_or(0, |u| u.undetermined.len()));
+        if self.command.options.json {
+            output::json_line(&json!({ "seconds": took, "objects": objects, "report": report }));
+        } else {
+            let open = if undetermined > 0 {
+                format!(", {undetermined} directions undetermined")
+            } else {
+                String::new()
+            };
+            let frames = count(report.frame + 1, "frame");
+            output::say(&format!(
+                "{frames}: {}{open}, the last in {}",
+                count(objects, "object"),
+                seconds(took)
+            ));
+        }
+    }
+}
+
+impl Watch for Frames<'_> {
+    fn wait(&mut self, timestamp: f64) {
+        let Some(rate) = self.command.rate else { return };
+        let (begun, first) = *self.begun.get_or_insert((Instant::now(), timestamp));
+        let Ok(due) = Duration::try_from_secs_f64((timestamp - first) / rate) else { return };
+        while let Some(left) = due.checked_sub(begun.elapsed()).filter(|_| !self.is_interrupted()) {
+            std::thread::sleep(left.min(NAP));
+        }
+    }
+
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        mapper: &mut Mapper,
+        took: f64,
+    ) -> ControlFlow<()> {
+        self.frames += 1;
+        match report {
+            Ok(report) => {
+                report.refused.iter().for_each(|refused| output::note(refused));
+                if self.frames.is_multiple_of(self.command.every) {
+                    self.tell(report, mapper, took);
+                }
+            }
+            Err(error) => output::note(&error.to_string()),
+        }
+        if self.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
