@@ -19,11 +19,13 @@ use crate::settings::Settings;
 use gravity::Up;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_online::{ChangeError, Session, UpdateError};
+use manifactor_graph::manifold_name;
+use manifactor_online::{ChangeError, ManifoldType, Session, UpdateError};
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_solve::{Observer, SettingError};
 use object::Tracked;
 use rules::Ledger;
+use std::any::TypeId;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -98,10 +100,17 @@ impl Mapper {
     /// # Errors
     /// Where a setting of the session is outside its domain.
     pub fn new(opening: Opening, settings: &Settings) -> Result<Self, SettingError> {
+        let mut online = settings.online.clone();
+        if let Some(window) = &mut online.window {
+            // poses leave, and nothing else
+            let own = settings.own.values.iter().map(|(_, value)| value.typetag_name());
+            let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]);
+            window.keep.extend(kept.filter_map(|name| ManifoldType::try_from(name.to_owned()).ok()));
+        }
         Ok(Self {
             settings: Arc::new(settings.clone()),
             camera: opening.camera,
-            session: Session::new(settings.online.clone())?,
+            session: Session::new(online)?,
             up: Up::new(opening),
             measurements: Measurements::default(),
             objects: BTreeMap::new(),

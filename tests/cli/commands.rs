@@ -7,6 +7,7 @@ mod graph;
 mod laws;
 mod names;
 mod new;
+mod online;
 mod replay;
 mod run;
 mod schema;

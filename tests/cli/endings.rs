@@ -1,7 +1,7 @@
 //! How the program ends: exit codes, signals, disks and folders that do not serve; and what is left then.
 mod disk;
 mod exit_codes;
-mod interrupt;
+pub(crate) mod interrupt;
 pub(crate) mod killed;
 mod overwriting;
 mod repeated;

@@ -41,11 +41,15 @@ impl Online {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         let mut interrupt = interrupt::on_ctrl_c();
         let flag = interrupt.0.clone();
-        self.options.run_as("online", &flag, |run, variant| {
+        let report = self.options.run_as("online", &flag, |run, variant| {
             let mut frames = Frames { command: self, interrupt: interrupt.clone(), frames: 0, begun: None };
             let mut progress = Progress::new(verbose, &variant.name);
             run.variant_online(variant, &mut frames, &mut All(vec![&mut progress, &mut interrupt]))
-        })
+        })?;
+        if self.options.json {
+            output::json_line(&report);
+        }
+        Ok(Status::from(&report))
     }
 }
 

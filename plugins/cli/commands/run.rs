@@ -10,7 +10,7 @@ use clap::Args;
 use manifactor::slam::estimate::Estimate;
 use manifactor::slam::output::{OutputFolder, write_report, write_variant, write_whole};
 use manifactor::slam::record::{RunRecord, VariantRecord};
-use manifactor::slam::report::VariantReport;
+use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::slam::run::{Run as Running, RunError};
 use manifactor::slam::run_document::Variant;
 use manifactor::solve::All;
@@ -50,21 +50,25 @@ impl Run {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         let mut interrupt = interrupt::on_ctrl_c();
         let flag = interrupt.0.clone();
-        self.options.run_as("run", &flag, |run, variant| {
+        let report = self.options.run_as("run", &flag, |run, variant| {
             let mut watch = Watch::new(verbose, &variant.name);
             run.variant(variant, &mut All(vec![&mut watch, &mut interrupt]))
-        })
+        })?;
+        if self.options.json {
+            output::json(&report);
+        }
+        Ok(Status::from(&report))
     }
 }
 
 impl RunOptions {
-    /// Estimates each variant, until `interrupted`, and writes all that there is to write.
+    /// Estimates each variant, until `interrupted`, writes all that there is to write, and prints the table, unless JSON is asked for.
     pub(super) fn run_as(
         &self,
         command: &str,
         interrupted: &AtomicBool,
         mut estimate: impl FnMut(&mut Running<'_>, &Variant) -> Result<(Estimate, VariantReport), RunError>,
-    ) -> Result<Status, Failure> {
+    ) -> Result<RunReport, Failure> {
         let mut document = self.run.open()?;
         if let Some(out) = &self.out {
             document.output.clone_from(out);
@@ -98,13 +102,11 @@ impl RunOptions {
             look.write(&folder, &run_pictures(&record, variant, look.width()))?;
             write_whole(&folder.join("map.ply"), ply(&record, variant))?;
         }
-        if self.json {
-            output::json(&report);
-        } else {
+        if !self.json {
             output::print(&table::of_run(&report));
             let out = document.output.display();
             output::print(&format!("\nWritten to {out}; open {out}/report.html in a browser.\n"));
         }
-        Ok(Status::from(&report))
+        Ok(report)
     }
 }

@@ -125,6 +125,7 @@ impl Mapper {
         alone: &Graph,
         report: &mut FrameReport,
     ) -> Result<(), FrameError> {
+        self.session.set_time(report.timestamp)?;
         let ids = self.session.push(graph, values)?;
         match self.session.update() {
             Ok(update) => {
@@ -138,6 +139,7 @@ impl Mapper {
                 Ok(())
             }
             Err(error) if !owners.is_empty() => {
+                self.session.set_time(report.timestamp)?;
                 self.session.push(alone, values)?;
                 report.updates.push(self.session.update()?);
                 report.refused.push(format!("the boxes at {} s: {error}", report.timestamp));

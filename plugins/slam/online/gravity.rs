@@ -55,11 +55,12 @@ impl Up {
             return Ok(false);
         };
         let angle = match (before.up, found.up) {
-            (Some(a), Some(b)) => a.dot(&b).clamp(-1.0, 1.0).acos(),
+            (Some(a), Some(b)) => (*a - *b).norm(),
             (None, None) => 0.0,
             _ => f64::INFINITY,
         };
-        if angle < MOVED {
+        // the last look counts, however little it changes
+        if angle < if self.is_settled { f64::EPSILON } else { MOVED } {
             return Ok(false);
         }
         // poses stay where they are: only the first frame says where the map lies

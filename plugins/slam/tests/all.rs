@@ -8,6 +8,7 @@
     clippy::print_stderr
 )]
 mod evo;
+mod online;
 mod simulation;
 mod tum;
 mod variance;

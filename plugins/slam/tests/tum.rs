@@ -11,7 +11,7 @@ use manifactor_solve::{Silent, Stall, Termination};
 use std::path::{Path, PathBuf};
 
 /// The data folder; `None`, with a message, if it is not given.
-fn data() -> Option<PathBuf> {
+pub(crate) fn data() -> Option<PathBuf> {
     let data = std::env::var_os("MANIFACTOR_DATA").map(PathBuf::from);
     if data.is_none() {
         eprintln!("skipped: set MANIFACTOR_DATA to the folder of the TUM RGB-D sequences to run this test");
@@ -19,7 +19,7 @@ fn data() -> Option<PathBuf> {
     data
 }
 
-fn document(config: &str, sets: &[&str]) -> RunDocument {
+pub(crate) fn document(config: &str, sets: &[&str]) -> RunDocument {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/tum");
     let mut document = Document::open(folder.join(config)).unwrap();
     document.set(sets).unwrap();

@@ -1,0 +1,243 @@
+//! Frame by frame, beside the batch.
+use crate::tum::{data, document};
+use manifactor_config::{Document, Format};
+use manifactor_geometry::Se3;
+use manifactor_slam::mapping::Mapping;
+use manifactor_slam::online::{FrameError, FrameReport, Mapper};
+use manifactor_slam::report::VariantReport;
+use manifactor_slam::run::{Run, Watch};
+use manifactor_slam::run_document::{RunDocument, Variant};
+use manifactor_slam::sequence::{ClassScores, Detection, ObjectId, Observation, Sequence};
+use manifactor_slam::settings::Settings;
+use manifactor_slam::source::Folders;
+use manifactor_solve::Silent;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// Keeps what came of each frame.
+#[derive(Default)]
+struct Kept(Vec<FrameReport>);
+
+impl Watch for Kept {
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        _: &mut Mapper,
+        _: f64,
+    ) -> ControlFlow<()> {
+        self.0.push(report.unwrap().clone());
+        ControlFlow::Continue(())
+    }
+}
+
+/// A desk, seen from a camera that walks around it.
+const DESK: &str = r#"
+semantics = "table_one"
+source = { type = "simulated", scene = { objects = 8 }, trajectory = { frames = 80 } }
+odometry = { noise = { sigma = 0.01 } }
+detections = { loss = { type = "cauchy", scale = 2.8 } }
+"#;
+
+fn run_of(text: &str, sets: &[&str]) -> RunDocument {
+    let mut document = Document::parse("desk.toml", text, Format::Toml).unwrap();
+    document.set(sets).unwrap();
+    RunDocument::read(&document).unwrap()
+}
+
+fn both(run: &RunDocument, variant: &Variant, data: Option<PathBuf>) -> (VariantReport, VariantReport, Kept) {
+    let (mut kept, mut run) = (Kept::default(), Run::new(run, data));
+    let (_, online) = run.variant_online(variant, &mut kept, &mut Silent).unwrap();
+    let (_, batch) = run.variant(variant, &mut Silent).unwrap();
+    (online, batch, kept)
+}
+
+/// The settings of a document without variants, and its sequence.
+fn scene(text: &str) -> (Settings, Sequence) {
+    let settings = run_of(text, &[]).variants.remove(0).settings;
+    let sequence = settings.source.load(&Folders::default()).unwrap();
+    (settings, sequence)
+}
+
+/// What is estimated after these frames, as text with all digits.
+fn mapped(mapper: &mut Mapper) -> String {
+    let values = mapper.session().estimates();
+    values.iter().map(|(key, value)| format!("{key} {}\n", serde_json::to_string(value).unwrap())).collect()
+}
+
+fn take_all(settings: &Settings, sequence: &Sequence) -> Mapper {
+    let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
+    for observation in sequence.observations() {
+        mapper.take(&observation).unwrap();
+    }
+    mapper
+}
+
+#[test]
+fn a_map_that_grew_ends_as_the_batch_does() {
+    let run = run_of(DESK, &[]);
+    let (online, batch, kept) = both(&run, &run.variants[0], None);
+    assert_eq!((online.counts, online.counts.frames), (batch.counts, 80));
+    let (found, expected) = (online.solve.final_cost, batch.solve.final_cost);
+    assert!(found <= expected * (1.0 + 1e-3), "{found} {expected}");
+    let stream = online.online.unwrap();
+    let born: usize = kept.0.iter().map(|frame| frame.born.len()).sum();
+    assert_eq!((stream.born, stream.objects, stream.refusals), (born, born - stream.withdrawn, 0));
+    assert!(born >= 4, "objects come before the end: {born} of {}", online.counts.objects);
+    // the estimate was there when it was needed: not that of the end, and not far from it
+    let (live, end) = (stream.trajectory[0].estimate.ate.rmse, online.trajectory[0].estimate.ate.rmse);
+    assert!(live < 4.0 * end.max(0.01), "{live} {end}");
+}
+
+#[test]
+fn the_same_frames_give_the_same_bits() {
+    let (settings, sequence) = scene(DESK);
+    let (mut one, mut other) = (take_all(&settings, &sequence), take_all(&settings, &sequence));
+    assert_eq!(mapped(&mut one), mapped(&mut other));
+}
+
+#[test]
+fn a_frame_that_cannot_be_taken_leaves_no_trace() {
+    let (settings, sequence) = scene(DESK);
+    let mut expected = take_all(&settings, &sequence);
+    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    for (i, observation) in sequence.observations().enumerate() {
+        let mut bad = observation.clone();
+        bad.frame.world_from_camera.translation.x = f64::NAN;
+        assert!(matches!(mapper.take(&bad), Err(FrameError::NotFinite { .. })));
+        mapper.take(&observation).unwrap();
+        let error = mapper.take(&observation).unwrap_err();
+        assert!(matches!(error, FrameError::Time { .. }), "{error}");
+        if i == 0 {
+            assert!(error.to_string().contains("does not come after the one before"), "{error}");
+        }
+    }
+    assert_eq!(mapped(&mut mapper), mapped(&mut expected));
+}
+
+#[test]
+fn a_rule_without_up_is_refused_at_the_first_frame() {
+    let (settings, mut sequence) = scene(DESK);
+    sequence.up = None;
+    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let first: Observation = sequence.observations().next().unwrap();
+    let error = mapper.take(&first).unwrap_err().to_string();
+    assert!(error.contains("set `[gravity]`"), "{error}");
+}
+
+#[test]
+fn an_object_of_several_things_is_taken_out_again_and_does_not_come_back() {
+    let (settings, mut sequence) = scene(DESK);
+    let mut objects: Vec<ObjectId> = sequence.detections.iter().filter_map(|d| d.object).collect();
+    objects.sort_unstable();
+    objects.dedup();
+    // from the middle on, one number stands for two things
+    let (one, other) = (objects[0], objects[1]);
+    for detection in sequence.detections.iter_mut().filter(|d| d.frame > 40 && d.object == Some(other)) {
+        detection.object = Some(one);
+        let bounds = detection.bounding_box.bounds();
+        detection.bounding_box.xmax = bounds[0] + 4.0 * (bounds[2] - bounds[0]);
+    }
+    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let (mut born, mut withdrawn) = (vec![], vec![]);
+    for observation in sequence.observations() {
+        let report = mapper.take(&observation).unwrap();
+        assert_eq!(report.refused, Vec::<String>::new());
+        born.extend(report.born);
+        withdrawn.extend(report.withdrawn);
+    }
+    let key = format!("q{one}");
+    assert_eq!(born.iter().filter(|born| born.as_str() == key).count(), 1, "{born:?}");
+    assert!(withdrawn.iter().any(|gone| gone.as_str() == key), "{withdrawn:?}");
+    assert!(mapper.session().estimate(&key).is_none());
+}
+
+#[test]
+fn an_object_whose_class_changes_gets_the_factors_of_the_other() {
+    let (settings, mut sequence) = scene(DESK);
+    let upright = |class: &str| ["bottle", "cup", "vase", "chair"].contains(&class);
+    let id =
+        sequence.detections.iter().find(|d| d.scores.best().is_some_and(|b| upright(b.0))).unwrap().object;
+    for detection in sequence.detections.iter_mut().filter(|d| d.object == id) {
+        let (class, score) = if detection.frame < 40 { ("cup", 0.3) } else { ("book", 0.9) };
+        detection.scores = ClassScores::single(class, score);
+    }
+    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let revised: usize = sequence.observations().map(|o| mapper.take(&o).unwrap().revised.len()).sum();
+    assert!(revised >= 1);
+    let (graph, _) = mapper.session().graph();
+    let key = format!("q{}", id.unwrap());
+    let rules = graph.factors().iter().filter(|f| f.keys.len() == 1 && f.keys[0].as_str() == key);
+    let rules: Vec<&str> = rules.map(|f| f.factor.typetag_name()).collect();
+    assert_eq!(rules, ["horizontal_orientation"]);
+}
+
+#[test]
+fn a_window_keeps_objects_and_lets_poses_go() {
+    for window in ["{ poses = 12 }", "{ seconds = 1.0 }"] {
+        let (settings, sequence) = scene(&format!("{DESK}\n[online]\nwindow = {window}"));
+        let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+        for observation in sequence.observations() {
+            let report = mapper.take(&observation).unwrap();
+            assert_eq!(report.refused, Vec::<String>::new(), "{window}");
+        }
+        let keys = mapper.session().estimates();
+        let poses = keys.iter().filter(|(key, _)| key.as_str().starts_with('x')).count();
+        assert!((2..40).contains(&poses), "{window}: {poses}");
+        assert_eq!(keys.len() - poses, mapper.mapped());
+        // the batch at the end has all frames again
+        let estimate = mapper.finish(sequence.clone().into(), &mut Silent).unwrap();
+        assert_eq!(estimate.trajectory().len(), 80);
+    }
+}
+
+#[test]
+fn boxes_that_nothing_can_explain_are_told_and_the_pose_is_taken() {
+    let (settings, sequence) = scene(DESK);
+    let mut mapper = take_all(&settings, &sequence);
+    let last = sequence.observations().last().unwrap();
+    let mut frame = last.frame.clone();
+    frame.timestamp += 1.0;
+    // a camera that has jumped by more than any square of it can hold
+    frame.world_from_camera = Se3::new(frame.world_from_camera.rotation, nalgebra::Vector3::repeat(1e200));
+    let detections: Vec<Detection> = last.detections;
+    let taken = mapper.take(&Observation { frame, detections, accelerometer: vec![] });
+    assert!(matches!(taken, Err(FrameError::Update(_))), "{taken:?}");
+    // and the stream goes on from the frame before
+    let mut next = sequence.frames.last().unwrap().clone();
+    next.timestamp += 2.0;
+    let taken = mapper.take(&Observation { frame: next, detections: vec![], accelerometer: vec![] }).unwrap();
+    assert_eq!((taken.frame, taken.refused.len()), (80, 0));
+}
+
+#[test]
+fn up_that_is_felt_is_settled_as_in_a_batch() {
+    let Some(data) = data() else { return };
+    let sets =
+        ["gravity = { type = 'accelerometer', window = 5.0, camera_from_sensor = [0.0, 0.0, 1.0, 0.0] }"];
+    let run = document("fr1_desk.toml", &sets);
+    let variant = run.variants.iter().find(|v| v.name == "Q+O C").unwrap();
+    let sequence = Run::new(&run, Some(data.clone())).sequence(variant).unwrap();
+    let batch = Mapping::new(&sequence, &variant.settings).unwrap();
+    let (online, _, kept) = both(&run, variant, Some(data));
+    assert_eq!(online.up.unwrap(), batch.frame.up.unwrap());
+    assert!(kept.0.iter().all(|frame| frame.refused.is_empty()));
+}
+
+#[test]
+fn a_desk_of_real_boxes_is_mapped_as_they_come() {
+    let Some(data) = data() else { return };
+    assert!(Path::new(&data).is_dir());
+    for name in ["Q C", "Q+O C"] {
+        let run = document("fr1_desk.toml", &[]);
+        let variant = run.variants.iter().find(|v| v.name == name).unwrap();
+        let (online, batch, _) = both(&run, variant, Some(data.clone()));
+        assert_eq!((online.counts.objects, online.counts.boxes), (15, 598), "{name}");
+        let (found, expected) = (online.solve.final_cost, batch.solve.final_cost);
+        assert!(found <= expected * 1.01, "{name}: {found} {expected}");
+        let stream = online.online.unwrap();
+        assert_eq!((stream.refusals, stream.solved_batch), (0, 0), "{name}");
+        assert!(stream.withdrawn > 0, "boxes of several things: {name}");
+        let live = stream.trajectory[0].estimate.ate.rmse;
+        assert!(live < 0.025, "{name}: {live}");
+    }
+}
