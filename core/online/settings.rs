@@ -32,10 +32,13 @@ pub struct Settings {
     /// Multiply-adds that an update may take where it relinearizes, for deadlines. Relinearizations beyond it wait for the next
     /// updates, those furthest out first; an update that has nothing else to do takes one at least. What new factors need
     /// is never put off, nor is a step shortened later because of it. Default: no budget.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<f64>,
     /// What stays of a graph that grows without end. Default: all of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<Window>,
     /// Which factors may be wrong, and are tested before they count. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub outliers: Option<Outliers>,
 }
 

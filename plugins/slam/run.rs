@@ -69,7 +69,9 @@ pub fn online(
     let mut progress = OnlineReport::default();
     let mut taken = Sequence { frames: vec![], detections: vec![], ..(*sequence).clone() };
     for observation in sequence.observations() {
-        watch.wait(observation.frame.timestamp);
+        if watch.wait(observation.frame.timestamp).is_break() {
+            break;
+        }
         let began = Instant::now();
         let report = mapper.take(&observation);
         let seconds = began.elapsed().as_secs_f64();
@@ -94,8 +96,10 @@ pub fn online(
 
 /// Watches frames as they come in.
 pub trait Watch {
-    /// Before each frame, with its time stamp in seconds: returns when it is there.
-    fn wait(&mut self, _timestamp: f64) {}
+    /// Before each frame, with its time stamp in seconds: returns when it is there, or to end the stream before it.
+    fn wait(&mut self, _timestamp: f64) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
 
     /// After each frame: what came of it, the map, and the seconds that it took.
     fn frame(

@@ -67,7 +67,7 @@ pub struct Settings {
     #[serde(default = "default_solver")]
     pub solver: Arc<dyn Optimizer>,
     /// How the graph is kept up to date while frames come in, by `manifactor online`.
-    #[serde(default, skip_serializing_if = "is_default")]
+    #[serde(default)]
     pub online: manifactor_online::Settings,
     /// What the estimate is compared with, and how.
     #[serde(default)]
@@ -79,10 +79,6 @@ pub struct Settings {
 
 fn no_aliases(aliases: &Aliases) -> bool {
     aliases.0.is_empty()
-}
-
-fn is_default(online: &manifactor_online::Settings) -> bool {
-    *online == manifactor_online::Settings::default()
 }
 
 fn from_source() -> Arc<dyn Gravity> {

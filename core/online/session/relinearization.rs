@@ -49,6 +49,9 @@ impl Session {
         if is_turn {
             let mut out: Vec<u32> = self.waiting.iter().copied().filter(|v| self.is_out(*v)).collect();
             if let Some(budget) = self.settings.budget {
+                out.extend(self.damped_now());
+                out.sort_unstable();
+                out.dedup();
                 self.postponed = out.len();
                 self.afford(&mut out, budget - spent, spent == 0.0 && chosen.is_empty(), affected);
                 self.postponed -= out.len();
@@ -93,8 +96,13 @@ impl Session {
         self.excess(variable) > 1.0 && self.may_move(variable)
     }
 
+    /// Variables whose steps are damped: such a step is none to the minimum, however short, and another has to follow.
+    pub(super) fn damped_now(&self) -> impl Iterator<Item = u32> {
+        self.damped.iter().copied().filter(|v| self.may_move(*v))
+    }
+
     /// Whether a variable may be linearized anew: it is solved for, and no prior holds its point.
-    pub(super) fn may_move(&self, variable: u32) -> bool {
+    fn may_move(&self, variable: u32) -> bool {
         self.tree.front_of(variable) != NONE && self.model.place(variable).sealed == 0
     }
 

@@ -185,8 +185,9 @@ impl Session {
         let last = self.last(touched);
         let postponed = self.postponed;
         let mut due = touched.held.clone();
-        // a step that is damped is no step to the minimum, however short
-        due.extend(self.damped.iter().copied().filter(|v| touched.steps && self.may_move(*v)));
+        if touched.steps && self.settings.budget.is_none() {
+            due.extend(self.damped_now());
+        }
         let chosen = self.choose(due, is_turn, &mut affected, report.operations);
         let relinearized = self.relinearize(chosen, &touched.held);
         for v in &relinearized.variables {

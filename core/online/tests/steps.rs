@@ -87,15 +87,13 @@ fn damped_steps_lead_along_a_narrow_valley_to_its_end() {
     let mut session = Session::new(Settings::default()).unwrap();
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: -1.2, y: 1.0 });
-    // so narrow that steps of Gauss-Newton leave it again and again
+    // so narrow that steps of Gauss-Newton leave it again and again; at its end, `bend` allows for 0.1² / 2 and more
     graph.add(["p"], Valley {}).noise(Noise::sigmas(&[1e-2, 1.0]).unwrap());
     session.push(&graph, &values).unwrap();
-    let (mut before, mut updates) = (f64::INFINITY, 0);
-    while session.cost() > 1e-6 {
-        session.update().unwrap();
-        let cost = session.cost();
-        assert!(cost <= before && updates < 300, "{before} -> {cost} after {updates}");
-        (before, updates) = (cost, updates + 1);
+    let mut updates = 0;
+    while updates == 0 || session.cost() > 0.01 {
+        assert!(!session.update().unwrap().solved_batch && updates < 1000, "{}", session.cost());
+        updates += 1;
     }
     // damping goes where it is not needed any more: what is known is as it is without
     (0..40).for_each(|_| drop(session.update().unwrap()));
@@ -103,8 +101,9 @@ fn damped_steps_lead_along_a_narrow_valley_to_its_end() {
     let one = session.covariance(&["p"]).unwrap();
     let mut fresh = Session::new(Settings::default()).unwrap();
     fresh.push(&session.graph().0, &session.estimates()).unwrap();
-    fresh.update().unwrap();
-    assert!((&one - fresh.covariance(&["p"]).unwrap()).amax() < 1e-2 * one.amax());
+    assert_eq!(fresh.update().unwrap().damped, 0);
+    // but for points of linearization that are not quite the same
+    assert!((&one - fresh.covariance(&["p"]).unwrap()).amax() < 0.05 * one.amax());
 }
 
 #[test]

@@ -70,6 +70,10 @@ impl Frames<'_> {
         self.interrupt.0.load(Ordering::Relaxed)
     }
 
+    fn goes_on(&self) -> ControlFlow<()> {
+        if self.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
     fn tell(&self, report: &FrameReport, mapper: &Mapper, took: f64) {
         let (objects, undetermined) =
             (mapper.mapped(), report.updates.last().map_or(0, |u| u.undetermined.len()));
@@ -92,13 +96,15 @@ impl Frames<'_> {
 }
 
 impl Watch for Frames<'_> {
-    fn wait(&mut self, timestamp: f64) {
-        let Some(rate) = self.command.rate else { return };
+    fn wait(&mut self, timestamp: f64) -> ControlFlow<()> {
+        let Some(rate) = self.command.rate else { return ControlFlow::Continue(()) };
         let (begun, first) = *self.begun.get_or_insert((Instant::now(), timestamp));
-        let Ok(due) = Duration::try_from_secs_f64((timestamp - first) / rate) else { return };
+        // a stamp that does not come after the first needs no waiting
+        let due = Duration::try_from_secs_f64((timestamp - first) / rate).unwrap_or_default();
         while let Some(left) = due.checked_sub(begun.elapsed()).filter(|_| !self.is_interrupted()) {
             std::thread::sleep(left.min(NAP));
         }
+        self.goes_on()
     }
 
     fn frame(
@@ -117,6 +123,6 @@ impl Watch for Frames<'_> {
             }
             Err(error) => output::note(&error.to_string()),
         }
-        if self.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        self.goes_on()
     }
 }

@@ -123,7 +123,7 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
     let (mut bounded, of_bounded) = run(Some(budget));
     let most = |reports: &[Report]| {
         // what new factors need is not bounded, nor are steps that had to be shortened
-        let relinearizing = reports.iter().filter(|r| r.relinearized > 0 && r.halved == 0);
+        let relinearizing = reports.iter().filter(|r| r.relinearized > 0 && r.halved + r.damped == 0);
         relinearizing.map(|r| r.operations).fold(0.0, f64::max)
     };
     let (without, with) = (most(&of_free), most(&of_bounded));
