@@ -1,6 +1,6 @@
 //! A session that was saved goes on as if nothing had been.
 use crate::history::{Change, History, bits, change, outliers, window};
-use crate::toy::Plane;
+use crate::toy::{Plane, Valley};
 use manifactor_graph::{Graph, Values};
 use manifactor_online::{LoadError, SaveError, Session, Settings, Window};
 use proptest::prelude::*;
@@ -104,4 +104,19 @@ fn counters_that_would_wrap_around_are_refused() {
     let other = json.replacen("\"ordinals\":[6,6]", "\"ordinals\":[6,18446744073709551615]", 1);
     assert_ne!(other, json);
     assert_eq!(Session::load(&resealed(&other)).unwrap_err(), LoadError::Inconsistent("its counters"));
+}
+
+#[test]
+fn a_session_that_is_damped_goes_on_with_the_same_bits() {
+    let mut session = Session::new(Settings::default()).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: -1.2, y: 1.0 });
+    graph.add(["p"], Valley {});
+    session.push(&graph, &values).unwrap();
+    assert!(session.update().unwrap().damped > 0);
+    let mut other = Session::load(&session.save().unwrap()).unwrap();
+    for _ in 0..30 {
+        assert_eq!(session.update().unwrap(), other.update().unwrap());
+        assert!(session.save().unwrap() == other.save().unwrap());
+    }
 }
