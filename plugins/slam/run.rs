@@ -59,7 +59,7 @@ pub fn estimate(
 /// Where the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
 pub fn online(
     name: &str,
-    sequence: Arc<Sequence>,
+    sequence: &Sequence,
     settings: &Settings,
     watch: &mut dyn Watch,
     observer: &mut dyn Observer,
@@ -67,9 +67,10 @@ pub fn online(
     let clock = Instant::now();
     let mut mapper = Mapper::new(sequence.opening(), settings)?;
     let mut progress = OnlineReport::default();
-    let mut taken = Sequence { frames: vec![], detections: vec![], ..(*sequence).clone() };
+    let mut taken = Sequence { frames: vec![], detections: vec![], ..sequence.clone() };
     for observation in sequence.observations() {
         if watch.wait(observation.frame.timestamp).is_break() {
+            progress.interrupted = true;
             break;
         }
         let began = Instant::now();
@@ -82,6 +83,7 @@ pub fn online(
             taken.detections.extend(detections.map(|d| Detection { frame: report.frame, ..d }));
         }
         if watch.frame(report.as_ref(), &mut mapper, seconds).is_break() {
+            progress.interrupted = true;
             break;
         }
     }
@@ -172,7 +174,7 @@ impl<'a> Run<'a> {
     ) -> Result<(Estimate, VariantReport), RunError> {
         let clock = Instant::now();
         let sequence = self.sequence(variant)?;
-        let done = online(&variant.name, sequence, &variant.settings, watch, observer)?;
+        let done = online(&variant.name, &sequence, &variant.settings, watch, observer)?;
         Ok(self.keep(variant, done, clock))
     }
 
@@ -190,7 +192,10 @@ impl<'a> Run<'a> {
 
     /// The report over all variants that were run.
     pub fn finish(self) -> RunReport {
-        let ended = |report: &VariantReport| report.solve.termination != Termination::Interrupted;
+        let ended = |report: &VariantReport| {
+            let interrupted = report.online.as_ref().is_some_and(|online| online.interrupted);
+            !interrupted && report.solve.termination != Termination::Interrupted
+        };
         let complete = self.reports.len() == self.document.variants.len() && self.reports.iter().all(ended);
         RunReport {
             version: env!("CARGO_PKG_VERSION"),

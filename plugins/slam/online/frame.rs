@@ -97,7 +97,7 @@ impl Mapper {
             }
         };
         values.insert(pose_key(report.frame), report.pose);
-        let seen = Seen { boxes: self.measure(&observation.detections, report.frame), up_moved };
+        let mut seen = Seen { boxes: self.measure(&observation.detections, report.frame), up_moved };
         report.boxes = seen.boxes.len();
         let alone = graph.clone();
         let mut owners = vec![];
@@ -107,11 +107,12 @@ impl Mapper {
             graph.push(box_entry(view, object_key(*id), self.camera, &self.settings.detections));
             owners.push(*id);
         }
-        let pushed = self.push_frame(&graph, &values, &mut owners, &alone, report);
-        if let Err(error) = pushed {
+        let pushed = self.push_frame(&graph, &values, owners, &alone, report);
+        if pushed.is_err() || !report.refused.is_empty() {
             self.measurements.forget(report.frame);
-            return Err(error);
+            seen.boxes.clear();
         }
+        pushed?;
         self.last = Some(frame.clone());
         Ok(seen)
     }
@@ -121,7 +122,7 @@ impl Mapper {
         &mut self,
         graph: &Graph,
         values: &Values,
-        owners: &mut Vec<ObjectId>,
+        owners: Vec<ObjectId>,
         alone: &Graph,
         report: &mut FrameReport,
     ) -> Result<(), FrameError> {
@@ -131,7 +132,7 @@ impl Mapper {
             Ok(update) => {
                 report.updates.push(update);
                 let first = ids.len() - owners.len();
-                for (owner, id) in owners.drain(..).zip(ids.into_iter().skip(first)) {
+                for (owner, id) in owners.into_iter().zip(ids.into_iter().skip(first)) {
                     if let Some(Tracked::Mapped(mapped)) = self.objects.get_mut(&owner) {
                         mapped.boxes.push(id);
                     }

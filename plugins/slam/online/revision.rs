@@ -166,7 +166,7 @@ impl Mapper {
             all.push(candidate(measured, start));
         }
         let up = self.up.frame().and_then(|frame| frame.up);
-        let ruled = self.ledger.ask(&[id], all, &settings, up).map_err(|error| error.to_string())?;
+        let ruled = self.ledger.ask(&[id], &all, &settings, up).map_err(|error| error.to_string())?;
         let entries: Vec<FactorEntry> = ruled.iter().map(|ruled| ruled.entry.clone()).collect();
         let all: Vec<&FactorEntry> = boxes.iter().chain(&entries).collect();
         let start = match settings.objects.refinements {
@@ -218,8 +218,8 @@ impl Mapper {
     fn ask(&mut self, about: &[ObjectId], report: &mut FrameReport) {
         let (all, before) = (self.candidates(), self.ledger.clone());
         let up = self.up.frame().and_then(|frame| frame.up);
-        let pushed = match self.ledger.ask(about, all, &self.settings, up) {
-            Ok(ruled) if ruled.is_empty() => return,
+        let pushed = match self.ledger.ask(about, &all, &self.settings, up) {
+            Ok([]) => return,
             Ok(ruled) => {
                 let mut graph = Graph::new();
                 for ruled in ruled {

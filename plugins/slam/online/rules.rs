@@ -37,13 +37,13 @@ impl Ledger {
     pub(super) fn ask(
         &mut self,
         about: &[ObjectId],
-        all: Vec<Candidate>,
+        all: &[Candidate],
         settings: &Settings,
         up: Option<Direction>,
     ) -> Result<&mut [Ruled], RuleError> {
         let before = self.factors.len();
         let connected = std::mem::take(&mut self.connected);
-        let mut judge = Judge::new(&settings.semantics, &settings.aliases, up, all.clone(), connected);
+        let mut judge = Judge::new(&settings.semantics, &settings.aliases, up, all.to_vec(), connected);
         for owner in about {
             let key = object_key(*owner);
             let Some(candidate) = all.iter().find(|candidate| candidate.key == key) else { continue };
@@ -114,7 +114,7 @@ impl Ledger {
             all.clone().filter_map(|(measured, start)| Some(candidate(measured, *start.as_ref().ok()?)));
         let new = all.filter(|(measured, start)| start.is_ok() && !self.left_out.contains_key(&measured.id));
         let new: Vec<ObjectId> = new.map(|(measured, _)| measured.id).collect();
-        self.ask(&new, candidates.collect(), settings, up)?;
+        self.ask(&new, &candidates.collect::<Vec<_>>(), settings, up)?;
         let decide =
             |(measured, start): (&Measured, _)| Decision { start, verdict: self.verdict(measured.id) };
         Ok(measurements.objects.iter().zip(starts).map(decide).collect())

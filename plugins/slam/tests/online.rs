@@ -2,13 +2,14 @@
 use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
+use manifactor_quadric::BoundingBox;
 use manifactor_slam::mapping::Mapping;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::{Run, Watch};
 use manifactor_slam::run_document::{RunDocument, Variant};
 use manifactor_slam::sequence::{ClassScores, Detection, ObjectId, Observation, Sequence};
-use manifactor_slam::settings::Settings;
+use manifactor_slam::settings::{CutSides, Settings};
 use manifactor_slam::source::Folders;
 use manifactor_solve::Silent;
 use std::ops::ControlFlow;
@@ -191,7 +192,30 @@ fn a_window_keeps_objects_and_lets_poses_go() {
 }
 
 #[test]
-fn boxes_that_nothing_can_explain_are_told_and_the_pose_is_taken() {
+fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
+    let (mut settings, sequence) = scene(DESK);
+    settings.detections.cut_sides = CutSides::Keep;
+    let mut mapper = take_all(&settings, &sequence);
+    let mapped = mapper.mapped();
+    let keys = mapper.session().estimates();
+    let id = keys.iter().find_map(|(key, _)| key.as_str().strip_prefix('q')?.parse().ok()).unwrap();
+    let mut frame = sequence.frames.last().unwrap().clone();
+    frame.timestamp += 1.0;
+    let far = Detection {
+        frame: 0,
+        object: Some(ObjectId(id)),
+        scores: ClassScores::single("cup", 0.5),
+        // a square of it is infinite
+        bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
+    };
+    let taken = mapper.take(&Observation { frame, detections: vec![far], accelerometer: vec![] }).unwrap();
+    assert!(taken.refused.len() == 1 && taken.refused[0].starts_with("the boxes at"), "{:?}", taken.refused);
+    assert_eq!((taken.frame, mapper.mapped()), (80, mapped));
+    assert!(mapper.session().estimate("x80").is_some());
+}
+
+#[test]
+fn a_pose_that_cannot_be_taken_is_an_error_and_the_stream_goes_on() {
     let (settings, sequence) = scene(DESK);
     let mut mapper = take_all(&settings, &sequence);
     let last = sequence.observations().last().unwrap();

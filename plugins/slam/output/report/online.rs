@@ -18,6 +18,8 @@ pub struct OnlineReport {
     /// The poses as they were estimated when their frames came.
     #[serde(skip)]
     pub live: Vec<StampedPose>,
+    /// Whether somebody ended it before its last frame.
+    pub interrupted: bool,
     /// Objects that came into the map.
     pub born: usize,
     /// Objects that were taken out again.
