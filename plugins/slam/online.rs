@@ -1,8 +1,8 @@
 //! Mapping frame by frame, as they come.
 //!
 //! A [`Mapper`] takes a frame with its boxes and has the pose and the map up to date before the next one. What
-//! [`Mapping`](crate::mapping::Mapping) decides with all boxes in view is decided here when an object is *born*, which is as soon as it
-//! can be placed, and decided again where later boxes say otherwise.
+//! [`Mapping`] decides with all boxes in view is decided here when an object is *born*, which is as soon as it can be
+//! placed, and decided again where later boxes say otherwise.
 mod frame;
 mod gravity;
 mod object;
