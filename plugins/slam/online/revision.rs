@@ -127,7 +127,7 @@ impl Mapper {
         let started = rejection::start(measured, |i| self.pose(i), self.camera, &self.settings.objects);
         let (views, class) = (measured.views.clone(), measured.class_name().map(str::to_owned));
         let born = started.map_err(|rejection| rejection.to_string());
-        let born = born.and_then(|start| Ok((start, self.push_object(id, start, &views)?)));
+        let born = born.and_then(|start| self.push_object(id, start, &views));
         let (start, boxes) = match born {
             Ok(born) => born,
             Err(why) => {
@@ -148,13 +148,14 @@ impl Mapper {
         }
     }
 
-    /// Pushes an object with its boxes and what the rules have for it, fitted alone to these before.
+    /// Pushes an object with its boxes and what the rules have for it, fitted alone to these before. Returns where that has led, and
+    /// the boxes' factors.
     fn push_object(
         &mut self,
         id: ObjectId,
         start: DualQuadric,
         views: &[ObjectBox],
-    ) -> Result<Vec<FactorId>, String> {
+    ) -> Result<(DualQuadric, Vec<FactorId>), String> {
         let key = object_key(id);
         let settings = Arc::clone(&self.settings);
         let there = views.iter().filter(|view| self.pose(view.frame).is_some());
@@ -182,7 +183,7 @@ impl Mapper {
             Ok(mut ids) => {
                 let of_rules = ids.split_off(boxes.len());
                 self.ledger.name(of_rules);
-                Ok(ids)
+                Ok((start, ids))
             }
             Err(error) => {
                 self.ledger = before;
