@@ -67,7 +67,8 @@ pub fn online(
     let clock = Instant::now();
     let mut mapper = Mapper::new(sequence.opening(), settings)?;
     let mut progress = OnlineReport::default();
-    let mut taken = Sequence { frames: vec![], detections: vec![], ..sequence.clone() };
+    let accelerometer = sequence.accelerometer.clone();
+    let mut taken = Sequence { accelerometer, ..sequence.opening().into_sequence() };
     for observation in sequence.observations() {
         if watch.wait(observation.frame.timestamp).is_break() {
             progress.interrupted = true;

@@ -38,7 +38,8 @@ impl Session {
         !self.urgent.is_empty()
     }
 
-    /// The variables to relinearize: those that are due, and in turn those that wait, as far as the budget goes. `spent` are the operations of the update so far.
+    /// The variables to relinearize: those that are due, and in turn those that wait, as far as the budget goes. `spent` are the
+    /// operations of the update so far.
     pub(super) fn choose(
         &mut self,
         mut chosen: Vec<u32>,

@@ -64,9 +64,6 @@ impl Session {
     /// Damps variables whose steps are far too long, as long as the cost of the factors around has risen since before; whether
     /// it has ceased to.
     fn damp(&mut self, report: &mut Report) -> bool {
-        if !self.is_urgent() {
-            return true;
-        }
         let mut before: BTreeMap<u32, SmallVec<[f64; 9]>> = BTreeMap::new();
         for _ in 0..DAMPINGS {
             for (v, first) in &self.moved {
