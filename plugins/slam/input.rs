@@ -1,6 +1,8 @@
 //! What a run is told: sequences of frames, where they come from, and the classes of objects.
 pub mod class;
+pub mod fusion;
 pub mod recording;
 pub mod sequence;
 pub mod simulator;
 pub mod source;
+pub mod stream;

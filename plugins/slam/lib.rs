@@ -3,9 +3,9 @@
 //! A [`RunDocument`](run_document::RunDocument) says what to do. A [`Source`](source::Source) gives a
 //! [`Sequence`](sequence::Sequence); a [`Mapping`](mapping::Mapping) makes a graph of it; a solver an
 //! [`Estimate`](estimate::Estimate), which is compared with the truth in a [`report`].
+pub mod association;
 pub mod estimate;
 pub mod experiment;
-pub mod fusion;
 pub mod gravity;
 mod input;
 pub mod mapping;
@@ -18,7 +18,7 @@ pub mod semantics;
 pub mod settings;
 
 pub use estimate::{refine, variance};
-pub use input::{class, recording, sequence, simulator, source};
+pub use input::{class, fusion, recording, sequence, simulator, source, stream};
 pub use mapping::measurements;
 pub use output::{record, report};
 pub use settings::run_document;

@@ -5,6 +5,7 @@
 mod align;
 mod associate;
 mod error;
+mod identity;
 mod statistics;
 #[cfg(test)]
 mod tests;
@@ -13,6 +14,7 @@ pub use align::{Alignment, Similarity, align};
 pub use associate::{PosePair, associate};
 pub(crate) use error::relative_errors;
 pub use error::{Pairing, RelativeError, absolute_error, relative_error};
+pub use identity::{ENOUGH, IdentityScores, identity};
 pub use statistics::Statistics;
 
 /// Why an error could not be measured.

@@ -3,12 +3,14 @@
 //! A [`Mapper`] takes a frame with its boxes and has the pose and the map up to date before the next one. What
 //! [`Mapping`] decides with all boxes in view is decided here when an object is *born*, which is as soon as it can be
 //! placed, and decided again where later boxes say otherwise.
+mod association;
 mod frame;
 mod gravity;
 mod object;
 mod revision;
 mod rules;
 
+use crate::association::{Associator, Names};
 use crate::estimate::{Estimate, EstimateError};
 use crate::gravity::GravityError;
 use crate::input::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
@@ -41,6 +43,9 @@ pub struct Mapper {
     camera: Camera,
     session: Session,
     up: Up,
+    associator: Box<dyn Associator>,
+    /// Of objects that turned out to be others.
+    names: Names,
     measurements: Measurements,
     objects: BTreeMap<ObjectId, Tracked>,
     ledger: Ledger,
@@ -62,6 +67,9 @@ pub enum FrameError {
         /// In seconds.
         before: f64,
     },
+    /// What the source gives is no frame.
+    #[error("left out: {0}")]
+    Source(String),
     /// A pose or a time stamp that is not a number.
     #[error("the frame at {timestamp} s is left out: its pose by odometry, or its time stamp, is not finite")]
     NotFinite {
@@ -111,6 +119,8 @@ impl Mapper {
             settings: Arc::new(settings.clone()),
             camera: opening.camera,
             session: Session::new(online)?,
+            associator: settings.association.begin(opening.camera, &settings.aliases),
+            names: Names::default(),
             up: Up::new(opening),
             measurements: Measurements::default(),
             objects: BTreeMap::new(),
@@ -120,7 +130,8 @@ impl Mapper {
         })
     }
 
-    /// Takes a frame in: its pose, and its boxes of objects that are in the map; then objects that it completes.
+    /// Takes a frame in: its pose, and its boxes of objects that are in the map; then objects that it completes. The settings'
+    /// `association` says which object a box shows.
     ///
     /// # Errors
     /// Where the pose cannot be taken. Boxes that cannot be taken are no error: the report tells of them.
@@ -136,6 +147,11 @@ impl Mapper {
     /// The graph so far, with its estimate.
     pub fn session(&mut self) -> &mut Session {
         &mut self.session
+    }
+
+    /// Names of objects that turned out to be others.
+    pub fn names(&self) -> &Names {
+        &self.names
     }
 
     /// Objects that are in the map.

@@ -1,10 +1,11 @@
 //! A run from its document to its report.
 use crate::estimate::{Estimate, EstimateError};
-use crate::input::sequence::{Detection, Sequence};
+use crate::input::sequence::Sequence;
+use crate::input::stream::Stream;
 use crate::input::source::{Folders, SourceError};
 use crate::mapping::{Mapping, MappingError};
 use crate::online::{FinishError, FrameError, FrameReport, Mapper};
-use crate::output::report::{OnlineReport, RunReport, VariantReport};
+use crate::output::report::{AssociationReport, Naming, OnlineReport, RunReport, VariantReport};
 use crate::settings::Settings;
 use crate::settings::run_document::{RunDocument, Variant};
 use manifactor_solve::{Observer, SettingError, Termination};
@@ -45,43 +46,75 @@ pub fn estimate(
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
+    let (sequence, association) = associated(sequence, settings)?;
     let mapping = Mapping::new(&sequence, settings)?;
     let estimate = Estimate::new(sequence, mapping, settings, observer)?;
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
+    report.association = association;
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))
 }
 
-/// Maps a sequence frame by frame, solves all of it at the end, and evaluates. `watch` is told of each frame, with the map and
+/// The sequence with its boxes put to objects by the settings' `association`: frame by frame, as they would have come. Frames that
+/// cannot be mapped so have boxes of no object.
+///
+/// # Errors
+/// Where the session cannot begin.
+pub fn associated(
+    sequence: Arc<Sequence>,
+    settings: &Settings,
+) -> Result<(Arc<Sequence>, Option<AssociationReport>), RunError> {
+    if settings.association.uses_names() {
+        return Ok((sequence, None));
+    }
+    let mut mapper = Mapper::new(sequence.opening(), settings)?;
+    let (mut named, mut naming) = (Sequence::clone(&sequence), Naming::default());
+    for observation in sequence.observations() {
+        match mapper.take(&observation) {
+            Ok(report) => naming.note(&observation.detections, &report.objects),
+            Err(error) => {
+                tracing::warn!("{error}");
+                naming.note(&observation.detections, &[]);
+            }
+        }
+    }
+    for (detection, name) in named.detections.iter_mut().zip(naming.now(mapper.names())) {
+        detection.object = name;
+    }
+    Ok((Arc::new(named), naming.report(&*settings.association, mapper.names())))
+}
+
+/// Maps a stream frame by frame, solves all of it at the end, and evaluates. `watch` is told of each frame, with the map and
 /// the seconds that it took; it can end the stream there.
 ///
 /// # Errors
 /// Where the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
 pub fn online(
     name: &str,
-    sequence: &Sequence,
+    stream: Stream,
     settings: &Settings,
     watch: &mut dyn Watch,
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
-    let mut mapper = Mapper::new(sequence.opening(), settings)?;
-    let mut progress = OnlineReport::default();
-    let accelerometer = sequence.accelerometer.clone();
-    let mut taken = Sequence { accelerometer, ..sequence.opening().into_sequence() };
-    for observation in sequence.observations() {
-        if watch.wait(observation.frame.timestamp).is_break() {
+    let mut mapper = Mapper::new(stream.opening.clone(), settings)?;
+    let (mut progress, mut naming) = (OnlineReport::default(), Naming::default());
+    let mut taken = stream.opening.into_sequence();
+    for observation in stream.observations {
+        if let Ok(observation) = &observation
+            && watch.wait(observation.frame.timestamp).is_break()
+        {
             progress.interrupted = true;
             break;
         }
         let began = Instant::now();
-        let report = mapper.take(&observation);
+        let report = observation.as_ref().map_err(|error| FrameError::Source(error.to_string()));
+        let report = report.and_then(|observation| mapper.take(observation));
         let seconds = began.elapsed().as_secs_f64();
         progress.count(report.as_ref(), seconds);
-        if let Ok(report) = &report {
-            taken.frames.push(observation.frame);
-            let detections = observation.detections.into_iter();
-            taken.detections.extend(detections.map(|d| Detection { frame: report.frame, ..d }));
+        if let (Ok(report), Ok(observation)) = (&report, observation) {
+            naming.note(&observation.detections, &report.objects);
+            taken.push(observation);
         }
         if watch.frame(report.as_ref(), &mut mapper, seconds).is_break() {
             progress.interrupted = true;
@@ -89,9 +122,14 @@ pub fn online(
         }
     }
     progress.end(&mut mapper);
+    for (detection, name) in taken.detections.iter_mut().zip(naming.now(mapper.names())) {
+        detection.object = name;
+    }
+    let association = naming.report(&*settings.association, mapper.names());
     let estimate = mapper.finish(Arc::new(taken), observer)?;
     progress.compare(&estimate, &settings.evaluation);
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
+    report.association = association;
     report.online = Some(progress);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))
@@ -174,8 +212,11 @@ impl<'a> Run<'a> {
         observer: &mut dyn Observer,
     ) -> Result<(Estimate, VariantReport), RunError> {
         let clock = Instant::now();
-        let sequence = self.sequence(variant)?;
-        let done = online(&variant.name, &sequence, &variant.settings, watch, observer)?;
+        let stream = match variant.settings.source.open(&self.folders)? {
+            Some(stream) => stream,
+            None => self.sequence(variant)?.into(),
+        };
+        let done = online(&variant.name, stream, &variant.settings, watch, observer)?;
         Ok(self.keep(variant, done, clock))
     }
 

@@ -1,4 +1,5 @@
 //! The settings of a run: how a sequence becomes a graph, and how the graph is solved.
+use crate::association::{Association, Given};
 use crate::gravity::{FromSource, Gravity};
 use crate::input::class::Aliases;
 use crate::input::source::Source;
@@ -44,6 +45,9 @@ pub struct Settings {
     /// Which boxes are used, and how.
     #[serde(default)]
     pub detections: DetectionSettings,
+    /// Which object a box shows. Default: the source says so.
+    #[serde(default = "given")]
+    pub association: Arc<dyn Association>,
     /// Which objects are mapped, and where they begin.
     #[serde(default)]
     pub objects: ObjectSettings,
@@ -79,6 +83,10 @@ pub struct Settings {
 
 fn no_aliases(aliases: &Aliases) -> bool {
     aliases.0.is_empty()
+}
+
+fn given() -> Arc<dyn Association> {
+    Arc::new(Given {})
 }
 
 fn from_source() -> Arc<dyn Gravity> {

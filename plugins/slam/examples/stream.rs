@@ -120,6 +120,23 @@ fn tell(report: &VariantReport, batch: &VariantReport) {
         "  cost live {:.3}, at the end {:.6}, in batch {:.6}; {} batch solves",
         online.cost, report.solve.final_cost, batch.solve.final_cost, online.solved_batch
     );
+    for (how, report) in [("live", report), ("batch", batch)] {
+        if let Some((then, now)) = report.association.as_ref().and_then(|a| Some((a.at_the_time?, a.in_the_end?))) {
+            println!(
+                "  {how}: F1 at the time {:.3}; in the end P {:.3} R {:.3} F1 {:.3}, homogeneity {:.3}, completeness {:.3}, identity F1 {:.3}, {} switches, {} objects of {}",
+                then.f1,
+                now.precision,
+                now.recall,
+                now.f1,
+                now.homogeneity,
+                now.completeness,
+                now.identity_f1,
+                now.switches,
+                now.objects,
+                now.true_objects,
+            );
+        }
+    }
     let ate = |of: &[TrajectoryReport]| {
         of.first().map_or((0.0, 0.0), |t| (t.odometry.ate.rmse, t.estimate.ate.rmse))
     };

@@ -3,6 +3,7 @@
 //! Real data and simulated data have the same form. Frames read right to left in names:
 //! `world_from_camera` maps a point in the camera's frame to the world's; the camera looks along +z,
 //! x is right and y down in the image.
+use crate::input::stream::Observations;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
@@ -64,6 +65,12 @@ impl Opening {
     }
 }
 
+impl AsRef<Self> for Sequence {
+    fn as_ref(&self) -> &Self {
+        self
+    }
+}
+
 impl Sequence {
     /// What is known before the first frame.
     pub fn opening(&self) -> Opening {
@@ -72,16 +79,7 @@ impl Sequence {
 
     /// Frame after frame, as they came. Readings of the accelerometer come with the first frame that is not before them.
     pub fn observations(&self) -> impl Iterator<Item = Observation> {
-        let (mut boxes, mut readings) = (0, 0);
-        self.frames.iter().enumerate().map(move |(i, frame)| {
-            let own = self.detections.get(boxes..).unwrap_or_default();
-            let own = &own[..own.partition_point(|detection| detection.frame <= i)];
-            boxes += own.len();
-            let felt = self.accelerometer.get(readings..).unwrap_or_default();
-            let felt = &felt[..felt.partition_point(|reading| reading.timestamp <= frame.timestamp)];
-            readings += felt.len();
-            Observation { frame: frame.clone(), detections: own.to_vec(), accelerometer: felt.to_vec() }
-        })
+        Observations::of(self)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Where sequences come from, chosen by name in a run's `[source]`.
 use crate::input::sequence::{ObjectId, Sequence};
+use crate::input::stream::Stream;
 use manifactor_config::Diagnostics;
 use manifactor_formats::FormatError;
 use std::fmt::Debug;
@@ -7,10 +8,12 @@ use std::path::{Path, PathBuf};
 
 mod assemble;
 mod camera;
+mod json_lines;
 mod recorded;
 mod tum;
 
 pub use camera::CameraChoice;
+pub use json_lines::{JsonLines, line};
 pub use recorded::Recorded;
 pub use tum::TumRgbd;
 
@@ -22,6 +25,14 @@ pub trait Source: Debug + Send + Sync {
     /// # Errors
     /// Files that are not there or not what they should be; sequences of nothing.
     fn load(&self, folders: &Folders) -> Result<Sequence, SourceError>;
+
+    /// The same frame by frame, where frames come while they are mapped; `None` where all of them are there before.
+    ///
+    /// # Errors
+    /// Files that are not there.
+    fn open(&self, _folders: &Folders) -> Result<Option<Stream>, SourceError> {
+        Ok(None)
+    }
 }
 
 manifactor_graph::kind!(dyn Source, "source");
@@ -117,6 +128,22 @@ pub enum SourceError {
         within: f64,
         /// Of the detection that is closest to a pose: its time stamp, and how far the pose is away, in seconds.
         nearest: Option<(f64, f64)>,
+    },
+    /// A line that is no frame.
+    #[error("{}, line {line}: {message}", file.display())]
+    Line {
+        /// The file.
+        file: PathBuf,
+        /// From 1.
+        line: usize,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A stream that is there once, and was read.
+    #[error("{} can be read once, and another variant has read it: run one variant, or give `file`", file.display())]
+    ReadBefore {
+        /// The stream.
+        file: PathBuf,
     },
     /// A simulation that cannot be run.
     #[error("the simulation cannot be run: {0}")]

@@ -2,7 +2,7 @@
 //!
 //! In this order: detections of no object and of low score are left out; the class is fused from all others; boxes cut
 //! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
-use crate::fusion::{FusedClass, Fusion};
+use crate::input::fusion::{FusedClass, Fusion};
 use crate::input::class::Aliases;
 use crate::input::sequence::{Detection, ObjectId, Sequence};
 use crate::settings::DetectionSettings;
@@ -72,11 +72,7 @@ impl Measurements {
             self.low_score += 1;
             return None;
         }
-        let place = self.objects.binary_search_by_key(&id, |object| object.id);
-        let place = place.unwrap_or_else(|place| {
-            self.objects.insert(place, Measured::new(id));
-            place
-        });
+        let place = self.place(id);
         let object = self.objects.get_mut(place)?;
         object.detections += 1;
         object.fusion.add(&detection.scores, aliases);
@@ -91,11 +87,38 @@ impl Measurements {
         Some((place, view))
     }
 
+    /// Gives what is measured of one object to another, and returns the boxes that are new to it: of two boxes in one frame, its own
+    /// stays.
+    pub(crate) fn merge(&mut self, from: ObjectId, into: ObjectId) -> Vec<ObjectBox> {
+        let Ok(place) = self.objects.binary_search_by_key(&from, |object| object.id) else { return vec![] };
+        let gone = self.objects.remove(place);
+        let place = self.place(into);
+        let Some(object) = self.objects.get_mut(place) else { return vec![] };
+        object.detections += gone.detections;
+        object.fusion.add_all(gone.fusion);
+        let seen = |view: &ObjectBox| object.views.binary_search_by_key(&view.frame, |own| own.frame).is_ok();
+        let (twice, new): (Vec<_>, Vec<_>) = gone.views.into_iter().partition(seen);
+        self.duplicates += twice.len();
+        for view in &new {
+            object.see(*view);
+        }
+        new
+    }
+
     /// Forgets the boxes of the last frame, which could not be taken.
     pub(crate) fn forget(&mut self, frame: usize) {
         for object in &mut self.objects {
             object.views.pop_if(|view| view.frame == frame);
         }
+    }
+
+    /// The place of an object, which may be a new one.
+    fn place(&mut self, id: ObjectId) -> usize {
+        let place = self.objects.binary_search_by_key(&id, |object| object.id);
+        place.unwrap_or_else(|place| {
+            self.objects.insert(place, Measured::new(id));
+            place
+        })
     }
 
     /// All boxes that are left.

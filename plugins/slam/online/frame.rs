@@ -1,6 +1,8 @@
 //! One frame: its pose and its boxes, then what they change in the map.
+use super::association::Known;
 use super::object::Tracked;
 use super::{FrameError, Mapper};
+use crate::association::{Image, Merge};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, ObjectId, Observation};
 use crate::mapping::measurements::ObjectBox;
@@ -23,6 +25,10 @@ pub struct FrameReport {
     pub pose: Se3,
     /// Boxes that passed the filters.
     pub boxes: usize,
+    /// The object of each box, in the order of the frame's; of a box that was left out, none.
+    pub objects: Vec<Option<ObjectId>>,
+    /// Objects that turned out to be others.
+    pub merged: Vec<Merge>,
     /// Objects that came into the map.
     pub born: Vec<Key>,
     /// Objects that left it: their boxes turned out to be those of several things.
@@ -40,6 +46,8 @@ pub struct FrameReport {
 pub(super) struct Seen {
     /// Boxes that passed the filters, by object.
     pub boxes: BTreeMap<ObjectId, ObjectBox>,
+    /// Objects that turn out to be one.
+    pub merges: Vec<Merge>,
     /// Whether up is another than it was.
     pub up_moved: bool,
 }
@@ -51,6 +59,8 @@ impl FrameReport {
             timestamp,
             pose: Se3::identity(),
             boxes: 0,
+            objects: vec![],
+            merged: vec![],
             born: vec![],
             withdrawn: vec![],
             revised: vec![],
@@ -97,7 +107,12 @@ impl Mapper {
             }
         };
         values.insert(pose_key(report.frame), report.pose);
-        let mut seen = Seen { boxes: self.measure(&observation.detections, report.frame), up_moved };
+        let detections = &observation.detections;
+        let image = Image { frame: report.frame, timestamp, detections };
+        let predicted = Known { newest: (report.frame, report.pose), live: &self.live, session: &self.session };
+        report.objects = self.associator.associate(&image, &predicted);
+        let boxes = self.measure(detections, report);
+        let mut seen = Seen { boxes, merges: vec![], up_moved };
         report.boxes = seen.boxes.len();
         let alone = graph.clone();
         let mut owners = vec![];
@@ -114,6 +129,11 @@ impl Mapper {
         }
         pushed?;
         self.last = Some(frame.clone());
+        if report.refused.is_empty() {
+            let newest = (report.frame, self.pose(report.frame).unwrap_or(report.pose));
+            let known = Known { newest, live: &self.live, session: &self.session };
+            seen.merges = self.associator.learn(&image, &report.objects, &known);
+        }
         Ok(seen)
     }
 
@@ -159,11 +179,11 @@ impl Mapper {
         }
     }
 
-    /// Sorts the detections of a frame in; of several boxes of an object the last stays.
-    fn measure(&mut self, detections: &[Detection], frame: usize) -> BTreeMap<ObjectId, ObjectBox> {
+    /// Sorts the detections of a frame in, under the names that they were given; of several boxes of an object the last stays.
+    fn measure(&mut self, detections: &[Detection], report: &FrameReport) -> BTreeMap<ObjectId, ObjectBox> {
         let mut seen = BTreeMap::new();
-        for detection in detections {
-            let detection = Detection { frame, ..detection.clone() };
+        for (detection, object) in detections.iter().zip(&report.objects) {
+            let detection = Detection { frame: report.frame, object: *object, ..detection.clone() };
             let settings = &self.settings;
             let added =
                 self.measurements.add(&detection, &self.camera, &settings.detections, &settings.aliases);

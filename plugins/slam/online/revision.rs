@@ -2,15 +2,17 @@
 use super::Mapper;
 use super::frame::{FrameReport, Seen};
 use super::object::{Mapped, Tracked};
-use super::rules::candidate;
+use super::rules::{Ledger, candidate};
+use crate::association::Merge;
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
-use crate::mapping::measurements::ObjectBox;
+use crate::mapping::measurements::{Measurements, ObjectBox};
 use crate::mapping::{Rejection, box_entry, object_key, rejection};
 use crate::semantics::Candidate;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_online::FactorId;
 use manifactor_quadric::DualQuadric;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// What becomes of an object.
@@ -23,6 +25,14 @@ enum Due {
     Birth,
 }
 
+/// What a frame changes, as it was before it.
+struct Before {
+    objects: BTreeMap<ObjectId, Tracked>,
+    ledger: Ledger,
+    /// Where objects are united.
+    measurements: Option<Measurements>,
+}
+
 impl Mapper {
     /// Makes the changes that the boxes of a frame call for: objects that are withdrawn, whose class is another, that are born.
     pub(super) fn revise(&mut self, seen: &Seen, report: &mut FrameReport) {
@@ -32,12 +42,14 @@ impl Mapper {
                 sights.add(view, &pose, &self.camera);
             }
         }
-        let due: Vec<(ObjectId, Due)> =
-            seen.boxes.keys().filter_map(|id| Some((*id, self.due(*id)?))).collect();
-        if due.is_empty() && !seen.up_moved {
+        let is_due = |id: &ObjectId| self.due(*id).is_some();
+        if seen.merges.is_empty() && !seen.up_moved && !seen.boxes.keys().any(is_due) {
             return;
         }
-        let (objects, ledger) = (self.objects.clone(), self.ledger.clone());
+        let before = self.before(&seen.merges);
+        let names = self.unite_all(&seen.merges, report);
+        let ids: BTreeSet<ObjectId> = seen.boxes.keys().map(|id| names.now(*id)).collect();
+        let due: Vec<(ObjectId, Due)> = ids.iter().filter_map(|id| Some((*id, self.due(*id)?))).collect();
         if seen.up_moved {
             self.ask_all_again(report);
         }
@@ -48,21 +60,34 @@ impl Mapper {
                 Due::Birth => self.bear(id, report),
             }
         }
-        if report.born.is_empty() && report.withdrawn.is_empty() && report.revised.is_empty() {
+        let is_same = report.born.is_empty() && report.withdrawn.is_empty() && report.revised.is_empty();
+        if is_same && report.merged.is_empty() {
             return;
         }
         match self.session.update() {
-            Ok(update) => report.updates.push(update),
+            Ok(update) => {
+                self.names = names;
+                report.updates.push(update);
+            }
             Err(error) => {
-                let keys = [&report.born, &report.withdrawn, &report.revised];
+                let merged: Vec<Key> = report.merged.drain(..).map(|merge| object_key(merge.from)).collect();
+                let keys = [&merged, &report.born, &report.withdrawn, &report.revised];
                 let keys: Vec<&str> = keys.into_iter().flatten().map(Key::as_str).collect();
                 report.refused.push(format!("changes of {}: {error}", keys.join(", ")));
-                (self.objects, self.ledger) = (objects, ledger);
+                (self.objects, self.ledger) = (before.objects, before.ledger);
+                if let Some(measurements) = before.measurements {
+                    self.measurements = measurements;
+                }
                 for list in [&mut report.born, &mut report.withdrawn, &mut report.revised] {
                     list.clear();
                 }
             }
         }
+    }
+
+    fn before(&self, merges: &[Merge]) -> Before {
+        let measurements = (!merges.is_empty()).then(|| self.measurements.clone());
+        Before { objects: self.objects.clone(), ledger: self.ledger.clone(), measurements }
     }
 
     /// What the boxes of an object call for, after another one of them.
@@ -88,6 +113,13 @@ impl Mapper {
 
     /// Takes an object out of the map.
     fn withdraw(&mut self, id: ObjectId, rejection: &Rejection, report: &mut FrameReport) {
+        self.take_out(id, report);
+        tracing::info!(object = %id, "taken out of the map: {rejection}");
+        report.withdrawn.push(object_key(id));
+    }
+
+    /// Takes an object out of the map, with all its factors.
+    pub(super) fn take_out(&mut self, id: ObjectId, report: &mut FrameReport) {
         let key = object_key(id);
         let (mut factors, _) = self.ledger.revoke(|other| *other == key);
         if let Some(Tracked::Mapped(mapped)) = self.objects.insert(id, Tracked::Withdrawn) {
@@ -96,8 +128,6 @@ impl Mapper {
         self.remove(&factors, report);
         let left = self.session.marginalize(&[&key]);
         report.refused.extend(left.err().map(|error| error.to_string()));
-        tracing::info!(object = %id, "taken out of the map: {rejection}");
-        report.withdrawn.push(key);
     }
 
     /// Asks the rules again about an object whose class has changed, and about those that they connect with it.

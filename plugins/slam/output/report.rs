@@ -9,11 +9,14 @@ use manifactor_quadric::{DualQuadric, LandmarkError};
 use manifactor_solve::{Diagnosis, Outcome, Rejected, Termination, Times};
 use serde::Serialize;
 
+mod association;
 mod landmarks;
 mod online;
 mod table;
 mod trajectory;
 
+pub use association::AssociationReport;
+pub(crate) use association::Naming;
 pub use landmarks::LandmarkReport;
 pub use online::OnlineReport;
 pub use table::Row;
@@ -52,6 +55,9 @@ pub struct VariantReport {
     /// The noise as it was estimated, round by round.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub variance_components: Vec<Components>,
+    /// How boxes were put to objects, where the source did not say, or was not asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub association: Option<AssociationReport>,
     /// How the stream went, where frames came one by one: the solve is then what followed it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub online: Option<OnlineReport>,
@@ -160,6 +166,7 @@ impl VariantReport {
             counts: Counts::of(estimate),
             up: mapping.frame.up,
             variance_components: estimate.components.clone(),
+            association: None,
             online: None,
             solve,
             trajectory,

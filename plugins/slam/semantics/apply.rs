@@ -1,6 +1,6 @@
 //! From rules and objects to factors, each with its reason.
 use super::{Rule, RuleError};
-use crate::fusion::FusedClass;
+use crate::input::fusion::FusedClass;
 use crate::input::class::Aliases;
 use manifactor_graph::{Direction, FactorEntry, Key};
 use manifactor_quadric::DualQuadric;

@@ -48,6 +48,14 @@ impl Fusion {
         }
     }
 
+    /// Counts another's detections in.
+    pub(crate) fn add_all(&mut self, other: Self) {
+        self.detections += other.detections;
+        for (class, sum) in other.sums {
+            *self.sums.entry(class).or_default() += sum;
+        }
+    }
+
     /// The class with the largest sum of scores, the first seen of equals, and that sum.
     pub(crate) fn leading(&self) -> Option<(&str, f64)> {
         let best = self.sums.iter().reduce(|best, next| if next.1 > best.1 { next } else { best });

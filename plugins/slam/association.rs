@@ -1,0 +1,64 @@
+//! Which object a box shows, where the source does not say: chosen by name in a run's `association`.
+//!
+//! An [`Associator`] names the boxes of a frame, and learns from it once the frame is in the map. What it names wrongly at first
+//! it may mend later: two objects that turn out to be one are [merged](Merge), and [`Names`] has the name that counts.
+mod assignment;
+mod given;
+mod likelihood;
+mod names;
+mod overlap;
+
+use crate::input::class::Aliases;
+use crate::input::sequence::{Detection, ObjectId};
+use manifactor_geometry::Se3;
+use manifactor_quadric::{Camera, DualQuadric};
+use std::fmt::Debug;
+
+pub use given::Given;
+pub use likelihood::Likelihood;
+pub use names::{Merge, Names};
+pub use overlap::{Iou, Projection};
+
+/// A way to associate boxes with objects.
+#[typetag::serialize(tag = "type")]
+pub trait Association: Debug + Send + Sync {
+    /// Begins, with no object known.
+    fn begin(&self, camera: Camera, aliases: &Aliases) -> Box<dyn Associator>;
+
+    /// Whether it takes the names that the source gives. Where it does not, they may serve to score it.
+    fn uses_names(&self) -> bool {
+        false
+    }
+}
+
+manifactor_graph::kind!(dyn Association, "association");
+
+/// Associates boxes with objects, frame by frame.
+pub trait Associator: Debug + Send {
+    /// Names the object of each box of a frame: one that is known, a new one, or none. The last pose of the map is that of the frame,
+    /// as it is predicted.
+    fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>>;
+
+    /// Learns from the boxes of a frame, which is in the map now, under these names. Returns objects that turn out to be one.
+    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Vec<Merge>;
+}
+
+/// What an associator sees of a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Image<'a> {
+    /// Counts the frames that are in the map.
+    pub frame: usize,
+    /// Seconds.
+    pub timestamp: f64,
+    /// The boxes in it.
+    pub detections: &'a [Detection],
+}
+
+/// What has been estimated so far.
+pub trait Map {
+    /// The pose of the camera in a frame, where it is still known.
+    fn pose(&self, frame: usize) -> Option<Se3>;
+
+    /// An object, where it is mapped.
+    fn object(&self, id: ObjectId) -> Option<DualQuadric>;
+}

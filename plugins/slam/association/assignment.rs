@@ -1,0 +1,34 @@
+//! Who goes with whom.
+use pathfinding::prelude::{Matrix, kuhn_munkres};
+
+/// Gains are compared in units of this.
+const UNIT: f64 = 1e-6;
+
+/// Matches each row with one column at most, and each column with one row, so that the sum of the gains is largest (the Hungarian
+/// method). `gains` are (row, column, gain); what is not listed, or gains nothing, is not matched.
+pub(super) fn best(rows: usize, columns: usize, gains: &[(usize, usize, f64)]) -> Vec<Option<usize>> {
+    if rows == 0 {
+        return vec![];
+    }
+    // a column of no gain for each row that stays alone
+    let mut weights = Matrix::new(rows, columns + rows, 0_i64);
+    for (row, column, gain) in gains {
+        weights[(*row, *column)] = (gain / UNIT).max(0.0) as i64;
+    }
+    let (_, matched) = kuhn_munkres(&weights);
+    let is_match = |(row, column): &(usize, usize)| *column < columns && weights[(*row, *column)] > 0;
+    matched.into_iter().enumerate().map(|pair| Some(pair).filter(is_match).map(|(_, column)| column)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sum_counts_and_not_the_first_best() {
+        assert_eq!(best(2, 2, &[(0, 0, 3.0), (0, 1, 2.5), (1, 0, 2.8)]), [Some(1), Some(0)]);
+        assert_eq!(best(2, 1, &[(0, 0, 1.0), (1, 0, 2.0)]), [None, Some(0)]);
+        assert_eq!(best(1, 3, &[(0, 2, -1.0)]), [None]);
+        assert!(best(0, 2, &[]).is_empty());
+    }
+}

@@ -1,0 +1,38 @@
+use super::{Association, Associator, Image, Map, Merge};
+use crate::input::class::Aliases;
+use crate::input::sequence::ObjectId;
+use manifactor_graph::register;
+use manifactor_quadric::Camera;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The source says which object a box shows; boxes that it names none for are left out.
+///
+/// ```toml
+/// association = { type = "given" }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Given {}
+
+#[typetag::serialize(name = "given")]
+impl Association for Given {
+    fn begin(&self, _camera: Camera, _aliases: &Aliases) -> Box<dyn Associator> {
+        Box::new(Self {})
+    }
+
+    fn uses_names(&self) -> bool {
+        true
+    }
+}
+register!(dyn Association, "given", Given);
+
+impl Associator for Given {
+    fn associate(&self, image: &Image<'_>, _map: &dyn Map) -> Vec<Option<ObjectId>> {
+        image.detections.iter().map(|detection| detection.object).collect()
+    }
+
+    fn learn(&mut self, _image: &Image<'_>, _names: &[Option<ObjectId>], _map: &dyn Map) -> Vec<Merge> {
+        vec![]
+    }
+}

@@ -1,0 +1,257 @@
+//! An ellipsoid fitted to boxes from known poses, from the first box on.
+//!
+//! One box says where an object is but for its depth. What is not known yet is held by a weak prior: a depth that is usual here,
+//! axes of about the same length, a rotation not far from that of the first camera.
+use super::sightings::Sighting;
+use manifactor_geometry::Se3;
+use manifactor_graph::{Manifold, Residual};
+use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
+use nalgebra::{Cholesky, SMatrix, SVector, Vector3, Vector4};
+
+type Matrix9 = SMatrix<f64, 9, 9>;
+type Vector9 = SVector<f64, 9>;
+
+/// How far boxes are off.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BoxNoise {
+    /// In pixels.
+    pub px: f64,
+    /// As a part of width and height.
+    pub of_size: f64,
+}
+
+/// What is believed of an object before its second box.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Belief {
+    /// Its ellipsoid, if it were as far away as objects usually are.
+    pub first: DualQuadric,
+    /// From where it was seen first.
+    eye: Vector3<f64>,
+    /// How far away that is, in metres.
+    distance: f64,
+    /// Standard deviation of the distance's logarithm.
+    depth: f64,
+}
+
+/// An ellipsoid, and how well it is known.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fitted {
+    pub quadric: DualQuadric,
+    /// By the tangent of the quadric.
+    pub covariance: Matrix9,
+}
+
+/// Standard deviation of the logarithm of an axis beside the first box and the distance.
+const SHAPE: f64 = 0.5;
+/// Standard deviation of the rotation, in radians.
+const TURN: f64 = 0.5;
+/// Steps of a fit, at most.
+const STEPS: usize = 8;
+/// It ends where a step gains less than this part of the cost.
+const ENOUGH: f64 = 1e-3;
+/// Squares beyond this count less and less.
+const WIDTH: f64 = 9.0;
+/// What a box costs that the ellipsoid cannot have.
+const LOST: f64 = 40.0;
+
+impl BoxNoise {
+    /// Standard deviations of the sides.
+    pub(super) fn deviations(&self, b: &BoundingBox) -> [f64; 4] {
+        let (x, y) = (self.px.hypot(self.of_size * b.width()), self.px.hypot(self.of_size * b.height()));
+        [x, y, x, y]
+    }
+}
+
+impl Belief {
+    /// Of an object that was seen once, and that is so far away by its depth.
+    pub(super) fn new(seen: &Sighting, camera: &Camera, depth: f64, deviation: f64) -> Self {
+        let b = &seen.bounding_box;
+        let ray = camera.ray(b.centre());
+        let eye = seen.world_from_camera.translation;
+        let centre = seen.world_from_camera.act(&(ray * depth));
+        let size = |length: f64, focal: f64| (0.5 * length.max(1.0) * depth / focal).max(1e-3);
+        let (x, y) = (size(b.width(), camera.fx), size(b.height(), camera.fy));
+        let pose = Se3::new(seen.world_from_camera.rotation, centre);
+        let first = DualQuadric { pose, semi_axes: Vector3::new(x, y, (x * y).sqrt()) };
+        Self { first, eye, distance: (centre - eye).norm(), depth: deviation }
+    }
+
+    /// Rows of the belief and their derivatives: distance, three axes, three of the rotation.
+    fn rows(&self, quadric: &DualQuadric) -> (SVector<f64, 7>, SMatrix<f64, 7, 9>) {
+        let away = quadric.centroid() - self.eye;
+        let log = (away.norm().max(1e-6) / self.distance).ln();
+        // the translation steps in the ellipsoid's own frame
+        let by_place = quadric.pose.rotation.inverse().act(&away) / away.norm_squared().max(1e-12);
+        let turn = self.first.pose.rotation.between(&quadric.pose.rotation).log();
+        let (mut r, mut j) = (SVector::<f64, 7>::zeros(), SMatrix::<f64, 7, 9>::zeros());
+        r[0] = log / self.depth;
+        for c in 0..3 {
+            j[(0, 3 + c)] = by_place[c] / self.depth;
+            r[1 + c] = ((quadric.semi_axes[c] / self.first.semi_axes[c]).ln() - log) / SHAPE;
+            for k in 0..3 {
+                j[(1 + c, 3 + k)] = -by_place[k] / SHAPE;
+            }
+            j[(1 + c, 6 + c)] = 1.0 / SHAPE;
+            r[4 + c] = turn[c] / TURN;
+            j[(4 + c, c)] = 1.0 / TURN;
+        }
+        (r, j)
+    }
+}
+
+/// What a camera sees of an ellipsoid, with the derivative by its tangent and by that of the pose.
+pub(super) struct Predicted {
+    pub bounding_box: BoundingBox,
+    pub by_pose: SMatrix<f64, 4, 6>,
+    pub by_quadric: SMatrix<f64, 4, 9>,
+}
+
+/// Predicts a box; `None` where nothing of the object is in the image.
+pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Option<Predicted> {
+    let nothing = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 0.0, ymax: 0.0 };
+    let factor = BoundingBoxFactor { bounding_box: nothing, camera: *camera, model: BoxModel::Truncated };
+    if !factor.is_defined((pose, quadric)) {
+        return None;
+    }
+    let mut jacobians = (SMatrix::zeros(), SMatrix::zeros());
+    let b = factor.linearize((pose, quadric), &[true; 15], &mut jacobians);
+    let bounding_box = BoundingBox::new(b.into()).ok()?;
+    Some(Predicted { bounding_box, by_pose: jacobians.0, by_quadric: jacobians.1 })
+}
+
+/// The ellipsoid that fits best, reached from `start`; `None` where it is not determined.
+pub(super) fn fit(
+    belief: &Belief,
+    start: DualQuadric,
+    seen: &[Sighting],
+    camera: &Camera,
+    noise: &BoxNoise,
+) -> Option<Fitted> {
+    let (mut quadric, mut damping) = (start, 1e-3);
+    let mut system = System::new(belief, &quadric, seen, camera, noise);
+    for _ in 0..STEPS {
+        let damped = system.h + Matrix9::from_diagonal(&system.h.diagonal()) * damping;
+        let step = -Cholesky::new(damped)?.solve(&system.gradient);
+        let next = quadric.retract(&step);
+        let there = System::new(belief, &next, seen, camera, noise);
+        if there.cost >= system.cost {
+            damping *= 10.0;
+            continue;
+        }
+        let is_done = system.cost - there.cost < ENOUGH * system.cost;
+        (quadric, system) = (next, there);
+        if is_done {
+            break;
+        }
+        damping *= 0.1;
+    }
+    let covariance = Cholesky::new(system.h)?.inverse();
+    covariance.iter().all(|x| x.is_finite()).then_some(Fitted { quadric, covariance })
+}
+
+/// The normal equations of an ellipsoid.
+struct System {
+    cost: f64,
+    gradient: Vector9,
+    h: Matrix9,
+}
+
+impl System {
+    fn new(belief: &Belief, quadric: &DualQuadric, seen: &[Sighting], camera: &Camera, noise: &BoxNoise) -> Self {
+        let (r, j) = belief.rows(quadric);
+        let mut all = Self { cost: r.norm_squared(), gradient: j.tr_mul(&r), h: j.tr_mul(&j) };
+        for seen in seen {
+            match whiten(quadric, seen, camera, noise) {
+                None => all.cost += LOST,
+                Some((r, j)) => {
+                    // Cauchy's loss of a box as a whole
+                    let square = r.norm_squared() / WIDTH;
+                    all.cost += WIDTH * square.ln_1p();
+                    all.gradient += j.tr_mul(&r) / (1.0 + square);
+                    all.h += j.tr_mul(&j) / (1.0 + square);
+                }
+            }
+        }
+        all
+    }
+}
+
+/// The errors of a box's sides and their derivatives, in standard deviations; `None` where the ellipsoid has no box there.
+fn whiten(
+    quadric: &DualQuadric,
+    seen: &Sighting,
+    camera: &Camera,
+    noise: &BoxNoise,
+) -> Option<(Vector4<f64>, SMatrix<f64, 4, 9>)> {
+    let predicted = predict(&seen.world_from_camera, quadric, camera)?;
+    let weights = Vector4::from(noise.deviations(&seen.bounding_box)).map(|sigma| 1.0 / sigma);
+    let error = Vector4::from(predicted.bounding_box.bounds()) - Vector4::from(seen.bounding_box.bounds());
+    Some((error.component_mul(&weights), SMatrix::from_diagonal(&weights) * predicted.by_quadric))
+}
+
+/// The square of a box's errors in standard deviations, which counts less and less where it is large.
+pub(super) fn squared_error(quadric: &DualQuadric, seen: &Sighting, camera: &Camera, noise: &BoxNoise) -> f64 {
+    let error = whiten(quadric, seen, camera, noise);
+    error.map_or(LOST, |(error, _)| WIDTH * (error.norm_squared() / WIDTH).ln_1p())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector2;
+
+    const CAMERA: Camera =
+        Camera { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
+    const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02 };
+
+    /// A camera at x metres to the right that looks ahead.
+    fn seen(x: f64, frame: usize, quadric: &DualQuadric) -> Sighting {
+        let world_from_camera = Se3 { translation: Vector3::x() * x, ..Se3::identity() };
+        let bounding_box = predict(&world_from_camera, quadric, &CAMERA).unwrap().bounding_box;
+        Sighting { frame, world_from_camera, bounding_box }
+    }
+
+    fn ball(z: f64) -> DualQuadric {
+        let pose = Se3 { translation: Vector3::new(0.1, 0.0, z), ..Se3::identity() };
+        DualQuadric { pose, semi_axes: Vector3::new(0.1, 0.15, 0.1) }
+    }
+
+    #[test]
+    fn one_box_says_all_but_the_depth() {
+        let first = seen(0.0, 0, &ball(2.0));
+        let belief = Belief::new(&first, &CAMERA, 3.0, 0.5);
+        let found = fit(&belief, belief.first, &[first], &CAMERA, &NOISE).unwrap();
+        let away = found.quadric.centroid();
+        assert!((away.z - 3.0).abs() < 0.1, "{away}");
+        let ray = CAMERA.ray(Vector2::new(345.0, 240.0)) * 3.0;
+        assert!((away - ray).norm() < 0.05, "{away}");
+        let [x, _, z] = [3, 4, 5].map(|i| found.covariance[(i, i)].sqrt());
+        assert!(z > 0.8 && x < 0.3 * z, "{x} {z}");
+    }
+
+    #[test]
+    fn boxes_from_the_side_say_the_depth() {
+        let sightings: Vec<_> = (0..8).map(|i| seen(0.1 * f64::from(i), i as usize, &ball(2.0))).collect();
+        let belief = Belief::new(&sightings[0], &CAMERA, 3.0, 0.5);
+        let found = fit(&belief, belief.first, &sightings, &CAMERA, &NOISE).unwrap();
+        assert!((found.quadric.centroid() - ball(2.0).centroid()).norm() < 0.1, "{}", found.quadric);
+        assert!(found.covariance[(5, 5)].sqrt() < 0.15);
+        assert!(squared_error(&found.quadric, &sightings[7], &CAMERA, &NOISE) < 1.0);
+        assert!(squared_error(&ball(4.0), &sightings[7], &CAMERA, &NOISE) > 10.0);
+    }
+
+    #[test]
+    fn derivatives_of_a_belief_are_right() {
+        let belief = Belief::new(&seen(0.0, 0, &ball(2.0)), &CAMERA, 3.0, 0.5);
+        let at = belief.first.retract(&Vector9::from_fn(|i, _| 0.02 * (i as f64 - 4.0)));
+        let (_, j) = belief.rows(&at);
+        for c in 0..9 {
+            let step = Vector9::from_fn(|i, _| if i == c { 1e-6 } else { 0.0 });
+            let (up, down) = (belief.rows(&at.retract(&step)).0, belief.rows(&at.retract(&-step)).0);
+            let numeric = (up - down) / 2e-6;
+            // the rotation's log is linearized at the start, which is near
+            let tolerance = if c < 3 { 0.1 } else { 1e-5 };
+            assert!((numeric - j.column(c)).norm() < tolerance * (1.0 + numeric.norm()), "{c}");
+        }
+    }
+}

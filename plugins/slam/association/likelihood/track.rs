@@ -1,0 +1,151 @@
+//! One object, as far as it is known.
+use super::super::Map;
+use super::Likelihood;
+use super::fit::{Belief, BoxNoise, Fitted, fit, predict};
+use super::sightings::{Sighting, Sightings};
+use crate::input::class::Aliases;
+use crate::input::sequence::{ClassScores, ObjectId};
+use indexmap::IndexMap;
+use manifactor_geometry::Se3;
+use manifactor_quadric::{BoundingBox, Camera};
+use nalgebra::{Cholesky, Matrix3, Matrix4, Vector4, Vector6};
+use std::f64::consts::TAU;
+
+/// An object.
+#[derive(Debug, Clone)]
+pub(super) struct Track {
+    pub id: ObjectId,
+    /// Scores of its boxes' best classes.
+    pub votes: IndexMap<String, f64>,
+    pub belief: Belief,
+    pub fitted: Fitted,
+    pub sightings: Sightings,
+    /// All frames that it was seen in.
+    pub frames: Vec<usize>,
+    /// When it was seen last, in seconds.
+    pub seen_at: f64,
+    /// It is compared with others when it has so many boxes.
+    pub next_look: usize,
+}
+
+/// The box that is expected of an object, and how far it may be off.
+pub(super) struct Expected {
+    pub bounding_box: BoundingBox,
+    /// Of the sides, in square pixels, the detector's own noise left out.
+    covariance: Matrix4<f64>,
+}
+
+/// Boxes that an object has when it is first compared with others.
+const FIRST_LOOK: usize = 3;
+/// How many times as many it has the next time.
+const MORE: f64 = 1.3;
+
+impl Track {
+    /// An object that is seen for the first time; `None` where no ellipsoid can be made of it.
+    pub(super) fn new(
+        id: ObjectId,
+        belief: Belief,
+        first: &Sighting,
+        camera: &Camera,
+        noise: &BoxNoise,
+    ) -> Option<Self> {
+        let fitted = fit(&belief, belief.first, &[*first], camera, noise)?;
+        let (votes, sightings, frames) = (IndexMap::new(), Sightings::default(), vec![]);
+        Some(Self { id, votes, belief, fitted, sightings, frames, seen_at: 0.0, next_look: FIRST_LOOK })
+    }
+
+    /// How many boxes it has.
+    pub(super) fn boxes(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// How far away it is, in metres.
+    pub(super) fn distance(&self, from: &Se3) -> f64 {
+        (self.fitted.quadric.centroid() - from.translation).norm()
+    }
+
+    /// Standard deviation of its place as a part of its distance.
+    pub(super) fn depth_spread(&self) -> f64 {
+        let last = self.sightings.all().last();
+        let distance = last.map_or(0.0, |last| self.distance(&last.world_from_camera));
+        self.place_covariance().trace().sqrt() / distance
+    }
+
+    /// Of its centre, in square metres.
+    pub(super) fn place_covariance(&self) -> Matrix3<f64> {
+        self.fitted.covariance.fixed_view::<3, 3>(3, 3).into_owned()
+    }
+
+    /// Counts a box's class.
+    pub(super) fn vote(&mut self, scores: &ClassScores, aliases: &Aliases) {
+        if let Some((class, score)) = scores.best() {
+            *self.votes.entry(aliases.canonical(class)).or_default() += score;
+        }
+    }
+
+    /// The share of a class in all votes; 1 where there are none.
+    pub(super) fn share(&self, class: &str) -> f64 {
+        let all: f64 = self.votes.values().sum();
+        if all > 0.0 { self.votes.get(class).copied().unwrap_or_default() / all } else { 1.0 }
+    }
+
+    /// The box that it should have, seen from here and now; `None` where it is not seen.
+    pub(super) fn expect(
+        &self,
+        timestamp: f64,
+        pose: &Se3,
+        camera: &Camera,
+        settings: &Likelihood,
+    ) -> Option<Expected> {
+        let predicted = predict(pose, &self.fitted.quadric, camera)?;
+        let seconds = (timestamp - self.seen_at).max(0.0);
+        let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| drift * drift * seconds);
+        let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
+        let by_drift = predicted.by_pose * nalgebra::Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
+        let by_quadric = predicted.by_quadric * self.fitted.covariance * predicted.by_quadric.transpose();
+        Some(Expected { bounding_box: predicted.bounding_box, covariance: by_quadric + by_drift })
+    }
+
+    /// Intersection over union of a box with that of its ellipsoid.
+    pub(super) fn overlap(&self, sighting: &Sighting, camera: &Camera) -> f64 {
+        let predicted = predict(&sighting.world_from_camera, &self.fitted.quadric, camera);
+        predicted.map_or(0.0, |predicted| predicted.bounding_box.iou(&sighting.bounding_box))
+    }
+
+    /// Takes a box in. Where the fit fails, the ellipsoid stays as it was.
+    pub(super) fn see(
+        &mut self,
+        sighting: Sighting,
+        timestamp: f64,
+        map: &dyn Map,
+        camera: &Camera,
+        noise: &BoxNoise,
+    ) {
+        self.frames.push(sighting.frame);
+        self.seen_at = timestamp;
+        self.sightings.renew(map);
+        self.sightings.add(sighting, &self.fitted.quadric.centroid());
+        let fitted = fit(&self.belief, self.fitted.quadric, self.sightings.all(), camera, noise);
+        self.fitted = fitted.unwrap_or(self.fitted);
+    }
+
+    /// Whether it is time to compare it with others: its name, and the time is put off.
+    pub(super) fn is_due(&mut self, frame: usize) -> Option<ObjectId> {
+        let is_due = self.frames.last() == Some(&frame) && self.boxes() >= self.next_look;
+        is_due.then(|| {
+            self.next_look = (self.boxes() as f64 * MORE).ceil() as usize + 1;
+            self.id
+        })
+    }
+}
+
+impl Expected {
+    /// What a box costs: d² + ln det 2πS, with boxes `lasting` times as far off as their own noise.
+    pub(super) fn cost(&self, b: &BoundingBox, noise: &BoxNoise, lasting: f64) -> f64 {
+        let sigma = Vector4::from(noise.deviations(&self.bounding_box)) * lasting;
+        let covariance = self.covariance + Matrix4::from_diagonal(&sigma.component_mul(&sigma));
+        let error = Vector4::from(b.bounds()) - Vector4::from(self.bounding_box.bounds());
+        let Some(factor) = Cholesky::new(covariance) else { return f64::INFINITY };
+        error.dot(&factor.solve(&error)) + factor.ln_determinant() + 4.0 * TAU.ln()
+    }
+}

@@ -1,0 +1,84 @@
+//! Whether two objects are one.
+use super::Likelihood;
+use super::fit::{fit, squared_error};
+use super::sightings::{Sighting, Sightings};
+use super::track::Track;
+use manifactor_quadric::Camera;
+
+/// Two objects that are one.
+pub(super) struct Union {
+    pub track: Track,
+    /// Mean square of the errors of its sides, in their standard deviations, of the worse of the two.
+    pub error: f64,
+}
+
+/// Objects that are seen in one frame are two: of the frames of the one with fewer, this share is forgiven.
+const TOGETHER: f64 = 0.05;
+/// How many standard deviations the places of two that are one may lie apart, beyond their sizes.
+const APART: f64 = 3.0;
+/// Objects whose classes are less alike than this need to fit better,
+const ALIKE: f64 = 0.1;
+/// by this factor.
+const STRICTER: f64 = 2.0;
+
+/// The object that two are, with the name of the one with more boxes, if one ellipsoid explains all boxes.
+pub(super) fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Option<Union> {
+    let (more, fewer) = if one.boxes() >= two.boxes() { (one, two) } else { (two, one) };
+    let apart = (more.fitted.quadric.centroid() - fewer.fitted.quadric.centroid()).norm();
+    let sizes = more.fitted.quadric.semi_axes.norm() + fewer.fitted.quadric.semi_axes.norm();
+    let spread = (more.place_covariance() + fewer.place_covariance()).trace().sqrt();
+    let together = common(&more.frames, &fewer.frames) as f64;
+    if apart > sizes + APART * spread || together > TOGETHER * fewer.boxes() as f64 {
+        return None;
+    }
+    let (noise, mut sightings) = (settings.noise(), more.sightings.and(&fewer.sightings));
+    let mut fitted = more.fitted;
+    // from the ellipsoid of one it may be a long way to that of both
+    for _ in 0..2 {
+        fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
+    }
+    let error_of = |sightings: &Sightings| {
+        let error = |seen: &Sighting| squared_error(&fitted.quadric, seen, camera, &noise);
+        let all = sightings.all();
+        all.iter().map(error).sum::<f64>() / (4 * all.len().max(1)) as f64
+    };
+    let error = error_of(&more.sightings).max(error_of(&fewer.sightings));
+    let stricter = if alike(more, fewer) < ALIKE { STRICTER } else { 1.0 };
+    if error * stricter > settings.merge_error * settings.merge_error {
+        return None;
+    }
+    let mut track = more.clone();
+    for (class, votes) in &fewer.votes {
+        *track.votes.entry(class.clone()).or_default() += votes;
+    }
+    track.frames.extend(&fewer.frames);
+    track.frames.sort_unstable();
+    track.frames.dedup();
+    track.seen_at = more.seen_at.max(fewer.seen_at);
+    track.next_look = track.next_look.max(fewer.next_look);
+    sightings.thin(&fitted.quadric.centroid());
+    track.fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
+    track.sightings = sightings;
+    Some(Union { track, error })
+}
+
+/// How much the classes of two have in common, from 0 to 1 (Bhattacharyya).
+fn alike(one: &Track, two: &Track) -> f64 {
+    one.votes.keys().map(|class| (one.share(class) * two.share(class)).sqrt()).sum()
+}
+
+/// How many numbers two ascending lists have in common.
+fn common(one: &[usize], two: &[usize]) -> usize {
+    one.iter().filter(|frame| two.binary_search(frame).is_ok()).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn common_frames_are_counted() {
+        assert_eq!(common(&[1, 3, 5, 9], &[2, 3, 4, 9, 12]), 2);
+        assert_eq!(common(&[], &[1]), 0);
+    }
+}

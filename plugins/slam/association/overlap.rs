@@ -1,0 +1,166 @@
+//! Boxes go to the objects that they overlap with most: what others do, to compare with.
+use super::{Association, Associator, Image, Map, Merge, assignment};
+use crate::input::class::Aliases;
+use crate::input::sequence::{Detection, ObjectId};
+use manifactor_geometry::Se3;
+use manifactor_graph::checked::within;
+use manifactor_graph::register;
+use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// By overlap with the box before, or with the outline of the object in the map, whatever the class (as quadricslam does).
+///
+/// Objects that are matched best in sum get the boxes; a box that overlaps with none enough begins an object.
+///
+/// ```toml
+/// association = { type = "iou", least = 0.2 }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Iou {
+    /// Intersection over union, at least.
+    #[serde(deserialize_with = "within::<0, 1, _>")]
+    #[schemars(range(min = 0, max = 1))]
+    pub least: f64,
+    /// A box is compared with the one before for so many frames.
+    pub frames: usize,
+}
+
+/// By overlap with the box before or with the outline in the map, within a class (as OA-SLAM does, without its points).
+///
+/// ```toml
+/// association = { type = "projection", least = 0.3, visible = 0.3 }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Projection {
+    /// Intersection over union with the outline in the map, at least.
+    #[serde(deserialize_with = "within::<0, 1, _>")]
+    #[schemars(range(min = 0, max = 1))]
+    pub least: f64,
+    /// The same with the box before.
+    #[serde(deserialize_with = "within::<0, 1, _>")]
+    #[schemars(range(min = 0, max = 1))]
+    pub least_before: f64,
+    /// A box is compared with the one before for so many frames.
+    pub frames: usize,
+    /// The share of the outline that is inside of the image, at least.
+    #[serde(deserialize_with = "within::<0, 1, _>")]
+    #[schemars(range(min = 0, max = 1))]
+    pub visible: f64,
+}
+
+impl Default for Iou {
+    fn default() -> Self {
+        Self { least: 0.2, frames: 30 }
+    }
+}
+
+impl Default for Projection {
+    fn default() -> Self {
+        Self { least: 0.3, least_before: 0.2, frames: 30, visible: 0.3 }
+    }
+}
+
+#[typetag::serialize(name = "iou")]
+impl Association for Iou {
+    fn begin(&self, camera: Camera, aliases: &Aliases) -> Box<dyn Associator> {
+        let Self { least, frames } = *self;
+        let rule = Projection { least, least_before: least, frames, visible: 0.0 };
+        Box::new(Overlap::new(rule, false, camera, aliases))
+    }
+}
+register!(dyn Association, "iou", Iou);
+
+#[typetag::serialize(name = "projection")]
+impl Association for Projection {
+    fn begin(&self, camera: Camera, aliases: &Aliases) -> Box<dyn Associator> {
+        Box::new(Overlap::new(self.clone(), true, camera, aliases))
+    }
+}
+register!(dyn Association, "projection", Projection);
+
+/// What both share.
+#[derive(Debug)]
+struct Overlap {
+    rule: Projection,
+    by_class: bool,
+    camera: Camera,
+    aliases: Aliases,
+    objects: BTreeMap<ObjectId, Last>,
+    next: u32,
+}
+
+/// An object when it was seen last.
+#[derive(Debug)]
+struct Last {
+    frame: usize,
+    bounding_box: BoundingBox,
+    class: Option<String>,
+}
+
+impl Overlap {
+    fn new(rule: Projection, by_class: bool, camera: Camera, aliases: &Aliases) -> Self {
+        Self { rule, by_class, camera, aliases: aliases.clone(), objects: BTreeMap::new(), next: 1 }
+    }
+
+    fn class(&self, detection: &Detection) -> Option<String> {
+        detection.scores.best().map(|(class, _)| self.aliases.canonical(class))
+    }
+
+    /// The outline of an object in the image, if enough of it is inside.
+    fn outline(&self, pose: Option<Se3>, quadric: Option<DualQuadric>) -> Option<BoundingBox> {
+        let (pose, quadric) = (pose?, quadric?);
+        let predict = |model| {
+            // what was measured makes no difference to what is predicted
+            let bounding_box = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 0.0, ymax: 0.0 };
+            BoundingBoxFactor { bounding_box, camera: self.camera, model }.predict(&pose, &quadric)
+        };
+        let (all, inside) = (predict(BoxModel::Standard)?, predict(BoxModel::Truncated)?);
+        (inside.area() >= self.rule.visible * all.area()).then_some(inside)
+    }
+}
+
+impl Associator for Overlap {
+    fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
+        let (pose, rule) = (map.pose(image.frame), &self.rule);
+        let classes: Vec<_> = image.detections.iter().map(|d| self.class(d)).collect();
+        let mut overlaps = vec![];
+        for (column, (id, last)) in self.objects.iter().enumerate() {
+            let before = Some(last.bounding_box).filter(|_| last.frame + rule.frames >= image.frame);
+            let outline = self.outline(pose, map.object(*id));
+            for (row, detection) in image.detections.iter().enumerate() {
+                if self.by_class && classes[row] != last.class {
+                    continue;
+                }
+                let with = |other: &Option<BoundingBox>, least: f64| {
+                    other.map(|other| other.iou(&detection.bounding_box)).filter(|iou| *iou >= least)
+                };
+                let (before, outline) = (with(&before, rule.least_before), with(&outline, rule.least));
+                let most = before.into_iter().chain(outline).reduce(f64::max);
+                overlaps.extend(most.map(|iou| (row, column, iou)));
+            }
+        }
+        let matched = assignment::best(image.detections.len(), self.objects.len(), &overlaps);
+        let known: Vec<ObjectId> = self.objects.keys().copied().collect();
+        let new = (self.next..).map(ObjectId);
+        let name = |matched: Option<usize>, new: &mut dyn Iterator<Item = ObjectId>| {
+            matched.and_then(|column| known.get(column).copied()).or_else(|| new.next())
+        };
+        matched.into_iter().scan(new, |new, matched| Some(name(matched, new))).collect()
+    }
+
+    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], _map: &dyn Map) -> Vec<Merge> {
+        for (detection, id) in image.detections.iter().zip(names) {
+            if let Some(id) = *id {
+                let (frame, bounding_box) = (image.frame, detection.bounding_box);
+                let class = self.class(detection);
+                self.objects.insert(id, Last { frame, bounding_box, class });
+                self.next = self.next.max(id.0.saturating_add(1));
+            }
+        }
+        vec![]
+    }
+}

@@ -1,0 +1,267 @@
+use super::assemble::read_ground_truth;
+use super::{CameraChoice, Folders, Source, SourceError};
+use crate::input::sequence::{
+    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening, Sequence,
+};
+use crate::input::stream::Stream;
+use indexmap::IndexMap;
+use manifactor_formats::FormatError;
+use manifactor_geometry::Se3;
+use manifactor_graph::checked::within;
+use manifactor_graph::{Direction, register};
+use manifactor_quadric::BoundingBox;
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, stdin};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Frames as lines of JSON, one by one as they come: from standard input, or from a file.
+///
+/// A line has the time, the pose by odometry (from the camera's frame, z forward, to a world of its own choice), and the boxes,
+/// each with a class and its score, or with the scores of several. What else it may have: `object`, where somebody knows which
+/// one it is, and readings of an accelerometer since the line before.
+///
+/// ```json
+/// {"timestamp": 0.1, "pose": {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}, "boxes": [{"box": [10.0, 20.0, 90.0, 80.0], "class": "cup", "score": 0.8}]}
+/// ```
+///
+/// A line that is no frame is told and left out where frames are mapped as they come, and an error where all are read before.
+///
+/// ```toml
+/// source = { type = "json_lines", camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JsonLines {
+    /// The camera.
+    pub camera: CameraChoice,
+    /// The file, beside the document. Default: standard input.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// The true trajectory, a file in TUM's format beside the document, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+    /// Up in the odometry's frame, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+}
+
+/// A frame, as a line has it.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Line {
+    /// Seconds.
+    timestamp: f64,
+    pose: Se3,
+    #[serde(default)]
+    boxes: Vec<LineBox>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    accelerometer: Vec<Reading>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LineBox {
+    #[serde(rename = "box")]
+    bounding_box: BoundingBox,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    class: Option<String>,
+    #[serde(default = "sure", deserialize_with = "within::<0, 1, _>", skip_serializing_if = "is_sure")]
+    score: f64,
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    scores: IndexMap<String, f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    object: Option<ObjectId>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Reading {
+    timestamp: f64,
+    acceleration: Vector3<f64>,
+}
+
+fn sure() -> f64 {
+    1.0
+}
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_sure(score: &f64) -> bool {
+    *score >= 1.0
+}
+
+/// A frame as a line that this source reads, without its end.
+pub fn line(observation: &Observation) -> String {
+    let of_box = |detection: &Detection| {
+        let scores: IndexMap<String, f64> = detection.scores.iter().map(|(c, s)| (c.to_owned(), s)).collect();
+        let single = scores.first().filter(|_| scores.len() == 1).map(|(class, score)| (class.clone(), *score));
+        LineBox {
+            bounding_box: detection.bounding_box,
+            scores: if single.is_some() { IndexMap::new() } else { scores },
+            score: single.as_ref().map_or(1.0, |(_, score)| *score),
+            class: single.map(|(class, _)| class),
+            object: detection.object,
+        }
+    };
+    let of_reading = |r: &Acceleration| Reading { timestamp: r.timestamp, acceleration: r.acceleration };
+    let line = Line {
+        timestamp: observation.frame.timestamp,
+        pose: observation.frame.world_from_camera,
+        boxes: observation.detections.iter().map(of_box).collect(),
+        accelerometer: observation.accelerometer.iter().map(of_reading).collect(),
+    };
+    serde_json::to_string(&line).unwrap_or_default()
+}
+
+impl From<Line> for Observation {
+    fn from(line: Line) -> Self {
+        let of_box = |b: LineBox| {
+            let single = b.class.map(|class| (class, b.score));
+            let scores: ClassScores = b.scores.into_iter().chain(single).collect();
+            Detection { frame: 0, object: b.object, scores, bounding_box: b.bounding_box }
+        };
+        let of_reading = |r: Reading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
+        Self {
+            frame: Frame { timestamp: line.timestamp, world_from_camera: line.pose },
+            detections: line.boxes.into_iter().map(of_box).collect(),
+            accelerometer: line.accelerometer.into_iter().map(of_reading).collect(),
+        }
+    }
+}
+
+/// Standard input is read once.
+static READ: AtomicBool = AtomicBool::new(false);
+/// What standard input is called.
+const STDIN: &str = "standard input";
+/// A longer line is no frame, in bytes.
+const LONGEST: u64 = 1 << 26;
+
+#[typetag::serialize(name = "json_lines")]
+impl Source for JsonLines {
+    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
+        self.lines(folders)?.collect()
+    }
+
+    fn open(&self, folders: &Folders) -> Result<Option<Stream>, SourceError> {
+        Ok(Some(self.lines(folders)?))
+    }
+}
+register!(dyn Source, "json_lines", JsonLines);
+
+impl JsonLines {
+    fn lines(&self, folders: &Folders) -> Result<Stream, SourceError> {
+        let truth = self.ground_truth.as_deref().map(|file| read_ground_truth(&folders.document, Some(file)));
+        let ground_truth = truth.transpose()?.flatten();
+        let opening = Opening { camera: self.camera.camera(), up: self.up, ground_truth };
+        let (file, reader): (_, Box<dyn BufRead + Send>) = match &self.file {
+            Some(file) => {
+                let file = folders.beside_document(file);
+                let opened = File::open(&file).map_err(|source| FormatError::Io { path: file.clone(), source })?;
+                (file, Box::new(BufReader::new(opened)))
+            }
+            None if READ.swap(true, Ordering::Relaxed) => {
+                return Err(SourceError::ReadBefore { file: STDIN.into() });
+            }
+            None => (STDIN.into(), Box::new(BufReader::new(stdin()))),
+        };
+        let lines = Lines { file, reader, line: 0, text: vec![] };
+        Ok(Stream { opening, observations: Box::new(lines.fuse()) })
+    }
+}
+
+/// The lines of a file, to its end or to where it cannot be read.
+struct Lines {
+    file: PathBuf,
+    reader: Box<dyn BufRead + Send>,
+    line: usize,
+    text: Vec<u8>,
+}
+
+impl Lines {
+    /// Reads the next line; its length, 0 at the end.
+    fn read(&mut self) -> std::io::Result<usize> {
+        self.line += 1;
+        self.text.clear();
+        let read = self.reader.by_ref().take(LONGEST).read_until(b'\n', &mut self.text)?;
+        if read as u64 == LONGEST && !self.text.ends_with(b"\n") {
+            // the rest of it is not kept
+            self.reader.skip_until(b'\n')?;
+        }
+        Ok(read)
+    }
+
+    fn parse(&self) -> Result<Observation, String> {
+        if self.text.len() as u64 == LONGEST {
+            return Err(format!("the line is longer than {LONGEST} bytes"));
+        }
+        let line: Line = serde_json::from_slice(&self.text).map_err(|error| error.to_string())?;
+        Ok(line.into())
+    }
+}
+
+impl Iterator for Lines {
+    type Item = Result<Observation, SourceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.read() {
+                Ok(0) => return None,
+                Ok(_) if self.text.trim_ascii().is_empty() => {}
+                Ok(_) => {
+                    let (file, line) = (self.file.clone(), self.line);
+                    return Some(self.parse().map_err(|message| SourceError::Line { file, line, message }));
+                }
+                Err(source) => {
+                    // what cannot be read once is not tried again
+                    self.reader = Box::new(std::io::empty());
+                    return Some(Err(FormatError::Io { path: self.file.clone(), source }.into()));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::simulator::Simulated;
+    use serde_json::json;
+    use std::path::Path;
+
+    fn source(folder: &Path, file: &str) -> JsonLines {
+        let camera = json!({ "fx": 320.0, "fy": 320.0, "cx": 320.0, "cy": 240.0, "width": 640, "height": 480 });
+        std::fs::write(folder.join("frames.jsonl"), file).unwrap();
+        serde_json::from_value(json!({ "camera": camera, "file": "frames.jsonl" })).unwrap()
+    }
+
+    #[test]
+    fn what_is_written_as_lines_is_read_back() {
+        let mut settings = Simulated::default();
+        settings.trajectory.frames = 20;
+        let sequence = settings.simulate().unwrap();
+        let lines: Vec<String> = sequence.observations().map(|o| line(&o)).collect();
+        let folder = tempfile::tempdir().unwrap();
+        let folders = Folders { data: None, document: folder.path().into() };
+        let read = source(folder.path(), &(lines.join("\n\n") + "\n")).load(&folders).unwrap();
+        assert_eq!((&read.frames, &read.detections), (&sequence.frames, &sequence.detections));
+    }
+
+    #[test]
+    fn a_line_that_is_no_frame_is_told_and_the_next_is_read() {
+        let good = r#"{"timestamp": 1.0, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}"#;
+        let bad_box = good.replace("}}", r#"}, "boxes": [{"box": [9, 0, 1, 1]}]}"#);
+        let text = format!("{good}\n{{\n{bad_box}\n{good}");
+        let folder = tempfile::tempdir().unwrap();
+        let folders = Folders { data: None, document: folder.path().into() };
+        let source = source(folder.path(), &text);
+        let stream = source.open(&folders).unwrap().unwrap();
+        let read: Vec<_> = stream.observations.collect();
+        assert_eq!(read.iter().map(Result::is_ok).collect::<Vec<_>>(), [true, false, false, true]);
+        let error = read[2].as_ref().unwrap_err().to_string();
+        assert!(error.contains("frames.jsonl, line 3: expected [xmin, ymin, xmax, ymax]"), "{error}");
+        let error = source.load(&folders).unwrap_err().to_string();
+        assert!(error.contains("line 2"), "{error}");
+    }
+}

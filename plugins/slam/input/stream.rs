@@ -1,0 +1,81 @@
+//! Frames one at a time, as they come.
+use crate::input::sequence::{Detection, Observation, Opening, Sequence};
+use crate::input::source::SourceError;
+use std::fmt;
+use std::sync::Arc;
+
+/// A sequence whose frames come one by one: from a file, from a simulator, from a sensor.
+pub struct Stream {
+    /// What is known before the first frame.
+    pub opening: Opening,
+    /// Frames in the order of time, as far as the source keeps it; what cannot be read is an error, and the next may be sound.
+    pub observations: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send>,
+}
+
+impl Stream {
+    /// Waits for the last frame, and keeps all of them.
+    ///
+    /// # Errors
+    /// The first thing that cannot be read.
+    pub fn collect(self) -> Result<Sequence, SourceError> {
+        let mut all = self.opening.into_sequence();
+        for observation in self.observations {
+            all.push(observation?);
+        }
+        Ok(all)
+    }
+}
+
+impl From<Arc<Sequence>> for Stream {
+    fn from(sequence: Arc<Sequence>) -> Self {
+        let opening = sequence.opening();
+        Self { opening, observations: Box::new(Observations::of(sequence).map(Ok)) }
+    }
+}
+
+impl fmt::Debug for Stream {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Stream").field("opening", &self.opening).finish_non_exhaustive()
+    }
+}
+
+/// The frames of a sequence, as they came. Readings of the accelerometer come with the first frame that is not before them.
+pub(crate) struct Observations<S> {
+    sequence: S,
+    frames: usize,
+    boxes: usize,
+    readings: usize,
+}
+
+impl<S: AsRef<Sequence>> Observations<S> {
+    pub(crate) fn of(sequence: S) -> Self {
+        Self { sequence, frames: 0, boxes: 0, readings: 0 }
+    }
+}
+
+impl<S: AsRef<Sequence>> Iterator for Observations<S> {
+    type Item = Observation;
+
+    fn next(&mut self) -> Option<Observation> {
+        let sequence = self.sequence.as_ref();
+        let frame = sequence.frames.get(self.frames)?;
+        let own = sequence.detections.get(self.boxes..).unwrap_or_default();
+        let own = &own[..own.partition_point(|detection| detection.frame <= self.frames)];
+        self.boxes += own.len();
+        let felt = sequence.accelerometer.get(self.readings..).unwrap_or_default();
+        let felt = &felt[..felt.partition_point(|reading| reading.timestamp <= frame.timestamp)];
+        self.readings += felt.len();
+        self.frames += 1;
+        Some(Observation { frame: frame.clone(), detections: own.to_vec(), accelerometer: felt.to_vec() })
+    }
+}
+
+impl Sequence {
+    /// Adds a frame, with its boxes and readings, after all others.
+    pub fn push(&mut self, observation: Observation) {
+        let frame = self.frames.len();
+        self.frames.push(observation.frame);
+        self.detections.extend(observation.detections.into_iter().map(|d| Detection { frame, ..d }));
+        self.accelerometer.extend(observation.accelerometer);
+    }
+}

@@ -1,0 +1,153 @@
+//! How well boxes are put together to objects, beside the names that they truly have.
+//!
+//! Objects have no names of their own, so that what counts is which boxes go together: of all *pairs* of boxes of one object, how
+//! many are together (recall), and of all pairs that are together, how many should be (precision). Homogeneity and
+//! completeness are those of Rosenberg and Hirschberg, V-Measure, 2007; switches and the identity F1 are those of
+//! multiple object tracking (Bernardin and Stiefelhagen, 2008; Ristani et al., 2016).
+use pathfinding::prelude::{Matrix, kuhn_munkres};
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::hash::Hash;
+
+/// Scores of an association of boxes with objects.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct IdentityScores {
+    /// Boxes whose true object is known: those that count.
+    pub boxes: usize,
+    /// Of all pairs of boxes that are together, the share that truly are.
+    pub precision: f64,
+    /// Of all pairs of boxes of one true object, the share that are together.
+    pub recall: f64,
+    /// The harmonic mean of the two.
+    pub f1: f64,
+    /// 1 where each object has boxes of one true object only.
+    pub homogeneity: f64,
+    /// 1 where all boxes of a true object are in one object.
+    pub completeness: f64,
+    /// The share of boxes in the right object, with objects matched one to one so that it is largest.
+    pub identity_f1: f64,
+    /// How many times the object changes from one box of a true object to its next.
+    pub switches: usize,
+    /// True objects.
+    pub true_objects: usize,
+    /// Objects with [`ENOUGH`] boxes.
+    pub objects: usize,
+}
+
+/// Boxes that make an object count.
+pub const ENOUGH: usize = 3;
+
+/// Scores boxes in order of time: the true object of each, and the one that it was put to. A box that was put to none is alone.
+pub fn identity<T, P>(boxes: impl IntoIterator<Item = (T, Option<P>)>) -> IdentityScores
+where
+    T: Copy + Ord + Hash,
+    P: Copy + Ord + Hash,
+{
+    /// A box that was put to none is an object of its own.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    enum Put<P> {
+        Into(P),
+        Alone(usize),
+    }
+    let (mut cells, mut truths, mut found) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+    let (mut last, mut switches, mut all) = (BTreeMap::new(), 0, 0);
+    for (truth, put) in boxes {
+        if let Some(put) = put
+            && last.insert(truth, put).is_some_and(|before| before != put)
+        {
+            switches += 1;
+        }
+        let put = put.map_or(Put::Alone(all), Put::Into);
+        *cells.entry((truth, put)).or_insert(0_usize) += 1;
+        *truths.entry(truth).or_insert(0_usize) += 1;
+        *found.entry(put).or_insert(0_usize) += 1;
+        all += 1;
+    }
+    let pairs = |counts: &mut dyn Iterator<Item = &usize>| counts.map(|n| (n * (n - 1) / 2) as f64).sum::<f64>();
+    let share = |part: f64, of: f64| if of > 0.0 { part / of } else { 1.0 };
+    let right = pairs(&mut cells.values());
+    let (precision, recall) =
+        (share(right, pairs(&mut found.values())), share(right, pairs(&mut truths.values())));
+    let f1 = if precision + recall > 0.0 { 2.0 * precision * recall / (precision + recall) } else { 0.0 };
+    let total = all.max(1) as f64;
+    let part = |n: usize, of: usize| -(n as f64 / total) * (n as f64 / of as f64).ln();
+    let of_all = |counts: &mut dyn Iterator<Item = &usize>| counts.map(|n| part(*n, all)).sum::<f64>();
+    let given_found = cells.iter().map(|((_, put), n)| part(*n, found[put])).sum::<f64>();
+    let given_truth = cells.iter().map(|((truth, _), n)| part(*n, truths[truth])).sum::<f64>();
+    let left = |given: f64, of: f64| if of > 0.0 { 1.0 - given / of } else { 1.0 };
+    IdentityScores {
+        boxes: all,
+        precision,
+        recall,
+        f1,
+        homogeneity: left(given_found, of_all(&mut truths.values())),
+        completeness: left(given_truth, of_all(&mut found.values())),
+        identity_f1: best_match(&cells, &truths, &found) as f64 / total,
+        switches,
+        true_objects: truths.len(),
+        objects: found.values().filter(|n| **n >= ENOUGH).count(),
+    }
+}
+
+/// Boxes in the right object, with objects matched one to one so that they are the most.
+fn best_match<T: Copy + Ord, P: Copy + Ord>(
+    cells: &BTreeMap<(T, P), usize>,
+    truths: &BTreeMap<T, usize>,
+    found: &BTreeMap<P, usize>,
+) -> usize {
+    let places = |keys: &mut dyn Iterator<Item = P>| keys.zip(0..).collect::<BTreeMap<P, usize>>();
+    let columns = places(&mut found.keys().copied());
+    let rows: BTreeMap<T, usize> = truths.keys().copied().zip(0..).collect();
+    if rows.is_empty() {
+        return 0;
+    }
+    let mut together = Matrix::new(rows.len(), columns.len().max(rows.len()), 0_i64);
+    for ((truth, put), n) in cells {
+        together[(rows[truth], columns[put])] = *n as i64;
+    }
+    usize::try_from(kuhn_munkres(&together).0).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scores(truth: &[u32], put: &[u32]) -> IdentityScores {
+        let put = put.iter().map(|put| Some(*put).filter(|put| *put > 0));
+        identity(truth.iter().copied().zip(put))
+    }
+
+    #[test]
+    fn what_is_right_scores_one_whatever_the_names() {
+        let right = scores(&[1, 1, 2, 2, 1, 2, 2], &[7, 7, 3, 3, 7, 3, 3]);
+        for score in [right.precision, right.recall, right.f1, right.homogeneity, right.completeness] {
+            assert!((score - 1.0).abs() < 1e-12);
+        }
+        assert_eq!((right.switches, right.true_objects, right.objects), (0, 2, 2));
+        assert_eq!(right.identity_f1, 1.0);
+    }
+
+    #[test]
+    fn pairs_are_counted_by_hand() {
+        // true pairs: 3 + 1; together: 1 + 3, of which 1 + 1 are right
+        let some = scores(&[1, 1, 1, 2, 2], &[4, 4, 5, 5, 5]);
+        assert_eq!((some.precision, some.recall, some.f1), (0.5, 0.5, 0.5));
+        assert_eq!((some.switches, some.objects, some.boxes), (1, 1, 5));
+        assert_eq!(some.identity_f1, 0.8);
+    }
+
+    #[test]
+    fn one_object_for_all_is_complete_and_tells_nothing() {
+        let one = scores(&[1, 1, 2, 2], &[9, 9, 9, 9]);
+        assert!((one.completeness - 1.0).abs() < 1e-12 && one.homogeneity.abs() < 1e-12);
+        assert_eq!((one.recall, one.identity_f1), (1.0, 0.5));
+    }
+
+    #[test]
+    fn boxes_of_no_object_are_alone() {
+        let none = scores(&[1, 1, 1], &[0, 0, 0]);
+        assert_eq!((none.precision, none.recall, none.f1, none.objects), (1.0, 0.0, 0.0, 0));
+        assert_eq!(scores(&[], &[]).f1, 1.0);
+    }
+}

@@ -1,0 +1,84 @@
+//! Objects that are named as they come, and that turn out to be one.
+use super::Mapper;
+use super::frame::FrameReport;
+use super::object::Tracked;
+use crate::association::{Map, Merge, Names};
+use crate::input::sequence::ObjectId;
+use crate::mapping::measurements::ObjectBox;
+use crate::mapping::{box_entry, object_key, pose_key};
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
+use manifactor_graph::{Graph, Values};
+use manifactor_online::Session;
+use manifactor_quadric::DualQuadric;
+
+/// What has been estimated so far; of frames that have left the window, as it was when they came.
+pub(super) struct Known<'a> {
+    /// The last frame, and its pose.
+    pub newest: (usize, Se3),
+    pub live: &'a [StampedPose],
+    pub session: &'a Session,
+}
+
+impl Map for Known<'_> {
+    fn pose(&self, frame: usize) -> Option<Se3> {
+        let (newest, pose) = self.newest;
+        if frame == newest {
+            return Some(pose);
+        }
+        let now = self.session.get(pose_key(frame).as_str()).ok();
+        now.or_else(|| self.live.get(frame).map(|live| live.pose))
+    }
+
+    fn object(&self, id: ObjectId) -> Option<DualQuadric> {
+        self.session.get(object_key(id).as_str()).ok()
+    }
+}
+
+impl Mapper {
+    /// Makes one of objects that turn out to be one. Returns the names as they are then.
+    pub(super) fn unite_all(&mut self, merges: &[Merge], report: &mut FrameReport) -> Names {
+        let mut names = self.names.clone();
+        for merge in merges {
+            self.unite(*merge, report);
+            names.merge(*merge);
+        }
+        names
+    }
+
+    /// Gives the boxes of one object to another: in the map, if that is there, or to place it by.
+    fn unite(&mut self, merge: Merge, report: &mut FrameReport) {
+        let Merge { from, into } = merge;
+        if self.objects.get(&from).is_some_and(Tracked::is_mapped) {
+            self.take_out(from, report);
+        }
+        self.objects.remove(&from);
+        let new = self.measurements.merge(from, into);
+        match self.objects.entry(into).or_default() {
+            Tracked::Mapped(_) => self.push_boxes(into, &new, report),
+            Tracked::Waiting(sights) => {
+                for view in &new {
+                    if let Ok(pose) = self.session.get(pose_key(view.frame).as_str()) {
+                        sights.add(view, &pose, &self.camera);
+                    }
+                }
+            }
+            Tracked::Withdrawn => {}
+        }
+        tracing::info!(object = %from, "is object {into}");
+        report.merged.push(merge);
+    }
+
+    /// Pushes boxes of an object that is in the map, as far as their poses are still there.
+    fn push_boxes(&mut self, id: ObjectId, views: &[ObjectBox], report: &mut FrameReport) {
+        let mut graph = Graph::new();
+        for view in views.iter().filter(|view| self.pose(view.frame).is_some()) {
+            graph.push(box_entry(view, object_key(id), self.camera, &self.settings.detections));
+        }
+        match (self.session.push(&graph, &Values::new()), self.objects.get_mut(&id)) {
+            (Ok(ids), Some(Tracked::Mapped(mapped))) => mapped.boxes.extend(ids),
+            (Ok(_), _) => {}
+            (Err(error), _) => report.refused.push(error.to_string()),
+        }
+    }
+}
