@@ -39,6 +39,12 @@ pub trait Associator: Debug + Send {
     /// as it is predicted.
     fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>>;
 
+    /// Names the boxes of a frame that it has learned from, when all others have been seen: those that it knows, with all that is known.
+    /// `None`, where it has no more to say than it had.
+    fn reconsider(&self, _image: &Image<'_>, _map: &dyn Map) -> Option<Vec<Option<ObjectId>>> {
+        None
+    }
+
     /// Learns from the boxes of a frame, which is in the map now, under these names. Returns objects that turn out to be one.
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Vec<Merge>;
 }

@@ -10,7 +10,7 @@ mod object;
 mod revision;
 mod rules;
 
-use crate::association::{Associator, Names};
+use crate::association::{Associator, Image, Names};
 use crate::estimate::{Estimate, EstimateError};
 use crate::gravity::GravityError;
 use crate::input::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
@@ -18,6 +18,7 @@ use crate::mapping::measurements::{Measured, Measurements};
 use crate::mapping::{Mapping, MappingError, object_key, pose_key, rejection};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
+use association::Known;
 use gravity::Up;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -147,6 +148,15 @@ impl Mapper {
     /// The graph so far, with its estimate.
     pub fn session(&mut self) -> &mut Session {
         &mut self.session
+    }
+
+    /// The objects of a frame's boxes, when all others have been seen. Those that nothing more is known of have none; `None`, where
+    /// the association has no more to say than it had.
+    pub fn reconsider(&self, frame: usize, observation: &Observation) -> Option<Vec<Option<ObjectId>>> {
+        let newest = (frame, self.pose(frame)?);
+        let (timestamp, detections) = (observation.frame.timestamp, observation.detections.as_slice());
+        let known = Known { newest, live: &self.live, session: &self.session };
+        self.associator.reconsider(&Image { frame, timestamp, detections }, &known)
     }
 
     /// Names of objects that turned out to be others.

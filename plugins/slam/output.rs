@@ -1,14 +1,16 @@
 //! The files that a run leaves.
 //!
 //! `report.json` and `record.json` (all that there is to draw) for the run as a whole, and a folder for each variant with
-//! `config.toml` (all settings, ready to be run again), `trajectory.txt` (TUM's format; `live.txt` as it was when each frame came, where they came one by one), `objects.json`, `frames.jsonl` (poses
+//! `config.toml` (all settings, ready to be run again), `trajectory.txt` (TUM's format; `live.txt` as it was when each frame came, where they came one by one), `detections.csv` (the boxes with the objects that they were put to, where the source does not say), `objects.json`, `frames.jsonl` (poses
 //! and boxes, a frame a line), `graph.json` (the literal graph at the estimate), `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
 //! into an [`OutputFolder`].
 use crate::estimate::Estimate;
+use crate::input::recording;
 use crate::output::record::{FrameRecord, RECORD, RunRecord, VariantRecord};
 use crate::output::report::{RunReport, VariantReport};
 use crate::settings::run_document::{RunDocument, Variant, absolute, slug};
 use manifactor_config::{Format, WriteError, to_toml, write_graph};
+use manifactor_formats::FormatError;
 use manifactor_formats::table::TableError;
 use manifactor_formats::tum;
 use manifactor_formats::whole;
@@ -39,6 +41,9 @@ pub enum OutputError {
     /// Covariances that are asked for, and infinite or out of reach.
     #[error("covariances.json: {0}")]
     Covariance(#[from] CovarianceError),
+    /// Boxes that cannot be written.
+    #[error(transparent)]
+    Boxes(#[from] FormatError),
     /// A table that no format can hold.
     #[error("{}: {source}", path.display())]
     Table {
@@ -100,6 +105,9 @@ pub fn write_variant(
     write_whole(&file("trajectory.txt"), tum::format(&estimate.trajectory()))?;
     if let Some(online) = &report.online {
         write_whole(&file("live.txt"), tum::format(&online.live))?;
+    }
+    if report.association.is_some() {
+        recording::write_detections(&estimate.sequence, &file("detections.csv"))?;
     }
     write_document(&file("objects.json"), results(&report.objects))?;
     write_document(&file("frames.jsonl"), lines(&record.frames))?;

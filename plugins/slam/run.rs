@@ -55,8 +55,8 @@ pub fn estimate(
     Ok((estimate, report))
 }
 
-/// The sequence with its boxes put to objects by the settings' `association`: frame by frame, as they would have come. Frames that
-/// cannot be mapped so have boxes of no object.
+/// The sequence with its boxes put to objects by the settings' `association`: frame by frame, as they would have come, then once more
+/// by what is known in the end. Frames that cannot be mapped so have boxes of no object.
 ///
 /// # Errors
 /// Where the session cannot begin.
@@ -69,14 +69,26 @@ pub fn associated(
     }
     let mut mapper = Mapper::new(sequence.opening(), settings)?;
     let (mut named, mut naming) = (Sequence::clone(&sequence), Naming::default());
+    let mut taken = vec![];
     for observation in sequence.observations() {
         match mapper.take(&observation) {
-            Ok(report) => naming.note(&observation.detections, &report.objects),
+            Ok(report) => {
+                naming.note(&observation.detections, &report.objects);
+                taken.push(Some(report.frame));
+            }
             Err(error) => {
                 tracing::warn!("{error}");
                 naming.note(&observation.detections, &[]);
+                taken.push(None);
             }
         }
+    }
+    let mut first = 0;
+    for (observation, frame) in sequence.observations().zip(taken) {
+        if let Some(names) = frame.and_then(|frame| mapper.reconsider(frame, &observation)) {
+            naming.reconsider(first, &names);
+        }
+        first += observation.detections.len();
     }
     for (detection, name) in named.detections.iter_mut().zip(naming.now(mapper.names())) {
         detection.object = name;

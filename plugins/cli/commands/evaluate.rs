@@ -4,22 +4,30 @@ use crate::output;
 use crate::output::text::{self, Table};
 use crate::status::Status;
 use clap::{Args, ValueEnum};
+use manifactor::formats::detections::{self, Detection};
 use manifactor::formats::tum;
 use manifactor::graph::checked::Positive;
 use manifactor::slam::metrics::{
-    Alignment, MetricsError, Pairing, Statistics, absolute_error, align, associate, relative_error,
+    Alignment, MetricsError, Pairing, Statistics, absolute_error, align, associate, identity, relative_error,
 };
 use serde_json::json;
+use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Compare two trajectories in TUM's format (timestamp tx ty tz qx qy qz qw): ATE and RPE.
+///
+/// With --boxes, compare which boxes go together to objects instead, in two files of detections (CSV, as of the source `tum`).
 #[derive(Debug, Args)]
 pub(crate) struct Evaluate {
-    /// The true trajectory.
+    /// The true trajectory; or the true objects of boxes.
     truth: PathBuf,
-    /// The estimated one.
+    /// The estimated one; or those that they were put to.
     estimate: PathBuf,
+    /// Compare objects of boxes: of equal boxes at equal times, the `object_key` of the one file with that of the other. Boxes that
+    /// have none, or 0, in the first do not count; in the second they are alone.
+    #[arg(long, conflicts_with_all = ["align", "within", "delta", "all_pairs"])]
+    boxes: bool,
     /// How the estimate is brought into the frame of the truth.
     #[arg(long, value_enum, default_value = "se3")]
     align: Align,
@@ -67,6 +75,9 @@ impl From<Align> for Alignment {
 
 impl Evaluate {
     pub(crate) fn run(&self) -> Result<Status, Failure> {
+        if self.boxes {
+            return self.boxes();
+        }
         let (truth, estimate) = (tum::read(&self.truth)?, tum::read(&self.estimate)?);
         let pairing = if self.all_pairs { Pairing::All } else { Pairing::Consecutive };
         let measure = || -> Result<_, MetricsError> {
@@ -89,6 +100,53 @@ impl Evaluate {
         table.row(row("RPE rotation, rad", &rpe.rotation));
         let pairs = text::count(pairs, "matched pose");
         output::print(&format!("{pairs}, scale {scale:.6}\n{}\n", table.text()));
+        Ok(Status::Done)
+    }
+}
+
+impl Evaluate {
+    /// Objects of boxes.
+    fn boxes(&self) -> Result<Status, Failure> {
+        let (truth, put) = (detections::read(&self.truth)?, detections::read(&self.estimate)?);
+        let key = |d: &Detection| (d.timestamp.to_bits(), [d.xmin, d.ymin, d.xmax, d.ymax].map(f64::to_bits));
+        let object = |d: &Detection| d.object_key.filter(|key| *key != 0);
+        let put: HashMap<_, _> = put.iter().map(|detection| (key(detection), object(detection))).collect();
+        let named = truth.iter().filter_map(|detection| Some((object(detection)?, put.get(&key(detection)))));
+        let named: Vec<_> = named.collect();
+        let missing = named.iter().filter(|(_, put)| put.is_none()).count();
+        if named.is_empty() || missing == named.len() {
+            let (truth, put) = (self.truth.display(), self.estimate.display());
+            return Err(Failure::input(format!(
+                "{put} has none of the {} of {truth} that have an object: are time stamps and sides written alike?",
+                text::count(named.len(), "box")
+            )));
+        }
+        let scores = identity(named.iter().map(|(truth, put)| (*truth, put.copied().flatten())));
+        if self.json {
+            output::json(&json!({ "missing": missing, "scores": scores }));
+            return Ok(Status::Done);
+        }
+        let mut table = Table::of_numbers(&["pairs of boxes", "precision", "recall", "F1"]);
+        let number = |x: f64| format!("{x:.4}");
+        table.row(["together".to_owned(), number(scores.precision), number(scores.recall), number(scores.f1)]);
+        let mut told = format!(
+            "{}, {}, {} of 3 boxes or more\n{}\n",
+            text::count(scores.boxes, "box"),
+            text::count(scores.true_objects, "true object"),
+            text::count(scores.objects, "object"),
+            table.text()
+        );
+        told += &format!(
+            "homogeneity {:.4}, completeness {:.4}, identity F1 {:.4}, {}\n",
+            scores.homogeneity,
+            scores.completeness,
+            scores.identity_f1,
+            text::count(scores.switches, "switch")
+        );
+        if missing > 0 {
+            told += &format!("{} not in {}: alone\n", text::count(missing, "box"), self.estimate.display());
+        }
+        output::print(&told);
         Ok(Status::Done)
     }
 }

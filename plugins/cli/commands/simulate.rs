@@ -9,9 +9,10 @@ use manifactor::config::{Diagnostic, Fault, SourceText};
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::recording;
 use manifactor::slam::run::Run as Running;
+use manifactor::slam::source::line;
 use std::path::PathBuf;
 
-/// Write the sequence of a run's source as files, which the source `recorded` reads.
+/// Write the sequence of a run's source as files, which the source `recorded` reads, or as lines.
 ///
 /// They are odometry.txt and groundtruth.txt (TUM's format), detections.csv and objects.json.
 #[derive(Debug, Args)]
@@ -19,8 +20,11 @@ pub(crate) struct Simulate {
     #[command(flatten)]
     run: RunArguments,
     /// The folder for the files.
-    #[arg(long, short, value_name = "DIR")]
-    out: PathBuf,
+    #[arg(long, short, value_name = "DIR", required_unless_present = "lines")]
+    out: Option<PathBuf>,
+    /// Print the frames instead, as lines of JSON, which the source `json_lines` reads.
+    #[arg(long, conflicts_with_all = ["out", "force"])]
+    lines: bool,
     /// Write into a folder that holds files of something else, over those of the same names.
     #[arg(long)]
     force: bool,
@@ -34,17 +38,22 @@ impl Simulate {
             let problem = Fault::invalid("there is no variant to simulate");
             return Err(Failure::Documents(Diagnostic::new(source.place(0..0), problem).into()));
         };
+        let sequence = || Running::new(&document, self.run.data()).sequence(variant);
+        let Some(out) = &self.out else {
+            sequence()?.observations().for_each(|frame| output::print(&(line(&frame) + "\n")));
+            return Ok(Status::Done);
+        };
         // held to the end
-        let _claimed = OutputFolder::claim(&self.out, "simulate", &self.run.config, self.force)?;
-        let sequence = Running::new(&document, self.run.data()).sequence(variant)?;
-        recording::write(&sequence, &self.out)?;
+        let _claimed = OutputFolder::claim(out, "simulate", &self.run.config, self.force)?;
+        let sequence = sequence()?;
+        recording::write(&sequence, out)?;
         let objects = sequence.ground_truth.as_ref().map_or(0, |truth| truth.objects.len());
         output::print(&format!(
             "{}, {}, {} written to {}\n",
             count(sequence.frames.len(), "frame"),
             count(sequence.detections.len(), "detection"),
             count(objects, "true object"),
-            self.out.display()
+            out.display()
         ));
         Ok(Status::Done)
     }

@@ -30,6 +30,7 @@ pub(crate) fn of_run(report: &RunReport) -> String {
         out += "!: ended without converging; a warning below says how.\n";
     }
     for variant in &report.variants {
+        out += &association(variant);
         out += &stream(variant);
     }
     for variant in &report.variants {
@@ -70,6 +71,26 @@ fn stream(variant: &VariantReport) -> String {
         text += &format!(", {} refused", text::count(online.refusals, "frame or change"));
     }
     text::wrap(&text) + "\n"
+}
+
+/// Where boxes were put to objects: how well, as far as it is known.
+fn association(variant: &VariantReport) -> String {
+    let Some(association) = &variant.association else { return String::new() };
+    let merged = text::count(association.merged, "object");
+    let mut line =
+        format!("{}: boxes put to objects by {}, {merged} merged", on_one_line(&variant.name), association.by);
+    if let (Some(then), Some(end)) = (&association.at_the_time, &association.in_the_end) {
+        line += &format!(
+            "; pairwise F1 {:.3} at the time, {:.3} in the end (precision {:.3}, recall {:.3}), {} of 3 boxes or more for {} true ones",
+            then.f1,
+            end.f1,
+            end.precision,
+            end.recall,
+            text::count(end.objects, "object"),
+            end.true_objects
+        );
+    }
+    text::wrap(&line) + "\n"
 }
 
 /// A line: the condition, what is rejected, and the factor that costs the most. The report has the whole table.

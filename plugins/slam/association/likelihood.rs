@@ -95,7 +95,7 @@ impl Default for Likelihood {
             class_error: 0.1,
             new_objects: 0.05,
             twin_iou: 0.7,
-            merge_error: 1.0,
+            merge_error: 1.2,
         }
     }
 }
@@ -166,6 +166,11 @@ impl Associator for Tracker {
         names
     }
 
+    fn reconsider(&self, image: &Image<'_>, map: &dyn Map) -> Option<Vec<Option<ObjectId>>> {
+        let known = |id: &ObjectId| id.0 < self.next;
+        Some(self.associate(image, map).into_iter().map(|name| name.filter(known)).collect())
+    }
+
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Vec<Merge> {
         let Some(pose) = map.pose(image.frame) else { return vec![] };
         let usual = self.usual_depth(&pose);
@@ -198,7 +203,7 @@ impl Tracker {
     /// What there is to gain by putting boxes to objects instead of new ones, as (row, column, gain), and the objects of
     /// the columns.
     fn gains(&self, image: &Image<'_>, boxes: &[usize], pose: &Se3) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
-        let (noise, new) = (self.settings.noise(), self.settings.cost_of_new(&self.camera));
+        let new = self.settings.cost_of_new(&self.camera);
         let class = |i: &usize| image.detections[*i].scores.best().map(|(class, _)| self.aliases.canonical(class));
         let classes: Vec<Option<String>> = boxes.iter().map(class).collect();
         let (mut gains, mut tracks) = (vec![], vec![]);
@@ -211,8 +216,7 @@ impl Tracker {
                     continue;
                 }
                 let share = classes[row].as_deref().map_or(1.0, |class| track.share(class));
-                let cost = expected.cost(b, &noise, self.settings.lasting)
-                    - 2.0 * self.settings.likelihood(share).ln();
+                let cost = expected.cost(b) - 2.0 * self.settings.likelihood(share).ln();
                 if cost < new {
                     gains.push((row, tracks.len(), new - cost));
                 }

@@ -21,11 +21,12 @@ impl Map for Fixed<'_> {
 
 fn main() {
     let mut settings = serde_json::to_value(Likelihood::default()).unwrap();
-    let (mut files, mut verbose) = (vec![], false);
+    let (mut files, mut verbose, mut oracle) = (vec![], false, false);
     for argument in std::env::args().skip(1) {
         match argument.split_once('=') {
             Some((k, v)) => settings[k] = serde_json::from_str(v).unwrap(),
             None if argument == "-v" => verbose = true,
+            None if argument == "-o" => oracle = true,
             None => files.push(argument),
         }
     }
@@ -33,8 +34,13 @@ fn main() {
     let folders = Folders { data: std::env::var("MANIFACTOR_DATA").ok().map(Into::into), ..Folders::default() };
     let mut f1s = vec![];
     for file in files {
-        let (sequence, odometry) = file.split_once(':').unwrap();
-        let source: TumRgbd = serde_json::from_value(serde_json::json!({"sequence": format!("rgbd_dataset_freiburg{sequence}"), "odometry": format!("trajectories/{odometry}")})).unwrap();
+        let source: Box<dyn Source> = if let Some((sequence, odometry)) = file.split_once(':') { Box::new(serde_json::from_value::<TumRgbd>(serde_json::json!({"sequence": format!("rgbd_dataset_freiburg{sequence}"), "odometry": format!("trajectories/{odometry}")})).unwrap()) } else {
+            let n: u64 = file.parse().unwrap();
+            let class: Vec<&str> = match n / 100 { 0 => vec![], 1 => vec!["bottle"], _ => vec!["bottle", "book", "cup"] };
+            let mut v = serde_json::json!({"seed": n, "scene": {"objects": 12, "seed": n}, "trajectory": {"frames": 300, "seed": n}, "detector": {"missed": 0.1, "occluded": 0.15, "sigma_px": 4.0, "misclassified": 0.05, "confused": 0.1}});
+            if !class.is_empty() { v["scene"]["gap"] = serde_json::json!(0.05); v["scene"]["area"] = serde_json::json!([1.4, 1.2]); v["scene"]["classes"] = serde_json::json!(class); }
+            Box::new(serde_json::from_value::<manifactor_slam::simulator::Simulated>(v).unwrap())
+        };
         let sequence = source.load(&folders).unwrap();
         let clock = std::time::Instant::now();
         let mut associator = settings.begin(sequence.camera, &Aliases::default());
@@ -45,7 +51,8 @@ fn main() {
             let c = std::time::Instant::now();
             let image = Image { frame: i, timestamp: o.frame.timestamp, detections: &o.detections };
             let names = associator.associate(&image, &Fixed(&sequence));
-            let merged = associator.learn(&image, &names, &Fixed(&sequence));
+            let taught: Vec<_> = if oracle { o.detections.iter().map(|d| d.object).collect() } else { names.clone() };
+            let merged = associator.learn(&image, &taught, &Fixed(&sequence));
             longest = longest.max(c.elapsed().as_secs_f64());
             merged.into_iter().for_each(|m| into.merge(m));
             for (d, id) in o.detections.iter().zip(names) {

@@ -25,13 +25,21 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
     let odometry: Vec<_> =
         odometry.map(|f| StampedPose { timestamp: f.timestamp, pose: f.world_from_camera }).collect();
     tum::write(folder.join("odometry.txt"), &odometry)?;
-    detections::write(folder.join("detections.csv"), &rows(sequence))?;
+    write_detections(sequence, &folder.join("detections.csv"))?;
     if let Some(truth) = &sequence.ground_truth {
         tum::write(folder.join("groundtruth.txt"), &truth.trajectory)?;
         let path = folder.join(OBJECTS);
         write_whole(&path, format!("{:#}\n", json!(truth.objects)).as_bytes()).map_err(io(&path))?;
     }
     Ok(())
+}
+
+/// Writes the boxes alone, with the objects that they show.
+///
+/// # Errors
+/// Where the file cannot be written.
+pub fn write_detections(sequence: &Sequence, file: &Path) -> Result<(), FormatError> {
+    detections::write(file, &rows(sequence))
 }
 
 fn rows(sequence: &Sequence) -> Vec<Detection> {

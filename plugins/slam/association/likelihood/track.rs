@@ -31,7 +31,7 @@ pub(super) struct Track {
 /// The box that is expected of an object, and how far it may be off.
 pub(super) struct Expected {
     pub bounding_box: BoundingBox,
-    /// Of the sides, in square pixels, the detector's own noise left out.
+    /// Of the sides, in square pixels.
     covariance: Matrix4<f64>,
 }
 
@@ -103,7 +103,9 @@ impl Track {
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
         let by_drift = predicted.by_pose * nalgebra::Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
         let by_quadric = predicted.by_quadric * self.fitted.covariance * predicted.by_quadric.transpose();
-        Some(Expected { bounding_box: predicted.bounding_box, covariance: by_quadric + by_drift })
+        let sigma = Vector4::from(settings.noise().deviations(&predicted.bounding_box)) * settings.lasting;
+        let by_detector = Matrix4::from_diagonal(&sigma.component_mul(&sigma));
+        Some(Expected { bounding_box: predicted.bounding_box, covariance: by_quadric + by_drift + by_detector })
     }
 
     /// Intersection over union of a box with that of its ellipsoid.
@@ -140,12 +142,10 @@ impl Track {
 }
 
 impl Expected {
-    /// What a box costs: d² + ln det 2πS, with boxes `lasting` times as far off as their own noise.
-    pub(super) fn cost(&self, b: &BoundingBox, noise: &BoxNoise, lasting: f64) -> f64 {
-        let sigma = Vector4::from(noise.deviations(&self.bounding_box)) * lasting;
-        let covariance = self.covariance + Matrix4::from_diagonal(&sigma.component_mul(&sigma));
+    /// What a box costs: d² + ln det 2πS.
+    pub(super) fn cost(&self, b: &BoundingBox) -> f64 {
         let error = Vector4::from(b.bounds()) - Vector4::from(self.bounding_box.bounds());
-        let Some(factor) = Cholesky::new(covariance) else { return f64::INFINITY };
+        let Some(factor) = Cholesky::new(self.covariance) else { return f64::INFINITY };
         error.dot(&factor.solve(&error)) + factor.ln_determinant() + 4.0 * TAU.ln()
     }
 }

@@ -21,32 +21,50 @@ pub struct AssociationReport {
 
 /// The names of all boxes, in order of time: of the source, and given.
 #[derive(Debug, Default)]
-pub(crate) struct Naming(Vec<[Option<ObjectId>; 2]>);
+pub(crate) struct Naming(Vec<Named>);
+
+#[derive(Debug)]
+struct Named {
+    /// Of the source.
+    truth: Option<ObjectId>,
+    /// When it came.
+    then: Option<ObjectId>,
+    /// In the end.
+    now: Option<ObjectId>,
+}
 
 impl Naming {
     /// Takes note of a frame's boxes, and of the names that they were given; none, where the frame was left out.
     pub(crate) fn note(&mut self, detections: &[Detection], given: &[Option<ObjectId>]) {
         let given = given.iter().copied().chain(std::iter::repeat(None));
-        self.0.extend(detections.iter().zip(given).map(|(detection, given)| [detection.object, given]));
+        let named = |(detection, given): (&Detection, _)| Named { truth: detection.object, then: given, now: given };
+        self.0.extend(detections.iter().zip(given).map(named));
     }
 
-    /// The names that were given, as they are now.
+    /// Gives boxes other names, from the `first` on; those of which nothing more is known keep their own.
+    pub(crate) fn reconsider(&mut self, first: usize, names: &[Option<ObjectId>]) {
+        for (named, name) in self.0.iter_mut().skip(first).zip(names) {
+            named.now = name.or(named.now);
+        }
+    }
+
+    /// The names of all boxes as they are now.
     pub(crate) fn now<'a>(&'a self, names: &'a Names) -> impl Iterator<Item = Option<ObjectId>> + 'a {
-        self.0.iter().map(|[_, given]| given.map(|given| names.now(given)))
+        self.0.iter().map(|named| named.now.map(|name| names.now(name)))
     }
 
     /// The report; none, where the names are those of the source.
     pub(crate) fn report(&self, by: &dyn Association, names: &Names) -> Option<AssociationReport> {
-        let known = || self.0.iter().filter_map(|[truth, given]| Some(((*truth)?, *given)));
-        let score = |put: &dyn Fn(ObjectId) -> ObjectId| {
-            let scored = known().map(|(truth, given)| (truth, given.map(put)));
-            (known().next().is_some()).then(|| identity(scored))
+        let is_known = self.0.iter().any(|named| named.truth.is_some());
+        let score = |put: &mut dyn Iterator<Item = Option<ObjectId>>| {
+            let truth = self.0.iter().map(|named| named.truth);
+            is_known.then(|| identity(truth.zip(put).filter_map(|(truth, put)| Some((truth?, put)))))
         };
         (!by.uses_names()).then(|| AssociationReport {
             by: by.typetag_name(),
             merged: names.given_up(),
-            at_the_time: score(&|given| given),
-            in_the_end: score(&|given| names.now(given)),
+            at_the_time: score(&mut self.0.iter().map(|named| named.then)),
+            in_the_end: score(&mut self.now(names)),
         })
     }
 }
