@@ -45,8 +45,17 @@ pub trait Associator: Debug + Send {
         None
     }
 
-    /// Learns from the boxes of a frame, which is in the map now, under these names. Returns objects that turn out to be one.
-    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Vec<Merge>;
+    /// Learns from the boxes of a frame, which is in the map now, under these names.
+    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned;
+}
+
+/// What a frame has taught of earlier ones.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Learned {
+    /// Objects that turn out to be one.
+    pub merged: Vec<Merge>,
+    /// Objects that were seen too rarely to be any, and are not looked for any more.
+    pub forgotten: Vec<ObjectId>,
 }
 
 /// What an associator sees of a frame.

@@ -164,6 +164,11 @@ impl Mapper {
         &self.names
     }
 
+    /// What is measured of each object.
+    pub fn measurements(&self) -> &Measurements {
+        &self.measurements
+    }
+
     /// Objects that are in the map.
     pub fn mapped(&self) -> usize {
         self.objects.values().filter(|object| object.is_mapped()).count()

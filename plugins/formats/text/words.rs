@@ -1,9 +1,10 @@
 //! Numbers and lists in words.
 use std::collections::BTreeMap;
 
-/// `1 edge`, `2 edges`.
+/// `1 edge`, `2 edges`, `2 boxes`.
 pub fn count(n: usize, noun: &str) -> String {
-    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+    let plural = if noun.ends_with(['x', 's']) || noun.ends_with("ch") { "es" } else { "s" };
+    format!("{n} {noun}{}", if n == 1 { "" } else { plural })
 }
 
 /// The first few of a list, and how many more there are.

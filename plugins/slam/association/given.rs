@@ -1,4 +1,4 @@
-use super::{Association, Associator, Image, Map, Merge};
+use super::{Association, Associator, Image, Learned, Map};
 use crate::input::class::Aliases;
 use crate::input::sequence::ObjectId;
 use manifactor_graph::register;
@@ -32,7 +32,7 @@ impl Associator for Given {
         image.detections.iter().map(|detection| detection.object).collect()
     }
 
-    fn learn(&mut self, _image: &Image<'_>, _names: &[Option<ObjectId>], _map: &dyn Map) -> Vec<Merge> {
-        vec![]
+    fn learn(&mut self, _image: &Image<'_>, _names: &[Option<ObjectId>], _map: &dyn Map) -> Learned {
+        Learned::default()
     }
 }

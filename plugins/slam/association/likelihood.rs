@@ -4,7 +4,7 @@ mod sightings;
 mod track;
 mod union;
 
-use super::{Association, Associator, Image, Map, Merge, assignment};
+use super::{Association, Associator, Image, Learned, Map, Merge, assignment};
 use crate::input::class::Aliases;
 use crate::input::sequence::{Detection, ObjectId};
 use fit::{Belief, BoxNoise};
@@ -134,6 +134,8 @@ const BOXES: usize = 200;
 const FIRM: usize = 3;
 /// That while, in seconds.
 const PATIENCE: f64 = 10.0;
+/// So many such objects are kept at most.
+const WAITING: usize = 500;
 /// Objects whose depth is known to this part tell how far away things are.
 const KNOWN_DEPTH: f64 = 0.15;
 
@@ -171,8 +173,8 @@ impl Associator for Tracker {
         Some(self.associate(image, map).into_iter().map(|name| name.filter(known)).collect())
     }
 
-    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Vec<Merge> {
-        let Some(pose) = map.pose(image.frame) else { return vec![] };
+    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
+        let Some(pose) = map.pose(image.frame) else { return Learned::default() };
         let usual = self.usual_depth(&pose);
         let mut seen = vec![];
         for (detection, id) in image.detections.iter().zip(names) {
@@ -194,8 +196,8 @@ impl Associator for Tracker {
         for (t, sighting) in &seen {
             self.tracks[*t].see(*sighting, image.timestamp, map, &self.camera, &noise);
         }
-        self.tracks.retain(|track| track.boxes() >= FIRM || track.seen_at + PATIENCE >= image.timestamp);
-        self.merge(image.frame)
+        let forgotten = self.forget(image.timestamp);
+        Learned { merged: self.merge(image.frame), forgotten }
     }
 }
 
@@ -254,16 +256,26 @@ impl Tracker {
         if depths.len() < FIRM { self.settings.depth } else { depths[depths.len() / 2] }
     }
 
+    /// Forgets objects that are seen too rarely, and those that are seen least lately where there are too many such.
+    fn forget(&mut self, now: f64) -> Vec<ObjectId> {
+        let is_firm = |track: &Track| track.boxes() >= FIRM;
+        let mut seen: Vec<f64> = self.tracks.iter().filter(|track| !is_firm(track)).map(|track| track.seen_at).collect();
+        seen.sort_by(|a, b| b.total_cmp(a));
+        let since = seen.get(WAITING).copied().unwrap_or(f64::NEG_INFINITY).max(now - PATIENCE);
+        let stays = |track: &mut Track| is_firm(track) || track.seen_at > since;
+        self.tracks.extract_if(.., |track| !stays(track)).map(|track| track.id).collect()
+    }
+
     /// Makes one of objects that turn out to be one: looks at those that were seen in this frame and have many more boxes than when
     /// they were looked at last.
     fn merge(&mut self, frame: usize) -> Vec<Merge> {
         let mut merges = vec![];
-        let due: Vec<ObjectId> = self.tracks.iter_mut().filter_map(|track| track.is_due(frame)).collect();
+        let due = self.tracks.iter_mut().filter_map(|track| track.is_due(frame));
+        let due: Vec<ObjectId> = due.take(LOOKS).collect();
         for id in due {
             // it may be gone by now
             let Some(own) = self.tracks.iter().position(|track| track.id == id) else { continue };
-            let others = (0..self.tracks.len()).filter(|other| *other != own);
-            let unions = others.filter_map(|other| {
+            let unions = self.neighbours(own).into_iter().filter_map(|other| {
                 let (one, two) = (&self.tracks[own], &self.tracks[other]);
                 Some((other, union::of(one, two, &self.camera, &self.settings)?))
             });
@@ -278,7 +290,21 @@ impl Tracker {
         }
         merges
     }
+
+    /// The objects that may be the same as this one, the nearest first.
+    fn neighbours(&self, own: usize) -> Vec<usize> {
+        let others = (0..self.tracks.len()).filter(|other| *other != own);
+        let near = others.filter_map(|other| Some((other, union::gap(&self.tracks[own], &self.tracks[other])?)));
+        let mut near: Vec<(usize, f64)> = near.collect();
+        near.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        near.into_iter().take(NEIGHBOURS).map(|(other, _)| other).collect()
+    }
 }
+
+/// Of so many objects it is asked in a frame, at most, whether they are the same as others,
+const LOOKS: usize = 20;
+/// of which so many are looked at, those that are nearest.
+const NEIGHBOURS: usize = 8;
 
 /// The boxes that are looked at, in order.
 fn best_scores(detections: &[Detection]) -> Vec<usize> {

@@ -1,5 +1,5 @@
 //! Boxes go to the objects that they overlap with most: what others do, to compare with.
-use super::{Association, Associator, Image, Map, Merge, assignment};
+use super::{Association, Associator, Image, Learned, Map, assignment};
 use crate::input::class::Aliases;
 use crate::input::sequence::{Detection, ObjectId};
 use manifactor_geometry::Se3;
@@ -152,7 +152,7 @@ impl Associator for Overlap {
         matched.into_iter().scan(new, |new, matched| Some(name(matched, new))).collect()
     }
 
-    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], _map: &dyn Map) -> Vec<Merge> {
+    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], _map: &dyn Map) -> Learned {
         for (detection, id) in image.detections.iter().zip(names) {
             if let Some(id) = *id {
                 let (frame, bounding_box) = (image.frame, detection.bounding_box);
@@ -161,6 +161,6 @@ impl Associator for Overlap {
                 self.next = self.next.max(id.0.saturating_add(1));
             }
         }
-        vec![]
+        Learned::default()
     }
 }

@@ -127,7 +127,7 @@ impl Simulated {
             frames.push(Frame { timestamp: time(i), world_from_camera });
         }
         let stamped = |(i, pose): (usize, &_)| StampedPose { timestamp: time(i), pose: *pose };
-        let detections = self.detect(&objects, &poses, &mut detector);
+        let detections = self.detect(&objects, &poses, [&mut detector, &mut Pcg64::from_rng(&mut noise)]);
         let truth = GroundTruth {
             trajectory: poses.iter().enumerate().map(stamped).collect(),
             objects: objects.into_iter().map(|object| object.truth).collect(),
@@ -146,7 +146,7 @@ impl Simulated {
         &self,
         objects: &[SceneObject],
         poses: &[manifactor_geometry::Se3],
-        rng: &mut Pcg64,
+        [rng, imagination]: [&mut Pcg64; 2],
     ) -> Vec<Detection> {
         let classes: Vec<&str> = catalogue::KINDS.iter().map(|kind| kind.class).collect();
         let mut usual = vec![];
@@ -158,17 +158,23 @@ impl Simulated {
             usual.push(if wrong { other } else { object.truth.class.as_str() });
         }
         let mut detections = vec![];
+        let mut lasting = vec![[0.0; 4]; objects.len()];
         for (frame, pose) in poses.iter().enumerate() {
-            for (object, usual) in objects.iter().zip(&usual) {
+            // what came before the first box has lasted as well
+            let seconds = if frame == 0 { f64::INFINITY } else { self.trajectory.interval };
+            for ((object, usual), noise) in objects.iter().zip(&usual).zip(&mut lasting) {
                 let Some(boxes) = object.solid.boxes(&object.truth.world_from_object, &self.camera, pose)
                 else {
                     continue;
                 };
-                let bounding_box = self.detector.draw(&boxes, &self.camera, rng);
+                let bounding_box = self.detector.draw(&boxes, &self.camera, (noise, seconds), rng);
                 let scores = self.detector.classify(usual, &classes, rng);
                 if let Some(bounding_box) = bounding_box {
                     detections.push(Detection { frame, object: Some(object.truth.id), scores, bounding_box });
                 }
+            }
+            for (bounding_box, scores) in self.detector.imagine(&self.camera, &classes, imagination) {
+                detections.push(Detection { frame, object: None, scores, bounding_box });
             }
         }
         detections
@@ -196,6 +202,9 @@ impl Simulated {
             ("odometry.translation", o.translation),
             ("odometry.rotation", o.rotation),
             ("detector.sigma_px", d.sigma_px),
+            ("detector.sigma_of_size", d.sigma_of_size),
+            ("detector.lasting", d.lasting),
+            ("detector.false_boxes", d.false_boxes),
             ("detector.min_size_px", d.min_size_px),
         ];
         let positive = [("trajectory.interval", t.interval), ("trajectory.radius", t.radius)];

@@ -87,6 +87,13 @@ impl Measurements {
         Some((place, view))
     }
 
+    /// Forgets an object: its boxes are of none.
+    pub(crate) fn disown(&mut self, id: ObjectId) {
+        if let Ok(place) = self.objects.binary_search_by_key(&id, |object| object.id) {
+            self.unassociated += self.objects.remove(place).detections;
+        }
+    }
+
     /// Gives what is measured of one object to another, and returns the boxes that are new to it: of two boxes in one frame, its own
     /// stays.
     pub(crate) fn merge(&mut self, from: ObjectId, into: ObjectId) -> Vec<ObjectBox> {

@@ -69,7 +69,9 @@ impl fmt::Display for Warning {
                     None => write!(f, "; there are {}", quoted_list(seen)),
                 }
             }
-            Self::NoObjects { detected: 0 } => f.write_str("no detection is associated with an object"),
+            Self::NoObjects { detected: 0 } => f.write_str(
+                "no box says which object it shows; `association = { type = \"likelihood\" }` finds out",
+            ),
             Self::NoObjects { detected } => {
                 write!(f, "none of {detected} detected objects is mapped; see why in objects.json")
             }

@@ -46,6 +46,14 @@ impl Mapper {
         names
     }
 
+    /// Forgets an object that is not in the map: its boxes are nobody's.
+    pub(super) fn forget(&mut self, id: ObjectId) {
+        if !self.objects.get(&id).is_some_and(Tracked::is_mapped) {
+            self.objects.remove(&id);
+            self.measurements.disown(id);
+        }
+    }
+
     /// Gives the boxes of one object to another: in the map, if that is there, or to place it by.
     fn unite(&mut self, merge: Merge, report: &mut FrameReport) {
         let Merge { from, into } = merge;

@@ -2,7 +2,7 @@
 use super::association::Known;
 use super::object::Tracked;
 use super::{FrameError, Mapper};
-use crate::association::{Image, Merge};
+use crate::association::{Image, Learned, Merge};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, ObjectId, Observation};
 use crate::mapping::measurements::ObjectBox;
@@ -46,8 +46,8 @@ pub struct FrameReport {
 pub(super) struct Seen {
     /// Boxes that passed the filters, by object.
     pub boxes: BTreeMap<ObjectId, ObjectBox>,
-    /// Objects that turn out to be one.
-    pub merges: Vec<Merge>,
+    /// What it has taught of earlier frames.
+    pub learned: Learned,
     /// Whether up is another than it was.
     pub up_moved: bool,
 }
@@ -112,7 +112,7 @@ impl Mapper {
         let predicted = Known { newest: (report.frame, report.pose), live: &self.live, session: &self.session };
         report.objects = self.associator.associate(&image, &predicted);
         let boxes = self.measure(detections, report);
-        let mut seen = Seen { boxes, merges: vec![], up_moved };
+        let mut seen = Seen { boxes, learned: Learned::default(), up_moved };
         report.boxes = seen.boxes.len();
         let alone = graph.clone();
         let mut owners = vec![];
@@ -132,7 +132,7 @@ impl Mapper {
         if report.refused.is_empty() {
             let newest = (report.frame, self.pose(report.frame).unwrap_or(report.pose));
             let known = Known { newest, live: &self.live, session: &self.session };
-            seen.merges = self.associator.learn(&image, &report.objects, &known);
+            seen.learned = self.associator.learn(&image, &report.objects, &known);
         }
         Ok(seen)
     }

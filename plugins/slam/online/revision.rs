@@ -3,7 +3,7 @@ use super::Mapper;
 use super::frame::{FrameReport, Seen};
 use super::object::{Mapped, Tracked};
 use super::rules::{Ledger, candidate};
-use crate::association::Merge;
+use crate::association::{Learned, Merge};
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measurements, ObjectBox};
@@ -42,12 +42,14 @@ impl Mapper {
                 sights.add(view, &pose, &self.camera);
             }
         }
+        let Learned { merged, forgotten } = &seen.learned;
+        forgotten.iter().for_each(|id| self.forget(*id));
         let is_due = |id: &ObjectId| self.due(*id).is_some();
-        if seen.merges.is_empty() && !seen.up_moved && !seen.boxes.keys().any(is_due) {
+        if merged.is_empty() && !seen.up_moved && !seen.boxes.keys().any(is_due) {
             return;
         }
-        let before = self.before(&seen.merges);
-        let names = self.unite_all(&seen.merges, report);
+        let before = self.before(merged);
+        let names = self.unite_all(merged, report);
         let ids: BTreeSet<ObjectId> = seen.boxes.keys().map(|id| names.now(*id)).collect();
         let due: Vec<(ObjectId, Due)> = ids.iter().filter_map(|id| Some((*id, self.due(*id)?))).collect();
         if seen.up_moved {

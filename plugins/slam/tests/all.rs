@@ -7,6 +7,7 @@
     clippy::print_stdout,
     clippy::print_stderr
 )]
+mod association;
 mod evo;
 mod online;
 mod simulation;

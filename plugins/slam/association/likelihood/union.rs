@@ -21,16 +21,20 @@ const ALIKE: f64 = 0.1;
 /// by this factor.
 const STRICTER: f64 = 2.0;
 
+/// How far apart two are that may be one, as a part of their sizes and of how well they are known; `None`, where they are too far apart,
+/// or were seen side by side.
+pub(super) fn gap(one: &Track, two: &Track) -> Option<f64> {
+    let apart = (one.fitted.quadric.centroid() - two.fitted.quadric.centroid()).norm();
+    let sizes = one.fitted.quadric.semi_axes.norm() + two.fitted.quadric.semi_axes.norm();
+    let spread = (one.place_covariance() + two.place_covariance()).trace().sqrt();
+    let gap = apart / (sizes + APART * spread);
+    let together = || common(&one.frames, &two.frames) as f64;
+    (gap <= 1.0 && together() <= TOGETHER * one.boxes().min(two.boxes()) as f64).then_some(gap)
+}
+
 /// The object that two are, with the name of the one with more boxes, if one ellipsoid explains all boxes.
 pub(super) fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Option<Union> {
     let (more, fewer) = if one.boxes() >= two.boxes() { (one, two) } else { (two, one) };
-    let apart = (more.fitted.quadric.centroid() - fewer.fitted.quadric.centroid()).norm();
-    let sizes = more.fitted.quadric.semi_axes.norm() + fewer.fitted.quadric.semi_axes.norm();
-    let spread = (more.place_covariance() + fewer.place_covariance()).trace().sqrt();
-    let together = common(&more.frames, &fewer.frames) as f64;
-    if apart > sizes + APART * spread || together > TOGETHER * fewer.boxes() as f64 {
-        return None;
-    }
     let (noise, mut sightings) = (settings.noise(), more.sightings.and(&fewer.sightings));
     let mut fitted = more.fitted;
     // from the ellipsoid of one it may be a long way to that of both

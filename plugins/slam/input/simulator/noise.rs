@@ -6,7 +6,7 @@ use manifactor_graph::Manifold;
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::{Vector3, Vector6};
 use rand::RngExt;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution, Poisson, StandardNormal};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -72,6 +72,12 @@ pub struct Detector {
     /// Standard deviation of each side of a box, in pixels. The paper says a variance of 4 px², its
     /// authors' code draws with 2 px: the same.
     pub sigma_px: f64,
+    /// What the noise has besides, as a part of width and height; the two add up as squares.
+    pub sigma_of_size: f64,
+    /// For how long the noise of an object's boxes lasts, in seconds: after that time 1/e of it is left. 0 for new noise in each frame.
+    pub lasting: f64,
+    /// Boxes of nothing in an image, on average.
+    pub false_boxes: f64,
     /// Boxes with a side shorter than this are not seen, in pixels.
     pub min_size_px: f64,
     /// Objects of which less than this share is in the image are not seen.
@@ -92,6 +98,9 @@ impl Default for Detector {
     fn default() -> Self {
         Self {
             sigma_px: 2.0,
+            sigma_of_size: 0.0,
+            lasting: 0.0,
+            false_boxes: 0.0,
             min_size_px: 8.0,
             min_visible: 0.3,
             missed: 0.0,
@@ -105,17 +114,27 @@ impl Default for Detector {
 
 impl Detector {
     /// The box that it draws; `None` where it draws none.
-    pub(super) fn draw(&self, boxes: &Boxes, camera: &Camera, rng: &mut Pcg64) -> Option<BoundingBox> {
+    /// `noise` is that of the object's box before, in standard deviations, and of this one after; `seconds` have passed.
+    pub(super) fn draw(
+        &self,
+        boxes: &Boxes,
+        camera: &Camera,
+        (noise, seconds): (&mut [f64; 4], f64),
+        rng: &mut Pcg64,
+    ) -> Option<BoundingBox> {
         // the same draws for each box, seen or not: one setting changes nothing but its own effect
         let (missed, hidden) = (rng.random_bool(self.missed), rng.random_bool(self.occluded));
         let (side, share) = (rng.random_range(0..4), rng.random::<f64>() * self.occlusion);
-        let noise = [(); 4].map(|()| self.sigma_px * normal(rng));
+        let left = if self.lasting > 0.0 { (-seconds / self.lasting).exp() } else { 0.0 };
+        noise.iter_mut().for_each(|n| *n = left * *n + (1.0 - left * left).sqrt() * normal(rng));
+        let (width, height) = (boxes.inside.width(), boxes.inside.height());
+        let sigma = [width, height].map(|size| self.sigma_px.hypot(self.sigma_of_size * size));
         let mut b = boxes.inside.bounds();
         if hidden {
             let extent = b[side % 2 + 2] - b[side % 2];
             b[side] += if side < 2 { share * extent } else { -share * extent };
         }
-        (0..4).for_each(|i| b[i] += noise[i]);
+        (0..4).for_each(|i| b[i] += sigma[i % 2] * noise[i]);
         let size = camera.size();
         for axis in 0..2 {
             let (low, high) = (b[axis].min(b[axis + 2]), b[axis].max(b[axis + 2]));
@@ -131,6 +150,30 @@ impl Detector {
         let (confused, score) = (rng.random_bool(self.confused), rng.random_range(0.5..1.0));
         let other = another(usual, classes, rng);
         ClassScores::single(if confused { other } else { usual }, score)
+    }
+}
+
+impl Detector {
+    /// Boxes of nothing in an image.
+    pub(super) fn imagine(
+        &self,
+        camera: &Camera,
+        classes: &[&str],
+        rng: &mut Pcg64,
+    ) -> Vec<(BoundingBox, ClassScores)> {
+        let count = Poisson::new(self.false_boxes).map_or(0, |poisson| poisson.sample(rng) as usize);
+        let size = camera.size();
+        let mut one = || {
+            let mut ends = |length: f64| {
+                let (a, b) = (rng.random::<f64>() * length, rng.random::<f64>() * length);
+                (a.min(b), a.max(b))
+            };
+            let ((xmin, xmax), (ymin, ymax)) = (ends(size.x), ends(size.y));
+            let class = classes.get(rng.random_range(0..classes.len().max(1)))?;
+            let scores = ClassScores::single(*class, rng.random_range(0.3..0.6));
+            Some((BoundingBox::new([xmin, ymin, xmax, ymax]).ok()?, scores))
+        };
+        (0..count).filter_map(|_| one()).collect()
     }
 }
 

@@ -1,0 +1,195 @@
+//! Boxes put to objects that nobody has named.
+use crate::tum::{data, document};
+use manifactor_config::{Document, Format};
+use manifactor_quadric::Camera;
+use manifactor_slam::association::{Association, Associator, Given, Image, Iou, Learned};
+use manifactor_slam::association::{Map, Merge, Projection};
+use manifactor_slam::class::Aliases;
+use manifactor_slam::metrics::IdentityScores;
+use manifactor_slam::online::Mapper;
+use manifactor_slam::report::VariantReport;
+use manifactor_slam::run::{self, Run};
+use manifactor_slam::run_document::RunDocument;
+use manifactor_slam::sequence::{Detection, ObjectId, Sequence};
+use manifactor_slam::settings::Settings;
+use manifactor_slam::source::Folders;
+use manifactor_solve::Silent;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+/// A desk whose objects come in three classes, seen by a detector that errs.
+const DESK: &str = r#"
+semantics = []
+association = { type = "likelihood" }
+odometry = { noise = { sigma = 0.003 } }
+detections = { noise = { sigma = 5.0 }, loss = { type = "cauchy", scale = 2.0 } }
+
+[source]
+type = "simulated"
+scene = { objects = 10, classes = ["bottle", "cup", "book"] }
+trajectory = { frames = 150 }
+detector = { missed = 0.1, confused = 0.1, sigma_px = 3.0, sigma_of_size = 0.02, lasting = 0.5, false_boxes = 0.1 }
+"#;
+
+fn scene(sets: &[&str]) -> (Settings, Arc<Sequence>) {
+    let mut document = Document::parse("desk.toml", DESK, Format::Toml).unwrap();
+    document.set(sets).unwrap();
+    let settings = RunDocument::read(&document).unwrap().variants.remove(0).settings;
+    let sequence = settings.source.load(&Folders::default()).unwrap();
+    (settings, Arc::new(sequence))
+}
+
+fn by(settings: &Settings, association: impl Association + 'static) -> Settings {
+    Settings { association: Arc::new(association), ..settings.clone() }
+}
+
+fn estimate(settings: &Settings, sequence: &Arc<Sequence>) -> VariantReport {
+    run::estimate("desk", sequence.clone(), settings, &mut Silent).unwrap().1
+}
+
+fn scores(report: &VariantReport) -> IdentityScores {
+    report.association.as_ref().unwrap().in_the_end.unwrap()
+}
+
+/// The names of all boxes as they come, by this association.
+fn names(settings: &Settings, sequence: &Sequence) -> Vec<Option<ObjectId>> {
+    let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
+    sequence.observations().flat_map(|frame| mapper.take(&frame).unwrap().objects).collect()
+}
+
+#[test]
+fn objects_without_names_are_mapped_as_those_with_names() {
+    let (settings, sequence) = scene(&[]);
+    let found = estimate(&settings, &sequence);
+    let known = estimate(&by(&settings, Given {}), &sequence);
+    let score = scores(&found);
+    assert!(score.f1 > 0.97 && score.objects <= 15, "{score:?}");
+    assert_eq!(score.true_objects, 10);
+    assert!(known.association.is_none());
+    let ate = |report: &VariantReport| report.trajectory[0].estimate.ate.rmse;
+    assert!(ate(&found) < 1.1 * ate(&known), "{} {}", ate(&found), ate(&known));
+    assert!(found.counts.objects >= known.counts.objects, "{:?} {:?}", found.counts, known.counts);
+}
+
+#[test]
+fn the_likelihood_does_better_than_overlap() {
+    let (settings, sequence) = scene(&[]);
+    let of = |settings: Settings| scores(&estimate(&settings, &sequence)).f1;
+    let (likelihood, iou, projection) =
+        (of(settings.clone()), of(by(&settings, Iou::default())), of(by(&settings, Projection::default())));
+    assert!(likelihood > iou + 0.05 && likelihood > projection + 0.05, "{likelihood} {iou} {projection}");
+    assert!(iou > 0.3 && projection > 0.3, "{iou} {projection}");
+}
+
+#[test]
+fn names_of_the_source_make_no_difference() {
+    let (settings, sequence) = scene(&[]);
+    let mut nameless = Sequence::clone(&sequence);
+    nameless.detections.iter_mut().for_each(|detection| detection.object = None);
+    let found = names(&settings, &sequence);
+    assert_eq!(found, names(&settings, &nameless));
+    assert_eq!(found, names(&settings, &sequence));
+    let report = estimate(&settings, &Arc::new(nameless));
+    assert_eq!(report.association.unwrap().in_the_end, None);
+    assert!(report.counts.objects >= 9);
+}
+
+#[test]
+fn an_eye_that_is_shut_for_a_while_knows_the_objects_again() {
+    let (settings, sequence) = scene(&[]);
+    let mut shut = Sequence::clone(&sequence);
+    shut.detections.retain(|detection| !(50..90).contains(&detection.frame));
+    let score = scores(&estimate(&settings, &Arc::new(shut)));
+    assert!(score.f1 > 0.95 && score.objects <= 15, "{score:?}");
+}
+
+#[test]
+fn a_detector_gone_mad_is_borne() {
+    let (settings, sequence) = scene(&["source.detector.false_boxes=250", "source.trajectory.frames=40"]);
+    assert!(sequence.detections.len() > 10_000);
+    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let mut named = BTreeSet::new();
+    for frame in sequence.observations() {
+        let report = mapper.take(&frame).unwrap();
+        // not all boxes are looked at
+        assert!(report.objects.iter().flatten().count() <= 200);
+        named.extend(report.objects.into_iter().flatten());
+    }
+    let all = mapper.measurements();
+    assert!(all.objects.len() < 1000 && all.objects.len() < named.len(), "{}", all.objects.len());
+}
+
+/// Calls all objects by other names in every other frame, and finds out later.
+#[derive(Debug, Clone, serde::Serialize)]
+struct Twofold {
+    found_out_at: usize,
+}
+
+const OTHER: u32 = 1000;
+
+#[typetag::serialize(name = "twofold")]
+impl Association for Twofold {
+    fn begin(&self, _: Camera, _: &Aliases) -> Box<dyn Associator> {
+        Box::new(self.clone())
+    }
+}
+
+impl Associator for Twofold {
+    fn associate(&self, image: &Image<'_>, _: &dyn Map) -> Vec<Option<ObjectId>> {
+        let is_other = image.frame % 2 == 1 && image.frame <= self.found_out_at;
+        let name = |id: ObjectId| if is_other { ObjectId(id.0 + OTHER) } else { id };
+        image.detections.iter().map(|detection: &Detection| detection.object.map(name)).collect()
+    }
+
+    fn learn(&mut self, image: &Image<'_>, _: &[Option<ObjectId>], _: &dyn Map) -> Learned {
+        let merge = |id| Merge { from: ObjectId(id + OTHER), into: ObjectId(id) };
+        let merged = if image.frame == self.found_out_at { (0..20).map(merge).collect() } else { vec![] };
+        Learned { merged, forgotten: vec![] }
+    }
+}
+
+#[test]
+fn objects_that_turn_out_to_be_one_become_one_in_the_map() {
+    let (settings, sequence) = scene(&[]);
+    let (given, twofold) = (by(&settings, Given {}), by(&settings, Twofold { found_out_at: 120 }));
+    let mut mapper = Mapper::new(sequence.opening(), &twofold).unwrap();
+    let mut most = 0;
+    for frame in sequence.observations() {
+        let report = mapper.take(&frame).unwrap();
+        assert_eq!(report.refused, Vec::<String>::new());
+        most = most.max(mapper.mapped());
+        assert_eq!(report.merged.is_empty(), report.frame != 120);
+    }
+    assert!(most > 15, "each object is there twice for a while: {most}");
+    let mut expected = Mapper::new(sequence.opening(), &given).unwrap();
+    sequence.observations().for_each(|frame| drop(expected.take(&frame).unwrap()));
+    let boxes = |mapper: &Mapper| {
+        let all = &mapper.measurements().objects;
+        all.iter().map(|object| (object.id, object.views.clone())).collect::<Vec<_>>()
+    };
+    assert_eq!(boxes(&mapper), boxes(&expected));
+    assert_eq!(mapper.mapped(), expected.mapped());
+    let factors = |mapper: &mut Mapper| mapper.session().graph().0.factors().len();
+    assert_eq!(factors(&mut mapper), factors(&mut expected));
+    let (cost, least) = (mapper.session().cost(), expected.session().cost());
+    assert!((cost - least).abs() < 0.05 * least, "{cost} {least}");
+}
+
+#[test]
+fn real_boxes_without_names_are_put_to_their_objects() {
+    let Some(data) = data() else { return };
+    let score = |association: &str| {
+        let run = document("fr1_desk.toml", &[&format!("association={association}")]);
+        let variant = run.variants.iter().find(|v| v.name == "Q C").unwrap();
+        let (_, report) = Run::new(&run, Some(data.clone())).variant(variant, &mut Silent).unwrap();
+        (scores(&report), report.trajectory[0].estimate.ate.rmse)
+    };
+    let (likelihood, ate) = score("{ type = 'likelihood' }");
+    assert!(likelihood.f1 > 0.9 && likelihood.objects < 39, "{likelihood:?}");
+    assert_eq!((likelihood.true_objects, likelihood.boxes), (26, 2177));
+    assert!(ate < 0.0165, "{ate}");
+    for other in ["{ type = 'iou' }", "{ type = 'projection' }"] {
+        let (found, _) = score(other);
+        assert!(found.f1 > 0.5 && found.f1 < 0.8, "{other}: {found:?}");
+    }
+}
