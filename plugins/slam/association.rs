@@ -39,10 +39,9 @@ pub trait Associator: Debug + Send {
     /// as it is predicted.
     fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>>;
 
-    /// Names the boxes of a frame that it has learned from, when all others have been seen: those that it knows, with all that is known.
-    /// `None`, where it has no more to say than it had.
-    fn reconsider(&self, _image: &Image<'_>, _map: &dyn Map) -> Option<Vec<Option<ObjectId>>> {
-        None
+    /// Names the boxes of a frame again that had these names, when all other frames have been seen.
+    fn reconsider(&self, _: &Image<'_>, names: &[Option<ObjectId>], _: &dyn Map) -> Vec<Option<ObjectId>> {
+        names.to_vec()
     }
 
     /// Learns from the boxes of a frame, which is in the map now, under these names.

@@ -3,8 +3,8 @@
 //! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
 //! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
 //! semantic rules say of it; last, variables and factors of the document's own.
-use crate::input::fusion::FusedClass;
 use crate::gravity::{GravityError, MapFrame};
+use crate::input::fusion::FusedClass;
 use crate::input::sequence::{ObjectId, Sequence};
 use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
 use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, Verdict, unmatched};

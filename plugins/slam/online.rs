@@ -150,13 +150,17 @@ impl Mapper {
         &mut self.session
     }
 
-    /// The objects of a frame's boxes, when all others have been seen. Those that nothing more is known of have none; `None`, where
-    /// the association has no more to say than it had.
-    pub fn reconsider(&self, frame: usize, observation: &Observation) -> Option<Vec<Option<ObjectId>>> {
-        let newest = (frame, self.pose(frame)?);
+    /// The objects of a frame's boxes, which had these names, when all other frames have been seen.
+    pub fn reconsider(
+        &self,
+        frame: usize,
+        observation: &Observation,
+        names: &[Option<ObjectId>],
+    ) -> Vec<Option<ObjectId>> {
+        let Some(pose) = self.pose(frame) else { return names.to_vec() };
         let (timestamp, detections) = (observation.frame.timestamp, observation.detections.as_slice());
-        let known = Known { newest, live: &self.live, session: &self.session };
-        self.associator.reconsider(&Image { frame, timestamp, detections }, &known)
+        let known = Known { newest: (frame, pose), live: &self.live, session: &self.session };
+        self.associator.reconsider(&Image { frame, timestamp, detections }, names, &known)
     }
 
     /// Names of objects that turned out to be others.

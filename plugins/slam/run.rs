@@ -1,8 +1,8 @@
 //! A run from its document to its report.
 use crate::estimate::{Estimate, EstimateError};
 use crate::input::sequence::Sequence;
-use crate::input::stream::Stream;
 use crate::input::source::{Folders, SourceError};
+use crate::input::stream::Stream;
 use crate::mapping::{Mapping, MappingError};
 use crate::online::{FinishError, FrameError, FrameReport, Mapper};
 use crate::output::report::{AssociationReport, Naming, OnlineReport, RunReport, VariantReport};
@@ -85,10 +85,11 @@ pub fn associated(
     }
     let mut first = 0;
     for (observation, frame) in sequence.observations().zip(taken) {
-        if let Some(names) = frame.and_then(|frame| mapper.reconsider(frame, &observation)) {
-            naming.reconsider(first, &names);
+        let boxes = first..first + observation.detections.len();
+        first = boxes.end;
+        if let Some(frame) = frame {
+            naming.replace(boxes, mapper.names(), |names| mapper.reconsider(frame, &observation, names));
         }
-        first += observation.detections.len();
     }
     for (detection, name) in named.detections.iter_mut().zip(naming.now(mapper.names())) {
         detection.object = name;

@@ -17,8 +17,8 @@
 //! ```
 //! The class `"*"` stands for all. `semantics = "table_one"` stands for the rules of the paper's Table I. All rules that are
 //! for an object apply to it.
-use crate::input::fusion::FusedClass;
 use crate::input::class::Aliases;
+use crate::input::fusion::FusedClass;
 use manifactor_graph::checked::{Positive, Share};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Direction, Factor, FactorEntry, Key, Noise};

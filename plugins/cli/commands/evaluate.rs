@@ -128,7 +128,12 @@ impl Evaluate {
         }
         let mut table = Table::of_numbers(&["pairs of boxes", "precision", "recall", "F1"]);
         let number = |x: f64| format!("{x:.4}");
-        table.row(["together".to_owned(), number(scores.precision), number(scores.recall), number(scores.f1)]);
+        table.row([
+            "together".to_owned(),
+            number(scores.precision),
+            number(scores.recall),
+            number(scores.f1),
+        ]);
         let mut told = format!(
             "{}, {}, {} of 3 boxes or more\n{}\n",
             text::count(scores.boxes, "box"),

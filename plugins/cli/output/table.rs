@@ -77,8 +77,11 @@ fn stream(variant: &VariantReport) -> String {
 fn association(variant: &VariantReport) -> String {
     let Some(association) = &variant.association else { return String::new() };
     let merged = text::count(association.merged, "object");
-    let mut line =
-        format!("{}: boxes put to objects by {}, {merged} merged", on_one_line(&variant.name), association.by);
+    let mut line = format!(
+        "{}: boxes put to objects by {}, {merged} merged",
+        on_one_line(&variant.name),
+        association.by
+    );
     if let (Some(then), Some(end)) = (&association.at_the_time, &association.in_the_end) {
         line += &format!(
             "; pairwise F1 {:.3} at the time, {:.3} in the end (precision {:.3}, recall {:.3}), {} of 3 boxes or more for {} true ones",

@@ -17,7 +17,11 @@ pub(super) fn best(rows: usize, columns: usize, gains: &[(usize, usize, f64)]) -
     }
     let (_, matched) = kuhn_munkres(&weights);
     let is_match = |(row, column): &(usize, usize)| *column < columns && weights[(*row, *column)] > 0;
-    matched.into_iter().enumerate().map(|pair| Some(pair).filter(is_match).map(|(_, column)| column)).collect()
+    matched
+        .into_iter()
+        .enumerate()
+        .map(|pair| Some(pair).filter(is_match).map(|(_, column)| column))
+        .collect()
 }
 
 #[cfg(test)]

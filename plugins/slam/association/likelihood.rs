@@ -151,26 +151,25 @@ struct Tracker {
 
 impl Associator for Tracker {
     fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
-        let mut names = vec![None; image.detections.len()];
-        let Some(pose) = map.pose(image.frame) else { return names };
-        let looked_at = best_scores(image.detections);
-        let (gains, tracks) = self.gains(image, &looked_at, &pose);
-        let matched = assignment::best(looked_at.len(), tracks.len(), &gains);
-        for (i, column) in looked_at.iter().zip(matched) {
-            names[*i] = column.map(|column| self.tracks[tracks[column]].id);
-        }
+        let mut names = self.put(image, &[], map);
         let mut next = (self.next..).map(ObjectId);
-        for i in looked_at {
+        for i in best_scores(image.detections) {
             if names[i].is_none() {
+                // new ones have twins as well
                 names[i] = self.twin(image.detections, &names, i).or_else(|| next.next());
             }
         }
         names
     }
 
-    fn reconsider(&self, image: &Image<'_>, map: &dyn Map) -> Option<Vec<Option<ObjectId>>> {
-        let known = |id: &ObjectId| id.0 < self.next;
-        Some(self.associate(image, map).into_iter().map(|name| name.filter(known)).collect())
+    fn reconsider(
+        &self,
+        image: &Image<'_>,
+        names: &[Option<ObjectId>],
+        map: &dyn Map,
+    ) -> Vec<Option<ObjectId>> {
+        let again = self.put(image, names, map);
+        again.into_iter().zip(names).map(|(again, before)| again.or(*before)).collect()
     }
 
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
@@ -180,8 +179,11 @@ impl Associator for Tracker {
         for (detection, id) in image.detections.iter().zip(names) {
             let Some(id) = *id else { continue };
             self.next = self.next.max(id.0.saturating_add(1));
-            let sighting =
-                Sighting { frame: image.frame, world_from_camera: pose, bounding_box: detection.bounding_box };
+            let sighting = Sighting {
+                frame: image.frame,
+                world_from_camera: pose,
+                bounding_box: detection.bounding_box,
+            };
             let Some(t) = self.track(id, &sighting, usual) else { continue };
             self.tracks[t].vote(&detection.scores, &self.aliases);
             seen.push((t, sighting));
@@ -202,15 +204,47 @@ impl Associator for Tracker {
 }
 
 impl Tracker {
+    /// The known objects of boxes, some of which had names before.
+    fn put(&self, image: &Image<'_>, before: &[Option<ObjectId>], map: &dyn Map) -> Vec<Option<ObjectId>> {
+        let mut names = vec![None; image.detections.len()];
+        let Some(pose) = map.pose(image.frame) else { return names };
+        let looked_at = best_scores(image.detections);
+        let (mut gains, tracks) = self.gains(image, &looked_at, &pose);
+        for (row, column, gain) in &mut gains {
+            let before = before.get(looked_at[*row]).copied().flatten();
+            if before == Some(self.tracks[tracks[*column]].id) {
+                *gain += STAY;
+            }
+        }
+        let matched = assignment::best(looked_at.len(), tracks.len(), &gains);
+        for (i, column) in looked_at.iter().zip(matched) {
+            names[*i] = column.map(|column| self.tracks[tracks[column]].id);
+        }
+        for i in looked_at {
+            if names[i].is_none() {
+                names[i] = self.twin(image.detections, &names, i);
+            }
+        }
+        names
+    }
+
     /// What there is to gain by putting boxes to objects instead of new ones, as (row, column, gain), and the objects of
     /// the columns.
-    fn gains(&self, image: &Image<'_>, boxes: &[usize], pose: &Se3) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
+    fn gains(
+        &self,
+        image: &Image<'_>,
+        boxes: &[usize],
+        pose: &Se3,
+    ) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
         let new = self.settings.cost_of_new(&self.camera);
-        let class = |i: &usize| image.detections[*i].scores.best().map(|(class, _)| self.aliases.canonical(class));
+        let class =
+            |i: &usize| image.detections[*i].scores.best().map(|(class, _)| self.aliases.canonical(class));
         let classes: Vec<Option<String>> = boxes.iter().map(class).collect();
         let (mut gains, mut tracks) = (vec![], vec![]);
         for (t, track) in self.tracks.iter().enumerate() {
-            let Some(expected) = track.expect(image.timestamp, pose, &self.camera, &self.settings) else { continue };
+            let Some(expected) = track.expect(image.timestamp, pose, &self.camera, &self.settings) else {
+                continue;
+            };
             let before = gains.len();
             for (row, i) in boxes.iter().enumerate() {
                 let b = &image.detections[*i].bounding_box;
@@ -233,7 +267,10 @@ impl Tracker {
     /// The name of the box that is nearly the same, if there is one.
     fn twin(&self, detections: &[Detection], names: &[Option<ObjectId>], i: usize) -> Option<ObjectId> {
         let own = &detections[i].bounding_box;
-        let named = detections.iter().zip(names).filter_map(|(other, name)| Some((own.iou(&other.bounding_box), (*name)?)));
+        let named = detections
+            .iter()
+            .zip(names)
+            .filter_map(|(other, name)| Some((own.iou(&other.bounding_box), (*name)?)));
         let near = named.filter(|(iou, _)| *iou >= self.settings.twin_iou);
         near.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
     }
@@ -259,7 +296,8 @@ impl Tracker {
     /// Forgets objects that are seen too rarely, and those that are seen least lately where there are too many such.
     fn forget(&mut self, now: f64) -> Vec<ObjectId> {
         let is_firm = |track: &Track| track.boxes() >= FIRM;
-        let mut seen: Vec<f64> = self.tracks.iter().filter(|track| !is_firm(track)).map(|track| track.seen_at).collect();
+        let mut seen: Vec<f64> =
+            self.tracks.iter().filter(|track| !is_firm(track)).map(|track| track.seen_at).collect();
         seen.sort_by(|a, b| b.total_cmp(a));
         let since = seen.get(WAITING).copied().unwrap_or(f64::NEG_INFINITY).max(now - PATIENCE);
         let stays = |track: &mut Track| is_firm(track) || track.seen_at > since;
@@ -294,13 +332,16 @@ impl Tracker {
     /// The objects that may be the same as this one, the nearest first.
     fn neighbours(&self, own: usize) -> Vec<usize> {
         let others = (0..self.tracks.len()).filter(|other| *other != own);
-        let near = others.filter_map(|other| Some((other, union::gap(&self.tracks[own], &self.tracks[other])?)));
+        let near =
+            others.filter_map(|other| Some((other, union::gap(&self.tracks[own], &self.tracks[other])?)));
         let mut near: Vec<(usize, f64)> = near.collect();
         near.sort_by(|(_, a), (_, b)| a.total_cmp(b));
         near.into_iter().take(NEIGHBOURS).map(|(other, _)| other).collect()
     }
 }
 
+/// What a box gains by the object that it had before: another has to be ten times as likely.
+const STAY: f64 = 4.6;
 /// Of so many objects it is asked in a frame, at most, whether they are the same as others,
 const LOOKS: usize = 20;
 /// of which so many are looked at, those that are nearest.

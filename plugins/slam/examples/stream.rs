@@ -121,7 +121,9 @@ fn tell(report: &VariantReport, batch: &VariantReport) {
         online.cost, report.solve.final_cost, batch.solve.final_cost, online.solved_batch
     );
     for (how, report) in [("live", report), ("batch", batch)] {
-        if let Some((then, now)) = report.association.as_ref().and_then(|a| Some((a.at_the_time?, a.in_the_end?))) {
+        if let Some((then, now)) =
+            report.association.as_ref().and_then(|a| Some((a.at_the_time?, a.in_the_end?)))
+        {
             println!(
                 "  {how}: F1 at the time {:.3}; in the end P {:.3} R {:.3} F1 {:.3}, homogeneity {:.3}, completeness {:.3}, identity F1 {:.3}, {} switches, {} objects of {}",
                 then.f1,

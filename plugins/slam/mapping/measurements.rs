@@ -2,8 +2,8 @@
 //!
 //! In this order: detections of no object and of low score are left out; the class is fused from all others; boxes cut
 //! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
-use crate::input::fusion::{FusedClass, Fusion};
 use crate::input::class::Aliases;
+use crate::input::fusion::{FusedClass, Fusion};
 use crate::input::sequence::{Detection, ObjectId, Sequence};
 use crate::settings::DetectionSettings;
 use manifactor_quadric::{BoundingBox, Camera};

@@ -64,7 +64,8 @@ where
         *found.entry(put).or_insert(0_usize) += 1;
         all += 1;
     }
-    let pairs = |counts: &mut dyn Iterator<Item = &usize>| counts.map(|n| (n * (n - 1) / 2) as f64).sum::<f64>();
+    let pairs =
+        |counts: &mut dyn Iterator<Item = &usize>| counts.map(|n| (n * (n - 1) / 2) as f64).sum::<f64>();
     let share = |part: f64, of: f64| if of > 0.0 { part / of } else { 1.0 };
     let right = pairs(&mut cells.values());
     let (precision, recall) =

@@ -109,7 +109,8 @@ impl Mapper {
         values.insert(pose_key(report.frame), report.pose);
         let detections = &observation.detections;
         let image = Image { frame: report.frame, timestamp, detections };
-        let predicted = Known { newest: (report.frame, report.pose), live: &self.live, session: &self.session };
+        let predicted =
+            Known { newest: (report.frame, report.pose), live: &self.live, session: &self.session };
         report.objects = self.associator.associate(&image, &predicted);
         let boxes = self.measure(detections, report);
         let mut seen = Seen { boxes, learned: Learned::default(), up_moved };

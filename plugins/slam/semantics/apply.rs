@@ -1,7 +1,7 @@
 //! From rules and objects to factors, each with its reason.
 use super::{Rule, RuleError};
-use crate::input::fusion::FusedClass;
 use crate::input::class::Aliases;
+use crate::input::fusion::FusedClass;
 use manifactor_graph::{Direction, FactorEntry, Key};
 use manifactor_quadric::DualQuadric;
 use serde::Serialize;

@@ -157,7 +157,13 @@ struct System {
 }
 
 impl System {
-    fn new(belief: &Belief, quadric: &DualQuadric, seen: &[Sighting], camera: &Camera, noise: &BoxNoise) -> Self {
+    fn new(
+        belief: &Belief,
+        quadric: &DualQuadric,
+        seen: &[Sighting],
+        camera: &Camera,
+        noise: &BoxNoise,
+    ) -> Self {
         let (r, j) = belief.rows(quadric);
         let mut all = Self { cost: r.norm_squared(), gradient: j.tr_mul(&r), h: j.tr_mul(&j) };
         for seen in seen {
@@ -190,7 +196,12 @@ fn whiten(
 }
 
 /// The square of a box's errors in standard deviations, which counts less and less where it is large.
-pub(super) fn squared_error(quadric: &DualQuadric, seen: &Sighting, camera: &Camera, noise: &BoxNoise) -> f64 {
+pub(super) fn squared_error(
+    quadric: &DualQuadric,
+    seen: &Sighting,
+    camera: &Camera,
+    noise: &BoxNoise,
+) -> f64 {
     let error = whiten(quadric, seen, camera, noise);
     error.map_or(LOST, |(error, _)| WIDTH * (error.norm_squared() / WIDTH).ln_1p())
 }

@@ -59,6 +59,12 @@ impl Track {
         self.frames.len()
     }
 
+    /// Whether each of two has its centre in the other.
+    pub(super) fn is_where(&self, other: &Self) -> bool {
+        let (own, others) = (&self.fitted.quadric, &other.fitted.quadric);
+        own.contains(&others.centroid()) && others.contains(&own.centroid())
+    }
+
     /// How far away it is, in metres.
     pub(super) fn distance(&self, from: &Se3) -> f64 {
         (self.fitted.quadric.centroid() - from.translation).norm()
@@ -101,11 +107,15 @@ impl Track {
         let seconds = (timestamp - self.seen_at).max(0.0);
         let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| drift * drift * seconds);
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
-        let by_drift = predicted.by_pose * nalgebra::Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
+        let by_drift =
+            predicted.by_pose * nalgebra::Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
         let by_quadric = predicted.by_quadric * self.fitted.covariance * predicted.by_quadric.transpose();
         let sigma = Vector4::from(settings.noise().deviations(&predicted.bounding_box)) * settings.lasting;
         let by_detector = Matrix4::from_diagonal(&sigma.component_mul(&sigma));
-        Some(Expected { bounding_box: predicted.bounding_box, covariance: by_quadric + by_drift + by_detector })
+        Some(Expected {
+            bounding_box: predicted.bounding_box,
+            covariance: by_quadric + by_drift + by_detector,
+        })
     }
 
     /// Intersection over union of a box with that of its ellipsoid.

@@ -1,6 +1,6 @@
 //! Whether two objects are one.
 use super::Likelihood;
-use super::fit::{fit, squared_error};
+use super::fit::{Fitted, fit, squared_error};
 use super::sightings::{Sighting, Sightings};
 use super::track::Track;
 use manifactor_quadric::Camera;
@@ -18,8 +18,12 @@ const TOGETHER: f64 = 0.05;
 const APART: f64 = 3.0;
 /// Objects whose classes are less alike than this need to fit better,
 const ALIKE: f64 = 0.1;
-/// by this factor.
-const STRICTER: f64 = 2.0;
+/// by this factor;
+const STRICTER: f64 = 1.4;
+/// those whose classes are more alike than this, and that are at the same place, where there is room for one, need to fit less well,
+const SAME: f64 = 0.5;
+/// by this factor: what has no simple shape has boxes that no ellipsoid explains.
+const LOOSER: f64 = 2.0;
 
 /// How far apart two are that may be one, as a part of their sizes and of how well they are known; `None`, where they are too far apart,
 /// or were seen side by side.
@@ -36,19 +40,31 @@ pub(super) fn gap(one: &Track, two: &Track) -> Option<f64> {
 pub(super) fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Option<Union> {
     let (more, fewer) = if one.boxes() >= two.boxes() { (one, two) } else { (two, one) };
     let (noise, mut sightings) = (settings.noise(), more.sightings.and(&fewer.sightings));
-    let mut fitted = more.fitted;
-    // from the ellipsoid of one it may be a long way to that of both
-    for _ in 0..2 {
-        fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
-    }
+    // the boxes of one may look like outliers from the other
+    let starts = [more, fewer].into_iter().filter_map(|start| {
+        let mut fitted = start.fitted;
+        // from the ellipsoid of one it may be a long way to that of both
+        for _ in 0..2 {
+            fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
+        }
+        Some(fitted)
+    });
+    let cost = |fitted: &Fitted| -> f64 {
+        sightings.all().iter().map(|seen| squared_error(&fitted.quadric, seen, camera, &noise)).sum()
+    };
+    let fitted = starts.min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
     let error_of = |sightings: &Sightings| {
         let error = |seen: &Sighting| squared_error(&fitted.quadric, seen, camera, &noise);
         let all = sightings.all();
         all.iter().map(error).sum::<f64>() / (4 * all.len().max(1)) as f64
     };
     let error = error_of(&more.sightings).max(error_of(&fewer.sightings));
-    let stricter = if alike(more, fewer) < ALIKE { STRICTER } else { 1.0 };
-    if error * stricter > settings.merge_error * settings.merge_error {
+    let limit = match alike(more, fewer) {
+        alike if alike < ALIKE => settings.merge_error / STRICTER,
+        alike if alike > SAME && more.is_where(fewer) => settings.merge_error * LOOSER,
+        _ => settings.merge_error,
+    };
+    if error > limit * limit {
         return None;
     }
     let mut track = more.clone();

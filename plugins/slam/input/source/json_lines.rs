@@ -96,7 +96,8 @@ fn is_sure(score: &f64) -> bool {
 pub fn line(observation: &Observation) -> String {
     let of_box = |detection: &Detection| {
         let scores: IndexMap<String, f64> = detection.scores.iter().map(|(c, s)| (c.to_owned(), s)).collect();
-        let single = scores.first().filter(|_| scores.len() == 1).map(|(class, score)| (class.clone(), *score));
+        let single =
+            scores.first().filter(|_| scores.len() == 1).map(|(class, score)| (class.clone(), *score));
         LineBox {
             bounding_box: detection.bounding_box,
             scores: if single.is_some() { IndexMap::new() } else { scores },
@@ -158,7 +159,8 @@ impl JsonLines {
         let (file, reader): (_, Box<dyn BufRead + Send>) = match &self.file {
             Some(file) => {
                 let file = folders.beside_document(file);
-                let opened = File::open(&file).map_err(|source| FormatError::Io { path: file.clone(), source })?;
+                let opened =
+                    File::open(&file).map_err(|source| FormatError::Io { path: file.clone(), source })?;
                 (file, Box::new(BufReader::new(opened)))
             }
             None if READ.swap(true, Ordering::Relaxed) => {
@@ -231,7 +233,8 @@ mod tests {
     use std::path::Path;
 
     fn source(folder: &Path, file: &str) -> JsonLines {
-        let camera = json!({ "fx": 320.0, "fy": 320.0, "cx": 320.0, "cy": 240.0, "width": 640, "height": 480 });
+        let camera =
+            json!({ "fx": 320.0, "fy": 320.0, "cx": 320.0, "cy": 240.0, "width": 640, "height": 480 });
         std::fs::write(folder.join("frames.jsonl"), file).unwrap();
         serde_json::from_value(json!({ "camera": camera, "file": "frames.jsonl" })).unwrap()
     }

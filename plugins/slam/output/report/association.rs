@@ -3,6 +3,7 @@ use crate::association::{Association, Names};
 use crate::input::sequence::{Detection, ObjectId};
 use crate::metrics::{IdentityScores, identity};
 use serde::Serialize;
+use std::ops::Range;
 
 /// An association of boxes with objects, scored by the names that the source gives where it gives any.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,14 +38,22 @@ impl Naming {
     /// Takes note of a frame's boxes, and of the names that they were given; none, where the frame was left out.
     pub(crate) fn note(&mut self, detections: &[Detection], given: &[Option<ObjectId>]) {
         let given = given.iter().copied().chain(std::iter::repeat(None));
-        let named = |(detection, given): (&Detection, _)| Named { truth: detection.object, then: given, now: given };
+        let named =
+            |(detection, given): (&Detection, _)| Named { truth: detection.object, then: given, now: given };
         self.0.extend(detections.iter().zip(given).map(named));
     }
 
-    /// Gives boxes other names, from the `first` on; those of which nothing more is known keep their own.
-    pub(crate) fn reconsider(&mut self, first: usize, names: &[Option<ObjectId>]) {
-        for (named, name) in self.0.iter_mut().skip(first).zip(names) {
-            named.now = name.or(named.now);
+    /// Gives some boxes other names for those that they have.
+    pub(crate) fn replace(
+        &mut self,
+        boxes: Range<usize>,
+        names: &Names,
+        by: impl FnOnce(&[Option<ObjectId>]) -> Vec<Option<ObjectId>>,
+    ) {
+        let boxes = self.0.get_mut(boxes).unwrap_or_default();
+        let now: Vec<_> = boxes.iter().map(|named| named.now.map(|name| names.now(name))).collect();
+        for (named, name) in boxes.iter_mut().zip(by(&now)) {
+            named.now = name;
         }
     }
 
