@@ -4,6 +4,7 @@ use manifactor::graph::catalogue::{Entry, Kind, all, entries};
 use manifactor::graph::loss::Loss;
 use manifactor::graph::{Factor, Noise, Variable};
 use manifactor::quadric::initialise::Initialiser;
+use manifactor::slam::association::Association;
 use manifactor::slam::gravity::Gravity;
 use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::schema::run_root;
@@ -153,6 +154,7 @@ macro_rules! for_kind {
             k if k == <dyn Optimizer as Kind>::NAME => $call::<Box<dyn Optimizer>>($($argument),*),
             k if k == <dyn Start as Kind>::NAME => $call::<Box<dyn Start>>($($argument),*),
             k if k == <dyn Source as Kind>::NAME => $call::<Box<dyn Source>>($($argument),*),
+            k if k == <dyn Association as Kind>::NAME => $call::<Box<dyn Association>>($($argument),*),
             k if k == <dyn Gravity as Kind>::NAME => $call::<Box<dyn Gravity>>($($argument),*),
             k if k == <dyn Initialiser as Kind>::NAME => $call::<Box<dyn Initialiser>>($($argument),*),
             other => panic!("the kind `{other}` is new: add it to this test"),

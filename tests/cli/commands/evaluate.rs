@@ -41,3 +41,17 @@ fn a_malformed_trajectory_is_shown_with_its_line() {
     let ran = manifactor(&format!("evaluate {} {}", path(&folder, "truth.txt"), path(&folder, "bad.txt")));
     ran.ended(2).complains("bad.txt:2:1");
 }
+
+#[test]
+fn boxes_that_do_not_meet_are_an_error() {
+    let header = "timestamp,class_name,score,xmin,ymin,xmax,ymax,object_key\n";
+    let (one, other) = (format!("{header}0,cup,0.5,1,1,5,5,3\n"), format!("{header}9,cup,0.5,1,1,5,5,3\n"));
+    let folder = folder(&[("one.csv", &one), ("other.csv", &other)]);
+    let (one, other) = (path(&folder, "one.csv"), path(&folder, "other.csv"));
+    let ran = manifactor(&format!("evaluate --boxes {one} {one}")).ended(0);
+    assert!(ran.stdout.contains("1 box, 1 true object, 0 objects"), "{}", ran.stdout);
+    manifactor(&format!("evaluate --boxes {one} {other}"))
+        .ended(2)
+        .complains("are time stamps and sides written alike?");
+    manifactor(&format!("evaluate --boxes {one} {one} --delta 3")).ended(2).complains("cannot be used with");
+}

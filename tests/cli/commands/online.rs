@@ -1,5 +1,5 @@
 use crate::endings::interrupt::AtWork;
-use crate::{folder, manifactor, path};
+use crate::{fed, folder, manifactor, path};
 use serde_json::Value;
 
 const DESK: &str = r#"
@@ -64,4 +64,80 @@ fn a_stream_that_waits_is_interrupted_and_written() {
     let ran = work.until("1 frame: ", 0).ended_by("-INT");
     assert_eq!(ran.code, 130, "{}", ran.stderr);
     assert_eq!(count(&std::fs::read_to_string(format!("{out}/estimate/live.txt")).unwrap()), 1);
+}
+
+/// The desk's frames, as they come from somewhere else.
+const LIVE: &str = r#"
+semantics = "table_one"
+association = { type = "likelihood" }
+odometry = { noise = { sigma = 0.01 } }
+detections = { loss = { type = "cauchy", scale = 2.8 } }
+
+[source]
+type = "json_lines"
+camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }
+up = [0.0, 0.0, 1.0]
+"#;
+
+#[test]
+fn frames_that_come_as_lines_are_mapped_without_names() {
+    let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
+    let (desk, live, out) = (path(&folder, "desk.toml"), path(&folder, "live.toml"), path(&folder, "out"));
+    let lines = manifactor(&format!("simulate {desk} --lines")).ended(0).stdout;
+    assert_eq!(lines.lines().count(), 60);
+    // twice a frame, and a line that is none
+    let second = lines.lines().nth(1).unwrap();
+    let broken = lines.replacen(second, &format!("{second}\n{{\n{second}"), 1);
+    let ran = fed(&format!("online {live} --out {out}"), &broken).ended(0);
+    ran.complains("standard input, line 3: EOF while parsing");
+    ran.complains("does not come after the one before");
+    assert!(ran.stdout.contains("boxes put to objects by likelihood"), "{}", ran.stdout);
+    let metrics = std::fs::read_to_string(format!("{out}/estimate/metrics.json")).unwrap();
+    let metrics: Value = serde_json::from_str(&metrics).unwrap();
+    assert_eq!((&metrics["counts"]["frames"], &metrics["online"]["refusals"]), (&60.into(), &2.into()));
+    assert!(
+        metrics["association"]["in_the_end"]["f1"].as_f64().unwrap() > 0.97,
+        "{}",
+        metrics["association"]
+    );
+    // what boxes were put to is a file of detections, which scores as the report says
+    let truth = path(&folder, "truth");
+    manifactor(&format!("simulate {desk} --out {truth}")).ended(0);
+    let files = format!("{truth}/detections.csv {out}/estimate/detections.csv");
+    let scored = manifactor(&format!("evaluate --boxes {files} --json")).ended(0).json();
+    assert_eq!(scored["scores"], metrics["association"]["in_the_end"]);
+}
+
+#[test]
+fn boxes_that_nobody_names_are_told_of_what_would_name_them() {
+    let nobody = LIVE.replace("association = { type = \"likelihood\" }", "");
+    let folder = folder(&[("desk.toml", DESK), ("live.toml", &nobody)]);
+    let lines = manifactor(&format!("simulate {} --lines", path(&folder, "desk.toml"))).ended(0).stdout;
+    let nameless: Vec<String> = lines.lines().map(nameless).collect();
+    let (live, out) = (path(&folder, "live.toml"), path(&folder, "out"));
+    for command in ["run", "online"] {
+        let ran = fed(&format!("{command} {live} --out {out} --force"), &nameless.join("\n")).ended(1);
+        assert!(ran.stdout.contains("no box says which object it shows"), "{}", ran.stdout);
+    }
+}
+
+/// A frame whose boxes have no names.
+fn nameless(line: &str) -> String {
+    let mut frame: Value = serde_json::from_str(line).unwrap();
+    for seen in frame["boxes"].as_array_mut().unwrap() {
+        seen.as_object_mut().unwrap().remove("object");
+    }
+    frame.to_string()
+}
+
+#[test]
+fn standard_input_is_read_once() {
+    let two = format!("{LIVE}\n[[variants]]\nname = \"one\"\n[[variants]]\nname = \"two\"\n");
+    let folder = folder(&[("desk.toml", DESK), ("live.toml", &two)]);
+    let lines = manifactor(&format!("simulate {} --lines", path(&folder, "desk.toml"))).ended(0).stdout;
+    let (live, out) = (path(&folder, "live.toml"), path(&folder, "out"));
+    let ran = fed(&format!("online {live} --out {out}"), &lines).ended(2);
+    ran.complains("standard input can be read once");
+    // a batch keeps what it has read
+    fed(&format!("run {live} --out {out}_of_run"), &lines).ended(0);
 }
