@@ -1,15 +1,18 @@
 //! Whether two objects are one.
+use super::super::Merge;
 use super::Likelihood;
 use super::fit::{Fitted, fit, squared_error};
 use super::sightings::{Sighting, Sightings};
 use super::track::Track;
+use super::tracker::Tracker;
+use crate::input::sequence::ObjectId;
 use manifactor_quadric::Camera;
 
 /// Two objects that are one.
-pub(super) struct Union {
-    pub track: Track,
+struct Union {
+    track: Track,
     /// Mean square of the errors of its sides, in their standard deviations, of the worse of the two.
-    pub error: f64,
+    error: f64,
 }
 
 /// Objects that are seen in one frame are two: of the frames of the one with fewer, this share is forgiven.
@@ -25,9 +28,50 @@ const SAME: f64 = 0.5;
 /// by this factor: what has no simple shape has boxes that no ellipsoid explains.
 const LOOSER: f64 = 2.0;
 
+/// Of so many objects it is asked in a frame, at most, whether they are the same as others,
+const LOOKS: usize = 20;
+/// of which so many are looked at, those that are nearest.
+const NEIGHBOURS: usize = 8;
+
+impl Tracker {
+    /// Makes one of objects that turn out to be one: looks at those that were seen in this frame and have many more boxes than when
+    /// they were looked at last.
+    pub(super) fn merge(&mut self, frame: usize) -> Vec<Merge> {
+        let mut merges = vec![];
+        let due = self.tracks.iter_mut().filter_map(|track| track.is_due(frame));
+        let due: Vec<ObjectId> = due.take(LOOKS).collect();
+        for id in due {
+            // it may be gone by now
+            let Some(own) = self.tracks.iter().position(|track| track.id == id) else { continue };
+            let unions = self.neighbours(own).into_iter().filter_map(|other| {
+                let (one, two) = (&self.tracks[own], &self.tracks[other]);
+                Some((other, of(one, two, &self.camera, &self.settings)?))
+            });
+            let best = unions.min_by(|(_, a), (_, b)| a.error.total_cmp(&b.error));
+            if let Some((other, union)) = best {
+                let gone = if union.track.id == id { other } else { own };
+                let stays = own + other - gone;
+                merges.push(Merge { from: self.tracks[gone].id, into: union.track.id });
+                self.tracks[stays] = union.track;
+                self.tracks.remove(gone);
+            }
+        }
+        merges
+    }
+
+    /// The objects that may be the same as this one, the nearest first.
+    fn neighbours(&self, own: usize) -> Vec<usize> {
+        let others = (0..self.tracks.len()).filter(|other| *other != own);
+        let near = others.filter_map(|other| Some((other, gap(&self.tracks[own], &self.tracks[other])?)));
+        let mut near: Vec<(usize, f64)> = near.collect();
+        near.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        near.into_iter().take(NEIGHBOURS).map(|(other, _)| other).collect()
+    }
+}
+
 /// How far apart two are that may be one, as a part of their sizes and of how well they are known; `None`, where they are too far apart,
 /// or were seen side by side.
-pub(super) fn gap(one: &Track, two: &Track) -> Option<f64> {
+fn gap(one: &Track, two: &Track) -> Option<f64> {
     let apart = (one.fitted.quadric.centroid() - two.fitted.quadric.centroid()).norm();
     let sizes = one.fitted.quadric.semi_axes.norm() + two.fitted.quadric.semi_axes.norm();
     let spread = (one.place_covariance() + two.place_covariance()).trace().sqrt();
@@ -37,7 +81,7 @@ pub(super) fn gap(one: &Track, two: &Track) -> Option<f64> {
 }
 
 /// The object that two are, with the name of the one with more boxes, if one ellipsoid explains all boxes.
-pub(super) fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Option<Union> {
+fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Option<Union> {
     let (more, fewer) = if one.boxes() >= two.boxes() { (one, two) } else { (two, one) };
     let (noise, mut sightings) = (settings.noise(), more.sightings.and(&fewer.sightings));
     // the boxes of one may look like outliers from the other

@@ -1,0 +1,206 @@
+//! All objects: boxes are put to them, and they learn from boxes.
+use super::super::{Associator, Image, Learned, Map, assignment};
+use super::Likelihood;
+use super::fit::Belief;
+use super::sightings::Sighting;
+use super::track::Track;
+use crate::input::class::Aliases;
+use crate::input::sequence::{Detection, ObjectId};
+use manifactor_geometry::Se3;
+use manifactor_quadric::Camera;
+
+/// Boxes of a frame that are looked at, those of the highest scores: a detector that draws more has gone mad.
+const BOXES: usize = 200;
+/// An object of fewer boxes is forgotten when it was not seen for a while.
+const FIRM: usize = 3;
+/// That while, in seconds.
+const PATIENCE: f64 = 10.0;
+/// So many such objects are kept at most.
+const WAITING: usize = 500;
+/// What a box gains by the object that it had before: another has to be ten times as likely.
+const STAY: f64 = 4.6;
+/// Objects whose depth is known to this part tell how far away things are.
+const KNOWN_DEPTH: f64 = 0.15;
+
+/// All objects.
+#[derive(Debug)]
+pub(super) struct Tracker {
+    pub settings: Likelihood,
+    pub camera: Camera,
+    aliases: Aliases,
+    pub tracks: Vec<Track>,
+    next: u32,
+}
+
+impl Associator for Tracker {
+    fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
+        let mut names = self.put(image, &[], map);
+        let mut next = (self.next..).map(ObjectId);
+        for i in best_scores(image.detections) {
+            if names[i].is_none() {
+                // new ones have twins as well
+                names[i] = self.twin(image.detections, &names, i).or_else(|| next.next());
+            }
+        }
+        names
+    }
+
+    fn reconsider(
+        &self,
+        image: &Image<'_>,
+        names: &[Option<ObjectId>],
+        map: &dyn Map,
+    ) -> Vec<Option<ObjectId>> {
+        let again = self.put(image, names, map);
+        again.into_iter().zip(names).map(|(again, before)| again.or(*before)).collect()
+    }
+
+    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
+        let Some(pose) = map.pose(image.frame) else { return Learned::default() };
+        let usual = self.usual_depth(&pose);
+        let mut seen = vec![];
+        for (detection, id) in image.detections.iter().zip(names) {
+            let Some(id) = *id else { continue };
+            self.next = self.next.max(id.0.saturating_add(1));
+            let sighting = Sighting {
+                frame: image.frame,
+                world_from_camera: pose,
+                bounding_box: detection.bounding_box,
+            };
+            let Some(t) = self.track(id, &sighting, usual) else { continue };
+            self.tracks[t].vote(&detection.scores, &self.aliases);
+            seen.push((t, sighting));
+        }
+        // of twins the one that fits best
+        seen.sort_by(|(a, x), (b, y)| {
+            let fits = |t: usize, sighting: &Sighting| self.tracks[t].overlap(sighting, &self.camera);
+            a.cmp(b).then(fits(*b, y).total_cmp(&fits(*a, x)))
+        });
+        seen.dedup_by_key(|(t, _)| *t);
+        let noise = self.settings.noise();
+        for (t, sighting) in &seen {
+            self.tracks[*t].see(*sighting, image.timestamp, map, &self.camera, &noise);
+        }
+        let forgotten = self.forget(image.timestamp);
+        Learned { merged: self.merge(image.frame), forgotten }
+    }
+}
+
+impl Tracker {
+    /// No object.
+    pub(super) fn new(settings: Likelihood, camera: Camera, aliases: Aliases) -> Self {
+        Self { settings, camera, aliases, tracks: vec![], next: 1 }
+    }
+
+    /// The known objects of boxes, some of which had names before.
+    fn put(&self, image: &Image<'_>, before: &[Option<ObjectId>], map: &dyn Map) -> Vec<Option<ObjectId>> {
+        let mut names = vec![None; image.detections.len()];
+        let Some(pose) = map.pose(image.frame) else { return names };
+        let looked_at = best_scores(image.detections);
+        let (mut gains, tracks) = self.gains(image, &looked_at, &pose);
+        for (row, column, gain) in &mut gains {
+            let before = before.get(looked_at[*row]).copied().flatten();
+            if before == Some(self.tracks[tracks[*column]].id) {
+                *gain += STAY;
+            }
+        }
+        let matched = assignment::best(looked_at.len(), tracks.len(), &gains);
+        for (i, column) in looked_at.iter().zip(matched) {
+            names[*i] = column.map(|column| self.tracks[tracks[column]].id);
+        }
+        for i in looked_at {
+            if names[i].is_none() {
+                names[i] = self.twin(image.detections, &names, i);
+            }
+        }
+        names
+    }
+
+    /// What there is to gain by putting boxes to objects instead of new ones, as (row, column, gain), and the objects of
+    /// the columns.
+    fn gains(
+        &self,
+        image: &Image<'_>,
+        boxes: &[usize],
+        pose: &Se3,
+    ) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
+        let new = self.settings.cost_of_new(&self.camera);
+        let class =
+            |i: &usize| image.detections[*i].scores.best().map(|(class, _)| self.aliases.canonical(class));
+        let classes: Vec<Option<String>> = boxes.iter().map(class).collect();
+        let (mut gains, mut tracks) = (vec![], vec![]);
+        for (t, track) in self.tracks.iter().enumerate() {
+            let Some(expected) = track.expect(image.timestamp, pose, &self.camera, &self.settings) else {
+                continue;
+            };
+            let before = gains.len();
+            for (row, i) in boxes.iter().enumerate() {
+                let b = &image.detections[*i].bounding_box;
+                if !b.intersects(&expected.bounding_box) {
+                    continue;
+                }
+                let share = classes[row].as_deref().map_or(1.0, |class| track.share(class));
+                let cost = expected.cost(b) - 2.0 * self.settings.likelihood(share).ln();
+                if cost < new {
+                    gains.push((row, tracks.len(), new - cost));
+                }
+            }
+            if gains.len() > before {
+                tracks.push(t);
+            }
+        }
+        (gains, tracks)
+    }
+
+    /// The name of the box that is nearly the same, if there is one.
+    fn twin(&self, detections: &[Detection], names: &[Option<ObjectId>], i: usize) -> Option<ObjectId> {
+        let own = &detections[i].bounding_box;
+        let named = detections
+            .iter()
+            .zip(names)
+            .filter_map(|(other, name)| Some((own.iou(&other.bounding_box), (*name)?)));
+        let near = named.filter(|(iou, _)| *iou >= self.settings.twin_iou);
+        near.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
+    }
+
+    /// The place of an object, which may begin with this sighting.
+    fn track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
+        let known = self.tracks.iter().position(|track| track.id == id);
+        known.or_else(|| {
+            let belief = Belief::new(first, &self.camera, depth, self.settings.depth_spread);
+            self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);
+            Some(self.tracks.len() - 1)
+        })
+    }
+
+    /// How far away objects are from here, as far as is known: the median.
+    fn usual_depth(&self, pose: &Se3) -> f64 {
+        let known = self.tracks.iter().filter(|track| track.depth_spread() < KNOWN_DEPTH);
+        let mut depths: Vec<f64> = known.map(|track| track.distance(pose)).collect();
+        depths.sort_by(f64::total_cmp);
+        if depths.len() < FIRM { self.settings.depth } else { depths[depths.len() / 2] }
+    }
+
+    /// Forgets objects that are seen too rarely, and those that are seen least lately where there are too many such.
+    fn forget(&mut self, now: f64) -> Vec<ObjectId> {
+        let is_firm = |track: &Track| track.boxes() >= FIRM;
+        let mut seen: Vec<f64> =
+            self.tracks.iter().filter(|track| !is_firm(track)).map(|track| track.seen_at).collect();
+        seen.sort_by(|a, b| b.total_cmp(a));
+        let since = seen.get(WAITING).copied().unwrap_or(f64::NEG_INFINITY).max(now - PATIENCE);
+        let stays = |track: &mut Track| is_firm(track) || track.seen_at > since;
+        self.tracks.extract_if(.., |track| !stays(track)).map(|track| track.id).collect()
+    }
+}
+
+/// The boxes that are looked at, in order.
+fn best_scores(detections: &[Detection]) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..detections.len()).collect();
+    if all.len() > BOXES {
+        let score = |i: &usize| detections[*i].scores.best().map_or(0.0, |(_, score)| score);
+        all.sort_by(|a, b| score(b).total_cmp(&score(a)));
+        all.truncate(BOXES);
+        all.sort_unstable();
+    }
+    all
+}
