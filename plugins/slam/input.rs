@@ -1,6 +1,7 @@
 //! What a run is told: sequences of frames, where they come from, and the classes of objects.
 pub mod class;
 pub mod fusion;
+pub mod journal;
 pub mod recording;
 pub mod sequence;
 pub mod simulator;

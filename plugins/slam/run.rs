@@ -1,5 +1,6 @@
 //! A run from its document to its report.
 use crate::estimate::{Estimate, EstimateError};
+use crate::input::journal::{JournalError, journaled};
 use crate::input::sequence::Sequence;
 use crate::input::source::{Folders, SourceError};
 use crate::input::stream::Stream;
@@ -30,6 +31,9 @@ pub enum RunError {
     /// A setting of the session is outside its domain.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// Frames that cannot be kept.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
     /// A map that came frame by frame has no end.
     #[error(transparent)]
     Finish(#[from] FinishError),
@@ -115,6 +119,7 @@ pub fn online(
     let mut taken = stream.opening.into_sequence();
     for observation in stream.observations {
         if let Ok(observation) = &observation
+            && observation.frame.timestamp > stream.past
             && watch.wait(observation.frame.timestamp).is_break()
         {
             progress.interrupted = true;
@@ -171,6 +176,7 @@ pub struct Run<'a> {
     pub document: &'a RunDocument,
     folders: Folders,
     loaded: Vec<(String, Arc<Sequence>)>,
+    journal: Option<PathBuf>,
     began: Instant,
     reports: Vec<VariantReport>,
 }
@@ -179,7 +185,12 @@ impl<'a> Run<'a> {
     /// Nothing done yet; `data` is the folder of public data sets.
     pub fn new(document: &'a RunDocument, data: Option<PathBuf>) -> Self {
         let folders = Folders { data, document: document.folder.clone() };
-        Self { document, folders, loaded: vec![], began: Instant::now(), reports: vec![] }
+        Self { document, folders, loaded: vec![], journal: None, began: Instant::now(), reports: vec![] }
+    }
+
+    /// Keeps the frames of a stream in a file, and begins with those that it has; see [`journal`](crate::journal).
+    pub fn keep_frames(&mut self, journal: PathBuf) {
+        self.journal = Some(journal);
     }
 
     /// The sequence of a variant.
@@ -228,6 +239,11 @@ impl<'a> Run<'a> {
         let stream = match variant.settings.source.open(&self.folders)? {
             Some(stream) => stream,
             None => self.sequence(variant)?.into(),
+        };
+        let stream = match &self.journal {
+            Some(_) if self.document.variants.len() > 1 => return Err(JournalError::Variants.into()),
+            Some(path) => journaled(stream, path, &variant.settings.fingerprint())?,
+            None => stream,
         };
         let done = online(&variant.name, stream, &variant.settings, watch, observer)?;
         Ok(self.keep(variant, done, clock))

@@ -12,6 +12,7 @@ use manifactor::slam::run::Watch;
 use manifactor::solve::{All, Interrupt};
 use serde_json::json;
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -27,6 +28,10 @@ pub(crate) struct Online {
     /// Wait for each frame's time: 1 is as fast as it was recorded, 2 twice as fast. Default: no waiting.
     #[arg(long, value_name = "X", value_parser = faster)]
     rate: Option<f64>,
+    /// Keep the frames in this file as they come, and begin with those that it has: after a kill, the same command goes on with
+    /// the same map.
+    #[arg(long, value_name = "FILE")]
+    journal: Option<PathBuf>,
     /// Tell of every N-th frame on stderr; with --json, in a line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
@@ -42,6 +47,9 @@ impl Online {
         let mut interrupt = interrupt::on_ctrl_c();
         let flag = interrupt.0.clone();
         let report = self.options.run_as("online", &flag, |run, variant| {
+            if let Some(journal) = &self.journal {
+                run.keep_frames(journal.clone());
+            }
             let mut frames = Frames { command: self, interrupt: interrupt.clone(), frames: 0, begun: None };
             let mut progress = Progress::new(verbose, &variant.name);
             run.variant_online(variant, &mut frames, &mut All(vec![&mut progress, &mut interrupt]))

@@ -2,7 +2,7 @@
 //!
 //! `kitti FOLDER SEQUENCE OUT`: FOLDER has `orbslam3_poses` (3 × 4, by frame), `label_02` and `pointrcnn_car`. A box gets the number of the track
 //! whose box it overlaps most with, if that is by half and its object is within 2 m of one place in 10 frames or more; else none.
-#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::expect_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, missing_docs)]
 use manifactor_geometry::{Se3, So3};
 use manifactor_quadric::{BoundingBox, Camera};
 use manifactor_slam::recording;

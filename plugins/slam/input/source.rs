@@ -13,6 +13,7 @@ mod recorded;
 mod tum;
 
 pub use camera::CameraChoice;
+pub(crate) use json_lines::parse;
 pub use json_lines::{JsonLines, line};
 pub use recorded::Recorded;
 pub use tum::TumRgbd;

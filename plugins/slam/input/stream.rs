@@ -10,9 +10,19 @@ pub struct Stream {
     pub opening: Opening,
     /// Frames in the order of time, as far as the source keeps it; what cannot be read is an error, and the next may be sound.
     pub observations: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send>,
+    /// Seconds: frames up to this time have come before, and come again at once.
+    pub past: f64,
 }
 
 impl Stream {
+    /// Frames that come now.
+    pub fn new(
+        opening: Opening,
+        observations: impl Iterator<Item = Result<Observation, SourceError>> + Send + 'static,
+    ) -> Self {
+        Self { opening, observations: Box::new(observations), past: f64::NEG_INFINITY }
+    }
+
     /// Waits for the last frame, and keeps all of them.
     ///
     /// # Errors
@@ -29,7 +39,7 @@ impl Stream {
 impl From<Arc<Sequence>> for Stream {
     fn from(sequence: Arc<Sequence>) -> Self {
         let opening = sequence.opening();
-        Self { opening, observations: Box::new(Observations::of(sequence).map(Ok)) }
+        Self::new(opening, Observations::of(sequence).map(Ok))
     }
 }
 

@@ -1,6 +1,9 @@
 use crate::endings::interrupt::AtWork;
-use crate::{fed, folder, manifactor, path};
+use crate::{fed, folder, manifactor, path, root};
+use rand::{RngExt, SeedableRng, rngs::StdRng};
 use serde_json::Value;
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 const DESK: &str = r#"
 semantics = "table_one"
@@ -140,4 +143,49 @@ fn standard_input_is_read_once() {
     ran.complains("standard input can be read once");
     // a batch keeps what it has read
     fed(&format!("run {live} --out {out}_of_run"), &lines).ended(0);
+}
+
+/// Lines of a file.
+fn lines(file: &str) -> usize {
+    std::fs::read(file).unwrap_or_default().iter().filter(|byte| **byte == b'\n').count()
+}
+
+#[test]
+fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
+    let desk = DESK.replace("semantics", "association = { type = \"likelihood\" }\nsemantics");
+    let folder = folder(&[("desk.toml", &desk)]);
+    let (desk, whole, out) = (path(&folder, "desk.toml"), path(&folder, "whole"), path(&folder, "out"));
+    let journal = path(&folder, "frames.jsonl");
+    manifactor(&format!("online {desk} --out {whole} --journal {whole}.jsonl")).ended(0);
+    let command = format!("online {desk} --out {out} --journal {journal} --rate 20 --force");
+    let mut rng = StdRng::seed_from_u64(5);
+    let (mut kills, mut ended) = (0, false);
+    while !ended {
+        let kept = lines(&journal);
+        let moment = kept + rng.random_range(1..9);
+        let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
+            .current_dir(root())
+            .args(command.split_whitespace())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        while lines(&journal) < moment && !ended {
+            ended = child.try_wait().unwrap().is_some_and(|status| status.success());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        if !ended {
+            child.kill().unwrap();
+            kills += usize::from(!child.wait().unwrap().success());
+            assert!(lines(&journal) >= kept, "nothing is lost");
+        }
+    }
+    assert!(kills >= 5, "{kills}");
+    for file in ["live.txt", "trajectory.txt", "objects.json", "detections.csv"] {
+        let read = |out: &str| std::fs::read_to_string(format!("{out}/estimate/{file}")).unwrap();
+        assert!(read(&whole) == read(&out), "{file}");
+    }
+    // other settings make another map
+    let ran = manifactor(&format!("{command} --set online.bend=0.2"));
+    ran.ended(2).complains("is the journal of other settings");
 }

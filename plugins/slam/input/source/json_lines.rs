@@ -116,6 +116,12 @@ pub fn line(observation: &Observation) -> String {
     serde_json::to_string(&line).unwrap_or_default()
 }
 
+/// A frame of such a line.
+pub(crate) fn parse(line: &[u8]) -> Result<Observation, String> {
+    let line: Line = serde_json::from_slice(line).map_err(|error| error.to_string())?;
+    Ok(line.into())
+}
+
 impl From<Line> for Observation {
     fn from(line: Line) -> Self {
         let of_box = |b: LineBox| {
@@ -169,7 +175,7 @@ impl JsonLines {
             None => (STDIN.into(), Box::new(BufReader::new(stdin()))),
         };
         let lines = Lines { file, reader, line: 0, text: vec![] };
-        Ok(Stream { opening, observations: Box::new(lines.fuse()) })
+        Ok(Stream::new(opening, lines.fuse()))
     }
 }
 
@@ -198,8 +204,7 @@ impl Lines {
         if self.text.len() as u64 == LONGEST {
             return Err(format!("the line is longer than {LONGEST} bytes"));
         }
-        let line: Line = serde_json::from_slice(&self.text).map_err(|error| error.to_string())?;
-        Ok(line.into())
+        parse(&self.text)
     }
 }
 
