@@ -10,7 +10,7 @@ mod object;
 mod revision;
 mod rules;
 
-use crate::association::{Associator, Image, Names};
+use crate::association::{Associator, Image, Map, Merge, Names};
 use crate::estimate::{Estimate, EstimateError};
 use crate::gravity::GravityError;
 use crate::input::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
@@ -36,8 +36,8 @@ pub use frame::FrameReport;
 
 /// A map that grows with each frame.
 ///
-/// It keeps what a batch solve at the end needs: some 70 bytes for each frame, and 50 for each box. Everything else is bounded by
-/// the window of the session, where there is one.
+/// It keeps what a batch solve at the end needs: some 70 bytes for each frame, and 50 for each box; and each object, where boxes are
+/// put to objects, with the frames that it was seen in. Everything else is bounded by the window of the session, where there is one.
 #[derive(Debug)]
 pub struct Mapper {
     settings: Arc<Settings>,
@@ -47,6 +47,8 @@ pub struct Mapper {
     associator: Box<dyn Associator>,
     /// Of objects that turned out to be others.
     names: Names,
+    /// Those that the map has not taken in yet.
+    pending: Vec<Merge>,
     measurements: Measurements,
     objects: BTreeMap<ObjectId, Tracked>,
     ledger: Ledger,
@@ -122,6 +124,7 @@ impl Mapper {
             session: Session::new(online)?,
             associator: settings.association.begin(opening.camera, &settings.aliases),
             names: Names::default(),
+            pending: vec![],
             up: Up::new(opening),
             measurements: Measurements::default(),
             objects: BTreeMap::new(),
@@ -157,9 +160,11 @@ impl Mapper {
         observation: &Observation,
         names: &[Option<ObjectId>],
     ) -> Vec<Option<ObjectId>> {
-        let Some(pose) = self.pose(frame) else { return names.to_vec() };
+        let newest = (self.live.len(), Se3::identity());
+        let known = Known { newest, live: &self.live, session: &self.session };
+        let Some(pose) = known.pose(frame) else { return names.to_vec() };
         let (timestamp, detections) = (observation.frame.timestamp, observation.detections.as_slice());
-        let known = Known { newest: (frame, pose), live: &self.live, session: &self.session };
+        let known = Known { newest: (frame, pose), ..known };
         self.associator.reconsider(&Image { frame, timestamp, detections }, names, &known)
     }
 

@@ -50,7 +50,7 @@ pub fn estimate(
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
-    let (sequence, association) = associated(sequence, settings)?;
+    let (sequence, association) = associated(sequence, settings, observer)?;
     let mapping = Mapping::new(&sequence, settings)?;
     let estimate = Estimate::new(sequence, mapping, settings, observer)?;
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
@@ -60,13 +60,15 @@ pub fn estimate(
 }
 
 /// The sequence with its boxes put to objects by the settings' `association`: frame by frame, as they would have come, then once more
-/// by what is known in the end. Frames that cannot be mapped so have boxes of no object.
+/// by what is known in the end. Frames that cannot be mapped so,
+/// and those after an interruption by `observer`, have boxes of no object.
 ///
 /// # Errors
 /// Where the session cannot begin.
 pub fn associated(
     sequence: Arc<Sequence>,
     settings: &Settings,
+    observer: &mut dyn Observer,
 ) -> Result<(Arc<Sequence>, Option<AssociationReport>), RunError> {
     if settings.association.uses_names() {
         return Ok((sequence, None));
@@ -74,10 +76,19 @@ pub fn associated(
     let mut mapper = Mapper::new(sequence.opening(), settings)?;
     let (mut named, mut naming) = (Sequence::clone(&sequence), Naming::default());
     let mut taken = vec![];
+    let mut interrupted = false;
     for observation in sequence.observations() {
+        interrupted |= observer.poll().is_break();
+        if interrupted {
+            naming.note(&observation.detections, &[]);
+            taken.push(None);
+            continue;
+        }
         match mapper.take(&observation) {
             Ok(report) => {
-                naming.note(&observation.detections, &report.objects);
+                naming.note(&observation.detections, &report.names);
+                naming.forget(&report.forgotten);
+                report.refused.iter().for_each(|refused| tracing::warn!("{refused}"));
                 taken.push(Some(report.frame));
             }
             Err(error) => {
@@ -131,7 +142,8 @@ pub fn online(
         let seconds = began.elapsed().as_secs_f64();
         progress.count(report.as_ref(), seconds);
         if let (Ok(report), Ok(observation)) = (&report, observation) {
-            naming.note(&observation.detections, &report.objects);
+            naming.note(&observation.detections, &report.names);
+            naming.forget(&report.forgotten);
             taken.push(observation);
         }
         if watch.frame(report.as_ref(), &mut mapper, seconds).is_break() {

@@ -14,8 +14,8 @@ use manifactor::graph::{Graph, Key, Values};
 use manifactor::quadric::DualQuadric;
 use manifactor::slam::experiment::Experiment;
 use manifactor::slam::mapping::Mapping;
-use manifactor::slam::run::Run as Running;
-use manifactor::solve::Problem;
+use manifactor::slam::run::{Run as Running, associated};
+use manifactor::solve::{Problem, Silent};
 use serde_json::json;
 
 /// Half the length of an object, in metres, from which on it is more likely to be in millimetres.
@@ -89,7 +89,7 @@ impl Check {
         found.lines.push(format!("A run of {}.", count(document.variants.len(), "variant")));
         let mut run = Running::new(&document, self.run.data());
         for variant in document.variants.iter().filter(|_| self.load) {
-            let sequence = run.sequence(variant)?;
+            let (sequence, _) = associated(run.sequence(variant)?, &variant.settings, &mut Silent)?;
             let mapping = Mapping::new(&sequence, &variant.settings).map_err(Failure::input)?;
             let mut of_this = Found::default();
             of_this.warnings.extend(mapping.warnings.iter().map(ToString::to_string));

@@ -152,7 +152,7 @@ impl Associator for Overlap {
         matched.into_iter().scan(new, |new, matched| Some(name(matched, new))).collect()
     }
 
-    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], _map: &dyn Map) -> Learned {
+    fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
         for (detection, id) in image.detections.iter().zip(names) {
             if let Some(id) = *id {
                 let (frame, bounding_box) = (image.frame, detection.bounding_box);
@@ -161,6 +161,9 @@ impl Associator for Overlap {
                 self.next = self.next.max(id.0.saturating_add(1));
             }
         }
+        // what is in no map, and was not seen lately, is never found again
+        let since = image.frame.saturating_sub(self.rule.frames);
+        self.objects.retain(|id, last| last.frame >= since || map.object(*id).is_some());
         Learned::default()
     }
 }

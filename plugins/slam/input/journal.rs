@@ -9,6 +9,7 @@ use crate::input::stream::Stream;
 use manifactor_formats::FormatError;
 use manifactor_formats::whole::open_regular;
 use manifactor_graph::Manifold;
+use std::collections::HashSet;
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -99,8 +100,11 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
     }
     let past = before.iter().map(|frame| frame.frame.timestamp).fold(f64::NEG_INFINITY, f64::max);
     let path = path.to_owned();
-    let new =
-        stream.observations.filter(move |frame| frame.as_ref().map_or(true, |f| f.frame.timestamp > past));
+    let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
+    let is_new = move |frame: &Result<Observation, _>| {
+        frame.as_ref().map_or(true, |frame| !had.contains(&frame.frame.timestamp.to_bits()))
+    };
+    let new = stream.observations.filter(is_new);
     let kept = new.map(move |frame| {
         let keep = keep(&mut file, frame?);
         Ok(keep.map_err(|source| FormatError::Io { path: path.clone(), source })?)
@@ -116,8 +120,15 @@ fn keep(file: &mut File, frame: Observation) -> io::Result<Observation> {
         return Ok(frame);
     }
     let line = line(&frame);
-    file.write_all(format!("{line}\n").as_bytes())?;
-    parse(line.as_bytes()).map_err(io::Error::other)
+    // what cannot be read again is not written
+    let read = parse(line.as_bytes()).map_err(io::Error::other)?;
+    let length = file.metadata()?.len();
+    if let Err(error) = file.write_all(format!("{line}\n").as_bytes()) {
+        // half a line would end the journal
+        file.set_len(length)?;
+        return Err(error);
+    }
+    Ok(read)
 }
 
 #[cfg(test)]

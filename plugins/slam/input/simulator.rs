@@ -158,16 +158,17 @@ impl Simulated {
             usual.push(if wrong { other } else { object.truth.class.as_str() });
         }
         let mut detections = vec![];
-        let mut lasting = vec![[0.0; 4]; objects.len()];
+        // of each object: the noise of its last box, and the seconds since
+        let mut lasting = vec![([0.0; 4], f64::INFINITY); objects.len()];
         for (frame, pose) in poses.iter().enumerate() {
-            // what came before the first box has lasted as well
-            let seconds = if frame == 0 { f64::INFINITY } else { self.trajectory.interval };
-            for ((object, usual), noise) in objects.iter().zip(&usual).zip(&mut lasting) {
+            for ((object, usual), (noise, seconds)) in objects.iter().zip(&usual).zip(&mut lasting) {
+                *seconds += self.trajectory.interval;
                 let Some(boxes) = object.solid.boxes(&object.truth.world_from_object, &self.camera, pose)
                 else {
                     continue;
                 };
-                let bounding_box = self.detector.draw(&boxes, &self.camera, (noise, seconds), rng);
+                let bounding_box = self.detector.draw(&boxes, &self.camera, (noise, *seconds), rng);
+                *seconds = 0.0;
                 let scores = self.detector.classify(usual, &classes, rng);
                 if let Some(bounding_box) = bounding_box {
                     detections.push(Detection { frame, object: Some(object.truth.id), scores, bounding_box });
@@ -203,7 +204,7 @@ impl Simulated {
             ("odometry.rotation", o.rotation),
             ("detector.sigma_px", d.sigma_px),
             ("detector.sigma_of_size", d.sigma_of_size),
-            ("detector.lasting", d.lasting),
+            ("detector.noise_lasts_s", d.noise_lasts_s),
             ("detector.false_boxes", d.false_boxes),
             ("detector.min_size_px", d.min_size_px),
         ];

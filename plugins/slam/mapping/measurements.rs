@@ -56,35 +56,31 @@ impl Measurements {
         all
     }
 
-    /// Sorts one detection in: the place of its object among all, and its box, where it passed the filters.
+    /// Sorts one detection in.
     pub(crate) fn add(
         &mut self,
         detection: &Detection,
         camera: &Camera,
         settings: &DetectionSettings,
         aliases: &Aliases,
-    ) -> Option<(usize, ObjectBox)> {
+    ) {
         let Some(id) = detection.object else {
             self.unassociated += 1;
-            return None;
+            return;
         };
-        if detection.scores.best().is_some_and(|(_, score)| score < settings.min_score) {
+        let sifted = sift(detection, camera, settings);
+        if matches!(sifted, Sifted::LowScore) {
             self.low_score += 1;
-            return None;
+            return;
         }
         let place = self.place(id);
-        let object = self.objects.get_mut(place)?;
+        let Some(object) = self.objects.get_mut(place) else { return };
         object.detections += 1;
         object.fusion.add(&detection.scores, aliases);
-        let bounding_box = detection.bounding_box;
-        let inside = bounding_box.sides_inside(camera.width, camera.height, settings.border_px);
-        if !settings.cut_sides.accepts(inside) {
-            self.cut += 1;
-            return None;
+        match sifted {
+            Sifted::View(view) => self.duplicates += usize::from(object.see(view)),
+            _ => self.cut += 1,
         }
-        let view = ObjectBox { frame: detection.frame, bounding_box, inside };
-        self.duplicates += usize::from(object.see(view));
-        Some((place, view))
     }
 
     /// Forgets an object: its boxes are of none.
@@ -112,13 +108,6 @@ impl Measurements {
         new
     }
 
-    /// Forgets the boxes of the last frame, which could not be taken.
-    pub(crate) fn forget(&mut self, frame: usize) {
-        for object in &mut self.objects {
-            object.views.pop_if(|view| view.frame == frame);
-        }
-    }
-
     /// The place of an object, which may be a new one.
     fn place(&mut self, id: ObjectId) -> usize {
         let place = self.objects.binary_search_by_key(&id, |object| object.id);
@@ -132,6 +121,29 @@ impl Measurements {
     pub fn boxes(&self) -> usize {
         self.objects.iter().map(|object| object.views.len()).sum()
     }
+}
+
+/// What a detection is good for.
+pub(crate) enum Sifted {
+    /// For nothing: it scores too low.
+    LowScore,
+    /// For the class of its object: the border cuts its box.
+    Cut,
+    /// For the object's place as well.
+    View(ObjectBox),
+}
+
+/// Passes a detection through the filters.
+pub(crate) fn sift(detection: &Detection, camera: &Camera, settings: &DetectionSettings) -> Sifted {
+    if detection.scores.best().is_some_and(|(_, score)| score < settings.min_score) {
+        return Sifted::LowScore;
+    }
+    let bounding_box = detection.bounding_box;
+    let inside = bounding_box.sides_inside(camera.width, camera.height, settings.border_px);
+    if !settings.cut_sides.accepts(inside) {
+        return Sifted::Cut;
+    }
+    Sifted::View(ObjectBox { frame: detection.frame, bounding_box, inside })
 }
 
 impl Measured {

@@ -7,7 +7,7 @@
 use pathfinding::prelude::{Matrix, kuhn_munkres};
 use schemars::JsonSchema;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hash;
 
 /// Scores of an association of boxes with objects.
@@ -77,6 +77,14 @@ where
     let given_found = cells.iter().map(|((_, put), n)| part(*n, found[put])).sum::<f64>();
     let given_truth = cells.iter().map(|((truth, _), n)| part(*n, truths[truth])).sum::<f64>();
     let left = |given: f64, of: f64| if of > 0.0 { 1.0 - given / of } else { 1.0 };
+    // of the boxes that are alone, one at most is the whole of its object
+    let mut shared = BTreeMap::new();
+    for ((truth, put), n) in &cells {
+        match put {
+            Put::Into(put) => shared.insert((*truth, Some(*put)), *n),
+            Put::Alone(_) => shared.insert((*truth, None), 1),
+        };
+    }
     IdentityScores {
         boxes: all,
         precision,
@@ -84,28 +92,28 @@ where
         f1,
         homogeneity: left(given_found, of_all(&mut truths.values())),
         completeness: left(given_truth, of_all(&mut found.values())),
-        identity_f1: best_match(&cells, &truths, &found) as f64 / total,
+        identity_f1: best_match(&shared, &truths) as f64 / total,
         switches,
         true_objects: truths.len(),
         objects: found.values().filter(|n| **n >= ENOUGH).count(),
     }
 }
 
-/// Boxes in the right object, with objects matched one to one so that they are the most.
+/// Boxes in the right object, with objects matched one to one so that they are the most; `None` is an object for each true one.
 fn best_match<T: Copy + Ord, P: Copy + Ord>(
-    cells: &BTreeMap<(T, P), usize>,
+    shared: &BTreeMap<(T, Option<P>), usize>,
     truths: &BTreeMap<T, usize>,
-    found: &BTreeMap<P, usize>,
 ) -> usize {
-    let places = |keys: &mut dyn Iterator<Item = P>| keys.zip(0..).collect::<BTreeMap<P, usize>>();
-    let columns = places(&mut found.keys().copied());
     let rows: BTreeMap<T, usize> = truths.keys().copied().zip(0..).collect();
+    let found: BTreeSet<P> = shared.keys().filter_map(|(_, put)| *put).collect();
+    let columns: BTreeMap<P, usize> = found.into_iter().zip(rows.len()..).collect();
     if rows.is_empty() {
         return 0;
     }
-    let mut together = Matrix::new(rows.len(), columns.len().max(rows.len()), 0_i64);
-    for ((truth, put), n) in cells {
-        together[(rows[truth], columns[put])] = *n as i64;
+    let mut together = Matrix::new(rows.len(), rows.len() + columns.len(), 0_i64);
+    for ((truth, put), n) in shared {
+        let row = rows[truth];
+        together[(row, put.map_or(row, |put| columns[&put]))] = *n as i64;
     }
     usize::try_from(kuhn_munkres(&together).0).unwrap_or(0)
 }

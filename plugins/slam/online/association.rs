@@ -11,6 +11,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};
 use manifactor_online::Session;
 use manifactor_quadric::DualQuadric;
+use std::collections::BTreeSet;
 
 /// What has been estimated so far; of frames that have left the window, as it was when they came.
 pub(super) struct Known<'a> {
@@ -38,11 +39,13 @@ impl Map for Known<'_> {
 impl Mapper {
     /// Makes one of objects that turn out to be one. Returns the names as they are then.
     pub(super) fn unite_all(&mut self, merges: &[Merge], report: &mut FrameReport) -> Names {
-        let mut names = self.names.clone();
+        let (mut names, mut owners) = (self.names.clone(), vec![]);
         for merge in merges {
-            self.unite(*merge, report);
+            owners.extend(self.unite(*merge, report));
             names.merge(*merge);
         }
+        let owners: BTreeSet<ObjectId> = owners.into_iter().map(|id| names.now(id)).collect();
+        self.ask(&owners.into_iter().collect::<Vec<_>>(), report);
         names
     }
 
@@ -54,14 +57,19 @@ impl Mapper {
         }
     }
 
-    /// Gives the boxes of one object to another: in the map, if that is there, or to place it by.
-    fn unite(&mut self, merge: Merge, report: &mut FrameReport) {
+    /// Gives the boxes of one object to another: in the map, if that is there, or to place it by. Returns objects that rules had connected
+    /// with the one that is no more.
+    fn unite(&mut self, merge: Merge, report: &mut FrameReport) -> Vec<ObjectId> {
         let Merge { from, into } = merge;
-        if self.objects.get(&from).is_some_and(Tracked::is_mapped) {
-            self.take_out(from, report);
-        }
+        let is_mapped = self.objects.get(&from).is_some_and(Tracked::is_mapped);
+        let owners = if is_mapped { self.take_out(from, report) } else { vec![] };
         self.objects.remove(&from);
-        let new = self.measurements.merge(from, into);
+        let mut new = self.measurements.merge(from, into);
+        if matches!(self.objects.get(&into), Some(Tracked::Withdrawn)) {
+            // it is another one now
+            self.objects.remove(&into);
+            new = self.measured(into).map_or(new, |measured| measured.views.clone());
+        }
         match self.objects.entry(into).or_default() {
             Tracked::Mapped(_) => self.push_boxes(into, &new, report),
             Tracked::Waiting(sights) => {
@@ -75,6 +83,7 @@ impl Mapper {
         }
         tracing::info!(object = %from, "is object {into}");
         report.merged.push(merge);
+        owners
     }
 
     /// Pushes boxes of an object that is in the map, as far as their poses are still there.

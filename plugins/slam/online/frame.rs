@@ -5,9 +5,10 @@ use super::{FrameError, Mapper};
 use crate::association::{Image, Learned, Merge};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, ObjectId, Observation};
-use crate::mapping::measurements::ObjectBox;
+use crate::mapping::measurements::{ObjectBox, Sifted, sift};
 use crate::mapping::{box_entry, object_key, odometry_entry, pose_key, prior_entry};
 use crate::semantics::RuleError;
+use crate::settings::Settings;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, Graph, Key, Manifold, Values};
 use manifactor_online::Report;
@@ -26,7 +27,10 @@ pub struct FrameReport {
     /// Boxes that passed the filters.
     pub boxes: usize,
     /// The object of each box, in the order of the frame's; of a box that was left out, none.
-    pub objects: Vec<Option<ObjectId>>,
+    pub names: Vec<Option<ObjectId>>,
+    /// Objects that were seen too rarely to be any: their boxes are of none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub forgotten: Vec<ObjectId>,
     /// Objects that turned out to be others.
     pub merged: Vec<Merge>,
     /// Objects that came into the map.
@@ -59,7 +63,8 @@ impl FrameReport {
             timestamp,
             pose: Se3::identity(),
             boxes: 0,
-            objects: vec![],
+            names: vec![],
+            forgotten: vec![],
             merged: vec![],
             born: vec![],
             withdrawn: vec![],
@@ -111,9 +116,11 @@ impl Mapper {
         let image = Image { frame: report.frame, timestamp, detections };
         let predicted =
             Known { newest: (report.frame, report.pose), live: &self.live, session: &self.session };
-        report.objects = self.associator.associate(&image, &predicted);
-        let boxes = self.measure(detections, report);
-        let mut seen = Seen { boxes, learned: Learned::default(), up_moved };
+        report.names = self.associator.associate(&image, &predicted);
+        let named = report.names.iter().zip(detections);
+        let named = named.map(|(object, d)| Detection { frame: report.frame, object: *object, ..d.clone() });
+        let named: Vec<Detection> = named.collect();
+        let mut seen = Seen { boxes: self.boxes(&named), learned: Learned::default(), up_moved };
         report.boxes = seen.boxes.len();
         let alone = graph.clone();
         let mut owners = vec![];
@@ -124,16 +131,19 @@ impl Mapper {
             owners.push(*id);
         }
         let pushed = self.push_frame(&graph, &values, owners, &alone, report);
-        if pushed.is_err() || !report.refused.is_empty() {
-            self.measurements.forget(report.frame);
-            seen.boxes.clear();
-        }
         pushed?;
         self.last = Some(frame.clone());
         if report.refused.is_empty() {
+            for detection in &named {
+                let Settings { detections, aliases, .. } = &*self.settings;
+                self.measurements.add(detection, &self.camera, detections, aliases);
+            }
             let newest = (report.frame, self.pose(report.frame).unwrap_or(report.pose));
             let known = Known { newest, live: &self.live, session: &self.session };
-            seen.learned = self.associator.learn(&image, &report.objects, &known);
+            seen.learned = self.associator.learn(&image, &report.names, &known);
+        } else {
+            seen.boxes.clear();
+            report.names.fill(None);
         }
         Ok(seen)
     }
@@ -180,18 +190,12 @@ impl Mapper {
         }
     }
 
-    /// Sorts the detections of a frame in, under the names that they were given; of several boxes of an object the last stays.
-    fn measure(&mut self, detections: &[Detection], report: &FrameReport) -> BTreeMap<ObjectId, ObjectBox> {
-        let mut seen = BTreeMap::new();
-        for (detection, object) in detections.iter().zip(&report.objects) {
-            let detection = Detection { frame: report.frame, object: *object, ..detection.clone() };
-            let settings = &self.settings;
-            let added =
-                self.measurements.add(&detection, &self.camera, &settings.detections, &settings.aliases);
-            if let (Some((_, view)), Some(id)) = (added, detection.object) {
-                seen.insert(id, view);
-            }
-        }
-        seen
+    /// The boxes of a frame that pass the filters, by object; of several boxes of an object the last.
+    fn boxes(&self, named: &[Detection]) -> BTreeMap<ObjectId, ObjectBox> {
+        let view = |detection: &Detection| match sift(detection, &self.camera, &self.settings.detections) {
+            Sifted::View(view) => Some((detection.object?, view)),
+            _ => None,
+        };
+        named.iter().filter_map(view).collect()
     }
 }

@@ -3,7 +3,7 @@ use super::Mapper;
 use super::frame::{FrameReport, Seen};
 use super::object::{Mapped, Tracked};
 use super::rules::{Ledger, candidate};
-use crate::association::{Learned, Merge};
+use crate::association::Merge;
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measurements, ObjectBox};
@@ -42,15 +42,18 @@ impl Mapper {
                 sights.add(view, &pose, &self.camera);
             }
         }
-        let Learned { merged, forgotten } = &seen.learned;
-        forgotten.iter().for_each(|id| self.forget(*id));
+        let mut merged = std::mem::take(&mut self.pending);
+        merged.extend(&seen.learned.merged);
+        report.forgotten.clone_from(&seen.learned.forgotten);
+        report.forgotten.iter().for_each(|id| self.forget(*id));
         let is_due = |id: &ObjectId| self.due(*id).is_some();
         if merged.is_empty() && !seen.up_moved && !seen.boxes.keys().any(is_due) {
             return;
         }
-        let before = self.before(merged);
-        let names = self.unite_all(merged, report);
-        let ids: BTreeSet<ObjectId> = seen.boxes.keys().map(|id| names.now(*id)).collect();
+        let before = self.before(&merged);
+        let names = self.unite_all(&merged, report);
+        let changed = seen.boxes.keys().copied().chain(merged.iter().map(|merge| merge.into));
+        let ids: BTreeSet<ObjectId> = changed.map(|id| names.now(id)).collect();
         let due: Vec<(ObjectId, Due)> = ids.iter().filter_map(|id| Some((*id, self.due(*id)?))).collect();
         if seen.up_moved {
             self.ask_all_again(report);
@@ -72,8 +75,10 @@ impl Mapper {
                 report.updates.push(update);
             }
             Err(error) => {
-                let merged: Vec<Key> = report.merged.drain(..).map(|merge| object_key(merge.from)).collect();
-                let keys = [&merged, &report.born, &report.withdrawn, &report.revised];
+                let united: Vec<Key> = report.merged.drain(..).map(|merge| object_key(merge.from)).collect();
+                // they are true all the same
+                self.pending = merged;
+                let keys = [&united, &report.born, &report.withdrawn, &report.revised];
                 let keys: Vec<&str> = keys.into_iter().flatten().map(Key::as_str).collect();
                 report.refused.push(format!("changes of {}: {error}", keys.join(", ")));
                 (self.objects, self.ledger) = (before.objects, before.ledger);
@@ -115,21 +120,23 @@ impl Mapper {
 
     /// Takes an object out of the map.
     fn withdraw(&mut self, id: ObjectId, rejection: &Rejection, report: &mut FrameReport) {
-        self.take_out(id, report);
+        let owners = self.take_out(id, report);
+        self.ask(&owners, report);
         tracing::info!(object = %id, "taken out of the map: {rejection}");
         report.withdrawn.push(object_key(id));
     }
 
-    /// Takes an object out of the map, with all its factors.
-    pub(super) fn take_out(&mut self, id: ObjectId, report: &mut FrameReport) {
+    /// Takes an object out of the map, with all its factors. Returns objects that rules had connected with it.
+    pub(super) fn take_out(&mut self, id: ObjectId, report: &mut FrameReport) -> Vec<ObjectId> {
         let key = object_key(id);
-        let (mut factors, _) = self.ledger.revoke(|other| *other == key);
+        let (mut factors, owners) = self.ledger.revoke(|other| *other == key);
         if let Some(Tracked::Mapped(mapped)) = self.objects.insert(id, Tracked::Withdrawn) {
             factors.extend(mapped.boxes);
         }
         self.remove(&factors, report);
         let left = self.session.marginalize(&[&key]);
         report.refused.extend(left.err().map(|error| error.to_string()));
+        owners
     }
 
     /// Asks the rules again about an object whose class has changed, and about those that they connect with it.
@@ -248,7 +255,7 @@ impl Mapper {
     }
 
     /// Asks the rules about some objects, and pushes the factors that are new.
-    fn ask(&mut self, about: &[ObjectId], report: &mut FrameReport) {
+    pub(super) fn ask(&mut self, about: &[ObjectId], report: &mut FrameReport) {
         let (all, before) = (self.candidates(), self.ledger.clone());
         let up = self.up.frame().and_then(|frame| frame.up);
         let pushed = match self.ledger.ask(about, &all, &self.settings, up) {

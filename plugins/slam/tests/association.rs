@@ -28,7 +28,7 @@ detections = { noise = { sigma = 5.0 }, loss = { type = "cauchy", scale = 2.0 } 
 type = "simulated"
 scene = { objects = 10, classes = ["bottle", "cup", "book"] }
 trajectory = { frames = 150 }
-detector = { missed = 0.1, confused = 0.1, sigma_px = 3.0, sigma_of_size = 0.02, lasting = 0.5, false_boxes = 0.1 }
+detector = { missed = 0.1, confused = 0.1, sigma_px = 3.0, sigma_of_size = 0.02, noise_lasts_s = 0.5, false_boxes = 0.1 }
 "#;
 
 fn scene(sets: &[&str]) -> (Settings, Arc<Sequence>) {
@@ -54,7 +54,7 @@ fn scores(report: &VariantReport) -> IdentityScores {
 /// The names of all boxes as they come, by this association.
 fn names(settings: &Settings, sequence: &Sequence) -> Vec<Option<ObjectId>> {
     let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
-    sequence.observations().flat_map(|frame| mapper.take(&frame).unwrap().objects).collect()
+    sequence.observations().flat_map(|frame| mapper.take(&frame).unwrap().names).collect()
 }
 
 #[test]
@@ -112,8 +112,8 @@ fn a_detector_gone_mad_is_borne() {
     for frame in sequence.observations() {
         let report = mapper.take(&frame).unwrap();
         // not all boxes are looked at
-        assert!(report.objects.iter().flatten().count() <= 200);
-        named.extend(report.objects.into_iter().flatten());
+        assert!(report.names.iter().flatten().count() <= 200);
+        named.extend(report.names.into_iter().flatten());
     }
     let all = mapper.measurements();
     assert!(all.objects.len() < 1000 && all.objects.len() < named.len(), "{}", all.objects.len());

@@ -208,8 +208,11 @@ fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
         // a square of it is infinite
         bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
     };
+    let measured = mapper.measurements().clone();
     let taken = mapper.take(&Observation { frame, detections: vec![far], accelerometer: vec![] }).unwrap();
     assert!(taken.refused.len() == 1 && taken.refused[0].starts_with("the boxes at"), "{:?}", taken.refused);
+    assert_eq!(taken.names, [None], "they are of no object");
+    assert_eq!(*mapper.measurements(), measured);
     assert_eq!((taken.frame, mapper.mapped()), (80, mapped));
     assert!(mapper.session().estimate("x80").is_some());
 }

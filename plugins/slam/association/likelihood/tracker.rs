@@ -52,7 +52,9 @@ impl Associator for Tracker {
         map: &dyn Map,
     ) -> Vec<Option<ObjectId>> {
         let again = self.put(image, names, map);
-        again.into_iter().zip(names).map(|(again, before)| again.or(*before)).collect()
+        let is_free = |before: &ObjectId| !again.contains(&Some(*before));
+        let keep = |(now, before): (&Option<ObjectId>, &Option<ObjectId>)| now.or(before.filter(is_free));
+        again.iter().zip(names).map(keep).collect()
     }
 
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
@@ -74,7 +76,7 @@ impl Associator for Tracker {
         // of twins the one that fits best
         seen.sort_by(|(a, x), (b, y)| {
             let fits = |t: usize, sighting: &Sighting| self.tracks[t].overlap(sighting, &self.camera);
-            a.cmp(b).then(fits(*b, y).total_cmp(&fits(*a, x)))
+            a.cmp(b).then_with(|| fits(*b, y).total_cmp(&fits(*a, x)))
         });
         seen.dedup_by_key(|(t, _)| *t);
         let noise = self.settings.noise();

@@ -75,7 +75,7 @@ pub struct Detector {
     /// What the noise has besides, as a part of width and height; the two add up as squares.
     pub sigma_of_size: f64,
     /// For how long the noise of an object's boxes lasts, in seconds: after that time 1/e of it is left. 0 for new noise in each frame.
-    pub lasting: f64,
+    pub noise_lasts_s: f64,
     /// Boxes of nothing in an image, on average.
     pub false_boxes: f64,
     /// Boxes with a side shorter than this are not seen, in pixels.
@@ -99,7 +99,7 @@ impl Default for Detector {
         Self {
             sigma_px: 2.0,
             sigma_of_size: 0.0,
-            lasting: 0.0,
+            noise_lasts_s: 0.0,
             false_boxes: 0.0,
             min_size_px: 8.0,
             min_visible: 0.3,
@@ -125,7 +125,7 @@ impl Detector {
         // the same draws for each box, seen or not: one setting changes nothing but its own effect
         let (missed, hidden) = (rng.random_bool(self.missed), rng.random_bool(self.occluded));
         let (side, share) = (rng.random_range(0..4), rng.random::<f64>() * self.occlusion);
-        let left = if self.lasting > 0.0 { (-seconds / self.lasting).exp() } else { 0.0 };
+        let left = if self.noise_lasts_s > 0.0 { (-seconds / self.noise_lasts_s).exp() } else { 0.0 };
         noise.iter_mut().for_each(|n| *n = left * *n + (1.0 - left * left).sqrt() * normal(rng));
         let (width, height) = (boxes.inside.width(), boxes.inside.height());
         let sigma = [width, height].map(|size| self.sigma_px.hypot(self.sigma_of_size * size));

@@ -119,6 +119,15 @@ pub fn line(observation: &Observation) -> String {
 /// A frame of such a line.
 pub(crate) fn parse(line: &[u8]) -> Result<Observation, String> {
     let line: Line = serde_json::from_slice(line).map_err(|error| error.to_string())?;
+    for (class, score) in line.boxes.iter().flat_map(|seen| &seen.scores) {
+        if !(0.0..=1.0).contains(score) {
+            return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
+        }
+    }
+    if let Some(twice) = line.boxes.iter().find(|seen| seen.class.is_some() && !seen.scores.is_empty()) {
+        let class = twice.class.as_deref().unwrap_or_default();
+        return Err(format!("a box has `class` and `score`, or `scores`, and not both: `{class}`"));
+    }
     Ok(line.into())
 }
 
@@ -271,5 +280,29 @@ mod tests {
         assert!(error.contains("frames.jsonl, line 3: expected [xmin, ymin, xmax, ymax]"), "{error}");
         let error = source.load(&folders).unwrap_err().to_string();
         assert!(error.contains("line 2"), "{error}");
+    }
+
+    #[test]
+    fn scores_are_from_0_to_1_and_given_once() {
+        let line = |seen: &str| {
+            format!(
+                r#"{{"timestamp": 1.0, "pose": {{"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}, "boxes": [{seen}]}}"#
+            )
+        };
+        let wrong = [
+            (r#"{"box": [1, 1, 5, 5], "class": "cup", "score": 1.7}"#, "0"),
+            (
+                r#"{"box": [1, 1, 5, 5], "scores": {"cup": 1.7}}"#,
+                "the score of `cup` must be a number from 0 to 1",
+            ),
+            (r#"{"box": [1, 1, 5, 5], "class": "cup", "scores": {"cup": 0.7}}"#, "and not both: `cup`"),
+        ];
+        for (seen, words) in wrong {
+            let error = parse(line(seen).as_bytes()).unwrap_err();
+            assert!(error.contains(words), "{error}");
+        }
+        let two =
+            parse(line(r#"{"box": [1, 1, 5, 5], "scores": {"cup": 0.7, "bowl": 0.2}}"#).as_bytes()).unwrap();
+        assert_eq!(two.detections[0].scores.iter().count(), 2);
     }
 }

@@ -3,6 +3,7 @@ use crate::association::{Association, Names};
 use crate::input::sequence::{Detection, ObjectId};
 use crate::metrics::{IdentityScores, identity};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// An association of boxes with objects, scored by the names that the source gives where it gives any.
@@ -22,7 +23,11 @@ pub struct AssociationReport {
 
 /// The names of all boxes, in order of time: of the source, and given.
 #[derive(Debug, Default)]
-pub(crate) struct Naming(Vec<Named>);
+pub(crate) struct Naming {
+    boxes: Vec<Named>,
+    /// Names that are of nothing.
+    forgotten: BTreeSet<ObjectId>,
+}
 
 #[derive(Debug)]
 struct Named {
@@ -35,12 +40,17 @@ struct Named {
 }
 
 impl Naming {
+    /// Takes note of objects that are none: their boxes have no name in the end.
+    pub(crate) fn forget(&mut self, objects: &[ObjectId]) {
+        self.forgotten.extend(objects);
+    }
+
     /// Takes note of a frame's boxes, and of the names that they were given; none, where the frame was left out.
     pub(crate) fn note(&mut self, detections: &[Detection], given: &[Option<ObjectId>]) {
         let given = given.iter().copied().chain(std::iter::repeat(None));
         let named =
             |(detection, given): (&Detection, _)| Named { truth: detection.object, then: given, now: given };
-        self.0.extend(detections.iter().zip(given).map(named));
+        self.boxes.extend(detections.iter().zip(given).map(named));
     }
 
     /// Gives some boxes other names for those that they have.
@@ -50,7 +60,7 @@ impl Naming {
         names: &Names,
         by: impl FnOnce(&[Option<ObjectId>]) -> Vec<Option<ObjectId>>,
     ) {
-        let boxes = self.0.get_mut(boxes).unwrap_or_default();
+        let boxes = self.boxes.get_mut(boxes).unwrap_or_default();
         let now: Vec<_> = boxes.iter().map(|named| named.now.map(|name| names.now(name))).collect();
         for (named, name) in boxes.iter_mut().zip(by(&now)) {
             named.now = name;
@@ -59,20 +69,21 @@ impl Naming {
 
     /// The names of all boxes as they are now.
     pub(crate) fn now<'a>(&'a self, names: &'a Names) -> impl Iterator<Item = Option<ObjectId>> + 'a {
-        self.0.iter().map(|named| named.now.map(|name| names.now(name)))
+        let is_known = |name: &ObjectId| !self.forgotten.contains(name);
+        self.boxes.iter().map(move |named| named.now.filter(is_known).map(|name| names.now(name)))
     }
 
     /// The report; none, where the names are those of the source.
     pub(crate) fn report(&self, by: &dyn Association, names: &Names) -> Option<AssociationReport> {
-        let is_known = self.0.iter().any(|named| named.truth.is_some());
+        let is_known = self.boxes.iter().any(|named| named.truth.is_some());
         let score = |put: &mut dyn Iterator<Item = Option<ObjectId>>| {
-            let truth = self.0.iter().map(|named| named.truth);
+            let truth = self.boxes.iter().map(|named| named.truth);
             is_known.then(|| identity(truth.zip(put).filter_map(|(truth, put)| Some((truth?, put)))))
         };
         (!by.uses_names()).then(|| AssociationReport {
             by: by.typetag_name(),
             merged: names.given_up(),
-            at_the_time: score(&mut self.0.iter().map(|named| named.then)),
+            at_the_time: score(&mut self.boxes.iter().map(|named| named.then)),
             in_the_end: score(&mut self.now(names)),
         })
     }
