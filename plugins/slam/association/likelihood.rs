@@ -74,7 +74,8 @@ pub struct Likelihood {
     #[serde(deserialize_with = "within::<0, 1, _>")]
     #[schemars(range(min = 0, max = 1))]
     pub twin_iou: f64,
-    /// Two objects are one where its boxes' sides are off by this many standard deviations at most, as a root of the mean square.
+    /// Two objects are one where the sides of their boxes are off by this many standard deviations at most from one ellipsoid, as a root of
+    /// the mean square: 1.4 times less for two of different classes, twice as many for two of one class in one place.
     #[serde(deserialize_with = "positive")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub merge_error: f64,

@@ -30,7 +30,7 @@ pub(super) struct Belief {
     /// How far away that is, in metres.
     distance: f64,
     /// Standard deviation of the distance's logarithm.
-    depth: f64,
+    spread: f64,
 }
 
 /// An ellipsoid, and how well it is known.
@@ -63,8 +63,8 @@ impl BoxNoise {
 }
 
 impl Belief {
-    /// Of an object that was seen once, and that is so far away by its depth.
-    pub(super) fn new(seen: &Sighting, camera: &Camera, depth: f64, deviation: f64) -> Self {
+    /// Of an object that was seen once, believed to be at this depth in metres, by a standard deviation of its logarithm.
+    pub(super) fn new(seen: &Sighting, camera: &Camera, depth: f64, spread: f64) -> Self {
         let b = &seen.bounding_box;
         let ray = camera.ray(b.centre());
         let eye = seen.world_from_camera.translation;
@@ -73,7 +73,7 @@ impl Belief {
         let (x, y) = (size(b.width(), camera.fx), size(b.height(), camera.fy));
         let pose = Se3::new(seen.world_from_camera.rotation, centre);
         let first = DualQuadric { pose, semi_axes: Vector3::new(x, y, (x * y).sqrt()) };
-        Self { first, eye, distance: (centre - eye).norm(), depth: deviation }
+        Self { first, eye, distance: (centre - eye).norm(), spread }
     }
 
     /// Rows of the belief and their derivatives: distance, three axes, three of the rotation.
@@ -84,9 +84,9 @@ impl Belief {
         let by_place = quadric.pose.rotation.inverse().act(&away) / away.norm_squared().max(1e-12);
         let turn = self.first.pose.rotation.between(&quadric.pose.rotation).log();
         let (mut r, mut j) = (SVector::<f64, 7>::zeros(), SMatrix::<f64, 7, 9>::zeros());
-        r[0] = log / self.depth;
+        r[0] = log / self.spread;
         for c in 0..3 {
-            j[(0, 3 + c)] = by_place[c] / self.depth;
+            j[(0, 3 + c)] = by_place[c] / self.spread;
             r[1 + c] = ((quadric.semi_axes[c] / self.first.semi_axes[c]).ln() - log) / SHAPE;
             for k in 0..3 {
                 j[(1 + c, 3 + k)] = -by_place[k] / SHAPE;

@@ -71,7 +71,7 @@ impl Track {
     }
 
     /// Standard deviation of its place as a part of its distance.
-    pub(super) fn depth_spread(&self) -> f64 {
+    pub(super) fn place_spread(&self) -> f64 {
         let last = self.sightings.all().last();
         let distance = last.map_or(0.0, |last| self.distance(&last.world_from_camera));
         self.place_covariance().trace().sqrt() / distance

@@ -19,8 +19,8 @@ const PATIENCE: f64 = 10.0;
 const WAITING: usize = 500;
 /// What a box gains by the object that it had before: another has to be ten times as likely.
 const STAY: f64 = 4.6;
-/// Objects whose depth is known to this part tell how far away things are.
-const KNOWN_DEPTH: f64 = 0.15;
+/// Objects whose place is known to this part of their distance tell how far away things are.
+const KNOWN: f64 = 0.15;
 
 /// All objects.
 #[derive(Debug)]
@@ -177,7 +177,7 @@ impl Tracker {
 
     /// How far away objects are from here, as far as is known: the median.
     fn usual_depth(&self, pose: &Se3) -> f64 {
-        let known = self.tracks.iter().filter(|track| track.depth_spread() < KNOWN_DEPTH);
+        let known = self.tracks.iter().filter(|track| track.place_spread() < KNOWN);
         let mut depths: Vec<f64> = known.map(|track| track.distance(pose)).collect();
         depths.sort_by(f64::total_cmp);
         if depths.len() < FIRM { self.settings.depth } else { depths[depths.len() / 2] }
