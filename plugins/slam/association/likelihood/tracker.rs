@@ -17,8 +17,6 @@ const FIRM: usize = 3;
 const PATIENCE: f64 = 10.0;
 /// So many such objects are kept at most.
 const WAITING: usize = 500;
-/// What a box gains by the object that it had before: another has to be ten times as likely.
-const STAY: f64 = 4.6;
 /// Objects whose place is known to this part of their distance tell how far away things are.
 const KNOWN: f64 = 0.15;
 
@@ -34,7 +32,7 @@ pub(super) struct Tracker {
 
 impl Associator for Tracker {
     fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
-        let mut names = self.put(image, &[], map);
+        let mut names = self.put(image, map);
         let mut next = (self.next..).map(ObjectId);
         for i in best_scores(image.detections) {
             if names[i].is_none() {
@@ -51,7 +49,7 @@ impl Associator for Tracker {
         names: &[Option<ObjectId>],
         map: &dyn Map,
     ) -> Vec<Option<ObjectId>> {
-        let again = self.put(image, names, map);
+        let again = self.put(image, map);
         let is_free = |before: &ObjectId| !again.contains(&Some(*before));
         let keep = |(now, before): (&Option<ObjectId>, &Option<ObjectId>)| now.or(before.filter(is_free));
         again.iter().zip(names).map(keep).collect()
@@ -94,18 +92,12 @@ impl Tracker {
         Self { settings, camera, aliases, tracks: vec![], next: 1 }
     }
 
-    /// The known objects of boxes, some of which had names before.
-    fn put(&self, image: &Image<'_>, before: &[Option<ObjectId>], map: &dyn Map) -> Vec<Option<ObjectId>> {
+    /// The known objects of boxes.
+    fn put(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
         let mut names = vec![None; image.detections.len()];
         let Some(pose) = map.pose(image.frame) else { return names };
         let looked_at = best_scores(image.detections);
-        let (mut gains, tracks) = self.gains(image, &looked_at, &pose);
-        for (row, column, gain) in &mut gains {
-            let before = before.get(looked_at[*row]).copied().flatten();
-            if before == Some(self.tracks[tracks[*column]].id) {
-                *gain += STAY;
-            }
-        }
+        let (gains, tracks) = self.gains(image, &looked_at, &pose);
         let matched = assignment::best(looked_at.len(), tracks.len(), &gains);
         for (i, column) in looked_at.iter().zip(matched) {
             names[*i] = column.map(|column| self.tracks[tracks[column]].id);
