@@ -60,8 +60,8 @@ pub fn estimate(
 }
 
 /// The sequence with its boxes put to objects by the settings' `association`: frame by frame, as they would have come, then once more
-/// by what is known in the end. Frames that cannot be mapped so,
-/// and those after an interruption by `observer`, have boxes of no object.
+/// by what is known in the end. Frames that cannot be mapped so, and those after an interruption by `observer`, have boxes of no
+/// object.
 ///
 /// # Errors
 /// Where the session cannot begin.

@@ -145,11 +145,8 @@ impl Associator for Overlap {
         }
         let matched = assignment::best(image.detections.len(), self.objects.len(), &overlaps);
         let known: Vec<ObjectId> = self.objects.keys().copied().collect();
-        let new = (self.next..).map(ObjectId);
-        let name = |matched: Option<usize>, new: &mut dyn Iterator<Item = ObjectId>| {
-            matched.and_then(|column| known.get(column).copied()).or_else(|| new.next())
-        };
-        matched.into_iter().scan(new, |new, matched| Some(name(matched, new))).collect()
+        let mut new = (self.next..).map(ObjectId);
+        matched.into_iter().map(|column| column.map(|column| known[column]).or_else(|| new.next())).collect()
     }
 
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {

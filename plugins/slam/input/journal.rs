@@ -19,13 +19,8 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum JournalError {
     /// A file that cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// Which.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FormatError),
     /// Somebody else's.
     #[error("{}: another program writes to this journal", path.display())]
     InUse {
@@ -67,11 +62,11 @@ const BEGINNING: &str = r#"{"frames_for":""#;
 /// # Errors
 /// Where the file cannot be read or written, is a link, or is not the journal of these settings; it is unchanged then.
 pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Stream, JournalError> {
-    let io = |source| JournalError::Io { path: path.to_owned(), source };
+    let io = |source| FormatError::Io { path: path.to_owned(), source };
     let mut file = open_regular(path).map_err(io)?;
     file.try_lock().map_err(|error| match error {
         TryLockError::WouldBlock => JournalError::InUse { path: path.to_owned() },
-        TryLockError::Error(source) => io(source),
+        TryLockError::Error(source) => io(source).into(),
     })?;
     let mut bytes = vec![];
     file.read_to_end(&mut bytes).map_err(io)?;

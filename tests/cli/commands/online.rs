@@ -2,6 +2,7 @@ use crate::endings::interrupt::AtWork;
 use crate::{fed, folder, manifactor, path, root};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use serde_json::Value;
+use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -145,52 +146,49 @@ fn standard_input_is_read_once() {
     fed(&format!("run {live} --out {out}_of_run"), &lines).ended(0);
 }
 
-/// Lines of a file.
-fn lines(file: &str) -> usize {
+/// Whole lines of a file.
+fn lines_of(file: &str) -> usize {
     std::fs::read(file).unwrap_or_default().iter().filter(|byte| **byte == b'\n').count()
 }
 
 #[test]
 fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
-    let desk = DESK.replace("semantics", "association = { type = \"likelihood\" }\nsemantics");
-    let folder = folder(&[("desk.toml", &desk)]);
-    let (desk, whole, out) = (path(&folder, "desk.toml"), path(&folder, "whole"), path(&folder, "out"));
+    let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
+    let (live, whole, out) = (path(&folder, "live.toml"), path(&folder, "whole"), path(&folder, "out"));
     let journal = path(&folder, "frames.jsonl");
-    manifactor(&format!("online {desk} --out {whole} --journal {whole}.jsonl")).ended(0);
-    let command = format!("online {desk} --out {out} --journal {journal} --rate 20 --force");
+    let frames = manifactor(&format!("simulate {} --lines", path(&folder, "desk.toml"))).ended(0).stdout;
+    fed(&format!("online {live} --out {whole} --journal {whole}.jsonl"), &frames).ended(0);
+    let command = format!("online {live} --out {out} --journal {journal} --force");
     let mut rng = StdRng::seed_from_u64(5);
-    let (mut kills, mut ended) = (0, false);
-    while !ended {
-        let kept = lines(&journal);
-        let moment = kept + rng.random_range(1..9);
+    let mut kept = 0;
+    while kept < 50 {
+        kept += rng.random_range(1..9);
         let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
             .current_dir(root())
             .args(command.split_whitespace())
+            .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        while lines(&journal) < moment && !ended {
-            if let Some(status) = child.try_wait().unwrap() {
-                assert!(status.success(), "{status}");
-                ended = true;
-            }
+        // no more frames come, and none is the last: it waits until it is killed
+        let mut frames_of_child = child.stdin.take().unwrap();
+        let known: Vec<&str> = frames.lines().take(kept).collect();
+        writeln!(frames_of_child, "{}", known.join("\n")).unwrap();
+        // the first line is not a frame
+        while lines_of(&journal) < kept + 1 {
+            assert!(child.try_wait().unwrap().is_none(), "it ended before its frames");
             std::thread::sleep(Duration::from_millis(1));
         }
-        if !ended {
-            child.kill().unwrap();
-        }
-        // it may have ended before the signal came
-        ended = child.wait().unwrap().success();
-        kills += usize::from(!ended);
-        assert!(lines(&journal) >= kept, "nothing is lost");
+        child.kill().unwrap();
+        assert!(!child.wait().unwrap().success());
     }
-    assert!(kills >= 5, "{kills}");
+    fed(&command, &frames).ended(0);
     for file in ["live.txt", "trajectory.txt", "objects.json", "detections.csv"] {
         let read = |out: &str| std::fs::read_to_string(format!("{out}/estimate/{file}")).unwrap();
         assert!(read(&whole) == read(&out), "{file}");
     }
     // other settings make another map
-    let ran = manifactor(&format!("{command} --set online.bend=0.2"));
+    let ran = fed(&format!("{command} --set online.bend=0.2"), &frames);
     ran.ended(2).complains("is the journal of other settings");
 }

@@ -8,7 +8,7 @@ use crate::input::sequence::{ClassScores, ObjectId};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
-use nalgebra::{Cholesky, Matrix3, Matrix4, Vector4, Vector6};
+use nalgebra::{Cholesky, Matrix3, Matrix4, Matrix6, Vector4, Vector6};
 use std::f64::consts::TAU;
 
 /// An object.
@@ -96,7 +96,7 @@ impl Track {
     }
 
     /// The box that it should have, seen from here and now; `None` where it is not seen.
-    pub(super) fn expect(
+    pub(super) fn expected(
         &self,
         timestamp: f64,
         pose: &Se3,
@@ -107,8 +107,7 @@ impl Track {
         let seconds = (timestamp - self.seen_at).max(0.0);
         let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| drift * drift * seconds);
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
-        let by_drift =
-            predicted.by_pose * nalgebra::Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
+        let by_drift = predicted.by_pose * Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
         let by_quadric = predicted.by_quadric * self.fitted.covariance * predicted.by_quadric.transpose();
         let sigma = Vector4::from(settings.noise().deviations(&predicted.bounding_box)) * settings.lasting;
         let by_detector = Matrix4::from_diagonal(&sigma.component_mul(&sigma));

@@ -124,7 +124,7 @@ impl Tracker {
         let classes: Vec<Option<String>> = boxes.iter().map(class).collect();
         let (mut gains, mut tracks) = (vec![], vec![]);
         for (t, track) in self.tracks.iter().enumerate() {
-            let Some(expected) = track.expect(image.timestamp, pose, &self.camera, &self.settings) else {
+            let Some(expected) = track.expected(image.timestamp, pose, &self.camera, &self.settings) else {
                 continue;
             };
             let before = gains.len();
