@@ -2,7 +2,7 @@
 //!
 //! An [`Associator`] names the boxes of a frame, and learns from it once the frame is in the map. What it names wrongly at first
 //! it may mend later: two objects that turn out to be one are [merged](Merge), and [`Names`] has the name that counts.
-mod assignment;
+pub(crate) mod assignment;
 mod given;
 mod likelihood;
 mod names;
@@ -10,9 +10,11 @@ mod overlap;
 
 use crate::input::class::Aliases;
 use crate::input::sequence::{Detection, ObjectId};
+use crate::mapping::prior_map::PriorObject;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{Camera, DualQuadric};
 use std::fmt::Debug;
+use std::sync::Arc;
 
 pub use given::Given;
 pub use likelihood::Likelihood;
@@ -22,8 +24,8 @@ pub use overlap::{Iou, Projection};
 /// A way to associate boxes with objects.
 #[typetag::serialize(tag = "type")]
 pub trait Association: Debug + Send + Sync {
-    /// Begins, with no object known.
-    fn begin(&self, camera: Camera, aliases: &Aliases) -> Box<dyn Associator>;
+    /// Begins, with the objects of an earlier map, where there is one.
+    fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator>;
 
     /// Whether it takes the names that the source gives. Where it does not, they may serve to score it.
     fn uses_names(&self) -> bool {

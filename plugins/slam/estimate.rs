@@ -1,4 +1,5 @@
 //! A sequence mapped and solved.
+pub(crate) mod looks;
 pub mod refine;
 pub mod variance;
 

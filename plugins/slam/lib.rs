@@ -19,6 +19,6 @@ pub mod settings;
 
 pub use estimate::{refine, variance};
 pub use input::{class, fusion, journal, recording, sequence, simulator, source, stream};
-pub use mapping::measurements;
+pub use mapping::{measurements, prior_map};
 pub use output::{record, report};
 pub use settings::run_document;

@@ -18,6 +18,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 pub mod measurements;
+pub mod prior_map;
 pub(crate) mod rejection;
 mod warning;
 
@@ -95,8 +96,10 @@ impl Mapping {
     /// # Errors
     /// Where there is no frame, or up is not known and a rule needs it.
     pub fn new(sequence: &Sequence, settings: &Settings) -> Result<Self, MappingError> {
-        let frame = settings.gravity.locate(sequence)?;
-        let measurements = Measurements::gather(sequence, &settings.detections, &settings.aliases);
+        let first = sequence.frames.first().ok_or(MappingError::NoFrames)?;
+        let located = settings.gravity.locate(sequence)?;
+        let frame = settings.anchor().map_or(located, |anchor| anchor.frame(first, located));
+        let measurements = Measurements::gather(sequence, settings);
         let all = &measurements.objects;
         let pose =
             |i: usize| Some(frame.map_from_odometry.compose(&sequence.frames.get(i)?.world_from_camera));
@@ -177,6 +180,8 @@ impl Mapping {
         match &start {
             Err(rejection) => tracing::info!(object = %measured.id, "not mapped: {rejection}"),
             Ok(start) => {
+                let loss = settings.anchor().map(|anchor| anchor.loss);
+                self.graph.factors_mut().extend(measured.prior.as_ref().map(|known| known.entry(loss)));
                 let boxes = measured.views.iter();
                 let boxes = boxes.map(|view| box_entry(view, key.clone(), camera, &settings.detections));
                 self.graph.factors_mut().extend(boxes);
@@ -228,7 +233,7 @@ pub(crate) struct Decision {
 /// A measured object as rules look at it; `None`, where it is not mapped.
 fn candidate(measured: &Measured, start: &Result<DualQuadric, Rejection>) -> Option<Candidate> {
     let start = *start.as_ref().ok()?;
-    Some(Candidate { key: object_key(measured.id), class: measured.class(), start })
+    Some(Candidate::new(measured, start))
 }
 
 /// The factor that holds the first pose.

@@ -6,6 +6,7 @@
 mod association;
 mod frame;
 mod gravity;
+mod locate;
 mod object;
 mod revision;
 mod rules;
@@ -33,6 +34,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub use frame::FrameReport;
+pub use locate::Located;
 
 /// A map that grows with each frame.
 ///
@@ -106,7 +108,7 @@ pub enum FinishError {
 }
 
 impl Mapper {
-    /// An empty map.
+    /// A map of nothing; where the settings have a prior map, and where the run begins in it, of what is in there.
     ///
     /// # Errors
     /// Where a setting of the session is outside its domain.
@@ -118,16 +120,20 @@ impl Mapper {
             let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]);
             window.keep.extend(kept.filter_map(|name| ManifoldType::try_from(name.to_owned()).ok()));
         }
+        let known = settings.anchor().map_or(&[][..], |anchor| &anchor.map.objects);
+        let measurements = Measurements::new(settings.anchor());
+        let objects =
+            measurements.objects.iter().filter_map(|measured| Some((measured.id, Tracked::known(measured)?)));
         Ok(Self {
             settings: Arc::new(settings.clone()),
             camera: opening.camera,
             session: Session::new(online)?,
-            associator: settings.association.begin(opening.camera, &settings.aliases),
+            associator: settings.association.begin(opening.camera, &settings.aliases, known),
             names: Names::default(),
             pending: vec![],
             up: Up::new(opening),
-            measurements: Measurements::default(),
-            objects: BTreeMap::new(),
+            objects: objects.collect(),
+            measurements,
             ledger: Ledger::default(),
             last: None,
             live: vec![],
@@ -230,8 +236,7 @@ impl Mapper {
     }
 
     fn measured(&self, id: ObjectId) -> Option<&Measured> {
-        let place = self.measurements.objects.binary_search_by_key(&id, |object| object.id);
-        self.measurements.objects.get(place.ok()?)
+        self.measurements.object(id)
     }
 
     fn quadric(&self, id: ObjectId) -> Option<DualQuadric> {

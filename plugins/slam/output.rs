@@ -2,10 +2,11 @@
 //!
 //! `report.json` and `record.json` (all that there is to draw) for the run as a whole, and a folder for each variant with
 //! `config.toml` (all settings, ready to be run again), `trajectory.txt` (TUM's format; `live.txt` as it was when each frame came, where they came one by one), `detections.csv` (the boxes with the objects that they were put to, where the source does not say), `objects.json`, `frames.jsonl` (poses
-//! and boxes, a frame a line), `graph.json` (the literal graph at the estimate), `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
+//! and boxes, a frame a line), `graph.json` (the literal graph at the estimate), `map.json` (the objects with their covariances, for another run to begin with), `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
 //! into an [`OutputFolder`].
 use crate::estimate::Estimate;
 use crate::input::recording;
+use crate::mapping::prior_map::PriorMap;
 use crate::output::record::{FrameRecord, RECORD, RunRecord, VariantRecord};
 use crate::output::report::{RunReport, VariantReport};
 use crate::settings::run_document::{RunDocument, Variant, absolute, slug};
@@ -21,10 +22,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 mod folder;
+mod map;
 pub mod record;
 pub mod report;
 
 pub use folder::{FolderError, OutputFolder};
+pub use map::MapError;
 
 /// Why results could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -113,6 +116,10 @@ pub fn write_variant(
     write_document(&file("frames.jsonl"), lines(&record.frames))?;
     let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);
     write_document(&file("graph.json"), graph)?;
+    match PriorMap::of(estimate, &variant.settings) {
+        Ok(map) => write_document(&file("map.json"), results(&map))?,
+        Err(error) => tracing::warn!("there is no map.json: {error}"),
+    }
     write_whole(&file("iterations.csv"), iterations(&estimate.solution.outcome.history))?;
     write_document(&file("metrics.json"), results(report))?;
     if variant.settings.report.covariances {

@@ -3,17 +3,23 @@ use crate::estimate::{Estimate, EstimateError};
 use crate::input::journal::{JournalError, journaled};
 use crate::input::sequence::Sequence;
 use crate::input::source::{Folders, SourceError};
-use crate::input::stream::Stream;
 use crate::mapping::{Mapping, MappingError};
-use crate::online::{FinishError, FrameError, FrameReport, Mapper};
-use crate::output::report::{AssociationReport, Naming, OnlineReport, RunReport, VariantReport};
+use crate::online::{FinishError, Located};
+use crate::output::report::{PriorMapReport, RunReport, VariantReport};
 use crate::settings::Settings;
 use crate::settings::run_document::{RunDocument, Variant};
+use location::find;
 use manifactor_solve::{Observer, SettingError, Termination};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
+
+mod association;
+mod location;
+mod stream;
+
+pub use association::associated;
+pub use stream::{Watch, online};
 
 /// Why a variant could not be run.
 #[derive(Debug, thiserror::Error)]
@@ -50,135 +56,20 @@ pub fn estimate(
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
-    let (sequence, association) = associated(sequence, settings, observer)?;
-    let mapping = Mapping::new(&sequence, settings)?;
-    let estimate = Estimate::new(sequence, mapping, settings, observer)?;
+    let found = find(&sequence, settings, observer)?;
+    let begun = found.as_ref().map(|found| {
+        let Located { start, noise, .. } = &found.located;
+        settings.beginning_at(*start, noise.clone())
+    });
+    let known = begun.as_ref().unwrap_or(settings);
+    let (sequence, association) = associated(sequence, known, observer)?;
+    let mapping = Mapping::new(&sequence, known)?;
+    let estimate = Estimate::new(sequence, mapping, known, observer)?;
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;
+    report.prior_map = PriorMapReport::new(&estimate, settings, found);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))
-}
-
-/// The sequence with its boxes put to objects by the settings' `association`: frame by frame, as they would have come, then once more
-/// by what is known in the end. Frames that cannot be mapped so, and those after an interruption by `observer`, have boxes of no
-/// object.
-///
-/// # Errors
-/// Where the session cannot begin.
-pub fn associated(
-    sequence: Arc<Sequence>,
-    settings: &Settings,
-    observer: &mut dyn Observer,
-) -> Result<(Arc<Sequence>, Option<AssociationReport>), RunError> {
-    if settings.association.uses_names() {
-        return Ok((sequence, None));
-    }
-    let mut mapper = Mapper::new(sequence.opening(), settings)?;
-    let (mut named, mut naming) = (Sequence::clone(&sequence), Naming::default());
-    let mut taken = vec![];
-    let mut interrupted = false;
-    for observation in sequence.observations() {
-        interrupted |= observer.poll().is_break();
-        if interrupted {
-            naming.note(&observation.detections, &[]);
-            taken.push(None);
-            continue;
-        }
-        match mapper.take(&observation) {
-            Ok(report) => {
-                naming.note(&observation.detections, &report.names);
-                naming.forget(&report.forgotten);
-                report.refused.iter().for_each(|refused| tracing::warn!("{refused}"));
-                taken.push(Some(report.frame));
-            }
-            Err(error) => {
-                tracing::warn!("{error}");
-                naming.note(&observation.detections, &[]);
-                taken.push(None);
-            }
-        }
-    }
-    let mut first = 0;
-    for (observation, frame) in sequence.observations().zip(taken) {
-        let boxes = first..first + observation.detections.len();
-        first = boxes.end;
-        if let Some(frame) = frame {
-            naming.replace(boxes, mapper.names(), |names| mapper.reconsider(frame, &observation, names));
-        }
-    }
-    for (detection, name) in named.detections.iter_mut().zip(naming.now(mapper.names())) {
-        detection.object = name;
-    }
-    Ok((Arc::new(named), naming.report(&*settings.association, mapper.names())))
-}
-
-/// Maps a stream frame by frame, solves all of it at the end, and evaluates. `watch` is told of each frame, with the map and
-/// the seconds that it took; it can end the stream there.
-///
-/// # Errors
-/// Where the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
-pub fn online(
-    name: &str,
-    stream: Stream,
-    settings: &Settings,
-    watch: &mut dyn Watch,
-    observer: &mut dyn Observer,
-) -> Result<(Estimate, VariantReport), RunError> {
-    let clock = Instant::now();
-    let mut mapper = Mapper::new(stream.opening.clone(), settings)?;
-    let (mut progress, mut naming) = (OnlineReport::default(), Naming::default());
-    let mut taken = stream.opening.into_sequence();
-    for observation in stream.observations {
-        if let Ok(observation) = &observation
-            && observation.frame.timestamp > stream.past
-            && watch.wait(observation.frame.timestamp).is_break()
-        {
-            progress.interrupted = true;
-            break;
-        }
-        let began = Instant::now();
-        let report = observation.as_ref().map_err(|error| FrameError::Source(error.to_string()));
-        let report = report.and_then(|observation| mapper.take(observation));
-        let seconds = began.elapsed().as_secs_f64();
-        progress.count(report.as_ref(), seconds);
-        if let (Ok(report), Ok(observation)) = (&report, observation) {
-            naming.note(&observation.detections, &report.names);
-            naming.forget(&report.forgotten);
-            taken.push(observation);
-        }
-        if watch.frame(report.as_ref(), &mut mapper, seconds).is_break() {
-            progress.interrupted = true;
-            break;
-        }
-    }
-    progress.end(&mut mapper);
-    for (detection, name) in taken.detections.iter_mut().zip(naming.now(mapper.names())) {
-        detection.object = name;
-    }
-    let association = naming.report(&*settings.association, mapper.names());
-    let estimate = mapper.finish(Arc::new(taken), observer)?;
-    progress.compare(&estimate, &settings.evaluation);
-    let mut report = VariantReport::new(name, &estimate, settings, 0.0);
-    report.association = association;
-    report.online = Some(progress);
-    report.seconds = clock.elapsed().as_secs_f64();
-    Ok((estimate, report))
-}
-
-/// Watches frames as they come in.
-pub trait Watch {
-    /// Before each frame, with its time stamp in seconds: returns when it is there, or to end the stream before it.
-    fn wait(&mut self, _timestamp: f64) -> ControlFlow<()> {
-        ControlFlow::Continue(())
-    }
-
-    /// After each frame: what came of it, the map, and the seconds that it took.
-    fn frame(
-        &mut self,
-        report: Result<&FrameReport, &FrameError>,
-        mapper: &mut Mapper,
-        seconds: f64,
-    ) -> ControlFlow<()>;
 }
 
 /// A run under way: sequences are loaded once for all variants that share them.

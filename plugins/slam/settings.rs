@@ -17,6 +17,7 @@ mod evaluation;
 mod objects;
 mod own;
 mod poses;
+mod prior_map;
 mod report;
 pub mod run_document;
 mod variance;
@@ -26,6 +27,8 @@ pub use evaluation::EvaluationSettings;
 pub use objects::ObjectSettings;
 pub use own::OwnGraph;
 pub use poses::{OdometrySettings, PriorSettings};
+pub(crate) use prior_map::Anchor;
+pub use prior_map::PriorMapSettings;
 pub use report::ReportSettings;
 pub use variance::{BoxGroups, VarianceSettings};
 
@@ -42,6 +45,9 @@ pub struct Settings {
     /// The factor that holds the first pose.
     #[serde(default)]
     pub prior: PriorSettings,
+    /// A map that was made before. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior_map: Option<PriorMapSettings>,
     /// Which boxes are used, and how.
     #[serde(default)]
     pub detections: DetectionSettings,
@@ -109,7 +115,11 @@ impl Settings {
         let settings = Section::new(node, &errors).and_then(|mut section| {
             let own = OwnGraph::take(&mut section);
             let semantics = read_semantics(section.take("semantics"), folder, &own.values, &errors);
-            Some(Self { semantics, own, ..section.rest()? })
+            let mut settings = Self { semantics, own, ..section.rest()? };
+            if let Some(prior) = &mut settings.prior_map {
+                prior.read(folder, node, &errors)?;
+            }
+            Some(settings)
         });
         errors.finish(settings)
     }
@@ -119,6 +129,9 @@ impl Settings {
         let mut hash = fnv::FnvHasher::default();
         // what cannot be written has the version alone
         hash.write(serde_json::to_string(self).unwrap_or_default().as_bytes());
+        if let Some(prior) = &self.prior_map {
+            hash.write(serde_json::to_string(&prior.map).unwrap_or_default().as_bytes());
+        }
         hash.write(env!("CARGO_PKG_VERSION").as_bytes());
         format!("{:016x}", hash.finish())
     }

@@ -6,7 +6,7 @@ const UNIT: f64 = 1e-6;
 
 /// Matches each row with one column at most, and each column with one row, so that the sum of the gains is largest (the Hungarian
 /// method). `gains` are (row, column, gain); what is not listed, or gains nothing, is not matched.
-pub(super) fn best(rows: usize, columns: usize, gains: &[(usize, usize, f64)]) -> Vec<Option<usize>> {
+pub(crate) fn best(rows: usize, columns: usize, gains: &[(usize, usize, f64)]) -> Vec<Option<usize>> {
     if rows == 0 {
         return vec![];
     }

@@ -1,10 +1,12 @@
 use super::{Association, Associator, Image, Learned, Map};
 use crate::input::class::Aliases;
 use crate::input::sequence::ObjectId;
+use crate::mapping::prior_map::PriorObject;
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// The source says which object a box shows; boxes that it names none for are left out.
 ///
@@ -17,7 +19,7 @@ pub struct Given {}
 
 #[typetag::serialize(name = "given")]
 impl Association for Given {
-    fn begin(&self, _camera: Camera, _aliases: &Aliases) -> Box<dyn Associator> {
+    fn begin(&self, _: Camera, _: &Aliases, _: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         Box::new(Self {})
     }
 

@@ -7,12 +7,14 @@ mod union;
 
 use super::{Association, Associator};
 use crate::input::class::Aliases;
+use crate::mapping::prior_map::PriorObject;
 use fit::BoxNoise;
 use manifactor_graph::checked::{positive, within};
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use tracker::Tracker;
 
 /// By the likelihood of box and class, under what each object is expected to look like.
@@ -101,9 +103,9 @@ impl Default for Likelihood {
 
 #[typetag::serialize(name = "likelihood")]
 impl Association for Likelihood {
-    fn begin(&self, camera: Camera, aliases: &Aliases) -> Box<dyn Associator> {
+    fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         let (settings, aliases) = (self.clone(), aliases.clone());
-        Box::new(Tracker::new(settings, camera, aliases))
+        Box::new(Tracker::new(settings, camera, aliases, known))
     }
 }
 register!(dyn Association, "likelihood", Likelihood);

@@ -2,6 +2,7 @@
 use super::{Association, Associator, Image, Learned, Map, assignment};
 use crate::input::class::Aliases;
 use crate::input::sequence::{Detection, ObjectId};
+use crate::mapping::prior_map::PriorObject;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::within;
 use manifactor_graph::register;
@@ -9,6 +10,7 @@ use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQ
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// By overlap with the box before, or with the outline of the object in the map, whatever the class (as quadricslam does).
 ///
@@ -66,18 +68,18 @@ impl Default for Projection {
 
 #[typetag::serialize(name = "iou")]
 impl Association for Iou {
-    fn begin(&self, camera: Camera, aliases: &Aliases) -> Box<dyn Associator> {
+    fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         let Self { least, frames } = *self;
         let rule = Projection { least, least_before: least, frames, visible: 0.0 };
-        Box::new(Overlap::new(rule, false, camera, aliases))
+        Box::new(Overlap::new(rule, false, camera, aliases, known))
     }
 }
 register!(dyn Association, "iou", Iou);
 
 #[typetag::serialize(name = "projection")]
 impl Association for Projection {
-    fn begin(&self, camera: Camera, aliases: &Aliases) -> Box<dyn Associator> {
-        Box::new(Overlap::new(self.clone(), true, camera, aliases))
+    fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
+        Box::new(Overlap::new(self.clone(), true, camera, aliases, known))
     }
 }
 register!(dyn Association, "projection", Projection);
@@ -96,14 +98,26 @@ struct Overlap {
 /// An object when it was seen last.
 #[derive(Debug)]
 struct Last {
-    frame: usize,
-    bounding_box: BoundingBox,
+    /// Where; `None` where an earlier map has it.
+    seen: Option<(usize, BoundingBox)>,
     class: Option<String>,
 }
 
 impl Overlap {
-    fn new(rule: Projection, by_class: bool, camera: Camera, aliases: &Aliases) -> Self {
-        Self { rule, by_class, camera, aliases: aliases.clone(), objects: BTreeMap::new(), next: 1 }
+    fn new(
+        rule: Projection,
+        by_class: bool,
+        camera: Camera,
+        aliases: &Aliases,
+        known: &[Arc<PriorObject>],
+    ) -> Self {
+        let last = |object: &Arc<PriorObject>| {
+            let class = object.classes.leading().map(|(class, _)| class.to_owned());
+            (object.id, Last { seen: None, class })
+        };
+        let objects: BTreeMap<_, _> = known.iter().map(last).collect();
+        let next = objects.last_key_value().map_or(1, |(id, _)| id.0.saturating_add(1));
+        Self { rule, by_class, camera, aliases: aliases.clone(), objects, next }
     }
 
     fn class(&self, detection: &Detection) -> Option<String> {
@@ -129,7 +143,7 @@ impl Associator for Overlap {
         let classes: Vec<_> = image.detections.iter().map(|d| self.class(d)).collect();
         let mut overlaps = vec![];
         for (column, (id, last)) in self.objects.iter().enumerate() {
-            let before = Some(last.bounding_box).filter(|_| last.frame + rule.frames >= image.frame);
+            let before = last.seen.filter(|(frame, _)| frame + rule.frames >= image.frame).map(|(_, b)| b);
             let outline = self.outline(pose, map.object(*id));
             for (row, detection) in image.detections.iter().enumerate() {
                 if self.by_class && classes[row] != last.class {
@@ -152,15 +166,16 @@ impl Associator for Overlap {
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
         for (detection, id) in image.detections.iter().zip(names) {
             if let Some(id) = *id {
-                let (frame, bounding_box) = (image.frame, detection.bounding_box);
+                let seen = Some((image.frame, detection.bounding_box));
                 let class = self.class(detection);
-                self.objects.insert(id, Last { frame, bounding_box, class });
+                self.objects.insert(id, Last { seen, class });
                 self.next = self.next.max(id.0.saturating_add(1));
             }
         }
         // what is in no map, and was not seen lately, is never found again
         let since = image.frame.saturating_sub(self.rule.frames);
-        self.objects.retain(|id, last| last.frame >= since || map.object(*id).is_some());
+        let is_recent = |last: &Last| last.seen.is_some_and(|(frame, _)| frame >= since);
+        self.objects.retain(|id, last| is_recent(last) || map.object(*id).is_some());
         Learned::default()
     }
 }

@@ -53,7 +53,7 @@ fn load(name: &str) -> Sequence {
 /// Scores of names as they come, in the end, and when all is reconsidered.
 fn scores(settings: &Likelihood, sequence: &Sequence) -> [IdentityScores; 3] {
     let map = Odometry(sequence);
-    let mut associator = settings.begin(sequence.camera, &Aliases::default());
+    let mut associator = settings.begin(sequence.camera, &Aliases::default(), &[]);
     let (mut names, mut then) = (Names::default(), vec![]);
     let frames: Vec<_> = sequence.observations().collect();
     let image = |frame: usize| {

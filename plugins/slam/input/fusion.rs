@@ -2,15 +2,20 @@
 use crate::input::class::Aliases;
 use crate::input::sequence::ClassScores;
 use indexmap::IndexMap;
-use serde::Serialize;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Scores of an object's detections, averaged.
 ///
 /// The class is the arg max of the average of the score vectors (Jablonsky et al., section V). Where a detector
 /// reports its best class only, the average is a vote in which each detection counts with its score.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fusion {
+    /// Scores, summed over the detections.
+    #[serde(rename = "scores", deserialize_with = "sums")]
     sums: IndexMap<String, f64>,
+    /// How many there were.
     detections: usize,
 }
 
@@ -26,6 +31,16 @@ pub struct FusedClass {
     /// What else it may be: the other classes by their part of all scores, the largest first.
     #[serde(skip_serializing_if = "IndexMap::is_empty")]
     pub others: IndexMap<String, f64>,
+}
+
+fn sums<'de, D: Deserializer<'de>>(from: D) -> Result<IndexMap<String, f64>, D::Error> {
+    let sums = IndexMap::<String, f64>::deserialize(from)?;
+    match sums.iter().find(|(_, sum)| !(sum.is_finite() && **sum >= 0.0)) {
+        None => Ok(sums),
+        Some((class, sum)) => {
+            Err(D::Error::custom(format!("a score of 0 or more is expected for `{class}`, got {sum}")))
+        }
+    }
 }
 
 /// Classes with a smaller part of all scores are not worth a word.
@@ -54,6 +69,18 @@ impl Fusion {
         for (class, sum) in other.sums {
             *self.sums.entry(class).or_default() += sum;
         }
+    }
+
+    /// The classes that were named, each with its part of all scores; for none, nothing.
+    pub(crate) fn shares(&self) -> impl Iterator<Item = (&str, f64)> {
+        let all: f64 = self.sums.values().sum();
+        let share = move |sum: f64| if all > 0.0 { sum / all } else { 0.0 };
+        self.sums.iter().map(move |(class, sum)| (class.as_str(), share(*sum)))
+    }
+
+    /// The classes that were named, each with the sum of its scores.
+    pub(crate) fn sums(&self) -> &IndexMap<String, f64> {
+        &self.sums
     }
 
     /// The class with the largest sum of scores, the first seen of equals, and that sum.

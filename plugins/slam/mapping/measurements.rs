@@ -5,8 +5,10 @@
 use crate::input::class::Aliases;
 use crate::input::fusion::{FusedClass, Fusion};
 use crate::input::sequence::{Detection, ObjectId, Sequence};
-use crate::settings::DetectionSettings;
+use crate::mapping::prior_map::PriorObject;
+use crate::settings::{Anchor, DetectionSettings, Settings};
 use manifactor_quadric::{BoundingBox, Camera};
+use std::sync::Arc;
 
 /// One box of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,6 +26,8 @@ pub struct ObjectBox {
 pub struct Measured {
     /// Its number.
     pub id: ObjectId,
+    /// What an earlier map has of it.
+    pub prior: Option<Arc<PriorObject>>,
     fusion: Fusion,
     /// Detections that are associated with it.
     pub detections: usize,
@@ -48,12 +52,18 @@ pub struct Measurements {
 
 impl Measurements {
     /// Sorts the detections of a sequence by object.
-    pub fn gather(sequence: &Sequence, settings: &DetectionSettings, aliases: &Aliases) -> Self {
-        let mut all = Self::default();
+    pub fn gather(sequence: &Sequence, settings: &Settings) -> Self {
+        let mut all = Self::new(settings.anchor());
         for detection in &sequence.detections {
-            all.add(detection, &sequence.camera, settings, aliases);
+            all.add(detection, &sequence.camera, &settings.detections, &settings.aliases);
         }
         all
+    }
+
+    /// Nothing but what an earlier map has.
+    pub(crate) fn new(anchor: Option<Anchor<'_>>) -> Self {
+        let known = anchor.map_or(&[][..], |anchor| &anchor.map.objects);
+        Self { objects: known.iter().map(Measured::known).collect(), ..Self::default() }
     }
 
     /// Sorts one detection in.
@@ -108,6 +118,12 @@ impl Measurements {
         new
     }
 
+    /// The object of this number.
+    pub fn object(&self, id: ObjectId) -> Option<&Measured> {
+        let place = self.objects.binary_search_by_key(&id, |object| object.id).ok()?;
+        self.objects.get(place)
+    }
+
     /// The place of an object, which may be a new one.
     fn place(&mut self, id: ObjectId) -> usize {
         let place = self.objects.binary_search_by_key(&id, |object| object.id);
@@ -148,7 +164,12 @@ pub(crate) fn sift(detection: &Detection, camera: &Camera, settings: &DetectionS
 
 impl Measured {
     fn new(id: ObjectId) -> Self {
-        Self { id, fusion: Fusion::default(), detections: 0, views: vec![] }
+        Self { id, prior: None, fusion: Fusion::default(), detections: 0, views: vec![] }
+    }
+
+    /// One that an earlier map has.
+    fn known(object: &Arc<PriorObject>) -> Self {
+        Self { fusion: object.classes.clone(), prior: Some(object.clone()), ..Self::new(object.id) }
     }
 
     /// Adds a box; whether it takes the place of another of its frame.
@@ -159,6 +180,11 @@ impl Measured {
             Err(place) => self.views.insert(place, view),
         }
         place.is_ok()
+    }
+
+    /// What all its detections took it for.
+    pub(crate) fn classes(&self) -> &Fusion {
+        &self.fusion
     }
 
     /// The name of its class; `None` where no detection named one.
@@ -202,9 +228,13 @@ mod tests {
     const INSIDE: [f64; 4] = [100.0, 100.0, 200.0, 150.0];
     const CUT: [f64; 4] = [10.0, 100.0, 200.0, 150.0];
 
-    fn gather(detections: Vec<Detection>, settings: &DetectionSettings) -> Measurements {
-        let sequence = Sequence { detections, ..sequence() };
-        Measurements::gather(&sequence, settings, &Aliases::default())
+    fn gather(detections: &[Detection], settings: &DetectionSettings) -> Measurements {
+        let camera = sequence().camera;
+        let mut all = Measurements::default();
+        for detection in detections {
+            all.add(detection, &camera, settings, &Aliases::default());
+        }
+        all
     }
 
     fn with(cut_sides: CutSides) -> DetectionSettings {
@@ -215,7 +245,7 @@ mod tests {
     fn a_later_box_replaces_an_earlier_one_of_its_frame() {
         let later = [101.0, 100.0, 200.0, 150.0];
         let all = gather(
-            vec![detection(0, 1, "cup", 0.5, INSIDE), detection(0, 1, "cup", 0.5, later)],
+            &[detection(0, 1, "cup", 0.5, INSIDE), detection(0, 1, "cup", 0.5, later)],
             &with(CutSides::Drop),
         );
         assert_eq!(all.duplicates, 1);
@@ -226,7 +256,7 @@ mod tests {
     #[test]
     fn a_cut_box_votes_and_replaces_nothing() {
         let boxes = vec![detection(0, 1, "cup", 0.5, INSIDE), detection(0, 1, "bowl", 0.9, CUT)];
-        let all = gather(boxes, &with(CutSides::Drop));
+        let all = gather(&boxes, &with(CutSides::Drop));
         assert_eq!((all.cut, all.duplicates, all.boxes()), (1, 0, 1));
         assert_eq!(all.objects[0].class().unwrap().name, "bowl");
         assert_eq!(all.objects[0].detections, 2);
@@ -234,12 +264,12 @@ mod tests {
 
     #[test]
     fn cut_sides_are_masked_or_kept_if_asked_for() {
-        let mask = gather(vec![detection(0, 1, "cup", 0.5, CUT)], &with(CutSides::Mask));
+        let mask = gather(&[detection(0, 1, "cup", 0.5, CUT)], &with(CutSides::Mask));
         assert_eq!(mask.objects[0].views[0].inside, [false, true, true, true]);
-        let keep = gather(vec![detection(0, 1, "cup", 0.5, CUT)], &with(CutSides::Keep));
+        let keep = gather(&[detection(0, 1, "cup", 0.5, CUT)], &with(CutSides::Keep));
         assert_eq!(keep.boxes(), 1);
         let whole = [0.0, 0.0, 640.0, 480.0];
-        let nothing = gather(vec![detection(0, 1, "cup", 0.5, whole)], &with(CutSides::Mask));
+        let nothing = gather(&[detection(0, 1, "cup", 0.5, whole)], &with(CutSides::Mask));
         assert_eq!((nothing.cut, nothing.boxes()), (1, 0));
     }
 
@@ -247,15 +277,16 @@ mod tests {
     fn strangers_and_doubtful_boxes_are_counted() {
         let settings = DetectionSettings { min_score: 0.3, ..with(CutSides::Drop) };
         let all =
-            gather(vec![detection(0, 0, "cup", 0.9, INSIDE), detection(0, 2, "cup", 0.2, INSIDE)], &settings);
+            gather(&[detection(0, 0, "cup", 0.9, INSIDE), detection(0, 2, "cup", 0.2, INSIDE)], &settings);
         assert_eq!((all.unassociated, all.low_score, all.objects.len()), (1, 1, 0));
     }
 
     #[test]
     fn deviation_is_that_of_the_worse_dimension() {
         let boxes = [[0.0, 0.0, 100.0, 50.0], [0.0, 0.0, 160.0, 50.0]];
-        let boxes = boxes.iter().enumerate().map(|(i, b)| detection(i, 1, "cup", 0.5, *b)).collect();
-        let all = gather(boxes, &with(CutSides::Keep));
+        let boxes = boxes.iter().enumerate().map(|(i, b)| detection(i, 1, "cup", 0.5, *b));
+        let boxes: Vec<_> = boxes.collect();
+        let all = gather(&boxes, &with(CutSides::Keep));
         assert_eq!(all.objects[0].box_deviation(), 30.0);
     }
 }

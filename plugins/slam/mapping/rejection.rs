@@ -65,6 +65,9 @@ pub(crate) fn start(
     camera: Camera,
     settings: &ObjectSettings,
 ) -> Result<DualQuadric, Rejection> {
+    if let Some(prior) = &measured.prior {
+        return Ok(prior.quadric);
+    }
     sound(measured, settings)?;
     let seen = |view: &ObjectBox| {
         let pose = pose(view.frame)?;
@@ -80,8 +83,11 @@ pub(crate) fn start(
     started.map_err(|error| Rejection::Initialisation { message: error.to_string() })
 }
 
-/// Whether an object has boxes enough, and such as one object has.
+/// Whether an object has boxes enough, and such as one object has; what an earlier map has needs none.
 pub(crate) fn sound(measured: &Measured, settings: &ObjectSettings) -> Result<(), Rejection> {
+    if measured.prior.is_some() {
+        return Ok(());
+    }
     let views = measured.views.len();
     if views < settings.min_views {
         return Err(Rejection::Views { views, least: settings.min_views });

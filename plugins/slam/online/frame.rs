@@ -1,7 +1,7 @@
 //! One frame: its pose and its boxes, then what they change in the map.
 use super::association::Known;
 use super::object::Tracked;
-use super::{FrameError, Mapper};
+use super::{FrameError, Located, Mapper};
 use crate::association::{Image, Learned, Merge};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, ObjectId, Observation};
@@ -24,6 +24,10 @@ pub struct FrameReport {
     pub timestamp: f64,
     /// The pose as it is estimated now, in the map's frame.
     pub pose: Se3,
+    /// Where the stream began in a map that was made before, if this frame has shown it: all names are those of that map from now on,
+    /// and poses in its frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub located: Option<Located>,
     /// Boxes that passed the filters.
     pub boxes: usize,
     /// The object of each box, in the order of the frame's; of a box that was left out, none.
@@ -62,6 +66,7 @@ impl FrameReport {
             frame,
             timestamp,
             pose: Se3::identity(),
+            located: None,
             boxes: 0,
             names: vec![],
             forgotten: vec![],
@@ -90,7 +95,7 @@ impl Mapper {
         if let Some(before) = self.last.as_ref().map(|last| last.timestamp).filter(|t| *t >= timestamp) {
             return Err(FrameError::Time { timestamp, before });
         }
-        let up_moved = self.up.look(observation, &*self.settings.gravity)?;
+        let up_moved = self.up.look(observation, &self.settings)?;
         let map = self.up.frame().unwrap_or_else(|| MapFrame::of_odometry(None));
         let (mut graph, mut values) = (Graph::new(), Values::new());
         report.pose = match &self.last {
@@ -108,6 +113,10 @@ impl Mapper {
                 let first = map.map_from_odometry.compose(&frame.world_from_camera);
                 graph.push(prior_entry(first, &self.settings));
                 self.settings.own.add_to(&mut graph, &mut values);
+                for known in self.measurements.objects.iter().filter_map(|measured| measured.prior.as_ref()) {
+                    graph.push(known.entry(self.settings.anchor().map(|anchor| anchor.loss)));
+                    values.insert(known.key(), known.quadric);
+                }
                 first
             }
         };

@@ -1,6 +1,7 @@
 //! Up, as far as it is known yet.
-use crate::gravity::{Gravity, GravityError, MapFrame};
+use crate::gravity::{GravityError, MapFrame};
 use crate::input::sequence::{Observation, Opening, Sequence};
+use crate::settings::Settings;
 
 /// Up moves by this much, in radians, before factors are made again: half a degree.
 const MOVED: f64 = 0.01;
@@ -28,7 +29,7 @@ impl Up {
     pub(super) fn look(
         &mut self,
         observation: &Observation,
-        gravity: &dyn Gravity,
+        settings: &Settings,
     ) -> Result<bool, GravityError> {
         if self.is_settled {
             return Ok(false);
@@ -36,7 +37,10 @@ impl Up {
         let frames = self.seen.frames.len();
         self.seen.frames.push(observation.frame.clone());
         self.seen.accelerometer.extend(observation.accelerometer.iter().cloned());
-        let found = match (gravity.locate(&self.seen), self.found) {
+        let gravity = &settings.gravity;
+        let first = self.seen.frames.first().unwrap_or(&observation.frame);
+        let anchored = |located| settings.anchor().map_or(located, |anchor| anchor.frame(first, located));
+        let found = match (gravity.locate(&self.seen).map(anchored), self.found) {
             (Ok(found), _) => found,
             // readings may cancel out for a while; what was found before is as good as it gets
             (Err(_), Some(before)) => before,

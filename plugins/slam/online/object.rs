@@ -48,6 +48,13 @@ impl Default for Tracked {
 }
 
 impl Tracked {
+    /// One that an earlier map has.
+    pub(super) fn known(measured: &Measured) -> Option<Self> {
+        let start = measured.prior.as_ref()?.quadric;
+        let class = measured.class_name().map(str::to_owned);
+        Some(Self::Mapped(Mapped { start, boxes: vec![], class }))
+    }
+
     pub(super) fn is_mapped(&self) -> bool {
         matches!(self, Self::Mapped(_))
     }

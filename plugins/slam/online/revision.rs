@@ -2,7 +2,7 @@
 use super::Mapper;
 use super::frame::{FrameReport, Seen};
 use super::object::{Mapped, Tracked};
-use super::rules::{Ledger, candidate};
+use super::rules::Ledger;
 use crate::association::Merge;
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
@@ -203,7 +203,7 @@ impl Mapper {
         let before = self.ledger.clone();
         let mut all = self.candidates();
         if let Some(measured) = self.measured(id) {
-            all.push(candidate(measured, start));
+            all.push(Candidate::new(measured, start));
         }
         let up = self.up.frame().and_then(|frame| frame.up);
         let ruled = self.ledger.ask(&[id], &all, &settings, up).map_err(|error| error.to_string())?;
@@ -249,7 +249,7 @@ impl Mapper {
         mapped
             .filter_map(|(id, object)| {
                 let now = self.quadric(*id).or(object.born_as())?;
-                Some(candidate(self.measured(*id)?, now))
+                Some(Candidate::new(self.measured(*id)?, now))
             })
             .collect()
     }

@@ -111,7 +111,7 @@ impl Ledger {
     ) -> Result<Vec<Decision>, RuleError> {
         let all = measurements.objects.iter().zip(&starts);
         let candidates =
-            all.clone().filter_map(|(measured, start)| Some(candidate(measured, *start.as_ref().ok()?)));
+            all.clone().filter_map(|(measured, start)| Some(Candidate::new(measured, *start.as_ref().ok()?)));
         let new = all.filter(|(measured, start)| start.is_ok() && !self.left_out.contains_key(&measured.id));
         let new: Vec<ObjectId> = new.map(|(measured, _)| measured.id).collect();
         self.ask(&new, &candidates.collect::<Vec<_>>(), settings, up)?;
@@ -119,9 +119,4 @@ impl Ledger {
             |(measured, start): (&Measured, _)| Decision { start, verdict: self.verdict(measured.id) };
         Ok(measurements.objects.iter().zip(starts).map(decide).collect())
     }
-}
-
-/// An object as rules look at it.
-pub(super) fn candidate(measured: &Measured, start: DualQuadric) -> Candidate {
-    Candidate { key: object_key(measured.id), class: measured.class(), start }
 }

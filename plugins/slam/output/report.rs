@@ -12,6 +12,7 @@ use serde::Serialize;
 mod association;
 mod landmarks;
 mod online;
+mod prior_map;
 mod table;
 mod trajectory;
 
@@ -19,6 +20,7 @@ pub use association::AssociationReport;
 pub(crate) use association::Naming;
 pub use landmarks::LandmarkReport;
 pub use online::OnlineReport;
+pub use prior_map::{Found, PriorMapReport};
 pub use table::Row;
 pub(crate) use trajectory::name as alignment_name;
 pub use trajectory::{TrajectoryError, TrajectoryReport};
@@ -58,6 +60,9 @@ pub struct VariantReport {
     /// How boxes were put to objects, where the source did not say, or was not asked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub association: Option<AssociationReport>,
+    /// How it went in a map that was made before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior_map: Option<PriorMapReport>,
     /// How the stream went, where frames came one by one: the solve is then what followed it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub online: Option<OnlineReport>,
@@ -167,6 +172,7 @@ impl VariantReport {
             up: mapping.frame.up,
             variance_components: estimate.components.clone(),
             association: None,
+            prior_map: None,
             online: None,
             solve,
             trajectory,

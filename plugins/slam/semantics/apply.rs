@@ -2,6 +2,8 @@
 use super::{Rule, RuleError};
 use crate::input::class::Aliases;
 use crate::input::fusion::FusedClass;
+use crate::mapping::measurements::Measured;
+use crate::mapping::object_key;
 use manifactor_graph::{Direction, FactorEntry, Key};
 use manifactor_quadric::DualQuadric;
 use serde::Serialize;
@@ -16,9 +18,17 @@ pub(crate) struct Candidate {
     pub class: Option<FusedClass>,
     /// Where it begins.
     pub start: DualQuadric,
+    /// Whether an earlier map has it, with what rules said of it then.
+    pub known: bool,
 }
 
 impl Candidate {
+    /// A measured object that is mapped.
+    pub(crate) fn new(measured: &Measured, start: DualQuadric) -> Self {
+        let (key, class, known) = (object_key(measured.id), measured.class(), measured.prior.is_some());
+        Self { key, class, start, known }
+    }
+
     pub(super) fn class_name(&self) -> &str {
         self.class.as_ref().map_or("", |class| &class.name)
     }
@@ -99,6 +109,11 @@ impl<'a> Judge<'a> {
         for (i, rule) in self.rules.iter().enumerate() {
             let Some(share) = rule.share(object.class.as_ref(), self.aliases) else { continue };
             let factor = rule.factor.name().to_owned();
+            if object.known {
+                let because = "the prior map has it, with what rules said of it then".to_owned();
+                verdict.left_out.push(LeftOut { factor, rule: i + 1, because });
+                continue;
+            }
             if self.up.is_none() && rule.near.as_ref().is_some_and(|near| near.below) {
                 return Err(RuleError::NoUp { factor });
             }

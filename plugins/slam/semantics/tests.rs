@@ -70,7 +70,7 @@ fn object(number: usize, class: &str, score: f64, x: f64) -> Candidate {
     let pose = Se3::new(So3::identity(), Vector3::new(x, 0.0, 0.1 * number as f64));
     let class = FusedClass { name: class.into(), score, share: 1.0, others: Default::default() };
     let start = DualQuadric { pose, semi_axes: Vector3::new(0.1, 0.1, 0.25) };
-    Candidate { key: Key::indexed("q", number), class: Some(class), start }
+    Candidate { key: Key::indexed("q", number), class: Some(class), start, known: false }
 }
 
 /// What a rule has for each of these objects.

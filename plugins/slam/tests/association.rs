@@ -7,6 +7,7 @@ use manifactor_slam::association::{Map, Merge, Projection};
 use manifactor_slam::class::Aliases;
 use manifactor_slam::metrics::IdentityScores;
 use manifactor_slam::online::Mapper;
+use manifactor_slam::prior_map::PriorObject;
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::{self, Run};
 use manifactor_slam::run_document::RunDocument;
@@ -129,7 +130,7 @@ const OTHER: u32 = 1000;
 
 #[typetag::serialize(name = "twofold")]
 impl Association for Twofold {
-    fn begin(&self, _: Camera, _: &Aliases) -> Box<dyn Associator> {
+    fn begin(&self, _: Camera, _: &Aliases, _: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         Box::new(self.clone())
     }
 }

@@ -5,7 +5,7 @@
 use super::sightings::Sighting;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Manifold, Residual};
-use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
+use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric, QuadricPrior};
 use nalgebra::{Cholesky, SMatrix, SVector, Vector3, Vector4};
 
 type Matrix9 = SMatrix<f64, 9, 9>;
@@ -20,12 +20,26 @@ pub(super) struct BoxNoise {
     pub of_size: f64,
 }
 
-/// What is believed of an object before its second box.
+/// What is believed of an object beside its boxes.
+#[derive(Debug, Clone)]
+pub(super) enum Belief {
+    /// What the first box says.
+    Seen(FirstSight),
+    /// What an earlier map says.
+    Known {
+        /// Its ellipsoid there.
+        quadric: DualQuadric,
+        /// W with WᵀW = Σ⁻¹.
+        root: Box<Matrix9>,
+    },
+}
+
+/// What is believed of an object after its first box.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Belief {
+pub(super) struct FirstSight {
     /// Its ellipsoid, if it were as far away as objects usually are.
-    pub first: DualQuadric,
-    /// From where it was seen first.
+    quadric: DualQuadric,
+    /// From where it was seen.
     eye: Vector3<f64>,
     /// How far away that is, in metres.
     distance: f64,
@@ -72,22 +86,52 @@ impl Belief {
         let size = |length: f64, focal: f64| (0.5 * length.max(1.0) * depth / focal).max(1e-3);
         let (x, y) = (size(b.width(), camera.fx), size(b.height(), camera.fy));
         let pose = Se3::new(seen.world_from_camera.rotation, centre);
-        let first = DualQuadric { pose, semi_axes: Vector3::new(x, y, (x * y).sqrt()) };
-        Self { first, eye, distance: (centre - eye).norm(), spread }
+        let quadric = DualQuadric { pose, semi_axes: Vector3::new(x, y, (x * y).sqrt()) };
+        Self::Seen(FirstSight { quadric, eye, distance: (centre - eye).norm(), spread })
     }
 
-    /// Rows of the belief and their derivatives: distance, three axes, three of the rotation.
-    fn rows(&self, quadric: &DualQuadric) -> (SVector<f64, 7>, SMatrix<f64, 7, 9>) {
+    /// Of an object that is known as well as this.
+    pub(super) fn known(fitted: &Fitted) -> Self {
+        let information = Cholesky::new(fitted.covariance).map(|factor| factor.inverse());
+        let root = information.and_then(Cholesky::new).map(|factor| factor.l().transpose());
+        // what is read of a file has a covariance that is positive definite
+        Self::Known { quadric: fitted.quadric, root: Box::new(root.unwrap_or_else(Matrix9::identity)) }
+    }
+
+    /// The ellipsoid that it begins with.
+    pub(super) fn first(&self) -> DualQuadric {
+        match self {
+            Self::Seen(first) => first.quadric,
+            Self::Known { quadric, .. } => *quadric,
+        }
+    }
+
+    /// Rows of the belief and their derivatives.
+    fn rows(&self, quadric: &DualQuadric) -> (Vector9, Matrix9) {
+        match self {
+            Self::Seen(first) => first.rows(quadric),
+            Self::Known { quadric: value, root } => {
+                let mut jacobians = (Matrix9::zeros(),);
+                let r = QuadricPrior { value: *value }.linearize((quadric,), &[true; 9], &mut jacobians);
+                (**root * r, **root * jacobians.0)
+            }
+        }
+    }
+}
+
+impl FirstSight {
+    /// Distance, three axes, three of the rotation; two rows stay empty.
+    fn rows(&self, quadric: &DualQuadric) -> (Vector9, Matrix9) {
         let away = quadric.centroid() - self.eye;
         let log = (away.norm().max(1e-6) / self.distance).ln();
         // the translation steps in the ellipsoid's own frame
         let by_place = quadric.pose.rotation.inverse().act(&away) / away.norm_squared().max(1e-12);
-        let turn = self.first.pose.rotation.between(&quadric.pose.rotation).log();
-        let (mut r, mut j) = (SVector::<f64, 7>::zeros(), SMatrix::<f64, 7, 9>::zeros());
+        let turn = self.quadric.pose.rotation.between(&quadric.pose.rotation).log();
+        let (mut r, mut j) = (Vector9::zeros(), Matrix9::zeros());
         r[0] = log / self.spread;
         for c in 0..3 {
             j[(0, 3 + c)] = by_place[c] / self.spread;
-            r[1 + c] = ((quadric.semi_axes[c] / self.first.semi_axes[c]).ln() - log) / SHAPE;
+            r[1 + c] = ((quadric.semi_axes[c] / self.quadric.semi_axes[c]).ln() - log) / SHAPE;
             for k in 0..3 {
                 j[(1 + c, 3 + k)] = -by_place[k] / SHAPE;
             }
@@ -231,7 +275,7 @@ mod tests {
     fn one_box_says_all_but_the_depth() {
         let first = seen(0.0, 0, &ball(2.0));
         let belief = Belief::new(&first, &CAMERA, 3.0, 0.5);
-        let found = fit(&belief, belief.first, &[first], &CAMERA, &NOISE).unwrap();
+        let found = fit(&belief, belief.first(), &[first], &CAMERA, &NOISE).unwrap();
         let away = found.quadric.centroid();
         assert!((away.z - 3.0).abs() < 0.1, "{away}");
         let ray = CAMERA.ray(Vector2::new(345.0, 240.0)) * 3.0;
@@ -244,7 +288,7 @@ mod tests {
     fn boxes_from_the_side_say_the_depth() {
         let sightings: Vec<_> = (0..8).map(|i| seen(0.1 * f64::from(i), i as usize, &ball(2.0))).collect();
         let belief = Belief::new(&sightings[0], &CAMERA, 3.0, 0.5);
-        let found = fit(&belief, belief.first, &sightings, &CAMERA, &NOISE).unwrap();
+        let found = fit(&belief, belief.first(), &sightings, &CAMERA, &NOISE).unwrap();
         assert!((found.quadric.centroid() - ball(2.0).centroid()).norm() < 0.1, "{}", found.quadric);
         assert!(found.covariance[(5, 5)].sqrt() < 0.15);
         assert!(squared_error(&found.quadric, &sightings[7], &CAMERA, &NOISE) < 1.0);
@@ -254,7 +298,13 @@ mod tests {
     #[test]
     fn derivatives_of_a_belief_are_right() {
         let belief = Belief::new(&seen(0.0, 0, &ball(2.0)), &CAMERA, 3.0, 0.5);
-        let at = belief.first.retract(&Vector9::from_fn(|i, _| 0.02 * (i as f64 - 4.0)));
+        check_derivatives(&belief);
+        let covariance = Matrix9::from_fn(|r, c| if r == c { 0.04 } else { 0.01 });
+        check_derivatives(&Belief::known(&Fitted { quadric: ball(2.0), covariance }));
+    }
+
+    fn check_derivatives(belief: &Belief) {
+        let at = belief.first().retract(&Vector9::from_fn(|i, _| 0.02 * (i as f64 - 4.0)));
         let (_, j) = belief.rows(&at);
         for c in 0..9 {
             let step = Vector9::from_fn(|i, _| if i == c { 1e-6 } else { 0.0 });

@@ -5,6 +5,7 @@ use super::fit::{Belief, BoxNoise, Fitted, fit, predict};
 use super::sightings::{Sighting, Sightings};
 use crate::input::class::Aliases;
 use crate::input::sequence::{ClassScores, ObjectId};
+use crate::mapping::prior_map::PriorObject;
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
@@ -23,7 +24,7 @@ pub(super) struct Track {
     /// All frames that it was seen in.
     pub frames: Vec<usize>,
     /// When it was seen last, in seconds.
-    pub seen_at: f64,
+    pub seen_at: Option<f64>,
     /// It is compared with others when it has so many boxes.
     pub next_look: usize,
 }
@@ -49,9 +50,29 @@ impl Track {
         camera: &Camera,
         noise: &BoxNoise,
     ) -> Option<Self> {
-        let fitted = fit(&belief, belief.first, &[*first], camera, noise)?;
+        let fitted = fit(&belief, belief.first(), &[*first], camera, noise)?;
         let (votes, sightings, frames) = (IndexMap::new(), Sightings::default(), vec![]);
-        Some(Self { id, votes, belief, fitted, sightings, frames, seen_at: 0.0, next_look: FIRST_LOOK })
+        Some(Self { id, votes, belief, fitted, sightings, frames, seen_at: None, next_look: FIRST_LOOK })
+    }
+
+    /// An object of an earlier map.
+    pub(super) fn known(object: &PriorObject) -> Self {
+        let fitted = Fitted { quadric: object.quadric, covariance: object.covariance() };
+        Self {
+            id: object.id,
+            votes: object.classes.sums().clone(),
+            belief: Belief::known(&fitted),
+            fitted,
+            sightings: Sightings::default(),
+            frames: vec![],
+            seen_at: None,
+            next_look: FIRST_LOOK,
+        }
+    }
+
+    /// Whether an earlier map has it.
+    pub(super) fn is_known(&self) -> bool {
+        matches!(self.belief, Belief::Known { .. })
     }
 
     /// How many boxes it has.
@@ -95,16 +116,15 @@ impl Track {
         if all > 0.0 { self.votes.get(class).copied().unwrap_or_default() / all } else { 1.0 }
     }
 
-    /// The box that it should have, seen from here and now; `None` where it is not seen.
+    /// The box that it should have, seen from here after so many seconds; `None` where it is not seen.
     pub(super) fn expected(
         &self,
-        timestamp: f64,
+        seconds: f64,
         pose: &Se3,
         camera: &Camera,
         settings: &Likelihood,
     ) -> Option<Expected> {
         let predicted = predict(pose, &self.fitted.quadric, camera)?;
-        let seconds = (timestamp - self.seen_at).max(0.0);
         let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| drift * drift * seconds);
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
         let by_drift = predicted.by_pose * Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
@@ -133,7 +153,7 @@ impl Track {
         noise: &BoxNoise,
     ) {
         self.frames.push(sighting.frame);
-        self.seen_at = timestamp;
+        self.seen_at = Some(timestamp);
         self.sightings.renew(map);
         self.sightings.add(sighting, &self.fitted.quadric.centroid());
         let fitted = fit(&self.belief, self.fitted.quadric, self.sightings.all(), camera, noise);

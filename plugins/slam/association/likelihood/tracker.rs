@@ -6,8 +6,10 @@ use super::sightings::Sighting;
 use super::track::Track;
 use crate::input::class::Aliases;
 use crate::input::sequence::{Detection, ObjectId};
+use crate::mapping::prior_map::PriorObject;
 use manifactor_geometry::Se3;
 use manifactor_quadric::Camera;
+use std::sync::Arc;
 
 /// Boxes of a frame that are looked at, those of the highest scores: a detector that draws more has gone mad.
 const BOXES: usize = 200;
@@ -17,6 +19,8 @@ const FIRM: usize = 3;
 const PATIENCE: f64 = 10.0;
 /// So many such objects are kept at most.
 const WAITING: usize = 500;
+/// Where a run begins in an earlier map is known as well as after so many seconds without seeing any of it.
+const AT_LARGE: f64 = 30.0;
 /// Objects whose place is known to this part of their distance tell how far away things are.
 const KNOWN: f64 = 0.15;
 
@@ -28,6 +32,8 @@ pub(super) struct Tracker {
     aliases: Aliases,
     pub tracks: Vec<Track>,
     next: u32,
+    /// When objects of an earlier map were seen last, as it were, in seconds.
+    began: Option<f64>,
 }
 
 impl Associator for Tracker {
@@ -57,6 +63,7 @@ impl Associator for Tracker {
 
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
         let Some(pose) = map.pose(image.frame) else { return Learned::default() };
+        self.began.get_or_insert(image.timestamp - AT_LARGE);
         let usual = self.usual_depth(&pose);
         let mut seen = vec![];
         for (detection, id) in image.detections.iter().zip(names) {
@@ -87,9 +94,16 @@ impl Associator for Tracker {
 }
 
 impl Tracker {
-    /// No object.
-    pub(super) fn new(settings: Likelihood, camera: Camera, aliases: Aliases) -> Self {
-        Self { settings, camera, aliases, tracks: vec![], next: 1 }
+    /// No object but those of an earlier map.
+    pub(super) fn new(
+        settings: Likelihood,
+        camera: Camera,
+        aliases: Aliases,
+        known: &[Arc<PriorObject>],
+    ) -> Self {
+        let tracks: Vec<Track> = known.iter().map(|object| Track::known(object)).collect();
+        let next = tracks.iter().map(|track| track.id.0.saturating_add(1)).max().unwrap_or(1);
+        Self { settings, camera, aliases, tracks, next, began: None }
     }
 
     /// The known objects of boxes.
@@ -122,9 +136,12 @@ impl Tracker {
         let class =
             |i: &usize| image.detections[*i].scores.best().map(|(class, _)| self.aliases.canonical(class));
         let classes: Vec<Option<String>> = boxes.iter().map(class).collect();
+        let began = self.began.unwrap_or(image.timestamp - AT_LARGE);
         let (mut gains, mut tracks) = (vec![], vec![]);
         for (t, track) in self.tracks.iter().enumerate() {
-            let Some(expected) = track.expected(image.timestamp, pose, &self.camera, &self.settings) else {
+            let since = track.seen_at.unwrap_or(began);
+            let unseen = (image.timestamp - since).max(0.0);
+            let Some(expected) = track.expected(unseen, pose, &self.camera, &self.settings) else {
                 continue;
             };
             let before = gains.len();
@@ -177,12 +194,12 @@ impl Tracker {
 
     /// Forgets objects that are seen too rarely, and those that are seen least lately where there are too many such.
     fn forget(&mut self, now: f64) -> Vec<ObjectId> {
-        let is_firm = |track: &Track| track.boxes() >= FIRM;
-        let mut seen: Vec<f64> =
-            self.tracks.iter().filter(|track| !is_firm(track)).map(|track| track.seen_at).collect();
+        let is_firm = |track: &Track| track.boxes() >= FIRM || track.is_known();
+        let doubtful = self.tracks.iter().filter(|track| !is_firm(track));
+        let mut seen: Vec<f64> = doubtful.filter_map(|track| track.seen_at).collect();
         seen.sort_by(|a, b| b.total_cmp(a));
         let since = seen.get(WAITING).copied().unwrap_or(f64::NEG_INFINITY).max(now - PATIENCE);
-        let stays = |track: &mut Track| is_firm(track) || track.seen_at > since;
+        let stays = |track: &mut Track| is_firm(track) || track.seen_at.is_some_and(|at| at > since);
         self.tracks.extract_if(.., |track| !stays(track)).map(|track| track.id).collect()
     }
 }

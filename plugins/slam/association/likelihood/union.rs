@@ -70,19 +70,23 @@ impl Tracker {
 }
 
 /// How far apart two are that may be one, as a part of their sizes and of how well they are known; `None`, where they are too far apart,
-/// or were seen side by side.
+/// were seen side by side, or an earlier map has both.
 fn gap(one: &Track, two: &Track) -> Option<f64> {
     let apart = (one.fitted.quadric.centroid() - two.fitted.quadric.centroid()).norm();
     let sizes = one.fitted.quadric.semi_axes.norm() + two.fitted.quadric.semi_axes.norm();
     let spread = (one.place_covariance() + two.place_covariance()).trace().sqrt();
     let gap = apart / (sizes + APART * spread);
+    if one.is_known() && two.is_known() {
+        return None;
+    }
     let together = || common(&one.frames, &two.frames) as f64;
     (gap <= 1.0 && together() <= TOGETHER * one.boxes().min(two.boxes()) as f64).then_some(gap)
 }
 
-/// The object that two are, with the name of the one with more boxes, if one ellipsoid explains all boxes.
+/// The object that two are, with the name of the one that an earlier map has, or that has more boxes, if one ellipsoid explains all boxes.
 fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Option<Union> {
-    let (more, fewer) = if one.boxes() >= two.boxes() { (one, two) } else { (two, one) };
+    let rank = |track: &Track| (track.is_known(), track.boxes());
+    let (more, fewer) = if rank(one) >= rank(two) { (one, two) } else { (two, one) };
     let (noise, mut sightings) = (settings.noise(), more.sightings.and(&fewer.sightings));
     // the boxes of one may look like outliers from the other
     let starts = [more, fewer].into_iter().filter_map(|start| {
@@ -118,7 +122,7 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
     track.frames.extend(&fewer.frames);
     track.frames.sort_unstable();
     track.frames.dedup();
-    track.seen_at = more.seen_at.max(fewer.seen_at);
+    track.seen_at = more.seen_at.into_iter().chain(fewer.seen_at).reduce(f64::max);
     track.next_look = track.next_look.max(fewer.next_look);
     sightings.thin(&fitted.quadric.centroid());
     track.fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;

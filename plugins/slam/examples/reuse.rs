@@ -1,0 +1,158 @@
+//! A map that is used again: made of one part of a sequence, then found again and extended by other parts.
+//!
+//! `reuse RUN.toml FROM..TO START[..END]… [KEY=VALUE…]`: frames FROM to TO make the map; each stream begins at frame START, at an unknown pose, and goes
+//! on until END, or as long as the sequence; `OTHER.toml:START` is one of another document. For each: after how many frames its pose was known, and how far off it was then
+//! and in the end, against the ground truth as the map has it. The variant is the one called `ours`, or the last.
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+use manifactor_config::Document;
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
+use manifactor_graph::Direction;
+use manifactor_slam::metrics::{Alignment, align, associate};
+use manifactor_slam::online::{FrameError, FrameReport, Located, Mapper};
+use manifactor_slam::output::write_whole;
+use manifactor_slam::prior_map::PriorMap;
+use manifactor_slam::run::{Watch, online};
+use manifactor_slam::run_document::RunDocument;
+use manifactor_slam::sequence::Sequence;
+use manifactor_slam::settings::Settings;
+use manifactor_slam::source::Folders;
+use manifactor_solve::Silent;
+use std::ops::{ControlFlow, Range};
+use std::sync::Arc;
+
+/// The frames of a part of a sequence. Its odometry begins elsewhere, as after a restart.
+fn part(all: &Sequence, frames: Range<usize>) -> Sequence {
+    let mut part = all.opening().into_sequence();
+    let observations = all.observations().skip(frames.start).take(frames.len());
+    let first = all.frames[frames.start].world_from_camera;
+    part.up = all.up.map(|up| Direction::new(first.rotation.inverse().act(&up)).unwrap());
+    for mut observation in observations {
+        observation.frame.world_from_camera = first.between(&observation.frame.world_from_camera);
+        part.push(observation);
+    }
+    part
+}
+
+/// The map's frame in that of the truth.
+fn truth_from_map(sequence: &Sequence, trajectory: &[StampedPose]) -> Se3 {
+    let truth = &sequence.ground_truth.as_ref().unwrap().trajectory;
+    let pairs = associate(truth, trajectory, 0.02).unwrap();
+    let found = align(&pairs, Alignment::Se3).unwrap().0;
+    Se3::new(found.rotation, found.translation)
+}
+
+/// Degrees and metres from the truth.
+fn off(sequence: &Sequence, truth_from_map: &Se3, pose: &StampedPose) -> Option<[f64; 2]> {
+    let truth = &sequence.ground_truth.as_ref().unwrap().trajectory;
+    let pair = associate(truth, std::slice::from_ref(pose), 0.02).ok()?.pop()?;
+    let error = pair.truth.between(&truth_from_map.compose(&pair.estimate));
+    Some([error.rotation.log().norm().to_degrees(), error.translation.norm()])
+}
+
+/// Root mean squares of these over a trajectory.
+fn rmse(sequence: &Sequence, truth_from_map: &Se3, trajectory: &[StampedPose]) -> [f64; 2] {
+    let all: Vec<_> = trajectory.iter().filter_map(|pose| off(sequence, truth_from_map, pose)).collect();
+    [0, 1].map(|i| (all.iter().map(|error| error[i] * error[i]).sum::<f64>() / all.len() as f64).sqrt())
+}
+
+/// Notes when the place was found, and where the camera was estimated to be then.
+#[derive(Default)]
+struct Found {
+    at: Option<(usize, StampedPose, Located)>,
+    longest: f64,
+}
+
+impl Watch for Found {
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        _: &mut Mapper,
+        seconds: f64,
+    ) -> ControlFlow<()> {
+        self.longest = self.longest.max(seconds);
+        if let Ok(FrameReport { frame, timestamp, pose, located: Some(located), .. }) = report {
+            self.at = Some((*frame, StampedPose { timestamp: *timestamp, pose: *pose }, located.clone()));
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+fn range(text: &str, all: usize) -> Range<usize> {
+    let (from, to) = text.split_once("..").unwrap_or((text, ""));
+    from.parse().unwrap()..to.parse().unwrap_or(all)
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (sets, places): (Vec<_>, Vec<_>) =
+        arguments.iter().skip(1).partition(|argument| argument.contains('='));
+    let mut document = Document::open(&arguments[0]).unwrap();
+    document.set(&sets).unwrap();
+    let run = RunDocument::read(&document).unwrap();
+    let variant = run.variants.iter().find(|v| v.name == "ours").or(run.variants.last()).unwrap();
+    let data = std::env::var("MANIFACTOR_DATA").ok().map(Into::into);
+    let folders = Folders { data, document: run.folder.clone() };
+    let sequence = variant.settings.source.load(&folders).unwrap();
+    let settings = &variant.settings;
+
+    let mapped = Arc::new(part(&sequence, range(places[0], sequence.frames.len())));
+    let (estimate, _) = manifactor_slam::run::estimate("map", mapped, settings, &mut Silent).unwrap();
+    let frame = truth_from_map(&sequence, &estimate.trajectory());
+    let clock = std::time::Instant::now();
+    let map = PriorMap::of(&estimate, settings).unwrap();
+    println!("{} objects, in {:.2} s", map.objects.len(), clock.elapsed().as_secs_f64());
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("map.json");
+    write_whole(&file, serde_json::to_string(&map).unwrap()).unwrap();
+    document.set(&[format!("prior_map.file={}", file.display())]).unwrap();
+    let run = RunDocument::read(&document).unwrap();
+    let variant = run.variants.iter().find(|v| v.name == "ours").or(run.variants.last()).unwrap();
+
+    for place in &places[1..] {
+        // a stream of another document
+        let other = place.split_once(':').map(|(other, _)| {
+            let mut document = Document::open(other).unwrap();
+            document.set(&sets).unwrap();
+            RunDocument::read(&document).unwrap().variants[0].settings.source.load(&folders).unwrap()
+        });
+        let sequence = other.as_ref().unwrap_or(&sequence);
+        let frames = place.rsplit(':').next().unwrap();
+        let stream = Arc::new(part(sequence, range(frames, sequence.frames.len())));
+        let settings: &Settings = &variant.settings;
+        let without = Settings { prior_map: None, ..settings.clone() };
+        let (alone, _) =
+            online(place, stream.clone().into(), &without, &mut Found::default(), &mut Silent).unwrap();
+        let own = truth_from_map(sequence, &alone.trajectory());
+        let alone = rmse(sequence, &own, &alone.trajectory());
+        let (mut found, began) = (Found::default(), stream.frames[0].timestamp);
+        let (estimate, report) = online(place, stream.into(), settings, &mut found, &mut Silent).unwrap();
+        let Some((at, pose, located)) = found.at else {
+            println!("{place}: not found");
+            continue;
+        };
+        let told =
+            |error: Option<[f64; 2]>| error.map_or("?".to_owned(), |[deg, m]| format!("{deg:.1}° {m:.3} m"));
+        let last = estimate.trajectory().pop().unwrap();
+        let prior = report.prior_map.unwrap();
+        let same = located.matches.iter().filter(|(a, b)| a == b).count();
+        println!(
+            "{place}: after {at} frames, {:.1} s, off by {}, in the end {}; {} matches ({same} of one name), lead {:.1}, IoU {:.2}, {:?}; longest frame {:.0} ms; seen {} of {}, gone {:?}, added {}; objects {}; rmse {:?}, without the map and aligned {:?}",
+            pose.timestamp - began,
+            told(off(sequence, &frame, &pose)),
+            told(off(sequence, &frame, &last)),
+            located.matches.len(),
+            located.lead,
+            located.overlap,
+            located.noise,
+            found.longest * 1e3,
+            prior.seen.len(),
+            prior.objects,
+            prior.gone,
+            prior.added.len(),
+            estimate.mapping.mapped().count(),
+            rmse(sequence, &frame, &estimate.trajectory()),
+            alone,
+        );
+    }
+}

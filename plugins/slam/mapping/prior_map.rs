@@ -1,0 +1,168 @@
+//! A map that was made before: what is in it is known when a run begins.
+//!
+//! Each object of it is a variable from the first frame on, with a factor that holds it where the map has it, as well as the map
+//! knows it. Boxes that show it are its own, and rules are not asked about it again.
+use crate::input::fusion::Fusion;
+use crate::input::sequence::ObjectId;
+use crate::mapping::object_key;
+use manifactor_config::{Diagnostics, Document, Errors, Fault};
+use manifactor_graph::loss::Loss;
+use manifactor_graph::noise::NoiseError;
+use manifactor_graph::{Direction, FactorEntry, Key, Noise};
+use manifactor_quadric::{DualQuadric, QuadricPrior};
+use nalgebra::{DMatrix, SMatrix};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::path::Path;
+use std::sync::Arc;
+
+mod layout;
+
+pub(crate) use layout::{Aligned, Layout, Mark};
+
+/// Objects, and up, in a frame of the map's own.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorMap {
+    /// Of the form of the file.
+    #[serde(deserialize_with = "version")]
+    version: u32,
+    /// Up, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+    /// By number.
+    pub objects: Vec<Arc<PriorObject>>,
+}
+
+/// An object of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorObject {
+    /// Its number.
+    pub id: ObjectId,
+    /// What detectors took it for.
+    pub classes: Fusion,
+    /// What it is estimated to be, in the map's frame.
+    pub quadric: DualQuadric,
+    /// Covariance of that, in the order of its tangent: rad, then m, both in its own frame, then the logarithms of its axes.
+    pub covariance: [[f64; 9]; 9],
+    /// How often it was there to be seen.
+    pub looks: Looks,
+}
+
+/// How often an object was looked at from nearby times and places, and how often it was seen then. A detector that misses an object in one frame misses
+/// it in the next as well, so that frames alone say little.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Looks {
+    /// All of them.
+    pub expected: usize,
+    /// Those with a box at least.
+    pub seen: usize,
+}
+
+/// The only one that there is yet.
+const VERSION: u32 = 1;
+
+fn version<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
+    let found = u32::deserialize(from)?;
+    let told = || format!("a map of version {found}, and this program reads version {VERSION}");
+    if found == VERSION { Ok(found) } else { Err(serde::de::Error::custom(told())) }
+}
+
+impl PriorMap {
+    /// A map of these objects.
+    pub fn new(up: Option<Direction>, mut objects: Vec<Arc<PriorObject>>) -> Self {
+        objects.sort_by_key(|object| object.id);
+        Self { version: VERSION, up, objects }
+    }
+
+    /// Reads `map.json`, as a run leaves it.
+    ///
+    /// # Errors
+    /// Where there is none, or what it says is not a map: each at its place.
+    pub fn read(path: &Path) -> Result<Self, Diagnostics> {
+        let document = Document::open(path)?;
+        let errors = Errors::new();
+        let map = document.root().read::<Self>(&errors).map(|map| {
+            let places = document.root().items("objects");
+            for (i, (object, node)) in map.objects.iter().zip(places).enumerate() {
+                if let Err(error) = object.noise() {
+                    let place = node.field("covariance").unwrap_or(node).place.clone();
+                    errors.report(place, Fault::invalid(error.to_string()));
+                }
+                if map.objects[..i].iter().any(|other| other.id == object.id) {
+                    let place = node.field("id").unwrap_or(node).place.clone();
+                    errors.report(place, Fault::invalid(format!("object {} is there twice", object.id)));
+                }
+            }
+            Self::new(map.up, map.objects)
+        });
+        errors.finish(map)
+    }
+
+    /// The same, if its objects may be `sigma_scale` times as far off as their covariances say, and `shape_error` besides: rad, and as a
+    /// part of their size.
+    pub(crate) fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
+        let trusted = |object: &Arc<PriorObject>| Arc::new(object.trusted(sigma_scale, shape_error));
+        Self { objects: self.objects.iter().map(trusted).collect(), ..*self }
+    }
+
+    /// The object of this number.
+    pub fn object(&self, id: ObjectId) -> Option<&Arc<PriorObject>> {
+        let place = self.objects.binary_search_by_key(&id, |object| object.id).ok()?;
+        self.objects.get(place)
+    }
+}
+
+impl PriorObject {
+    /// Its covariance.
+    pub fn covariance(&self) -> SMatrix<f64, 9, 9> {
+        SMatrix::from_fn(|r, c| self.covariance[r][c])
+    }
+
+    fn noise(&self) -> Result<Noise, NoiseError> {
+        let noise = Noise::covariance(DMatrix::from_fn(9, 9, |r, c| self.covariance[r][c]))?;
+        noise.whitener(9)?;
+        Ok(noise)
+    }
+
+    /// The same, if it may be `sigma_scale` times as far off as it says, and `shape_error` besides: rad, and as a part of its size.
+    fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
+        let mut covariance = self.covariance.map(|row| row.map(|entry| entry * sigma_scale * sigma_scale));
+        let size = self.quadric.semi_axes.mean();
+        let errors = [1.0, size, 1.0].map(|of| shape_error * of);
+        for i in 0..9 {
+            covariance[i][i] += errors[i / 3] * errors[i / 3];
+        }
+        Self { covariance, ..self.clone() }
+    }
+
+    /// The key of its variable.
+    pub(crate) fn key(&self) -> Key {
+        object_key(self.id)
+    }
+
+    /// The factor that holds it.
+    pub(crate) fn entry(&self, loss: Option<&Arc<dyn Loss>>) -> FactorEntry {
+        FactorEntry {
+            keys: vec![self.key()],
+            name: None,
+            factor: Arc::new(QuadricPrior { value: self.quadric }),
+            // a covariance that was read has a noise
+            noise: self.noise().unwrap_or_default(),
+            loss: loss.cloned(),
+        }
+    }
+}
+
+impl Looks {
+    /// How likely it is to be seen in a look.
+    pub fn rate(&self) -> f64 {
+        (self.seen + 1) as f64 / (self.expected + 2) as f64
+    }
+
+    /// Those of both.
+    pub fn plus(self, other: Self) -> Self {
+        Self { expected: self.expected + other.expected, seen: self.seen + other.seen }
+    }
+}

@@ -1,0 +1,95 @@
+//! Where a stream is in a map that was made before.
+use super::Mapper;
+use super::object::Tracked;
+use crate::input::sequence::ObjectId;
+use crate::mapping::measurements::{Measured, ObjectBox};
+use crate::mapping::object_key;
+use crate::mapping::prior_map::{Aligned, Layout, Mark, PriorMap};
+use manifactor_geometry::Se3;
+use manifactor_graph::Noise;
+use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric};
+use serde::Serialize;
+
+/// Where a run begins in a map that was made before.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Located {
+    /// The pose of the first camera in the map's frame.
+    pub start: Se3,
+    /// How well that is known: rad, then m.
+    #[serde(skip)]
+    pub noise: Noise,
+    /// Objects that are the same: of the run until then, of the map.
+    pub matches: Vec<(ObjectId, ObjectId)>,
+    /// What speaks for it and not for the next best place, in nats.
+    pub lead: f64,
+    /// Mean intersection over union of the boxes of these objects with the outlines of the map's.
+    pub overlap: f64,
+}
+
+/// Boxes of an object that are compared with its outline.
+const BOXES: usize = 20;
+/// Their mean intersection over union is at least this.
+const OVERLAP: f64 = 0.4;
+/// Variance of the centre of an object of which it is not known, as a part of its distance squared.
+const UNKNOWN: f64 = 0.04;
+
+impl Mapper {
+    /// Where the stream begins in `map`, by the objects that it has mapped; `None` as long as that is not clear.
+    pub fn locate(&self, map: &PriorMap) -> Option<Located> {
+        let first = self.pose(0).or_else(|| Some(self.live.first()?.pose))?;
+        let mapped = self.objects.iter().filter(|(_, object)| matches!(object, Tracked::Mapped(_)));
+        let marks = mapped.filter_map(|(id, _)| self.mark(self.measured(*id)?));
+        let up = self.up.frame().and_then(|frame| frame.up);
+        let layout = Layout::new(marks.collect(), up, map, self.settings.association.uses_names());
+        let aligned = layout.align()?;
+        let overlap = self.overlap(&aligned, map);
+        tracing::debug!(
+            lead = aligned.lead,
+            matches = aligned.matches.len(),
+            overlap,
+            "a place in the prior map"
+        );
+        if overlap < OVERLAP {
+            return None;
+        }
+        let start = aligned.known_from_local.compose(&first);
+        let noise = aligned.noise(&first).ok()?;
+        Some(Located { start, noise, lead: aligned.lead, overlap, matches: aligned.matches })
+    }
+
+    fn mark(&self, measured: &Measured) -> Option<Mark> {
+        let (key, quadric) = (object_key(measured.id), self.quadric(measured.id)?);
+        let distance = (quadric.centroid() - self.live.last()?.pose.translation).norm();
+        let variance = self.session.covariance(&[key.as_str()]);
+        let variance = variance
+            .map_or(UNKNOWN * distance * distance, |of| (3..6).map(|i| of[(i, i)]).sum::<f64>() / 3.0);
+        Some(Mark::new(measured.id, &quadric, variance, measured.classes()))
+    }
+
+    /// How well the boxes of matched objects agree with the outlines of the map's.
+    fn overlap(&self, aligned: &Aligned, map: &PriorMap) -> f64 {
+        let of_pair = |(local, known): &(ObjectId, ObjectId)| {
+            let (measured, object) = (self.measured(*local)?, map.object(*known)?);
+            let every = measured.views.len().div_ceil(BOXES).max(1);
+            let overlaps = measured.views.iter().step_by(every).filter_map(|view| {
+                let pose = aligned.known_from_local.compose(&self.pose(view.frame)?);
+                Some(
+                    self.outline(&pose, &object.quadric, view)
+                        .map_or(0.0, |outline| outline.iou(&view.bounding_box)),
+                )
+            });
+            mean(overlaps)
+        };
+        mean(aligned.matches.iter().filter_map(of_pair)).unwrap_or_default()
+    }
+
+    fn outline(&self, pose: &Se3, quadric: &DualQuadric, view: &ObjectBox) -> Option<BoundingBox> {
+        let (bounding_box, camera) = (view.bounding_box, self.camera);
+        BoundingBoxFactor { bounding_box, camera, model: BoxModel::Truncated }.predict(pose, quadric)
+    }
+}
+
+fn mean(of: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, n) = of.fold((0.0, 0), |(sum, n), x| (sum + x, n + 1));
+    (n > 0).then(|| sum / f64::from(n))
+}

@@ -1,0 +1,92 @@
+//! The map that a run leaves, for other runs to begin with.
+use crate::estimate::looks::looks;
+use crate::estimate::{Estimate, Landmark};
+use crate::mapping::measurements::Measured;
+use crate::mapping::prior_map::{Looks, PriorMap, PriorObject};
+use crate::settings::Settings;
+use manifactor_graph::{FactorEntry, Noise};
+use manifactor_quadric::QuadricPrior;
+use manifactor_solve::{CompileError, CovarianceError, Problem};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Why there is no map.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MapError {
+    /// The graph does not go with the estimate.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+    /// It is not known how well objects are known.
+    #[error(transparent)]
+    Covariance(#[from] CovarianceError),
+}
+
+/// As well as an object is known of which nothing is known: rad, m, and the logarithm of its axes.
+const UNKNOWN: [f64; 9] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0];
+
+impl PriorMap {
+    /// The map of an estimate, without those objects of an earlier map that are gone.
+    ///
+    /// # Errors
+    /// Where there are no covariances.
+    pub fn of(estimate: &Estimate, settings: &Settings) -> Result<Self, MapError> {
+        let new = looks(estimate, settings.detections.border_px);
+        let mut covariances = covariances(estimate)?;
+        let object = |landmark: Landmark<'_>| {
+            let Landmark { object, quadric, .. } = landmark;
+            let measured = estimate.mapping.measurements.object(object.id)?;
+            let looks = new.get(&object.id).copied().unwrap_or_default();
+            if is_gone(measured, looks) {
+                return None;
+            }
+            let before = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default();
+            Some(Arc::new(PriorObject {
+                id: object.id,
+                classes: measured.classes().clone(),
+                quadric: *quadric,
+                covariance: covariances.remove(object.key.as_str())?,
+                looks: before.plus(looks),
+            }))
+        };
+        let objects = estimate.landmarks().into_iter().filter_map(object).collect();
+        Ok(Self::new(estimate.mapping.frame.up, objects))
+    }
+}
+
+/// The smallest chance to miss an object in all looks at which it is believed to be there.
+const MISSED: f64 = 0.01;
+/// An object that is gone was looked at so many times.
+const LOOKS: usize = 5;
+
+/// Whether an object of an earlier map is not there any more: it should have been seen, and was not.
+pub(super) fn is_gone(measured: &Measured, looks: Looks) -> bool {
+    let Some(prior) = &measured.prior else { return false };
+    let missed = (1.0 - prior.looks.rate()).powf(looks.expected as f64);
+    measured.views.is_empty() && looks.seen == 0 && looks.expected >= LOOKS && missed < MISSED
+}
+
+/// The covariance of each object, by its key. Directions that nothing determines are known as badly as can be.
+fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, MapError> {
+    let (mut graph, values) = (estimate.mapping.graph.clone(), &estimate.solution.values);
+    let keys: Vec<&str> = estimate.mapping.mapped().map(|object| object.key.as_str()).collect();
+    if keys.is_empty() {
+        return Ok(HashMap::new());
+    }
+    for landmark in estimate.landmarks() {
+        graph.push(FactorEntry {
+            keys: vec![landmark.object.key.clone()],
+            name: None,
+            factor: Arc::new(QuadricPrior { value: *landmark.quadric }),
+            // literals that are positive
+            noise: Noise::sigmas(&UNKNOWN).unwrap_or_default(),
+            loss: None,
+        });
+    }
+    let mut problem = Problem::compile(&graph, values)?;
+    problem.linearize();
+    let all = problem.marginals()?;
+    let of_objects = all.into_iter().filter(|(key, _)| keys.contains(&key.as_str()));
+    let entries = |m: nalgebra::DMatrix<f64>| std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]));
+    Ok(of_objects.map(|(key, covariance)| (key.to_string(), entries(covariance))).collect())
+}

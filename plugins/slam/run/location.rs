@@ -1,0 +1,66 @@
+//! Where a run begins in a map that was made before.
+use super::RunError;
+use crate::input::sequence::Sequence;
+use crate::mapping::prior_map::PriorMap;
+use crate::online::{FrameReport, Located, Mapper};
+use crate::output::report::Found;
+use crate::settings::Settings;
+use manifactor_solve::Observer;
+use std::sync::Arc;
+
+/// A search for the place of a stream in a map, as long as it is not known.
+#[derive(Debug)]
+pub(super) struct Search {
+    map: Option<Arc<PriorMap>>,
+    /// Frames since it was last looked for.
+    frames: usize,
+}
+
+/// It is looked for when an object is new, and after so many frames, in which those that are there have become better known.
+const FRAMES: usize = 15;
+
+impl Search {
+    pub(super) fn new(settings: &Settings) -> Self {
+        Self { map: settings.unknown_start().map(|prior| prior.map.clone()), frames: 0 }
+    }
+
+    /// Looks for the place after a frame; it is found once at most.
+    pub(super) fn look(&mut self, report: &FrameReport, mapper: &Mapper) -> Option<Located> {
+        let map = self.map.as_ref()?;
+        self.frames += 1;
+        if report.born.is_empty() && report.merged.is_empty() && self.frames < FRAMES {
+            return None;
+        }
+        self.frames = 0;
+        let located = mapper.locate(map)?;
+        self.map = None;
+        Some(located)
+    }
+}
+
+/// Where a sequence begins in the settings' prior map, if that is to be found, and is.
+///
+/// # Errors
+/// Where a session cannot begin.
+pub(super) fn find(
+    sequence: &Sequence,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> Result<Option<Found>, RunError> {
+    let mut search = Search::new(settings);
+    if search.map.is_none() {
+        return Ok(None);
+    }
+    let mut mapper = Mapper::new(sequence.opening(), settings)?;
+    for (frame, observation) in sequence.observations().enumerate() {
+        if observer.poll().is_break() {
+            break;
+        }
+        // what cannot be taken is told when all is mapped
+        let report = mapper.take(&observation).ok();
+        if let Some(located) = report.and_then(|report| search.look(&report, &mapper)) {
+            return Ok(Some(Found { frame, located }));
+        }
+    }
+    Ok(None)
+}

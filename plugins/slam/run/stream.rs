@@ -1,0 +1,122 @@
+//! A stream, mapped while it comes.
+use super::RunError;
+use super::location::Search;
+use crate::estimate::Estimate;
+use crate::input::sequence::{Observation, Opening, Sequence};
+use crate::input::stream::Stream;
+use crate::online::{FrameError, FrameReport, Mapper};
+use crate::output::report::{Found, Naming, OnlineReport, PriorMapReport, VariantReport};
+use crate::settings::Settings;
+use manifactor_solve::{Observer, SettingError};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Maps a stream frame by frame, solves all of it at the end, and evaluates. `watch` is told of each frame, with the map and
+/// the seconds that it took; it can end the stream there.
+///
+/// # Errors
+/// Where the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
+pub fn online(
+    name: &str,
+    stream: Stream,
+    settings: &Settings,
+    watch: &mut dyn Watch,
+    observer: &mut dyn Observer,
+) -> Result<(Estimate, VariantReport), RunError> {
+    let clock = Instant::now();
+    let mut taken = Taken::new(stream.opening, settings)?;
+    let (mut progress, mut search, mut found) = (OnlineReport::default(), Search::new(settings), None);
+    for observation in stream.observations {
+        if let Ok(observation) = &observation
+            && observation.frame.timestamp > stream.past
+            && watch.wait(observation.frame.timestamp).is_break()
+        {
+            progress.interrupted = true;
+            break;
+        }
+        let began = Instant::now();
+        let report = observation.as_ref().map_err(|error| FrameError::Source(error.to_string()));
+        let mut report = report.and_then(|observation| taken.take(observation));
+        if let Ok(report) = &mut report
+            && let Some(located) = search.look(report, &taken.mapper)
+        {
+            let known = settings.beginning_at(located.start, located.noise.clone());
+            taken = taken.again(&known, report)?;
+            report.located = Some(located.clone());
+            found = Some(Found { frame: report.frame, located });
+        }
+        let seconds = began.elapsed().as_secs_f64();
+        progress.count(report.as_ref(), seconds);
+        if watch.frame(report.as_ref(), &mut taken.mapper, seconds).is_break() {
+            progress.interrupted = true;
+            break;
+        }
+    }
+    progress.end(&mut taken.mapper);
+    let Taken { mapper, mut sequence, naming } = taken;
+    for (detection, name) in sequence.detections.iter_mut().zip(naming.now(mapper.names())) {
+        detection.object = name;
+    }
+    let association = naming.report(&*settings.association, mapper.names());
+    let estimate = mapper.finish(Arc::new(sequence), observer)?;
+    progress.compare(&estimate, &settings.evaluation);
+    let mut report = VariantReport::new(name, &estimate, settings, 0.0);
+    report.association = association;
+    report.prior_map = PriorMapReport::new(&estimate, settings, found);
+    report.online = Some(progress);
+    report.seconds = clock.elapsed().as_secs_f64();
+    Ok((estimate, report))
+}
+
+/// Frames that were taken, and what was made of them.
+struct Taken {
+    mapper: Mapper,
+    sequence: Sequence,
+    naming: Naming,
+}
+
+impl Taken {
+    fn new(opening: Opening, settings: &Settings) -> Result<Self, SettingError> {
+        let mapper = Mapper::new(opening.clone(), settings)?;
+        Ok(Self { mapper, sequence: opening.into_sequence(), naming: Naming::default() })
+    }
+
+    fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
+        let report = self.mapper.take(observation)?;
+        self.naming.note(&observation.detections, &report.names);
+        self.naming.forget(&report.forgotten);
+        self.sequence.push(observation.clone());
+        Ok(report)
+    }
+
+    /// The same frames with other settings; `report` becomes that of the last, and tells of all that is refused now.
+    fn again(self, settings: &Settings, report: &mut FrameReport) -> Result<Self, SettingError> {
+        let mut again = Self::new(self.sequence.opening(), settings)?;
+        let mut refused = vec![];
+        for observation in self.sequence.observations() {
+            match again.take(&observation) {
+                Ok(taken) => *report = taken,
+                Err(error) => refused.push(error.to_string()),
+            }
+        }
+        report.refused.extend(refused);
+        Ok(again)
+    }
+}
+
+/// Watches frames as they come in.
+pub trait Watch {
+    /// Before each frame, with its time stamp in seconds: returns when it is there, or to end the stream before it.
+    fn wait(&mut self, _timestamp: f64) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    /// After each frame: what came of it, the map, and the seconds that it took.
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        mapper: &mut Mapper,
+        seconds: f64,
+    ) -> ControlFlow<()>;
+}

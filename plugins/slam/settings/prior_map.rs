@@ -1,0 +1,114 @@
+use crate::gravity::MapFrame;
+use crate::input::sequence::Frame;
+use crate::mapping::prior_map::PriorMap;
+use manifactor_config::{Errors, Fault, Node};
+use manifactor_geometry::Se3;
+use manifactor_graph::checked::{not_negative, positive};
+use manifactor_graph::loss::{Cauchy, Loss};
+use manifactor_graph::{Direction, Noise};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// `[prior_map]`: a map that an earlier run has left, which this one begins with.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PriorMapSettings {
+    /// Its file: `map.json` in the folder of a variant.
+    pub file: PathBuf,
+    /// The pose of the first camera in the map's frame; how well that is known is for `[prior]` to say. Default: it is not known, and
+    /// found by the objects that are seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<Se3>,
+    /// How many times as far off its objects may be as their covariances say: a detector's errors last for many frames.
+    #[serde(default = "sigma_scale", deserialize_with = "positive")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub sigma_scale: f64,
+    /// How far off they may be besides, in rad and as a part of their size: what is no ellipsoid is another one from each side.
+    #[serde(default = "shape_error", deserialize_with = "not_negative")]
+    #[schemars(range(min = 0))]
+    pub shape_error: f64,
+    /// How much of a large error of them counts. Default: Cauchy's, as things are moved.
+    #[serde(default = "loss")]
+    pub loss: Arc<dyn Loss>,
+    /// What the file says.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub map: Arc<PriorMap>,
+}
+
+fn sigma_scale() -> f64 {
+    2.5
+}
+
+fn shape_error() -> f64 {
+    0.3
+}
+
+fn loss() -> Arc<dyn Loss> {
+    Arc::new(Cauchy::default())
+}
+
+/// A map, and where a run begins in it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Anchor<'a> {
+    pub map: &'a PriorMap,
+    pub start: Se3,
+    pub loss: &'a Arc<dyn Loss>,
+}
+
+impl PriorMapSettings {
+    /// Reads the file, from `folder`.
+    pub(super) fn read(&mut self, folder: &Path, settings: &Node, errors: &Errors) -> Option<()> {
+        match PriorMap::read(&folder.join(&self.file)) {
+            Ok(map) => self.map = Arc::new(map.trusted(self.sigma_scale, self.shape_error)),
+            Err(diagnostics) => {
+                let place = settings.field("prior_map").and_then(|prior| prior.field("file"));
+                let place = place.unwrap_or(settings).place.clone();
+                errors.report(place, Fault::invalid("names no map that can be read"));
+                errors.extend(diagnostics);
+                return None;
+            }
+        }
+        Some(())
+    }
+
+    /// The map, where it is known where the run begins in it.
+    pub(super) fn anchor(&self) -> Option<Anchor<'_>> {
+        Some(Anchor { map: &self.map, start: self.start?, loss: &self.loss })
+    }
+}
+
+impl Anchor<'_> {
+    /// The frame of the map, for an odometry that begins with this frame and knows up as `located` says.
+    pub(crate) fn frame(&self, first: &Frame, located: MapFrame) -> MapFrame {
+        let map_from_odometry = self.start.compose(&first.world_from_camera.inverse());
+        let moved = map_from_odometry.compose(&located.map_from_odometry.inverse());
+        let up =
+            self.map.up.or_else(|| located.up.and_then(|up| Direction::new(moved.rotation.act(&up)).ok()));
+        MapFrame { map_from_odometry, up }
+    }
+}
+
+impl super::Settings {
+    /// The map that was made before, where it is known where the run begins in it.
+    pub(crate) fn anchor(&self) -> Option<Anchor<'_>> {
+        self.prior_map.as_ref().and_then(PriorMapSettings::anchor)
+    }
+
+    /// The map that was made before, where it is to be found out where the run begins in it.
+    pub(crate) fn unknown_start(&self) -> Option<&PriorMapSettings> {
+        self.prior_map.as_ref().filter(|prior| prior.start.is_none())
+    }
+
+    /// The same with a start that was found.
+    pub(crate) fn beginning_at(&self, start: Se3, noise: Noise) -> Self {
+        let mut settings = self.clone();
+        if let Some(prior) = &mut settings.prior_map {
+            prior.start = Some(start);
+        }
+        settings.prior.noise = noise;
+        settings
+    }
+}
