@@ -7,7 +7,7 @@ use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, Solid, Track
 use serde_json::{Value, json};
 
 pub(super) const MARKUP: &str = include_str!("assets/map.html");
-/// In the order in which they use each other.
+/// The map's, in the order in which they use each other. A page adds one that feeds the map.
 pub(super) const SCRIPTS: [&str; 6] = [
     include_str!("assets/algebra.js"),
     include_str!("assets/shapes.js"),
@@ -16,6 +16,7 @@ pub(super) const SCRIPTS: [&str; 6] = [
     include_str!("assets/panels.js"),
     include_str!("assets/map.js"),
 ];
+pub(super) const REPLAY: &str = include_str!("assets/replay.js");
 
 /// All that the script draws. Metres to a hundredth of a millimetre and pixels to a tenth: no more is seen.
 pub(super) fn data(run: &RunRecord, palette: &Palette) -> Value {

@@ -6,6 +6,12 @@ function element(name, text = "", attributes = {}) {
   return made;
 }
 
+// The colours of the page, which follow its theme.
+function pageStyle() {
+  const variable = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  return { paper: rgb(variable("paper")), text: variable("text"), grid: rgb(variable("grid")), faint: variable("faint") };
+}
+
 // One image of a variant: measured boxes dashed, estimated outlines filled, the boxes around these thin.
 function drawImage(canvas, variant, frame, selected, style) {
   const [, , , , width, height] = variant.camera, shown = Math.max(canvas.clientWidth, 200);
