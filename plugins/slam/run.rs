@@ -1,7 +1,7 @@
 //! A run from its document to its report.
 use crate::estimate::{Estimate, EstimateError};
 use crate::input::journal::{JournalError, journaled};
-use crate::input::sequence::Sequence;
+use crate::input::sequence::{Observation, Sequence};
 use crate::input::source::{Folders, SourceError};
 use crate::input::stream::Stream;
 use crate::mapping::{Mapping, MappingError};
@@ -141,17 +141,19 @@ pub fn online(
         let report = report.and_then(|observation| mapper.take(observation));
         let seconds = began.elapsed().as_secs_f64();
         progress.count(report.as_ref(), seconds);
+        let goes_on = watch.frame(report.as_ref(), observation.as_ref().ok(), &mut mapper, seconds);
         if let (Ok(report), Ok(observation)) = (&report, observation) {
             naming.note(&observation.detections, &report.names);
             naming.forget(&report.forgotten);
             taken.push(observation);
         }
-        if watch.frame(report.as_ref(), &mut mapper, seconds).is_break() {
+        if goes_on.is_break() {
             progress.interrupted = true;
             break;
         }
     }
     progress.end(&mut mapper);
+    watch.end(&mut mapper);
     for (detection, name) in taken.detections.iter_mut().zip(naming.now(mapper.names())) {
         detection.object = name;
     }
@@ -172,13 +174,17 @@ pub trait Watch {
         ControlFlow::Continue(())
     }
 
-    /// After each frame: what came of it, the map, and the seconds that it took.
+    /// After each frame: what came of it, the frame if it could be read, the map, and the seconds that it took.
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
+        observation: Option<&Observation>,
         mapper: &mut Mapper,
         seconds: f64,
     ) -> ControlFlow<()>;
+
+    /// After the last frame, before all of it is solved as one batch.
+    fn end(&mut self, _mapper: &mut Mapper) {}
 }
 
 /// A run under way: sequences are loaded once for all variants that share them.

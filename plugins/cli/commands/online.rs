@@ -9,6 +9,7 @@ use crate::status::Status;
 use clap::Args;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
 use manifactor::slam::run::Watch;
+use manifactor::slam::sequence::Observation;
 use manifactor::solve::{All, Interrupt};
 use serde_json::json;
 use std::ops::ControlFlow;
@@ -118,6 +119,7 @@ impl Watch for Frames<'_> {
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
+        _: Option<&Observation>,
         mapper: &mut Mapper,
         took: f64,
     ) -> ControlFlow<()> {

@@ -23,6 +23,7 @@ impl Watch for Kept {
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
+        _: Option<&Observation>,
         _: &mut Mapper,
         _: f64,
     ) -> ControlFlow<()> {
