@@ -23,7 +23,7 @@ function drawImage(canvas, variant, frame, selected, style) {
   const pixel = width / canvas.width * ratio;
   draw.font = `${12 * pixel}px system-ui, sans-serif`;
   const taken = [];
-  for (const [id, [xmin, ymin, xmax, ymax], ellipse] of variant.frames[frame][6]) {
+  for (const [id, [xmin, ymin, xmax, ymax], ellipse, label] of variant.frames[frame][6]) {
     const object = byId.get(id), color = object?.color ?? style.text, bold = id === selected ? 2 : 1;
     Object.assign(draw, { strokeStyle: color, fillStyle: color });
     if (ellipse) {
@@ -44,7 +44,7 @@ function drawImage(canvas, variant, frame, selected, style) {
     draw.strokeRect(xmin, ymin, xmax - xmin, ymax - ymin);
     draw.setLineDash([]);
     // a name that would lie on another is left out: the map has its colour
-    const name = object?.class ?? "", left = Math.max(xmin, 0) + 2 * pixel, wide = draw.measureText(name).width;
+    const name = label ?? object?.class ?? "", left = Math.max(xmin, 0) + 2 * pixel, wide = draw.measureText(name).width;
     const below = [Math.max(ymin - 3 * pixel, 12 * pixel), ymax + 13 * pixel].find(y =>
       !taken.some(t => left < t[2] && t[0] < left + wide && y - 12 * pixel < t[3] && t[1] < y));
     if (below === undefined) continue;
