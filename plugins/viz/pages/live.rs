@@ -18,10 +18,12 @@ use path::Path;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 
-/// Frames whose latencies are shown.
+/// Frames whose latencies are shown, of those that were taken.
 const LATENCIES: usize = 300;
 /// Variables and directions that are named where they are undetermined.
 const NAMED: usize = 20;
+/// Characters of a class that are written beside a box.
+const ROOM: usize = 20;
 
 /// What the page of [`live_page`](crate::live_page) shows. It is cheap to keep up to date, and cheap to clone, so that the
 /// thread that maps never waits for those who look: what they are sent is made of a clone.
@@ -90,14 +92,14 @@ impl LiveMap {
         seconds: f64,
     ) {
         self.phase = Phase::Running;
-        if self.seconds.len() == LATENCIES {
-            self.seconds.pop_front();
-        }
-        self.seconds.push_back(seconds);
         let report = match report {
             Ok(report) => report,
             Err(error) => return self.notes.refused(self.frames, error.to_string()),
         };
+        if self.seconds.len() == LATENCIES {
+            self.seconds.pop_front();
+        }
+        self.seconds.push_back(seconds);
         (self.frames, self.timestamp) = (report.frame + 1, report.timestamp);
         self.boxes_so_far += report.boxes;
         self.notes.take(report, |id| mapper.names().now(id));
@@ -157,13 +159,13 @@ impl LiveMap {
         let boxes = observation.detections.iter().zip(&report.names).map(|(detection, name)| {
             let class = detection.scores.best().map_or("unknown", |(class, _)| class);
             let Some(id) = name.map(|name| mapper.names().now(name)) else {
-                return LiveBox::Nameless(detection.bounding_box, class.to_owned());
+                return LiveBox::Nameless(detection.bounding_box, short(class));
             };
             let object = known(id);
             let class = object.map_or(class, |object| object.class.as_str());
             let estimate = object.and_then(|object| Some((&report.pose, object.estimate.as_ref()?)));
             let seen = SeenBox::new(id, detection.bounding_box, estimate, mapper.camera());
-            LiveBox::Named(seen, format!("{class} {id}"))
+            LiveBox::Named(seen, format!("{} {id}", short(class)))
         });
         self.boxes = boxes.collect();
     }
@@ -232,6 +234,14 @@ impl LiveBox {
             },
             Self::Nameless(measured, label) => json!([null, bounds(measured), null, label]),
         }
+    }
+}
+
+/// As much of a class as has room beside its box.
+fn short(class: &str) -> String {
+    match class.char_indices().nth(ROOM) {
+        Some((end, _)) => format!("{}…", class.get(..end).unwrap_or_default()),
+        None => class.to_owned(),
     }
 }
 
