@@ -94,7 +94,7 @@ impl LiveMap {
         self.phase = Phase::Running;
         let report = match report {
             Ok(report) => report,
-            Err(error) => return self.notes.refused(self.frames, error.to_string()),
+            Err(error) => return self.notes.refused(self.frames, &error.to_string()),
         };
         if self.seconds.len() == LATENCIES {
             self.seconds.pop_front();
@@ -197,7 +197,7 @@ impl LiveMap {
             "waiting": self.waiting,
             "undetermined": self.undetermined,
             "notes": self.notes.to_json(),
-            "run": of_scenes(vec![self.scene()]),
+            "run": of_scenes(&[self.scene()]),
         })
     }
 
@@ -205,7 +205,7 @@ impl LiveMap {
     fn scene(&self) -> Value {
         let color =
             |class: &String| self.classes.iter().position(|own| own == class).map_or(Ink::Text, Ink::Class);
-        let objects = self.objects.iter().map(|object| of_object(object, color(&object.class))).collect();
+        let objects = self.objects.iter().map(|object| of_object(object, color(&object.class)));
         let start = self.path.start();
         let mut frames: Vec<Value> = self.path.frames().map(|frame| of_frame(frame, start)).collect();
         if let Some(Value::Array(last)) = frames.last_mut() {
@@ -214,7 +214,7 @@ impl LiveMap {
             last.push(self.boxes.iter().map(LiveBox::to_json).collect());
         }
         let camera = self.camera.unwrap_or(NO_CAMERA);
-        scene(&self.variant, &self.up, &camera, self.path.every(), frames, objects)
+        scene(&self.variant, &self.up, &camera, self.path.every(), &frames, &objects.collect::<Vec<_>>())
     }
 }
 

@@ -23,11 +23,12 @@ pub(super) const REPLAY: &str = include_str!("assets/replay.js");
 
 /// All that the script draws. Metres to a hundredth of a millimetre and pixels to a tenth: no more is seen.
 pub(super) fn data(run: &RunRecord, palette: &Palette) -> Value {
-    of_scenes(run.variants.iter().map(|variant| of_variant(variant, palette)).collect())
+    let scenes = run.variants.iter().map(|variant| of_variant(variant, palette));
+    of_scenes(&scenes.collect::<Vec<_>>())
 }
 
 /// Scenes side by side, with the colours of their paths.
-pub(super) fn of_scenes(scenes: Vec<Value>) -> Value {
+pub(super) fn of_scenes(scenes: &[Value]) -> Value {
     let color = |ink: Ink| ink.hex(Theme::Light);
     let colors = json!({ "odometry": color(Ink::Odometry), "estimate": color(Ink::Estimate) });
     json!({ "colors": colors, "variants": scenes })
@@ -39,10 +40,16 @@ const FRAMES: usize = 5000;
 fn of_variant(variant: &VariantRecord, palette: &Palette) -> Value {
     let start = variant.frames.first().map_or(0.0, |frame| frame.timestamp);
     let every = variant.frames.len().div_ceil(FRAMES).max(1);
-    let frames = variant.frames.iter().step_by(every).map(|frame| of_frame(frame, start)).collect();
-    let objects =
-        variant.objects.iter().map(|object| of_object(object, palette.ink(&object.class))).collect();
-    scene(&variant.name, &variant.up, &variant.camera, every, frames, objects)
+    let frames = variant.frames.iter().step_by(every).map(|frame| of_frame(frame, start));
+    let objects = variant.objects.iter().map(|object| of_object(object, palette.ink(&object.class)));
+    scene(
+        &variant.name,
+        &variant.up,
+        &variant.camera,
+        every,
+        &frames.collect::<Vec<_>>(),
+        &objects.collect::<Vec<_>>(),
+    )
 }
 
 /// What the script draws beside others of its kind. `frames` are all, or every second, third, … of a long recording.
@@ -51,8 +58,8 @@ pub(super) fn scene(
     up: &Direction,
     camera: &Camera,
     every: usize,
-    frames: Vec<Value>,
-    objects: Vec<Value>,
+    frames: &[Value],
+    objects: &[Value],
 ) -> Value {
     json!({
         "name": name,

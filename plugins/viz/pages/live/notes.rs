@@ -31,16 +31,16 @@ impl Notes {
         self.merged += report.merged.len();
         self.forgotten += report.forgotten.len();
         for key in &report.born {
-            self.note(frame, format!("{key} came into the map"));
+            self.note(frame, &format!("{key} came into the map"));
         }
         for key in &report.withdrawn {
-            self.note(frame, format!("{key} was withdrawn: its boxes are those of several things"));
+            self.note(frame, &format!("{key} was withdrawn: its boxes are those of several things"));
         }
         for merge in &report.merged {
-            self.note(frame, format!("object {} merged into {}", merge.from, now(merge.into)));
+            self.note(frame, &format!("object {} merged into {}", merge.from, now(merge.into)));
         }
         for id in &report.forgotten {
-            self.note(frame, format!("object {id} forgotten: it was seen too rarely"));
+            self.note(frame, &format!("object {id} forgotten: it was seen too rarely"));
         }
         for update in &report.updates {
             self.rejected += update.rejected.len();
@@ -48,23 +48,23 @@ impl Notes {
             for (factors, what) in [(&update.rejected, "rejected as outliers"), (&update.readmitted, "back")]
             {
                 if !factors.is_empty() {
-                    self.note(frame, format!("factors {what}: {}", factors.len()));
+                    self.note(frame, &format!("factors {what}: {}", factors.len()));
                 }
             }
         }
         for refused in &report.refused {
-            self.refused(frame, refused.clone());
+            self.refused(frame, refused);
         }
     }
 
     /// Something that could not be taken.
-    pub(super) fn refused(&mut self, frame: usize, text: String) {
+    pub(super) fn refused(&mut self, frame: usize, text: &str) {
         self.refused += 1;
         self.note(frame, text);
     }
 
     /// The text may be somebody else's, of any length.
-    fn note(&mut self, frame: usize, text: String) {
+    fn note(&mut self, frame: usize, text: &str) {
         let text: String = text.chars().take(LONGEST).collect();
         if self.newest.len() == KEPT {
             self.newest.pop_front();
