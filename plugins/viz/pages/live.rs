@@ -208,10 +208,14 @@ impl LiveMap {
         let objects = self.objects.iter().map(|object| of_object(object, color(&object.class)));
         let start = self.path.start();
         let mut frames: Vec<Value> = self.path.frames().map(|frame| of_frame(frame, start)).collect();
-        if let Some(Value::Array(last)) = frames.last_mut() {
-            // boxes are those of the last frame, and stand at the end of what is told of it
-            last.pop();
-            last.push(self.boxes.iter().map(LiveBox::to_json).collect());
+        // boxes stand at the end of what is told of a frame, and those of the last alone are kept
+        for parts in frames.iter_mut().filter_map(Value::as_array_mut) {
+            parts.pop();
+            parts.push(Value::Null);
+        }
+        if let Some(boxes) = frames.last_mut().and_then(Value::as_array_mut).and_then(|last| last.last_mut())
+        {
+            *boxes = self.boxes.iter().map(LiveBox::to_json).collect();
         }
         let camera = self.camera.unwrap_or(NO_CAMERA);
         scene(&self.variant, &self.up, &camera, self.path.every(), &frames, &objects.collect::<Vec<_>>())

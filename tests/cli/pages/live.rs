@@ -129,6 +129,9 @@ fn a_page_shows_the_map_as_it_grows() {
     // an object is picked by keys
     browser.value("canvas.focus(); canvas.dispatchEvent(new KeyboardEvent('keydown', { key: 'n' })); 0");
     browser.until("canvas.dataset.selected !== ''");
+    let told = browser.value("document.getElementById('object').textContent");
+    let told = told.as_str().unwrap();
+    assert!(told.contains("semi-axes (m)") && told.contains("boxes") && !told.contains("seen in"), "{told}");
     browser.was_quiet();
     // who comes late has all of it, on a phone too
     for (width, scheme) in [(1280, "dark"), (390, "dark"), (1280, "light")] {

@@ -96,7 +96,8 @@ function describe(panel, variants, id, frame) {
     const projected = e && [e[0] - Math.sqrt(e[2]), e[1] - Math.sqrt(e[4]), e[0] + Math.sqrt(e[2]), e[1] + Math.sqrt(e[4])];
     return `measured ${measured.map(x => x.toFixed(0)).join(" ")}${projected ? `, estimated ${projected.map(x => x.toFixed(0)).join(" ")}` : ""}`;
   });
-  const frames = variants.map(v => v.frames.flatMap((f, i) => f[6].some(box => box[0] === id) ? [i] : []));
+  // while frames come, boxes of the newest alone are known
+  const frames = variants.map(v => v.frames.every(f => f[6]) ? v.frames.flatMap((f, i) => f[6].some(box => box[0] === id) ? [i] : []) : []);
   row("seen in frames", o => {
     const of = frames[found.indexOf(o)];
     return of.length ? `${of.length}, from ${of[0]} to ${of[of.length - 1]}` : undefined;
