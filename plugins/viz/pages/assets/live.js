@@ -8,7 +8,12 @@ class GrowingMap extends MapView {
     if (before && norm(sub(middle, before.middle)) < 0.2 * before.radius && ratio < 1.15 && ratio > 0.6)
       this.extent = { ...before, floor: this.extent.floor };
     this.orbit?.aim(run.variants[0].up, this.extent);
-    if (this.state) this.state.frame = Math.max(run.variants[0].frames.length - 1, 0);
+    if (this.state) this.controls();
+  }
+
+  // The newest frame is shown.
+  controls() {
+    this.state.frame = Math.max(this.run.variants[0].frames.length - 1, 0);
   }
 
   update(run) {
