@@ -14,6 +14,7 @@ use crate::failure::Failure;
 use crate::output;
 use access::Access;
 use feed::Feed;
+use manifactor::slam::estimate::Estimate;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
 use manifactor::slam::sequence::Observation;
 use manifactor::solve::{IterationRecord, Observer};
@@ -37,7 +38,7 @@ pub(crate) struct View {
 /// The whole map is looked at no more often than this, and in no more than this share of the time.
 const REFRESH: (Duration, u32) = (Duration::from_millis(500), 50);
 /// How long the end waits for browsers that have not been told of it yet.
-const FAREWELL: Duration = Duration::from_secs(2);
+const FAREWELL: Duration = Duration::from_secs(5);
 
 impl View {
     /// Serves the page on this address from now on; port 0 is one that is free.
@@ -92,6 +93,11 @@ impl View {
     /// Shows all of the map as it is now.
     pub(crate) fn refresh(&self, mapper: &mut Mapper) {
         self.feed.change(|map| map.refresh(mapper));
+    }
+
+    /// Shows the map that all frames together give.
+    pub(crate) fn settle(&self, estimate: &Estimate) {
+        self.feed.change(|map| map.settle(estimate));
     }
 
     /// Tells browsers how it ended, and waits for them, though not for long.

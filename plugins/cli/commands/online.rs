@@ -68,7 +68,11 @@ impl Online {
             let mut observers = All(vec![&mut progress, &mut interrupt, &mut solve]);
             let mut frames =
                 Frames { command: self, interrupt: interrupted, view: view.as_mut(), frames: 0, begun: None };
-            run.variant_online(variant, &mut frames, &mut observers)
+            let done = run.variant_online(variant, &mut frames, &mut observers)?;
+            if let Some(view) = &view {
+                view.settle(&done.0);
+            }
+            Ok(done)
         });
         if let Some(view) = &view {
             view.end(match &report {

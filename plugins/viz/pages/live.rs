@@ -9,6 +9,9 @@ use crate::canvas::Ink;
 use manifactor_formats::replay::Latencies;
 use manifactor_graph::Direction;
 use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
+use manifactor_slam::estimate::{Estimate, Landmark};
+use manifactor_slam::mapping::object_key;
+use manifactor_slam::measurements::Measured;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::record::{FrameRecord, ObjectRecord, SeenBox, TrackedPose};
 use manifactor_slam::sequence::{ObjectId, Observation};
@@ -132,6 +135,21 @@ impl LiveMap {
         self.look(mapper);
     }
 
+    /// Shows the map that all frames together give.
+    pub fn settle(&mut self, estimate: &Estimate) {
+        let poses = estimate.trajectory();
+        self.path.correct(|frame| poses.get(frame).map(|stamped| stamped.pose));
+        let landmarks = estimate.landmarks();
+        let record = |mark: &Landmark<'_>| {
+            let class = mark.object.class.as_ref().map(|class| class.name.as_str());
+            record(mark.object.id, class, mark.object.boxes, *mark.quadric)
+        };
+        self.hold(landmarks.iter().map(record).collect());
+        // what was seen in the last image is told of the map as it was then
+        self.boxes.iter_mut().for_each(LiveBox::forget_estimate);
+        self.cost = Some(estimate.solution.outcome.final_cost);
+    }
+
     /// How far the stream is, and the cost where that is known.
     pub fn enter(&mut self, phase: Phase, cost: Option<f64>) {
         self.phase = phase;
@@ -141,16 +159,23 @@ impl LiveMap {
     /// Objects, and which way is up.
     fn look(&mut self, mapper: &Mapper) {
         self.camera = Some(*mapper.camera());
-        self.objects = mapper.objects().map(|(measured, quadric)| record(measured, quadric)).collect();
-        for object in &self.objects {
-            if !self.classes.contains(&object.class) {
-                self.classes.push(object.class.clone());
-            }
-        }
+        let record = |(measured, quadric): (&Measured, DualQuadric)| {
+            record(measured.id, measured.class_name(), measured.views.len(), quadric)
+        };
+        self.hold(mapper.objects().map(record).collect());
         // where up is unknown, up in the first image is the best guess
         let image_up = || self.path.first().map(|first| first.rotation.act(&-Vector3::y()));
         let up = mapper.up().or_else(|| Direction::new(image_up()?).ok());
         self.up = up.unwrap_or(self.up);
+    }
+
+    fn hold(&mut self, objects: Vec<ObjectRecord>) {
+        for object in &objects {
+            if !self.classes.contains(&object.class) {
+                self.classes.push(object.class.clone());
+            }
+        }
+        self.objects = objects;
     }
 
     /// The boxes of a frame, each with what the estimate puts there.
@@ -226,6 +251,12 @@ impl LiveMap {
 const NO_CAMERA: Camera = Camera { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, skew: 0.0, width: 4, height: 3 };
 
 impl LiveBox {
+    fn forget_estimate(&mut self) {
+        if let Self::Named(seen, _) = self {
+            (seen.projected, seen.ellipse) = (None, None);
+        }
+    }
+
     /// As the script of every map draws it, and what is written beside it.
     fn to_json(&self) -> Value {
         match self {
@@ -250,13 +281,13 @@ fn short(class: &str) -> String {
 }
 
 /// What is known of an object while frames come.
-fn record(measured: &manifactor_slam::measurements::Measured, estimate: DualQuadric) -> ObjectRecord {
+fn record(id: ObjectId, class: Option<&str>, boxes: usize, estimate: DualQuadric) -> ObjectRecord {
     ObjectRecord {
-        id: measured.id,
-        key: manifactor_slam::mapping::object_key(measured.id).to_string(),
-        class: measured.class_name().unwrap_or("unknown").to_owned(),
+        id,
+        key: object_key(id).to_string(),
+        class: class.unwrap_or("unknown").to_owned(),
         score: None,
-        boxes: measured.views.len(),
+        boxes,
         box_rms: None,
         initial: None,
         estimate: Some(estimate),

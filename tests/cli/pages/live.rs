@@ -8,6 +8,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdin, Command, Stdio};
+use std::thread::JoinHandle;
 
 /// What a detector may call a thing.
 const NASTY: &str = "<script>document.title=1</script><img src=x onerror=document.title=2>";
@@ -74,13 +75,14 @@ fn frames(desk: &str, renamed: &str) -> Vec<String> {
     lines.lines().map(rename).collect()
 }
 
-/// The states that a server has sent by the time that it closes the connection.
-fn events(url: &str) -> std::thread::JoinHandle<usize> {
+/// Looks until the server closes the connection: from now on, as it has sent a state already.
+fn look(url: &str) -> JoinHandle<()> {
     let host = url.trim_start_matches("http://").trim_end_matches('/').to_owned();
     let mut stream = TcpStream::connect(&host).unwrap();
     write!(stream, "GET /events HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
-    let lines = BufReader::new(stream).lines();
-    std::thread::spawn(move || lines.filter(|line| line.as_ref().unwrap().starts_with("data: ")).count())
+    let mut lines = BufReader::new(stream).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.starts_with("data: ")));
+    std::thread::spawn(move || lines.for_each(drop))
 }
 
 #[test]
@@ -136,7 +138,9 @@ fn a_page_shows_the_map_as_it_grows() {
     // who comes late has all of it, on a phone too
     for (width, scheme) in [(1280, "dark"), (390, "dark"), (1280, "light")] {
         browser.visit(&url, &url, width, scheme);
-        browser.until("document.documentElement.dataset.frames === '60' && canvas.dataset.frame === '59'");
+        browser.until("document.documentElement.dataset.frames === '60'");
+        assert_eq!(browser.value("document.documentElement.dataset.map"), "webgl");
+        browser.until("canvas.dataset.frame === '59'");
         let wide = browser.value("document.documentElement.scrollWidth").as_f64().unwrap();
         assert!(wide <= f64::from(width), "{wide} of {width} pixels");
         browser.keep(&format!("live_{width}_{scheme}"));
@@ -148,6 +152,14 @@ fn a_page_shows_the_map_as_it_grows() {
     assert_eq!(code, 0, "{said}");
     assert_eq!(browser.value("document.getElementById('words').textContent"), "all is written");
     assert_eq!(browser.value("document.documentElement.dataset.frames"), "60");
+    // what it shows is what was written
+    let metrics = std::fs::read_to_string(format!("{out}/estimate/metrics.json")).unwrap();
+    let metrics: Value = serde_json::from_str(&metrics).unwrap();
+    assert_eq!(browser.value("livePage.state.cost"), metrics["solve"]["final_cost"]);
+    let last = std::fs::read_to_string(format!("{out}/estimate/trajectory.txt")).unwrap();
+    let x: f64 = last.lines().last().unwrap().split(' ').nth(1).unwrap().parse().unwrap();
+    let shown = browser.value("mapView.variants[0].frames.at(-1)[4][0]").as_f64().unwrap();
+    assert!((x - shown).abs() < 1e-4, "{x} m is shown as {shown} m");
     browser.keep("live_ended");
     browser.was_quiet();
 }
@@ -159,15 +171,13 @@ fn a_map_is_the_same_whoever_looks() {
     let frames = frames(&path(&folder, "desk.toml"), "laptop");
     fed(&format!("online {live} --out {}", out("unseen")), &frames.join("\n")).ended(0);
     let mut stream = Stream::begin(&format!("online {live} --out {} --view", out("seen")));
-    let looking = [events(&stream.url), events(&stream.url)];
+    let looking = [look(&stream.url), look(&stream.url)];
     for frame in &frames {
         stream.give(std::slice::from_ref(frame));
     }
     stream.end();
     assert_eq!(stream.ended().0, 0);
-    for states in looking {
-        assert!(states.join().unwrap() > 1);
-    }
+    looking.map(|looks| looks.join().unwrap());
     let files = |name: &str| {
         let mut files = timeless(Path::new(&out(name)));
         files.retain(|name, _| !name.contains("latency."));
