@@ -38,9 +38,8 @@ pub(crate) struct Online {
     /// Tell of every N-th frame on stderr; with --json, in a line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
-    /// Serve a page that shows the map as it grows, and tell its address: for browsers of this machine, at a free port, unless
-    /// an ADDRESS such as 8080 or 0.0.0.0:8080 says otherwise. An address that other machines reach needs the token that is told
-    /// with it.
+    /// Serve a page of the map as it grows, and tell its address on stderr. Default: for browsers of this machine, at a free port;
+    /// --view=8080 is another port. Other machines can look with --view=0.0.0.0:8080 and the token in the address.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "0", value_parser = address)]
     view: Option<SocketAddr>,
 }
