@@ -23,6 +23,7 @@ mod interrupt;
 mod output;
 mod reference;
 mod status;
+mod view;
 
 pub use arguments::Cli;
 pub use failure::Failure;

@@ -8,6 +8,7 @@ mod frame;
 mod gravity;
 mod locate;
 mod object;
+mod present;
 mod revision;
 mod rules;
 
@@ -205,8 +206,7 @@ impl Mapper {
         observer: &mut dyn Observer,
     ) -> Result<Estimate, FinishError> {
         let frame = self.up.frame().ok_or(MappingError::NoFrames)?;
-        let poses = self.live.iter().enumerate();
-        let poses: Vec<Se3> = poses.map(|(i, live)| self.pose(i).unwrap_or(live.pose)).collect();
+        let poses: Vec<Se3> = (0..self.live.len()).filter_map(|i| self.pose_of(i)).collect();
         let start = |measured: &Measured| match self.objects.get(&measured.id).and_then(Tracked::born_as) {
             Some(start) => Ok(start),
             None => {

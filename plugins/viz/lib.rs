@@ -13,7 +13,7 @@ mod xml;
 pub use canvas::Theme;
 pub use drawing::{NotDrawn, Picture};
 pub use latencies::latencies;
-pub use pages::{experiment_page, experiment_pictures, run_page};
+pub use pages::{LiveMap, Phase, experiment_page, experiment_pictures, live_page, run_page};
 pub use ply::ply;
 pub use run::run_pictures;
 pub use xml::escape;

@@ -1,9 +1,13 @@
 //! Reports to be opened in a browser.
 mod experiment_page;
+mod live;
+mod live_page;
 mod page;
 mod run_page;
 mod run_tables;
 mod viewer;
 
 pub use experiment_page::{experiment_page, experiment_pictures};
+pub use live::{LiveMap, Phase};
+pub use live_page::live_page;
 pub use run_page::run_page;

@@ -7,7 +7,7 @@ mod graph;
 mod laws;
 mod names;
 mod new;
-mod online;
+pub(crate) mod online;
 mod replay;
 mod run;
 mod schema;

@@ -4,4 +4,4 @@ mod exit_codes;
 pub(crate) mod interrupt;
 pub(crate) mod killed;
 mod overwriting;
-mod repeated;
+pub(crate) mod repeated;

@@ -1,3 +1,4 @@
 //! Pages and pictures.
 mod browser;
+mod live;
 mod reports;

@@ -6,11 +6,14 @@ use crate::output;
 use crate::output::text::{count, seconds};
 use crate::output::watch::Watch as Progress;
 use crate::status::Status;
+use crate::view::{Solve, View, address};
 use clap::Args;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
 use manifactor::slam::run::Watch;
+use manifactor::slam::sequence::Observation;
 use manifactor::solve::{All, Interrupt};
 use serde_json::json;
+use std::net::SocketAddr;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -35,6 +38,10 @@ pub(crate) struct Online {
     /// Tell of every N-th frame on stderr; with --json, in a line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
+    /// Serve a page of the map as it grows, and tell its address on stderr. Default: for browsers of this machine, at a free port;
+    /// --view=8080 is another port. Other machines can look with --view=0.0.0.0:8080 and the token in the address.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "0", value_parser = address)]
+    view: Option<SocketAddr>,
 }
 
 fn faster(text: &str) -> Result<f64, String> {
@@ -46,14 +53,34 @@ impl Online {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         let mut interrupt = interrupt::on_ctrl_c();
         let flag = interrupt.0.clone();
+        let mut view = self.view.map(View::open).transpose()?;
         let report = self.options.run_as("online", &flag, |run, variant| {
+            if let Some(view) = &mut view {
+                view.begin(&run.document.title, &variant.name, self.options.json);
+            }
             if let Some(journal) = &self.journal {
                 run.keep_frames(journal.clone());
             }
-            let mut frames = Frames { command: self, interrupt: interrupt.clone(), frames: 0, begun: None };
             let mut progress = Progress::new(verbose, &variant.name);
-            run.variant_online(variant, &mut frames, &mut All(vec![&mut progress, &mut interrupt]))
-        })?;
+            let interrupted = interrupt.clone();
+            let mut solve = Solve::shown_by(view.as_ref());
+            let mut observers = All(vec![&mut progress, &mut interrupt, &mut solve]);
+            let mut frames =
+                Frames { command: self, interrupt: interrupted, view: view.as_mut(), frames: 0, begun: None };
+            let done = run.variant_online(variant, &mut frames, &mut observers)?;
+            if let Some(view) = &view {
+                view.settle(&done.0);
+            }
+            Ok(done)
+        });
+        if let Some(view) = &view {
+            view.end(match &report {
+                Ok(report) if report.complete => "all is written",
+                Ok(_) => "interrupted; what there was is written",
+                Err(_) => "it failed: the program says why",
+            });
+        }
+        let report = report?;
         if self.options.json {
             output::json_line(&report);
         }
@@ -65,6 +92,7 @@ impl Online {
 struct Frames<'a> {
     command: &'a Online,
     interrupt: Interrupt,
+    view: Option<&'a mut View>,
     frames: u64,
     /// When the first frame came, and its time stamp.
     begun: Option<(Instant, f64)>,
@@ -118,10 +146,14 @@ impl Watch for Frames<'_> {
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
+        observation: Option<&Observation>,
         mapper: &mut Mapper,
         took: f64,
     ) -> ControlFlow<()> {
         self.frames += 1;
+        if let Some(view) = &mut self.view {
+            view.frame(report, observation, mapper, took);
+        }
         match report {
             Ok(report) => {
                 report.refused.iter().for_each(|refused| output::note(refused));
@@ -132,5 +164,11 @@ impl Watch for Frames<'_> {
             Err(error) => output::note(&error.to_string()),
         }
         self.goes_on()
+    }
+
+    fn end(&mut self, mapper: &mut Mapper) {
+        if let Some(view) = &self.view {
+            view.refresh(mapper);
+        }
     }
 }

@@ -14,8 +14,7 @@ use manifactor_slam::output::write_whole;
 use manifactor_slam::prior_map::PriorMap;
 use manifactor_slam::run::{Watch, online};
 use manifactor_slam::run_document::RunDocument;
-use manifactor_slam::sequence::Sequence;
-use manifactor_slam::settings::Settings;
+use manifactor_slam::sequence::{Observation, Sequence};
 use manifactor_slam::source::Folders;
 use manifactor_solve::Silent;
 use std::ops::{ControlFlow, Range};
@@ -67,6 +66,7 @@ impl Watch for Found {
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
+        _: Option<&Observation>,
         _: &mut Mapper,
         seconds: f64,
     ) -> ControlFlow<()> {
@@ -119,14 +119,9 @@ fn main() {
         let sequence = other.as_ref().unwrap_or(&sequence);
         let frames = place.rsplit(':').next().unwrap();
         let stream = Arc::new(part(sequence, range(frames, sequence.frames.len())));
-        let settings: &Settings = &variant.settings;
-        let without = Settings { prior_map: None, ..settings.clone() };
-        let (alone, _) =
-            online(place, stream.clone().into(), &without, &mut Found::default(), &mut Silent).unwrap();
-        let own = truth_from_map(sequence, &alone.trajectory());
-        let alone = rmse(sequence, &own, &alone.trajectory());
         let (mut found, began) = (Found::default(), stream.frames[0].timestamp);
-        let (estimate, report) = online(place, stream.into(), settings, &mut found, &mut Silent).unwrap();
+        let (estimate, report) =
+            online(place, stream.into(), &variant.settings, &mut found, &mut Silent).unwrap();
         let Some((at, pose, located)) = found.at else {
             println!("{place}: not found");
             continue;
@@ -136,23 +131,23 @@ fn main() {
         let last = estimate.trajectory().pop().unwrap();
         let prior = report.prior_map.unwrap();
         let same = located.matches.iter().filter(|(a, b)| a == b).count();
+        let [turn, shift] = rmse(sequence, &frame, &estimate.trajectory());
         println!(
-            "{place}: after {at} frames, {:.1} s, off by {}, in the end {}; {} matches ({same} of one name), lead {:.1}, IoU {:.2}, {:?}; longest frame {:.0} ms; seen {} of {}, gone {:?}, added {}; objects {}; rmse {:?}, without the map and aligned {:?}",
+            "{place}: after {at} frames, {:.1} s, off by {}, in the end {}; {} matches ({same} of one name), lead {:.1}, IoU {:.2}; longest frame {:.0} ms; seen {} of {}, gone {:?}, added {}; objects {}; rmse {:.1}° {:.3} m",
             pose.timestamp - began,
             told(off(sequence, &frame, &pose)),
             told(off(sequence, &frame, &last)),
             located.matches.len(),
             located.lead,
             located.overlap,
-            located.noise,
             found.longest * 1e3,
             prior.seen.len(),
             prior.objects,
             prior.gone,
             prior.added.len(),
             estimate.mapping.mapped().count(),
-            rmse(sequence, &frame, &estimate.trajectory()),
-            alone,
+            turn,
+            shift,
         );
     }
 }

@@ -8,6 +8,7 @@ use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::{TrajectoryReport, VariantReport};
 use manifactor_slam::run::{Run, Watch};
 use manifactor_slam::run_document::RunDocument;
+use manifactor_slam::sequence::Observation;
 use manifactor_solve::{Optimizer, Silent};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -26,6 +27,7 @@ impl Watch for Gaps {
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
+        _: Option<&Observation>,
         mapper: &mut Mapper,
         seconds: f64,
     ) -> ControlFlow<()> {

@@ -1,6 +1,5 @@
 //! Where a stream is in a map that was made before.
 use super::Mapper;
-use super::object::Tracked;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measured, ObjectBox};
 use crate::mapping::object_key;
@@ -36,11 +35,9 @@ const UNKNOWN: f64 = 0.04;
 impl Mapper {
     /// Where the stream begins in `map`, by the objects that it has mapped; `None` as long as that is not clear.
     pub fn locate(&self, map: &PriorMap) -> Option<Located> {
-        let first = self.pose(0).or_else(|| Some(self.live.first()?.pose))?;
-        let mapped = self.objects.iter().filter(|(_, object)| matches!(object, Tracked::Mapped(_)));
-        let marks = mapped.filter_map(|(id, _)| self.mark(self.measured(*id)?));
-        let up = self.up.frame().and_then(|frame| frame.up);
-        let layout = Layout::new(marks.collect(), up, map, self.settings.association.uses_names());
+        let first = self.pose_of(0)?;
+        let marks = self.objects().filter_map(|(measured, quadric)| self.mark(measured, &quadric));
+        let layout = Layout::new(marks.collect(), self.up(), map, self.settings.association.uses_names());
         let aligned = layout.align()?;
         let overlap = self.overlap(&aligned, map);
         tracing::debug!(
@@ -57,13 +54,13 @@ impl Mapper {
         Some(Located { start, noise, lead: aligned.lead, overlap, matches: aligned.matches })
     }
 
-    fn mark(&self, measured: &Measured) -> Option<Mark> {
-        let (key, quadric) = (object_key(measured.id), self.quadric(measured.id)?);
+    fn mark(&self, measured: &Measured, quadric: &DualQuadric) -> Option<Mark> {
+        let key = object_key(measured.id);
         let distance = (quadric.centroid() - self.live.last()?.pose.translation).norm();
         let variance = self.session.covariance(&[key.as_str()]);
         let variance = variance
             .map_or(UNKNOWN * distance * distance, |of| (3..6).map(|i| of[(i, i)]).sum::<f64>() / 3.0);
-        Some(Mark::new(measured.id, &quadric, variance, measured.classes()))
+        Some(Mark::new(measured.id, quadric, variance, measured.classes()))
     }
 
     /// How well the boxes of matched objects agree with the outlines of the map's.

@@ -48,12 +48,14 @@ pub fn online(
         }
         let seconds = began.elapsed().as_secs_f64();
         progress.count(report.as_ref(), seconds);
-        if watch.frame(report.as_ref(), &mut taken.mapper, seconds).is_break() {
+        let goes_on = watch.frame(report.as_ref(), observation.as_ref().ok(), &mut taken.mapper, seconds);
+        if goes_on.is_break() {
             progress.interrupted = true;
             break;
         }
     }
     progress.end(&mut taken.mapper);
+    watch.end(&mut taken.mapper);
     let Taken { mapper, mut sequence, naming } = taken;
     for (detection, name) in sequence.detections.iter_mut().zip(naming.now(mapper.names())) {
         detection.object = name;
@@ -112,11 +114,15 @@ pub trait Watch {
         ControlFlow::Continue(())
     }
 
-    /// After each frame: what came of it, the map, and the seconds that it took.
+    /// After each frame: what came of it, the frame if it could be read, the map, and the seconds that it took.
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
+        observation: Option<&Observation>,
         mapper: &mut Mapper,
         seconds: f64,
     ) -> ControlFlow<()>;
+
+    /// After the last frame, before all of it is solved as one batch.
+    fn end(&mut self, _mapper: &mut Mapper) {}
 }

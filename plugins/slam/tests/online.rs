@@ -23,12 +23,55 @@ impl Watch for Kept {
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
+        _: Option<&Observation>,
         _: &mut Mapper,
         _: f64,
     ) -> ControlFlow<()> {
         self.0.push(report.unwrap().clone());
         ControlFlow::Continue(())
     }
+}
+
+/// Looks at the map after each frame, and after the last.
+#[derive(Default)]
+struct Looking {
+    frames: usize,
+    ends: usize,
+}
+
+impl Watch for Looking {
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        observation: Option<&Observation>,
+        mapper: &mut Mapper,
+        _: f64,
+    ) -> ControlFlow<()> {
+        let (report, observation) = (report.unwrap(), observation.unwrap());
+        assert_eq!(report.names.len(), observation.detections.len());
+        assert_eq!(mapper.objects().count(), mapper.mapped());
+        assert_eq!(mapper.pose_of(report.frame), Some(report.pose));
+        assert_eq!(mapper.pose_of(report.frame + 1), None);
+        // odometry leads away from the estimate, frame by frame
+        let apart = (mapper.odometry(observation).unwrap().translation - report.pose.translation).norm();
+        assert!(apart < if report.frame == 0 { 1e-9 } else { 1.0 }, "{apart} m at frame {}", report.frame);
+        self.frames += 1;
+        ControlFlow::Continue(())
+    }
+
+    fn end(&mut self, mapper: &mut Mapper) {
+        assert!(mapper.pose_of(0).is_some() && mapper.up().is_some());
+        self.ends += 1;
+    }
+}
+
+#[test]
+fn the_map_can_be_looked_at_after_each_frame_and_has_all_poses_with_a_window() {
+    let document = run_of(DESK, &["online.window.poses=20"]);
+    let mut looking = Looking::default();
+    let mut run = Run::new(&document, None);
+    run.variant_online(&document.variants[0], &mut looking, &mut Silent).unwrap();
+    assert_eq!((looking.frames, looking.ends), (80, 1));
 }
 
 /// A desk, seen from a camera that walks around it.

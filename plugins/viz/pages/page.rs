@@ -10,6 +10,8 @@ pub(crate) struct Page {
     title: String,
     body: String,
     scripts: String,
+    style: &'static str,
+    is_live: bool,
 }
 
 const STYLE: &str = include_str!("assets/page.css");
@@ -17,11 +19,19 @@ const STYLE: &str = include_str!("assets/page.css");
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
+/// What a live page may do besides, and that it has no icon for the browser to ask for.
+const LIVE: (&str, &str) = ("; connect-src 'self'", "<link rel=\"icon\" href=\"data:,\">\n");
+
 impl Page {
     /// A page with a heading.
     pub(crate) fn new(title: &str) -> Self {
         let body = format!("<h1>{}</h1>\n", escape(title));
-        Self { title: title.to_owned(), body, scripts: String::new() }
+        Self { title: title.to_owned(), body, ..Self::default() }
+    }
+
+    /// A page that may ask the server that it came from for more, with a style of its own beside that of all pages.
+    pub(crate) fn live(title: &str, style: &'static str) -> Self {
+        Self { style, is_live: true, ..Self::new(title) }
     }
 
     /// A heading, with a name that links lead to.
@@ -139,6 +149,7 @@ impl Page {
         let (title, body) = (escape(&self.title), &self.body);
         let (light, dark) = (style_sheet(Theme::Light), style_sheet(Theme::Dark));
         let theme = format!(":root{{{light}}}\n@media (prefers-color-scheme:dark){{:root{{{dark}}}}}\n");
+        let (style, more) = (self.style, if self.is_live { LIVE } else { ("", "") });
         let scripts = match self.scripts.as_str() {
             "" => String::new(),
             scripts => format!("<script>\n{scripts}</script>\n"),
@@ -147,8 +158,9 @@ impl Page {
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n<title>{title}</title>\n\
-             <style>\n{theme}{STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n{scripts}</body>\n</html>\n"
+             <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}{}\">\n{}<title>{title}</title>\n\
+             <style>\n{theme}{STYLE}{style}</style>\n</head>\n<body>\n<main>\n{body}</main>\n{scripts}</body>\n</html>\n",
+            more.0, more.1
         )
     }
 }

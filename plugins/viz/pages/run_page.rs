@@ -61,7 +61,8 @@ fn in_3d(page: &mut Page, record: &RunRecord, palette: &Palette) {
         "The map from above. Where the browser has WebGL 2, it is a map in 3D that can be turned.",
     );
     page.own("</div>", "");
-    page.data("run-data", &viewer::data(record, palette)).own(viewer::MARKUP, &viewer::SCRIPTS.concat());
+    page.data("run-data", &viewer::data(record, palette));
+    page.own(viewer::MARKUP, &viewer::SCRIPTS.concat()).own("", viewer::REPLAY);
 }
 
 /// Each kind of picture once, the variants beside each other.

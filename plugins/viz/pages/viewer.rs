@@ -2,12 +2,15 @@
 use crate::canvas::{Ink, Theme};
 use crate::drawing::Palette;
 use manifactor_geometry::Se3;
-use manifactor_quadric::DualQuadric;
-use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, Solid, TrackedPose, VariantRecord};
+use manifactor_graph::Direction;
+use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
+use manifactor_slam::record::{
+    FrameRecord, ObjectRecord, RunRecord, SeenBox, Solid, TrackedPose, VariantRecord,
+};
 use serde_json::{Value, json};
 
 pub(super) const MARKUP: &str = include_str!("assets/map.html");
-/// In the order in which they use each other.
+/// The map's, in the order in which they use each other. A page adds one that feeds the map.
 pub(super) const SCRIPTS: [&str; 6] = [
     include_str!("assets/algebra.js"),
     include_str!("assets/shapes.js"),
@@ -16,14 +19,19 @@ pub(super) const SCRIPTS: [&str; 6] = [
     include_str!("assets/panels.js"),
     include_str!("assets/map.js"),
 ];
+pub(super) const REPLAY: &str = include_str!("assets/replay.js");
 
 /// All that the script draws. Metres to a hundredth of a millimetre and pixels to a tenth: no more is seen.
 pub(super) fn data(run: &RunRecord, palette: &Palette) -> Value {
+    let scenes = run.variants.iter().map(|variant| of_variant(variant, palette));
+    of_scenes(&scenes.collect::<Vec<_>>())
+}
+
+/// Scenes side by side, with the colours of their paths.
+pub(super) fn of_scenes(scenes: &[Value]) -> Value {
     let color = |ink: Ink| ink.hex(Theme::Light);
-    json!({
-        "colors": { "odometry": color(Ink::Odometry), "estimate": color(Ink::Estimate) },
-        "variants": run.variants.iter().map(|variant| of_variant(variant, palette)).collect::<Vec<_>>(),
-    })
+    let colors = json!({ "odometry": color(Ink::Odometry), "estimate": color(Ink::Estimate) });
+    json!({ "colors": colors, "variants": scenes })
 }
 
 /// Frames of a variant that the page has: more cannot be told apart on a screen, and a browser takes long to read them.
@@ -31,28 +39,42 @@ const FRAMES: usize = 5000;
 
 fn of_variant(variant: &VariantRecord, palette: &Palette) -> Value {
     let start = variant.frames.first().map_or(0.0, |frame| frame.timestamp);
-    let camera = &variant.camera;
-    let up = numbers(variant.up.iter(), 6);
     let every = variant.frames.len().div_ceil(FRAMES).max(1);
+    let frames = variant.frames.iter().step_by(every).map(|frame| of_frame(frame, start));
+    let objects = variant.objects.iter().map(|object| of_object(object, palette.ink(&object.class)));
+    scene(
+        &variant.name,
+        &variant.up,
+        &variant.camera,
+        every,
+        &frames.collect::<Vec<_>>(),
+        &objects.collect::<Vec<_>>(),
+    )
+}
+
+/// What the script draws beside others of its kind. `frames` are all, or every second, third, … of a long recording.
+pub(super) fn scene(
+    name: &str,
+    up: &Direction,
+    camera: &Camera,
+    every: usize,
+    frames: &[Value],
+    objects: &[Value],
+) -> Value {
     json!({
-        "name": variant.name,
-        "up": up,
+        "name": name,
+        "up": numbers(up.iter(), 6),
         "camera": [camera.fx, camera.fy, camera.cx, camera.cy, f64::from(camera.width), f64::from(camera.height)],
-        // each frame, or every second, third, … of a long recording
         "every": every,
-        "frames": variant.frames.iter().step_by(every).map(|frame| of_frame(frame, start)).collect::<Vec<_>>(),
-        "objects": variant.objects.iter().map(|object| of_object(object, palette)).collect::<Vec<_>>(),
+        "frames": frames,
+        "objects": objects,
     })
 }
 
 /// `[seconds, true position, position by odometry, its error, estimated pose, its error, boxes]`
-fn of_frame(frame: &FrameRecord, start: f64) -> Value {
+pub(super) fn of_frame(frame: &FrameRecord, start: f64) -> Value {
     let position = |pose: &Se3| numbers(pose.translation.iter(), 4);
     let error = |tracked: &TrackedPose| tracked.error.map(|x| number(x, 5));
-    let boxes = frame.boxes.iter().map(|seen| {
-        let measured = numbers(seen.measured.bounds().iter(), 1);
-        json!([seen.object, measured, seen.ellipse.map(ellipse)])
-    });
     json!([
         number(frame.timestamp - start, 3),
         frame.truth.as_ref().map(position),
@@ -60,11 +82,21 @@ fn of_frame(frame: &FrameRecord, start: f64) -> Value {
         error(&frame.odometry),
         pose(&frame.estimate.pose),
         error(&frame.estimate),
-        boxes.collect::<Vec<Value>>(),
+        frame.boxes.iter().map(of_box).collect::<Vec<Value>>(),
     ])
 }
 
-fn of_object(object: &ObjectRecord, palette: &Palette) -> Value {
+/// `[object, measured, outline of the estimate]`
+pub(super) fn of_box(seen: &SeenBox) -> Value {
+    json!([seen.object, bounds(&seen.measured), seen.ellipse.map(ellipse)])
+}
+
+/// Left, top, right, bottom.
+pub(super) fn bounds(of_box: &BoundingBox) -> Vec<Value> {
+    numbers(of_box.bounds().iter(), 1)
+}
+
+pub(super) fn of_object(object: &ObjectRecord, color: Ink) -> Value {
     let quadric = |q: &DualQuadric| [pose(&q.pose), numbers(q.semi_axes.iter(), 5)].concat();
     let solid = |s: &Solid| [pose(&s.pose), numbers(s.half_extents.iter(), 5)].concat();
     let factors = object.factors.iter().map(|factor| {
@@ -76,7 +108,7 @@ fn of_object(object: &ObjectRecord, palette: &Palette) -> Value {
         "id": object.id,
         "key": object.key,
         "class": object.class,
-        "color": palette.ink(&object.class).hex(Theme::Light),
+        "color": color.hex(Theme::Light),
         "score": object.score.map(|x| number(x, 3)),
         "boxes": object.boxes,
         "box_rms": object.box_rms.map(|x| number(x, 3)),
@@ -105,7 +137,7 @@ fn numbers<'a>(list: impl Iterator<Item = &'a f64>, digits: i32) -> Vec<Value> {
 }
 
 /// A number with so many digits behind its point.
-fn number(x: f64, digits: i32) -> Value {
+pub(super) fn number(x: f64, digits: i32) -> Value {
     let unit = 10f64.powi(digits);
     let near = (x * unit).round() / unit;
     match near {

@@ -6,7 +6,7 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-const DESK: &str = r#"
+pub(crate) const DESK: &str = r#"
 semantics = "table_one"
 source = { type = "simulated", scene = { objects = 8 }, trajectory = { frames = 60 } }
 odometry = { noise = { sigma = 0.01 } }
@@ -71,7 +71,7 @@ fn a_stream_that_waits_is_interrupted_and_written() {
 }
 
 /// The desk's frames, as they come from somewhere else.
-const LIVE: &str = r#"
+pub(crate) const LIVE: &str = r#"
 semantics = "table_one"
 association = { type = "likelihood" }
 odometry = { noise = { sigma = 0.01 } }

@@ -57,7 +57,9 @@ pub(crate) fn timeless(folder: &Path) -> BTreeMap<String, String> {
 fn forget_times(json: &mut Value) {
     match json {
         Value::Object(fields) => {
-            fields.retain(|name, _| !["seconds", "times", "refinement_seconds"].contains(&name.as_str()));
+            fields.retain(|name, _| {
+                !["seconds", "times", "refinement_seconds", "latencies"].contains(&name.as_str())
+            });
             fields.values_mut().for_each(forget_times);
         }
         Value::Array(items) => items.iter_mut().for_each(forget_times),
@@ -66,7 +68,7 @@ fn forget_times(json: &mut Value) {
 }
 
 /// With what names the folder, as it is another each time.
-fn same(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>, places: [&str; 2]) {
+pub(crate) fn same(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>, places: [&str; 2]) {
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
     for (name, text) in a {
         let [text, other] =

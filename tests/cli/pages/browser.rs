@@ -16,6 +16,8 @@ pub(crate) struct Browser {
     from: Receiver<Value>,
     sent: u64,
     session: String,
+    /// What addresses of the page shown begin with.
+    origin: String,
     /// What was not an answer, in order.
     events: Vec<Value>,
     _profile: tempfile::TempDir,
@@ -27,7 +29,7 @@ impl Browser {
         let names = ["chromium", "chromium-browser", "google-chrome"];
         let there = |name: &&str| cfg!(unix) && Command::new(name).arg("--version").output().is_ok();
         let Some(name) = names.into_iter().find(there) else {
-            eprintln!("skipped: there is no Chromium to open report.html with");
+            eprintln!("skipped: there is no Chromium to open pages with");
             return None;
         };
         let profile = tempfile::tempdir().unwrap();
@@ -52,8 +54,9 @@ impl Browser {
                 }
             }
         });
+        let (session, origin) = (String::new(), String::new());
         let mut browser =
-            Self { process, to, from, sent: 0, session: String::new(), events: vec![], _profile: profile };
+            Self { process, to, from, sent: 0, session, origin, events: vec![], _profile: profile };
         let tab = browser.call("Target.createTarget", json!({ "url": "about:blank" }));
         let attached = json!({ "targetId": tab["targetId"], "flatten": true });
         let session = browser.call("Target.attachToTarget", attached)["sessionId"].clone();
@@ -86,12 +89,18 @@ impl Browser {
 
     /// Opens a file in a window of this width, and waits until it is loaded.
     pub(crate) fn show(&mut self, file: &Path, width: u32, scheme: &str) {
+        self.visit(&format!("file://{}", file.display()), "file:", width, scheme);
+    }
+
+    /// The same for an address, and what all begin with that its page may ask for.
+    pub(crate) fn visit(&mut self, address: &str, origin: &str, width: u32, scheme: &str) {
+        origin.clone_into(&mut self.origin);
         let window = json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500 });
         self.call("Emulation.setDeviceMetricsOverride", window);
         let scheme = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
         self.call("Emulation.setEmulatedMedia", scheme);
         self.events.clear();
-        self.call("Page.navigate", json!({ "url": format!("file://{}", file.display()) }));
+        self.call("Page.navigate", json!({ "url": address }));
         self.until("document.readyState === 'complete'");
     }
 
@@ -147,8 +156,8 @@ impl Browser {
             let error = method == "Runtime.exceptionThrown"
                 || (method == "Log.entryAdded" && told["entry"]["level"] == "error");
             assert!(!error, "{told}");
-            let address = told["request"]["url"].as_str().unwrap_or("file:");
-            assert!(address.starts_with("file:") || address.starts_with("data:"), "fetched {address}");
+            let address = told["request"]["url"].as_str().unwrap_or("data:");
+            assert!(address.starts_with(&self.origin) || address.starts_with("data:"), "fetched {address}");
         }
     }
 

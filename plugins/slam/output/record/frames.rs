@@ -7,7 +7,7 @@ use crate::metrics::{Alignment, Pairing, PosePair, Similarity, align, associate,
 use crate::settings::EvaluationSettings;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_quadric::{BoundingBox, DualQuadric, Ellipsoid};
+use manifactor_quadric::{BoundingBox, Camera, DualQuadric, Ellipsoid};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -53,6 +53,25 @@ pub struct SeenBox {
     /// That outline, the points centre + x with xᵀΣ⁻¹x ≤ 1: u, v, Σ's uu, uv, vv.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ellipse: Option<[f64; 5]>,
+}
+
+impl SeenBox {
+    /// A box of an object, beside what `estimate` puts there: the pose of the camera, and the object.
+    pub fn new(
+        object: ObjectId,
+        measured: BoundingBox,
+        estimate: Option<(&Se3, &DualQuadric)>,
+        camera: &Camera,
+    ) -> Self {
+        let ellipsoid = estimate.map(|(pose, quadric)| Ellipsoid::seen(pose, quadric));
+        let ellipse = ellipsoid.filter(Ellipsoid::is_in_front).map(|e| e.outline(camera));
+        Self {
+            object,
+            measured,
+            projected: ellipse.map(|e| e.bounds()),
+            ellipse: ellipse.map(|e| [e.centre.x, e.centre.y, e.xx, e.xy, e.yy]),
+        }
+    }
 }
 
 /// Errors of one trajectory by time stamp.
@@ -132,15 +151,9 @@ fn boxes(estimate: &Estimate) -> BTreeMap<usize, Vec<SeenBox>> {
     for object in &estimate.mapping.measurements.objects {
         for view in &object.views {
             let camera: Option<&Se3> = estimate.solution.values.get(pose_key(view.frame)).ok();
-            let ellipsoid = camera.zip(quadrics.get(&object.id)).map(|(c, q)| Ellipsoid::seen(c, q));
-            let ellipse =
-                ellipsoid.filter(Ellipsoid::is_in_front).map(|e| e.outline(&estimate.sequence.camera));
-            boxes.entry(view.frame).or_default().push(SeenBox {
-                object: object.id,
-                measured: view.bounding_box,
-                projected: ellipse.map(|e| e.bounds()),
-                ellipse: ellipse.map(|e| [e.centre.x, e.centre.y, e.xx, e.xy, e.yy]),
-            });
+            let seen = camera.zip(quadrics.get(&object.id).copied());
+            let seen = SeenBox::new(object.id, view.bounding_box, seen, &estimate.sequence.camera);
+            boxes.entry(view.frame).or_default().push(seen);
         }
     }
     boxes

@@ -1,14 +1,18 @@
-// The map: variants side by side under one camera, a frame of the recording, and a picked object.
+// The map: variants side by side under one camera, one of their frames, and a picked object.
 class MapView {
   constructor(run) {
-    this.run = run;
     this.find = id => document.getElementById(id);
     this.canvas = this.find("canvas");
     this.renderer = new Renderer(this.canvas);
-    this.extent = extent(run.variants);
-    this.mostError = run.variants.flatMap(v => v.frames).reduce((most, f) => Math.max(most, f[5] ?? 0), 1e-9);
+    this.take(run);
     this.state = { frame: 0, selected: null, show: {}, active: this.first() };
     this.orbit = new Orbit(this.canvas, run.variants[0].up, this.extent, () => this.redraw(), (x, y) => this.tap(x, y), e => this.pressed(e));
+    for (const box of document.querySelectorAll("[data-show]")) {
+      const set = () => { this.state.show[box.dataset.show] = box.checked; };
+      box.addEventListener("change", () => { set(); this.redraw(); });
+      set();
+    }
+    this.find("reset").addEventListener("click", () => this.orbit.reset());
     this.controls();
     document.documentElement.classList.add("webgl");
     new ResizeObserver(() => this.redraw()).observe(this.canvas);
@@ -18,77 +22,29 @@ class MapView {
     this.draw();
   }
 
-  // On a wide screen the first variant and the last; else the last alone.
+  // What there is to see.
+  take(run) {
+    this.run = run;
+    this.extent = extent(run.variants);
+    this.mostError = run.variants.flatMap(v => v.frames).reduce((most, f) => Math.max(most, f[5] ?? 0), 1e-9);
+  }
+
+  // Places of the variants that are shown first.
   first() {
-    const last = this.run.variants.length - 1;
-    return last > 0 && window.innerWidth > 900 ? [0, last] : [last];
+    return [0];
+  }
+
+  // Other controls than those of every map.
+  controls() {}
+
+  // Variants or the window have changed: the panels below are made anew.
+  panels() {
+    this.find("images").replaceChildren(...this.variants.map(() => element("canvas")));
+    this.redraw();
   }
 
   get variants() {
     return this.state.active.map(i => this.run.variants[i]);
-  }
-
-  get frames() {
-    return Math.max(...this.variants.map(v => v.frames.length), 1);
-  }
-
-  // The longest of the variants shown tells the time.
-  get longest() {
-    return this.variants.reduce((a, b) => (b.frames.length > a.frames.length ? b : a));
-  }
-
-  controls() {
-    const { state } = this, bar = this.find("variants"), time = this.find("time");
-    this.run.variants.forEach((variant, i) => {
-      const button = element("button", variant.name, { "aria-pressed": state.active.includes(i) });
-      button.addEventListener("click", () => {
-        const others = state.active.filter(k => k !== i);
-        if (state.active.includes(i) && !others.length) return;
-        state.active = state.active.includes(i) ? others : [...others, i].sort((a, b) => a - b);
-        button.setAttribute("aria-pressed", state.active.includes(i));
-        this.panels();
-      });
-      bar.append(button);
-    });
-    for (const box of document.querySelectorAll("[data-show]")) {
-      const set = () => { state.show[box.dataset.show] = box.checked; };
-      box.addEventListener("change", () => { set(); this.redraw(); });
-      set();
-    }
-    time.addEventListener("input", () => this.goTo(+time.value));
-    this.find("play").addEventListener("click", () => this.play());
-    this.find("reset").addEventListener("click", () => this.orbit.reset());
-  }
-
-  // Variants or the window have changed: the panels below are made anew.
-  panels() {
-    this.find("time").max = this.frames - 1;
-    this.find("images").replaceChildren(...this.variants.map(() => element("canvas")));
-    this.goTo(Math.min(this.state.frame, this.frames - 1));
-  }
-
-  goTo(frame) {
-    this.state.frame = Math.min(Math.max(frame, 0), this.frames - 1);
-    this.find("time").value = this.state.frame;
-    const { frames, every } = this.longest, seconds = frames[this.state.frame]?.[0];
-    const thinned = every > 1 ? ` (every ${every}th is shown)` : "";
-    this.find("clock").textContent = `frame ${this.state.frame * every}${seconds == null ? "" : `, ${seconds.toFixed(2)} s`}${thinned}`;
-    this.redraw();
-  }
-
-  play() {
-    const button = this.find("play"), begun = performance.now(), from = this.state.frame >= this.frames - 1 ? 0 : this.state.frame;
-    this.playing = !this.playing;
-    button.textContent = this.playing ? "⏸ pause" : "▶ replay";
-    // all of it in at most half a minute
-    const rate = Math.max(15, this.frames / 30);
-    const step = now => {
-      if (!this.playing) return;
-      this.goTo(from + Math.floor((now - begun) / 1000 * rate));
-      if (this.state.frame < this.frames - 1) requestAnimationFrame(step);
-      else this.play();
-    };
-    if (this.playing) requestAnimationFrame(step);
   }
 
   select(id) {
@@ -101,9 +57,6 @@ class MapView {
     const next = step => ids.length && this.select(ids[(ids.indexOf(this.state.selected) + step + ids.length + (step < 0 && this.state.selected === null ? 1 : 0)) % ids.length]);
     if (key === "n") next(1);
     else if (key === "p") next(-1);
-    else if (key === ".") this.goTo(this.state.frame + 1);
-    else if (key === ",") this.goTo(this.state.frame - 1);
-    else if (key === " ") this.play();
     else if (key === "Escape") this.select(null);
     else return false;
     return true;
@@ -141,8 +94,7 @@ class MapView {
   }
 
   draw() {
-    const variable = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-    const style = { paper: rgb(variable("paper")), text: variable("text"), grid: rgb(variable("grid")), faint: variable("faint") };
+    const style = pageStyle();
     this.renderer.resize();
     const { ratio } = this.renderer, height = this.canvas.clientHeight, names = [];
     this.parts().forEach((part, i) => {
@@ -229,12 +181,3 @@ class MapView {
   }
 }
 
-// Where there is no WebGL 2, the picture from above stays in its place, and says so.
-try {
-  window.mapView = new MapView(JSON.parse(document.getElementById("run-data").textContent));
-} catch (error) {
-  document.documentElement.dataset.map = "static";
-  document.documentElement.classList.remove("webgl");
-  document.querySelector("#static-map figcaption")?.append(` (${error.message})`);
-}
-document.documentElement.dataset.map ??= "webgl";

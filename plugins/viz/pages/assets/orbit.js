@@ -1,10 +1,9 @@
 // A camera that turns around a point, moved by mouse, fingers and keys.
 class Orbit {
   constructor(canvas, up, { middle, radius }, changed, tapped, pressed) {
-    Object.assign(this, { canvas, up, home: { target: middle, distance: 2.35 * radius, azimuth: -0.9, height: 0.65 }, changed, tapped });
-    this.reach = radius;
+    Object.assign(this, { canvas, changed, tapped });
     this.pointers = new Map();
-    this.reset();
+    this.aim(up, { middle, radius });
     canvas.addEventListener("pointerdown", event => this.down(event));
     canvas.addEventListener("pointermove", event => this.move(event));
     for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, event => this.up_(event));
@@ -19,8 +18,19 @@ class Orbit {
     });
   }
 
+  // All of what there is to see: until somebody turns it, it is looked at from there.
+  aim(up, { middle, radius }) {
+    Object.assign(this, { up, reach: radius, home: { target: middle, distance: 2.35 * radius, azimuth: -0.9, height: 0.65 } });
+    if (!this.moved) this.reset();
+  }
+
   reset() {
-    Object.assign(this, { ...this.home });
+    Object.assign(this, { ...this.home, moved: false });
+    this.changed();
+  }
+
+  turned() {
+    this.moved = true;
     this.changed();
   }
 
@@ -41,19 +51,19 @@ class Orbit {
   turn(dx, dy) {
     this.azimuth -= 0.008 * dx;
     this.height = Math.min(Math.max(this.height + 0.008 * dy, -1.5), 1.5);
-    this.changed();
+    this.turned();
   }
 
   pan(dx, dy) {
     const ahead = unit(sub(this.target, this.eye)), right = unit(cross(ahead, this.up)), above = cross(right, ahead);
     const metres = 0.9 * this.distance / this.canvas.clientHeight;
     this.target = add(this.target, add(scaled(right, -dx * metres), scaled(above, dy * metres)));
-    this.changed();
+    this.turned();
   }
 
   zoom(factor) {
     this.distance = Math.min(Math.max(this.distance * factor, 0.02 * this.reach), 20 * this.reach);
-    this.changed();
+    this.turned();
   }
 
   down(event) {

@@ -6,6 +6,12 @@ function element(name, text = "", attributes = {}) {
   return made;
 }
 
+// The colours of the page, which follow its theme.
+function pageStyle() {
+  const variable = name => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  return { paper: rgb(variable("paper")), text: variable("text"), grid: rgb(variable("grid")), faint: variable("faint") };
+}
+
 // One image of a variant: measured boxes dashed, estimated outlines filled, the boxes around these thin.
 function drawImage(canvas, variant, frame, selected, style) {
   const [, , , , width, height] = variant.camera, shown = Math.max(canvas.clientWidth, 200);
@@ -17,7 +23,7 @@ function drawImage(canvas, variant, frame, selected, style) {
   const pixel = width / canvas.width * ratio;
   draw.font = `${12 * pixel}px system-ui, sans-serif`;
   const taken = [];
-  for (const [id, [xmin, ymin, xmax, ymax], ellipse] of variant.frames[frame][6]) {
+  for (const [id, [xmin, ymin, xmax, ymax], ellipse, label] of variant.frames[frame][6]) {
     const object = byId.get(id), color = object?.color ?? style.text, bold = id === selected ? 2 : 1;
     Object.assign(draw, { strokeStyle: color, fillStyle: color });
     if (ellipse) {
@@ -38,7 +44,7 @@ function drawImage(canvas, variant, frame, selected, style) {
     draw.strokeRect(xmin, ymin, xmax - xmin, ymax - ymin);
     draw.setLineDash([]);
     // a name that would lie on another is left out: the map has its colour
-    const name = object?.class ?? "", left = Math.max(xmin, 0) + 2 * pixel, wide = draw.measureText(name).width;
+    const name = label ?? object?.class ?? "", left = Math.max(xmin, 0) + 2 * pixel, wide = draw.measureText(name).width;
     const below = [Math.max(ymin - 3 * pixel, 12 * pixel), ymax + 13 * pixel].find(y =>
       !taken.some(t => left < t[2] && t[0] < left + wide && y - 12 * pixel < t[3] && t[1] < y));
     if (below === undefined) continue;
@@ -90,7 +96,8 @@ function describe(panel, variants, id, frame) {
     const projected = e && [e[0] - Math.sqrt(e[2]), e[1] - Math.sqrt(e[4]), e[0] + Math.sqrt(e[2]), e[1] + Math.sqrt(e[4])];
     return `measured ${measured.map(x => x.toFixed(0)).join(" ")}${projected ? `, estimated ${projected.map(x => x.toFixed(0)).join(" ")}` : ""}`;
   });
-  const frames = variants.map(v => v.frames.flatMap((f, i) => f[6].some(box => box[0] === id) ? [i] : []));
+  // while frames come, boxes of the newest alone are known
+  const frames = variants.map(v => v.frames.every(f => f[6]) ? v.frames.flatMap((f, i) => f[6].some(box => box[0] === id) ? [i] : []) : []);
   row("seen in frames", o => {
     const of = frames[found.indexOf(o)];
     return of.length ? `${of.length}, from ${of[0]} to ${of[of.length - 1]}` : undefined;

@@ -1,0 +1,300 @@
+//! The state of a map that grows, as its page shows it.
+mod notes;
+mod path;
+#[cfg(test)]
+mod tests;
+
+use super::viewer::{bounds, number, of_box, of_frame, of_object, of_scenes, scene};
+use crate::canvas::Ink;
+use manifactor_formats::replay::Latencies;
+use manifactor_graph::Direction;
+use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
+use manifactor_slam::estimate::{Estimate, Landmark};
+use manifactor_slam::mapping::object_key;
+use manifactor_slam::measurements::Measured;
+use manifactor_slam::online::{FrameError, FrameReport, Mapper};
+use manifactor_slam::record::{FrameRecord, ObjectRecord, SeenBox, TrackedPose};
+use manifactor_slam::sequence::{ObjectId, Observation};
+use nalgebra::Vector3;
+use notes::Notes;
+use path::Path;
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+
+/// Frames whose latencies are shown, of those that were taken.
+const LATENCIES: usize = 300;
+/// Variables and directions that are named where they are undetermined.
+const NAMED: usize = 20;
+/// Characters of a class that are written beside a box.
+const ROOM: usize = 20;
+
+/// What the page of [`live_page`](crate::live_page) shows. It is cheap to keep up to date, and cheap to clone, so that the
+/// thread that maps never waits for those who look: what they are sent is made of a clone.
+#[derive(Debug, Clone, Default)]
+pub struct LiveMap {
+    title: String,
+    variant: String,
+    phase: Phase,
+    /// Frames that were taken.
+    frames: usize,
+    timestamp: f64,
+    camera: Option<Camera>,
+    up: Direction,
+    path: Path,
+    boxes: Vec<LiveBox>,
+    objects: Vec<ObjectRecord>,
+    /// In the order in which they came, so that colours stay.
+    classes: Vec<String>,
+    seconds: VecDeque<f64>,
+    cost: Option<f64>,
+    /// Variables that wait, and directions that nothing constrains; the first of them in words.
+    waiting: usize,
+    undetermined: Vec<String>,
+    boxes_so_far: usize,
+    notes: Notes,
+}
+
+/// How far a stream is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Phase {
+    /// For its first frame.
+    #[default]
+    Waiting,
+    /// Frames come.
+    Running,
+    /// All frames have come, and are solved as one batch.
+    Solving {
+        /// Iterations so far.
+        iteration: usize,
+    },
+    /// All is done, in these words.
+    Ended(String),
+}
+
+/// A box of the last frame.
+#[derive(Debug, Clone)]
+enum LiveBox {
+    /// Of an object.
+    Named(SeenBox, String),
+    /// Of no object, or of one that is not known yet.
+    Nameless(BoundingBox, String),
+}
+
+impl LiveMap {
+    /// A map of nothing yet: the run's title and the variant's name.
+    pub fn new(title: &str, variant: &str) -> Self {
+        Self { title: title.to_owned(), variant: variant.to_owned(), ..Self::default() }
+    }
+
+    /// Takes in what came of a frame: work for the objects of the map and the boxes of the frame, and not for the path.
+    pub fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        observation: Option<&Observation>,
+        mapper: &Mapper,
+        seconds: f64,
+    ) {
+        self.phase = Phase::Running;
+        let report = match report {
+            Ok(report) => report,
+            Err(error) => return self.notes.refused(self.frames, &error.to_string()),
+        };
+        if self.seconds.len() == LATENCIES {
+            self.seconds.pop_front();
+        }
+        self.seconds.push_back(seconds);
+        (self.frames, self.timestamp) = (report.frame + 1, report.timestamp);
+        self.boxes_so_far += report.boxes;
+        self.notes.take(report, |id| mapper.names().now(id));
+        let parked = report.updates.last().map(|update| (&update.parked, &update.undetermined));
+        if let Some((parked, undetermined)) = parked {
+            self.waiting = parked.len() + undetermined.len();
+            let parked = parked.iter().map(ToString::to_string);
+            let directions = undetermined.iter().map(|(key, direction)| format!("{key}: {direction}"));
+            self.undetermined = parked.chain(directions).take(NAMED).collect();
+        }
+        self.look(mapper);
+        if let Some(observation) = observation {
+            let odometry = mapper.odometry(observation).unwrap_or(report.pose);
+            let tracked = |pose| TrackedPose { pose, error: None, relative: None };
+            self.path.push(FrameRecord {
+                timestamp: report.timestamp,
+                truth: None,
+                odometry: tracked(odometry),
+                estimate: tracked(report.pose),
+                boxes: vec![],
+            });
+            self.see(report, observation, mapper);
+        }
+    }
+
+    /// Brings the whole path up to date, and the cost: work for all that is in the map.
+    pub fn refresh(&mut self, mapper: &mut Mapper) {
+        self.path.correct(|frame| mapper.pose_of(frame));
+        self.cost = Some(mapper.session().cost());
+        self.look(mapper);
+    }
+
+    /// Shows the map that all frames together give.
+    pub fn settle(&mut self, estimate: &Estimate) {
+        let poses = estimate.trajectory();
+        self.path.correct(|frame| poses.get(frame).map(|stamped| stamped.pose));
+        let landmarks = estimate.landmarks();
+        let record = |mark: &Landmark<'_>| {
+            let class = mark.object.class.as_ref().map(|class| class.name.as_str());
+            record(mark.object.id, class, mark.object.boxes, *mark.quadric)
+        };
+        self.hold(landmarks.iter().map(record).collect());
+        // what was seen in the last image is told of the map as it was then
+        self.boxes.iter_mut().for_each(LiveBox::forget_estimate);
+        self.cost = Some(estimate.solution.outcome.final_cost);
+    }
+
+    /// How far the stream is, and the cost where that is known.
+    pub fn enter(&mut self, phase: Phase, cost: Option<f64>) {
+        self.phase = phase;
+        self.cost = cost.or(self.cost);
+    }
+
+    /// Objects, and which way is up.
+    fn look(&mut self, mapper: &Mapper) {
+        self.camera = Some(*mapper.camera());
+        let record = |(measured, quadric): (&Measured, DualQuadric)| {
+            record(measured.id, measured.class_name(), measured.views.len(), quadric)
+        };
+        self.hold(mapper.objects().map(record).collect());
+        // where up is unknown, up in the first image is the best guess
+        let image_up = || self.path.first().map(|first| first.rotation.act(&-Vector3::y()));
+        let up = mapper.up().or_else(|| Direction::new(image_up()?).ok());
+        self.up = up.unwrap_or(self.up);
+    }
+
+    fn hold(&mut self, objects: Vec<ObjectRecord>) {
+        for object in &objects {
+            if !self.classes.contains(&object.class) {
+                self.classes.push(object.class.clone());
+            }
+        }
+        self.objects = objects;
+    }
+
+    /// The boxes of a frame, each with what the estimate puts there.
+    fn see(&mut self, report: &FrameReport, observation: &Observation, mapper: &Mapper) {
+        let known = |id: ObjectId| self.objects.iter().find(|object| object.id == id);
+        let boxes = observation.detections.iter().zip(&report.names).map(|(detection, name)| {
+            let class = detection.scores.best().map_or("unknown", |(class, _)| class);
+            let Some(id) = name.map(|name| mapper.names().now(name)) else {
+                return LiveBox::Nameless(detection.bounding_box, short(class));
+            };
+            let object = known(id);
+            let class = object.map_or(class, |object| object.class.as_str());
+            let estimate = object.and_then(|object| Some((&report.pose, object.estimate.as_ref()?)));
+            let seen = SeenBox::new(id, detection.bounding_box, estimate, mapper.camera());
+            LiveBox::Named(seen, format!("{} {id}", short(class)))
+        });
+        self.boxes = boxes.collect();
+    }
+
+    /// What the page's script reads.
+    pub fn to_json(&self) -> Value {
+        let seconds: Vec<f64> = self.seconds.iter().copied().collect();
+        let (latencies, ms) = (Latencies::of(&seconds), |seconds: f64| number(1e3 * seconds, 3));
+        let (phase, words) = match &self.phase {
+            Phase::Waiting => ("waiting", String::new()),
+            Phase::Running => ("running", String::new()),
+            Phase::Solving { iteration } => ("solving", format!("iteration {iteration}")),
+            Phase::Ended(words) => ("ended", words.clone()),
+        };
+        json!({
+            "title": self.title,
+            "phase": phase,
+            "words": words,
+            "frames": self.frames,
+            "timestamp": self.timestamp,
+            "boxes": self.boxes_so_far,
+            "cost": self.cost,
+            "latencies": {
+                "ms": seconds.iter().map(|seconds| ms(*seconds)).collect::<Vec<_>>(),
+                "p50": ms(latencies.p50),
+                "p99": ms(latencies.p99),
+                "max": ms(latencies.max),
+            },
+            "waiting": self.waiting,
+            "undetermined": self.undetermined,
+            "notes": self.notes.to_json(),
+            "run": of_scenes(&[self.scene()]),
+        })
+    }
+
+    /// The map, as the script of every map draws it.
+    fn scene(&self) -> Value {
+        let color =
+            |class: &String| self.classes.iter().position(|own| own == class).map_or(Ink::Text, Ink::Class);
+        let objects = self.objects.iter().map(|object| of_object(object, color(&object.class)));
+        let start = self.path.start();
+        let mut frames: Vec<Value> = self.path.frames().map(|frame| of_frame(frame, start)).collect();
+        // boxes stand at the end of what is told of a frame, and those of the last alone are kept
+        for parts in frames.iter_mut().filter_map(Value::as_array_mut) {
+            parts.pop();
+            parts.push(Value::Null);
+        }
+        if let Some(boxes) = frames.last_mut().and_then(Value::as_array_mut).and_then(|last| last.last_mut())
+        {
+            *boxes = self.boxes.iter().map(LiveBox::to_json).collect();
+        }
+        let camera = self.camera.unwrap_or(NO_CAMERA);
+        scene(&self.variant, &self.up, &camera, self.path.every(), &frames, &objects.collect::<Vec<_>>())
+    }
+}
+
+/// Before the first frame.
+const NO_CAMERA: Camera = Camera { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, skew: 0.0, width: 4, height: 3 };
+
+impl LiveBox {
+    fn forget_estimate(&mut self) {
+        if let Self::Named(seen, _) = self {
+            (seen.projected, seen.ellipse) = (None, None);
+        }
+    }
+
+    /// As the script of every map draws it, and what is written beside it.
+    fn to_json(&self) -> Value {
+        match self {
+            Self::Named(seen, label) => match of_box(seen) {
+                Value::Array(mut parts) => {
+                    parts.push(Value::from(label.as_str()));
+                    Value::Array(parts)
+                }
+                other => other,
+            },
+            Self::Nameless(measured, label) => json!([null, bounds(measured), null, label]),
+        }
+    }
+}
+
+/// As much of a class as has room beside its box.
+fn short(class: &str) -> String {
+    match class.char_indices().nth(ROOM) {
+        Some((end, _)) => format!("{}…", class.get(..end).unwrap_or_default()),
+        None => class.to_owned(),
+    }
+}
+
+/// What is known of an object while frames come.
+fn record(id: ObjectId, class: Option<&str>, boxes: usize, estimate: DualQuadric) -> ObjectRecord {
+    ObjectRecord {
+        id,
+        key: object_key(id).to_string(),
+        class: class.unwrap_or("unknown").to_owned(),
+        score: None,
+        boxes,
+        box_rms: None,
+        initial: None,
+        estimate: Some(estimate),
+        truth: None,
+        error: None,
+        factors: vec![],
+        left_out: vec![],
+        rejected: None,
+    }
+}

@@ -1,0 +1,89 @@
+//! What has happened to the map, in words, and how often.
+use manifactor_slam::online::FrameReport;
+use manifactor_slam::sequence::ObjectId;
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+
+/// Notes that are kept: the newest.
+const KEPT: usize = 100;
+/// Characters of a note.
+const LONGEST: usize = 300;
+
+/// Counts of all, and the newest in words.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Notes {
+    born: usize,
+    withdrawn: usize,
+    merged: usize,
+    forgotten: usize,
+    refused: usize,
+    rejected: usize,
+    /// Each with the frame that it belongs to.
+    newest: VecDeque<(usize, String)>,
+}
+
+impl Notes {
+    /// Takes in what came of a frame; `now` is what an object is called now.
+    pub(super) fn take(&mut self, report: &FrameReport, now: impl Fn(ObjectId) -> ObjectId) {
+        let frame = report.frame;
+        self.born += report.born.len();
+        self.withdrawn += report.withdrawn.len();
+        self.merged += report.merged.len();
+        self.forgotten += report.forgotten.len();
+        for key in &report.born {
+            self.note(frame, &format!("{key} came into the map"));
+        }
+        for key in &report.withdrawn {
+            self.note(frame, &format!("{key} was withdrawn: its boxes are those of several things"));
+        }
+        for merge in &report.merged {
+            self.note(frame, &format!("object {} merged into {}", merge.from, now(merge.into)));
+        }
+        for id in &report.forgotten {
+            self.note(frame, &format!("object {id} forgotten: it was seen too rarely"));
+        }
+        for update in &report.updates {
+            self.rejected += update.rejected.len();
+            self.rejected = self.rejected.saturating_sub(update.readmitted.len());
+            for (factors, what) in [(&update.rejected, "rejected as outliers"), (&update.readmitted, "back")]
+            {
+                if !factors.is_empty() {
+                    self.note(frame, &format!("factors {what}: {}", factors.len()));
+                }
+            }
+        }
+        for refused in &report.refused {
+            self.refused(frame, refused);
+        }
+    }
+
+    /// Something that could not be taken.
+    pub(super) fn refused(&mut self, frame: usize, text: &str) {
+        self.refused += 1;
+        self.note(frame, text);
+    }
+
+    /// The text may be somebody else's, of any length.
+    fn note(&mut self, frame: usize, text: &str) {
+        let text: String = text.chars().take(LONGEST).collect();
+        if self.newest.len() == KEPT {
+            self.newest.pop_front();
+        }
+        self.newest.push_back((frame, text));
+    }
+
+    /// Counts by name, and the newest notes, each with its frame.
+    pub(super) fn to_json(&self) -> Value {
+        json!({
+            "counts": {
+                "born": self.born,
+                "withdrawn": self.withdrawn,
+                "merged": self.merged,
+                "forgotten": self.forgotten,
+                "refused": self.refused,
+                "rejected": self.rejected,
+            },
+            "newest": self.newest,
+        })
+    }
+}
