@@ -4,12 +4,14 @@ use crate::input::journal::{JournalError, journaled};
 use crate::input::sequence::Sequence;
 use crate::input::source::{Folders, SourceError};
 use crate::mapping::{Mapping, MappingError};
-use crate::online::{FinishError, Located};
-use crate::output::report::{PriorMapReport, RunReport, VariantReport};
+use crate::online::FinishError;
+use crate::output::report::{AssociationReport, Found, RunReport, VariantReport};
 use crate::settings::Settings;
 use crate::settings::run_document::{RunDocument, Variant};
+use association::associated;
 use location::find;
 use manifactor_solve::{Observer, SettingError, Termination};
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -18,7 +20,6 @@ mod association;
 mod location;
 mod stream;
 
-pub use association::associated;
 pub use stream::{Watch, online};
 
 /// Why a variant could not be run.
@@ -45,6 +46,42 @@ pub enum RunError {
     Finish(#[from] FinishError),
 }
 
+/// A sequence that is mapped and not solved.
+#[derive(Debug)]
+pub struct Mapped<'a> {
+    /// With the objects that its boxes were put to.
+    pub sequence: Arc<Sequence>,
+    /// The graph.
+    pub mapping: Mapping,
+    /// What it was made with: where the run begins in a map that was made before is known now, if it was found.
+    pub settings: Cow<'a, Settings>,
+    /// How boxes were put to objects.
+    pub association: Option<AssociationReport>,
+    /// Where the run begins in a map that was made before, if that was to be found, and was.
+    pub found: Option<Found>,
+}
+
+impl<'a> Mapped<'a> {
+    /// Finds where a sequence begins in the settings' prior map, puts its boxes to objects, and makes its graph.
+    ///
+    /// # Errors
+    /// Where no graph can be made of it.
+    pub fn new(
+        sequence: Arc<Sequence>,
+        settings: &'a Settings,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, RunError> {
+        let found = find(&sequence, settings, observer)?;
+        let settings = match &found {
+            Some(Found { located, .. }) => Cow::Owned(settings.beginning_at(located)),
+            None => Cow::Borrowed(settings),
+        };
+        let (sequence, association) = associated(sequence, &settings, observer)?;
+        let mapping = Mapping::new(&sequence, &settings)?;
+        Ok(Self { sequence, mapping, settings, association, found })
+    }
+}
+
 /// Maps, solves and evaluates a sequence.
 ///
 /// # Errors
@@ -56,18 +93,12 @@ pub fn estimate(
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
-    let found = find(&sequence, settings, observer)?;
-    let begun = found.as_ref().map(|found| {
-        let Located { start, noise, .. } = &found.located;
-        settings.beginning_at(*start, noise.clone())
-    });
-    let known = begun.as_ref().unwrap_or(settings);
-    let (sequence, association) = associated(sequence, known, observer)?;
-    let mapping = Mapping::new(&sequence, known)?;
-    let estimate = Estimate::new(sequence, mapping, known, observer)?;
+    let Mapped { sequence, mapping, settings: begun, association, found } =
+        Mapped::new(sequence, settings, observer)?;
+    let estimate = Estimate::new(sequence, mapping, &begun, observer)?;
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;
-    report.prior_map = PriorMapReport::new(&estimate, settings, found);
+    report.tell_prior_map(&estimate, settings, found);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))
 }

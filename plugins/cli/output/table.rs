@@ -1,5 +1,6 @@
 //! The table that a run prints.
 use crate::output::text::{self, Table, on_one_line, seconds};
+use manifactor::slam::mapping::object_key;
 use manifactor::slam::report::{RunReport, VariantReport};
 
 /// What a run came to, in a table and a few lines.
@@ -31,6 +32,7 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     }
     for variant in &report.variants {
         out += &association(variant);
+        out += &prior_map(variant);
         out += &stream(variant);
     }
     for variant in &report.variants {
@@ -93,6 +95,29 @@ fn association(variant: &VariantReport) -> String {
             end.true_objects
         );
     }
+    text::wrap(&line) + "\n"
+}
+
+/// What was seen again of a map that was made before, what is gone, and what is new.
+fn prior_map(variant: &VariantReport) -> String {
+    let Some(prior) = variant.prior_map.as_ref().filter(|prior| prior.is_located) else {
+        return String::new();
+    };
+    let found = prior.found.as_ref().map(|found| {
+        let matches = text::count(found.located.matches.len(), "object");
+        format!(" found after {} by {matches},", text::count(found.frame + 1, "frame"))
+    });
+    let gone: Vec<String> = prior.gone.iter().map(|id| object_key(*id).to_string()).collect();
+    let gone = if gone.is_empty() { "none gone".to_owned() } else { format!("gone are {}", gone.join(", ")) };
+    let line = format!(
+        "{}: in {},{} {} of {} seen again, {gone}, {} added",
+        on_one_line(&variant.name),
+        prior.file.display(),
+        found.unwrap_or_default(),
+        prior.seen.len(),
+        text::count(prior.objects, "object"),
+        prior.added.len()
+    );
     text::wrap(&line) + "\n"
 }
 

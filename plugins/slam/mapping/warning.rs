@@ -1,6 +1,7 @@
 use manifactor_config::{nearest, quoted_list};
 use serde::{Serialize, Serializer};
 use std::fmt;
+use std::path::PathBuf;
 
 /// What a user should know, though nothing failed.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +52,11 @@ pub enum Warning {
         /// Of the estimate, in metres.
         estimate: f64,
     },
+    /// A run that is nowhere in the map that it was to begin with.
+    NotLocated {
+        /// The file of that map.
+        file: PathBuf,
+    },
     /// An estimate without the ground truth that it should be compared with.
     NotEvaluated {
         /// Why.
@@ -87,6 +93,12 @@ impl fmt::Display for Warning {
                 f,
                 "the trajectory is worse than the odometry that came in: ATE ({alignment}) {odometry:.5} m before, \
                  {estimate:.5} m after"
+            ),
+            Self::NotLocated { file } => write!(
+                f,
+                "it is not clear where in {} the run begins, so the map is one of its own: too few objects of it were seen, or they may \
+                 be in several places; `prior_map.start` says where, if it is known",
+                file.display()
             ),
             Self::NotEvaluated { reason } => write!(f, "the trajectory is not evaluated: {reason}"),
         }

@@ -184,6 +184,16 @@ impl VariantReport {
     }
 }
 
+impl VariantReport {
+    /// Tells how it went in the map that the run was to begin with.
+    pub(crate) fn tell_prior_map(&mut self, estimate: &Estimate, settings: &Settings, found: Option<Found>) {
+        self.prior_map = PriorMapReport::new(estimate, settings, found);
+        if let Some(prior) = self.prior_map.as_ref().filter(|prior| !prior.is_located) {
+            self.warnings.push(Warning::NotLocated { file: prior.file.clone() });
+        }
+    }
+}
+
 impl Counts {
     fn of(estimate: &Estimate) -> Self {
         let Estimate { sequence, mapping, .. } = estimate;

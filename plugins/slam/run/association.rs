@@ -13,7 +13,7 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// Where the session cannot begin.
-pub fn associated(
+pub(super) fn associated(
     sequence: Arc<Sequence>,
     settings: &Settings,
     observer: &mut dyn Observer,

@@ -5,7 +5,7 @@ use crate::estimate::Estimate;
 use crate::input::sequence::{Observation, Opening, Sequence};
 use crate::input::stream::Stream;
 use crate::online::{FrameError, FrameReport, Mapper};
-use crate::output::report::{Found, Naming, OnlineReport, PriorMapReport, VariantReport};
+use crate::output::report::{Found, Naming, OnlineReport, VariantReport};
 use crate::settings::Settings;
 use manifactor_solve::{Observer, SettingError};
 use std::ops::ControlFlow;
@@ -41,7 +41,7 @@ pub fn online(
         if let Ok(report) = &mut report
             && let Some(located) = search.look(report, &taken.mapper)
         {
-            let known = settings.beginning_at(located.start, located.noise.clone());
+            let known = settings.beginning_at(&located);
             taken = taken.again(&known, report)?;
             report.located = Some(located.clone());
             found = Some(Found { frame: report.frame, located });
@@ -65,7 +65,7 @@ pub fn online(
     progress.compare(&estimate, &settings.evaluation);
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;
-    report.prior_map = PriorMapReport::new(&estimate, settings, found);
+    report.tell_prior_map(&estimate, settings, found);
     report.online = Some(progress);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))

@@ -10,6 +10,7 @@
 mod association;
 mod evo;
 mod online;
+mod prior_map;
 mod simulation;
 mod tum;
 mod variance;

@@ -1,0 +1,226 @@
+//! Runs that begin with the map of another run.
+use manifactor_config::{Document, Format};
+use manifactor_geometry::{LieGroup, Se3};
+use manifactor_graph::Direction;
+use manifactor_slam::online::{FrameError, FrameReport, Mapper};
+use manifactor_slam::output::write_whole;
+use manifactor_slam::prior_map::PriorMap;
+use manifactor_slam::report::{PriorMapReport, VariantReport};
+use manifactor_slam::run::{Mapped, Watch, estimate, online};
+use manifactor_slam::run_document::RunDocument;
+use manifactor_slam::sequence::{ObjectId, Observation, Sequence};
+use manifactor_slam::settings::Settings;
+use manifactor_slam::source::Folders;
+use manifactor_solve::Silent;
+use nalgebra::Vector3;
+use std::ops::{ControlFlow, Range};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A table with objects of a few classes, seen by a detector that errs and gives no names.
+const TABLE: &str = r#"
+semantics = "table_one"
+association = { type = "likelihood" }
+odometry = { noise = { sigma = 0.005 } }
+detections = { noise = { sigma = 6.0 }, loss = { type = "cauchy", scale = 1.0 } }
+
+[source]
+type = "simulated"
+seed = 1
+scene = { objects = 12, seed = 6, classes = ["bottle", "book", "cup"], gap = 0.05, area = [1.6, 1.2] }
+trajectory = { frames = 240, seed = 1 }
+detector = { missed = 0.1, misclassified = 0.05, sigma_px = 3.0 }
+"#;
+
+/// Another walk around the same table.
+const AGAIN: [&str; 2] = ["source.seed=2", "source.trajectory.seed=2"];
+
+fn settings(sets: &[&str]) -> Settings {
+    let mut document = Document::parse("table.toml", TABLE, Format::Toml).unwrap();
+    document.set(sets).unwrap();
+    RunDocument::read(&document).unwrap().variants.remove(0).settings
+}
+
+fn sequence(settings: &Settings) -> Arc<Sequence> {
+    Arc::new(settings.source.load(&Folders::default()).unwrap())
+}
+
+/// Some of the frames, with an odometry that begins where they do.
+fn part(all: &Sequence, frames: Range<usize>) -> Arc<Sequence> {
+    let (mut part, first) = (all.opening().into_sequence(), all.frames[frames.start].world_from_camera);
+    part.up = all.up.map(|up| Direction::new(first.rotation.inverse().act(&up)).unwrap());
+    for mut observation in all.observations().skip(frames.start).take(frames.len()) {
+        observation.frame.world_from_camera = first.between(&observation.frame.world_from_camera);
+        part.push(observation);
+    }
+    Arc::new(part)
+}
+
+/// The map of a walk around the table, in a file.
+fn mapped(folder: &Path, change: impl FnOnce(&mut Sequence)) -> PriorMap {
+    let settings = settings(&[]);
+    let mut sequence = Sequence::clone(&sequence(&settings));
+    change(&mut sequence);
+    let (estimate, _) = estimate("first", Arc::new(sequence), &settings, &mut Silent).unwrap();
+    let map = PriorMap::of(&estimate, &settings).unwrap();
+    write_whole(&folder.join("map.json"), serde_json::to_string(&map).unwrap()).unwrap();
+    map
+}
+
+fn in_map(folder: &Path, more: &[&str]) -> Settings {
+    let file = format!("prior_map.file={}", folder.join("map.json").display());
+    settings(&[&AGAIN[..], more, &[&file]].concat())
+}
+
+/// Notes the poses, and when the place was found.
+#[derive(Default)]
+struct Found {
+    poses: Vec<Se3>,
+    at: Option<usize>,
+}
+
+impl Watch for Found {
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        _: Option<&Observation>,
+        _: &mut Mapper,
+        _: f64,
+    ) -> ControlFlow<()> {
+        let report = report.unwrap();
+        self.poses.push(report.pose);
+        self.at = self.at.or(report.located.as_ref().map(|_| report.frame));
+        ControlFlow::Continue(())
+    }
+}
+
+/// Degrees and metres between the truth and a pose in the frame of the first run's map, which is that of the simulated world.
+fn off(sequence: &Sequence, frame: usize, pose: &Se3) -> [f64; 2] {
+    let error = sequence.ground_truth.as_ref().unwrap().trajectory[frame].pose.between(pose);
+    [error.rotation.log().norm().to_degrees(), error.translation.norm()]
+}
+
+fn told(report: &VariantReport) -> &PriorMapReport {
+    report.prior_map.as_ref().unwrap()
+}
+
+#[test]
+fn a_map_is_read_as_it_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = mapped(folder.path(), |_| {});
+    assert!(map.objects.len() >= 11, "{}", map.objects.len());
+    assert_eq!(PriorMap::read(&folder.path().join("map.json")).unwrap(), map);
+    let seen = map.objects.iter().filter(|object| object.looks.rate() > 0.5).count();
+    assert!(seen >= 10, "{:?}", map.objects.iter().map(|object| object.looks).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_stream_that_begins_anywhere_finds_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = mapped(folder.path(), |_| {});
+    let settings = in_map(folder.path(), &[]);
+    let all = sequence(&settings);
+    for start in [0, 90] {
+        let stream = part(&all, start..240);
+        let mut watch = Found::default();
+        let (estimate, report) = online("again", stream.into(), &settings, &mut watch, &mut Silent).unwrap();
+        let at = watch.at.unwrap();
+        let [deg, m] = off(&all, start + at, &watch.poses[at]);
+        assert!(deg < 5.0 && m < 0.1, "{start}: {deg} {m}");
+        let [deg, m] = off(&all, 239, &estimate.trajectory().last().unwrap().pose);
+        assert!(deg < 3.0 && m < 0.15, "{start}, in the end: {deg} {m}");
+        let prior = told(&report);
+        assert!(prior.is_located && prior.found.as_ref().unwrap().frame == at);
+        assert!(prior.seen.len() >= map.objects.len() - 2 && prior.added.len() <= 2, "{prior:?}");
+        assert!(prior.gone.is_empty(), "{prior:?}");
+    }
+}
+
+#[test]
+fn a_batch_finds_the_same_place_as_a_stream() {
+    let folder = tempfile::tempdir().unwrap();
+    mapped(folder.path(), |_| {});
+    let settings = in_map(folder.path(), &[]);
+    let all = part(&sequence(&settings), 40..240);
+    let mapped = Mapped::new(all.clone(), &settings, &mut Silent).unwrap();
+    let (_, report) =
+        online("stream", all.clone().into(), &settings, &mut Found::default(), &mut Silent).unwrap();
+    assert_eq!(mapped.found, told(&report).found);
+    let (_, report) = estimate("batch", all, &settings, &mut Silent).unwrap();
+    assert!(told(&report).seen.len() >= 10 && told(&report).gone.is_empty());
+}
+
+#[test]
+fn a_place_that_is_known_is_not_looked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    mapped(folder.path(), |_| {});
+    // simulated walks begin at the pose that their odometry begins at
+    let settings = in_map(folder.path(), &["association.type=given"]);
+    let all = sequence(&settings);
+    let first = all.frames[0].world_from_camera;
+    let Se3 { rotation, translation } = first;
+    let rotation = format!("prior_map.start.rotation={:?}", rotation.quaternion_xyzw());
+    let translation = format!("prior_map.start.translation={:?}", translation.as_slice());
+    for association in ["likelihood", "projection", "iou"] {
+        let by = format!("association.type={association}");
+        let settings = in_map(folder.path(), &[&by, &rotation, &translation]);
+        let mut watch = Found::default();
+        let (_, report) = online("again", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
+        let prior = told(&report);
+        assert!(watch.at.is_none() && prior.found.is_none() && prior.is_located);
+        let error = first.between(&watch.poses[0]);
+        assert!(error.log().norm() < 1e-3, "{error:?}");
+        // overlap needs what was seen just before, or what is mapped well
+        assert!(prior.seen.len() >= 8, "{association} {prior:?}");
+    }
+}
+
+#[test]
+fn another_table_is_not_taken_for_this_one() {
+    let folder = tempfile::tempdir().unwrap();
+    mapped(folder.path(), |_| {});
+    for seed in [7, 8, 9] {
+        let settings = in_map(folder.path(), &[&format!("source.scene.seed={seed}")]);
+        let (estimate, report) =
+            online("other", sequence(&settings).into(), &settings, &mut Found::default(), &mut Silent)
+                .unwrap();
+        let prior = told(&report);
+        assert!(!prior.is_located && prior.seen.is_empty() && prior.added.is_empty());
+        assert!(report.warnings.iter().any(|warning| warning.to_string().contains("not clear where in")));
+        // it has a map of its own
+        assert!(estimate.mapping.mapped().count() >= 8);
+    }
+}
+
+#[test]
+fn what_is_gone_is_told_and_what_is_new_is_added() {
+    let folder = tempfile::tempdir().unwrap();
+    let known = |id: u32| {
+        move |detection: &manifactor_slam::sequence::Detection| detection.object != Some(ObjectId(id))
+    };
+    // the first walk sees all but one, and the second all but another
+    let map = mapped(folder.path(), |sequence| sequence.detections.retain(known(2)));
+    let settings = in_map(folder.path(), &[]);
+    let mut second = Sequence::clone(&sequence(&settings));
+    let gone = 4;
+    let truth = second.ground_truth.clone().unwrap();
+    let place = |id: u32| {
+        truth.objects.iter().find(|object| object.id.0 == id).unwrap().world_from_object.translation
+    };
+    second.detections.retain(known(gone));
+    let (estimate, report) =
+        online("second", Arc::new(second).into(), &settings, &mut Found::default(), &mut Silent).unwrap();
+    let prior = told(&report);
+    let near = |id: &ObjectId, map: &PriorMap, place: Vector3<f64>| {
+        map.object(*id).is_some_and(|object| (object.quadric.centroid() - place).norm() < 0.1)
+    };
+    assert_eq!(prior.gone.len(), 1, "{prior:?}");
+    assert!(near(&prior.gone[0], &map, place(gone)));
+    let after = PriorMap::of(&estimate, &settings).unwrap();
+    assert!(after.object(prior.gone[0]).is_none());
+    assert!(prior.added.iter().any(|id| near(id, &after, place(2))), "{prior:?}");
+    // a map that is extended knows its objects better, and what they were in both walks
+    let id = prior.seen[0];
+    let looks = |map: &PriorMap| map.object(id).unwrap().looks.expected;
+    assert!(looks(&after) > looks(&map));
+}
