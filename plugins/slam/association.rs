@@ -9,8 +9,8 @@ mod names;
 mod overlap;
 
 use crate::input::class::Aliases;
+use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{Detection, ObjectId};
-use crate::mapping::prior_map::PriorObject;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{Camera, DualQuadric};
 use std::fmt::Debug;

@@ -18,7 +18,7 @@ pub mod semantics;
 pub mod settings;
 
 pub use estimate::{refine, variance};
-pub use input::{class, fusion, journal, recording, sequence, simulator, source, stream};
-pub use mapping::{measurements, prior_map};
+pub use input::{class, fusion, journal, prior_map, recording, sequence, simulator, source, stream};
+pub use mapping::measurements;
 pub use output::{record, report};
 pub use settings::run_document;

@@ -5,6 +5,7 @@
 //! semantic rules say of it; last, variables and factors of the document's own.
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::fusion::FusedClass;
+use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{ObjectId, Sequence};
 use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
 use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, Verdict, unmatched};
@@ -12,13 +13,12 @@ use crate::settings::{DetectionSettings, OdometrySettings, Settings};
 use manifactor_formats::plausible;
 use manifactor_geometry::{Between, Prior, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_quadric::{BoundingBoxFactor, Camera, DualQuadric};
+use manifactor_quadric::{BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
 use serde::Serialize;
 use std::collections::HashSet;
 use std::sync::Arc;
 
 pub mod measurements;
-pub mod prior_map;
 pub(crate) mod rejection;
 mod warning;
 
@@ -180,8 +180,8 @@ impl Mapping {
         match &start {
             Err(rejection) => tracing::info!(object = %measured.id, "not mapped: {rejection}"),
             Ok(start) => {
-                let loss = settings.anchor().map(|anchor| anchor.loss);
-                self.graph.factors_mut().extend(measured.prior.as_ref().map(|known| known.entry(loss)));
+                let known = measured.prior.as_ref().map(|known| known_entry(known, settings));
+                self.graph.factors_mut().extend(known);
                 let boxes = measured.views.iter();
                 let boxes = boxes.map(|view| box_entry(view, key.clone(), camera, &settings.detections));
                 self.graph.factors_mut().extend(boxes);
@@ -232,8 +232,13 @@ pub(crate) struct Decision {
 
 /// A measured object as rules look at it; `None`, where it is not mapped.
 fn candidate(measured: &Measured, start: &Result<DualQuadric, Rejection>) -> Option<Candidate> {
-    let start = *start.as_ref().ok()?;
-    Some(Candidate::new(measured, start))
+    Some(as_candidate(measured, *start.as_ref().ok()?))
+}
+
+/// An object that is mapped, as rules look at it.
+pub(crate) fn as_candidate(measured: &Measured, start: DualQuadric) -> Candidate {
+    let (key, class, known) = (object_key(measured.id), measured.class(), measured.prior.is_some());
+    Candidate { key, class, start, known }
 }
 
 /// The factor that holds the first pose.
@@ -244,6 +249,18 @@ pub(crate) fn prior_entry(value: Se3, settings: &Settings) -> FactorEntry {
         factor: Arc::new(Prior { value }),
         noise: settings.prior.noise.clone(),
         loss: None,
+    }
+}
+
+/// The factor that holds an object of an earlier map.
+pub(crate) fn known_entry(object: &PriorObject, settings: &Settings) -> FactorEntry {
+    FactorEntry {
+        keys: vec![object_key(object.id)],
+        name: None,
+        factor: Arc::new(QuadricPrior { value: object.quadric }),
+        // what was read has one
+        noise: object.noise().unwrap_or_default(),
+        loss: settings.anchor().map(|anchor| anchor.loss.clone()),
     }
 }
 

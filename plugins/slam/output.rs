@@ -5,8 +5,8 @@
 //! and boxes, a frame a line), `graph.json` (the literal graph at the estimate), `map.json` (the objects with their covariances, for another run to begin with), `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
 //! into an [`OutputFolder`].
 use crate::estimate::Estimate;
+use crate::input::prior_map::PriorMap;
 use crate::input::recording;
-use crate::mapping::prior_map::PriorMap;
 use crate::output::record::{FrameRecord, RECORD, RunRecord, VariantRecord};
 use crate::output::report::{RunReport, VariantReport};
 use crate::settings::run_document::{RunDocument, Variant, absolute, slug};

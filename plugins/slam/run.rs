@@ -73,7 +73,9 @@ impl<'a> Mapped<'a> {
     ) -> Result<Self, RunError> {
         let found = find(&sequence, settings, observer)?;
         let settings = match &found {
-            Some(Found { located, .. }) => Cow::Owned(settings.beginning_at(located)),
+            Some(Found { located, .. }) => {
+                Cow::Owned(settings.beginning_at(located.start, located.noise.clone()))
+            }
             None => Cow::Borrowed(settings),
         };
         let (sequence, association) = associated(sequence, &settings, observer)?;

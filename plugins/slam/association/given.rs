@@ -1,7 +1,7 @@
 use super::{Association, Associator, Image, Learned, Map};
 use crate::input::class::Aliases;
+use crate::input::prior_map::PriorObject;
 use crate::input::sequence::ObjectId;
-use crate::mapping::prior_map::PriorObject;
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;

@@ -7,7 +7,7 @@ mod union;
 
 use super::{Association, Associator};
 use crate::input::class::Aliases;
-use crate::mapping::prior_map::PriorObject;
+use crate::input::prior_map::PriorObject;
 use fit::BoxNoise;
 use manifactor_graph::checked::{positive, within};
 use manifactor_graph::register;

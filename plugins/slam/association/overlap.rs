@@ -1,8 +1,8 @@
 //! Boxes go to the objects that they overlap with most: what others do, to compare with.
 use super::{Association, Associator, Image, Learned, Map, assignment};
 use crate::input::class::Aliases;
+use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{Detection, ObjectId};
-use crate::mapping::prior_map::PriorObject;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::within;
 use manifactor_graph::register;

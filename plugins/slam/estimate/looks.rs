@@ -1,7 +1,7 @@
 //! How often objects were there to be seen, and were seen.
 use crate::estimate::Estimate;
+use crate::input::prior_map::Looks;
 use crate::input::sequence::ObjectId;
-use crate::mapping::prior_map::Looks;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
 use nalgebra::Vector3;

@@ -4,8 +4,8 @@
 //! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
 use crate::input::class::Aliases;
 use crate::input::fusion::{FusedClass, Fusion};
+use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{Detection, ObjectId, Sequence};
-use crate::mapping::prior_map::PriorObject;
 use crate::settings::{Anchor, DetectionSettings, Settings};
 use manifactor_quadric::{BoundingBox, Camera};
 use std::sync::Arc;

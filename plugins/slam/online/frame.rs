@@ -6,7 +6,7 @@ use crate::association::{Image, Learned, Merge};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, ObjectId, Observation};
 use crate::mapping::measurements::{ObjectBox, Sifted, sift};
-use crate::mapping::{box_entry, object_key, odometry_entry, pose_key, prior_entry};
+use crate::mapping::{box_entry, known_entry, object_key, odometry_entry, pose_key, prior_entry};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
 use manifactor_geometry::Se3;
@@ -114,8 +114,8 @@ impl Mapper {
                 graph.push(prior_entry(first, &self.settings));
                 self.settings.own.add_to(&mut graph, &mut values);
                 for known in self.measurements.objects.iter().filter_map(|measured| measured.prior.as_ref()) {
-                    graph.push(known.entry(self.settings.anchor().map(|anchor| anchor.loss)));
-                    values.insert(known.key(), known.quadric);
+                    graph.push(known_entry(known, &self.settings));
+                    values.insert(object_key(known.id), known.quadric);
                 }
                 first
             }

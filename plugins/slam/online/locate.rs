@@ -1,13 +1,17 @@
 //! Where a stream is in a map that was made before.
 use super::Mapper;
+use crate::input::prior_map::PriorMap;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measured, ObjectBox};
 use crate::mapping::object_key;
-use crate::mapping::prior_map::{Aligned, Layout, Mark, PriorMap};
 use manifactor_geometry::Se3;
 use manifactor_graph::Noise;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric};
 use serde::Serialize;
+
+mod layout;
+
+use layout::{Aligned, Layout, Mark};
 
 /// Where a run begins in a map that was made before.
 #[derive(Debug, Clone, PartialEq, Serialize)]

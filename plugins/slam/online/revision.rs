@@ -7,7 +7,7 @@ use crate::association::Merge;
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measurements, ObjectBox};
-use crate::mapping::{Rejection, box_entry, object_key, rejection};
+use crate::mapping::{Rejection, as_candidate, box_entry, object_key, rejection};
 use crate::semantics::Candidate;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_online::FactorId;
@@ -203,7 +203,7 @@ impl Mapper {
         let before = self.ledger.clone();
         let mut all = self.candidates();
         if let Some(measured) = self.measured(id) {
-            all.push(Candidate::new(measured, start));
+            all.push(as_candidate(measured, start));
         }
         let up = self.up.frame().and_then(|frame| frame.up);
         let ruled = self.ledger.ask(&[id], &all, &settings, up).map_err(|error| error.to_string())?;
@@ -249,7 +249,7 @@ impl Mapper {
         mapped
             .filter_map(|(id, object)| {
                 let now = self.quadric(*id).or(object.born_as())?;
-                Some(Candidate::new(self.measured(*id)?, now))
+                Some(as_candidate(self.measured(*id)?, now))
             })
             .collect()
     }

@@ -1,7 +1,7 @@
 //! Semantic factors in a map that grows: what rules have brought, and to whom.
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measured, Measurements};
-use crate::mapping::{Decision, Rejection, object_key};
+use crate::mapping::{Decision, Rejection, as_candidate, object_key};
 use crate::semantics::{Applied, Candidate, Connected, Judge, LeftOut, RuleError, Verdict};
 use crate::settings::Settings;
 use manifactor_graph::{Direction, FactorEntry, Key};
@@ -111,7 +111,7 @@ impl Ledger {
     ) -> Result<Vec<Decision>, RuleError> {
         let all = measurements.objects.iter().zip(&starts);
         let candidates =
-            all.clone().filter_map(|(measured, start)| Some(Candidate::new(measured, *start.as_ref().ok()?)));
+            all.clone().filter_map(|(measured, start)| Some(as_candidate(measured, *start.as_ref().ok()?)));
         let new = all.filter(|(measured, start)| start.is_ok() && !self.left_out.contains_key(&measured.id));
         let new: Vec<ObjectId> = new.map(|(measured, _)| measured.id).collect();
         self.ask(&new, &candidates.collect::<Vec<_>>(), settings, up)?;

@@ -1,8 +1,8 @@
 //! The map that a run leaves, for other runs to begin with.
 use crate::estimate::looks::looks;
 use crate::estimate::{Estimate, Landmark};
+use crate::input::prior_map::{Looks, PriorMap, PriorObject};
 use crate::mapping::measurements::Measured;
-use crate::mapping::prior_map::{Looks, PriorMap, PriorObject};
 use crate::settings::Settings;
 use manifactor_graph::{FactorEntry, Noise};
 use manifactor_quadric::QuadricPrior;

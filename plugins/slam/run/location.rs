@@ -1,7 +1,7 @@
 //! Where a run begins in a map that was made before.
 use super::RunError;
+use crate::input::prior_map::PriorMap;
 use crate::input::sequence::Sequence;
-use crate::mapping::prior_map::PriorMap;
 use crate::online::{FrameReport, Located, Mapper};
 use crate::output::report::Found;
 use crate::settings::Settings;

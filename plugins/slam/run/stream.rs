@@ -41,7 +41,7 @@ pub fn online(
         if let Ok(report) = &mut report
             && let Some(located) = search.look(report, &taken.mapper)
         {
-            let known = settings.beginning_at(&located);
+            let known = settings.beginning_at(located.start, located.noise.clone());
             taken = taken.again(&known, report)?;
             report.located = Some(located.clone());
             found = Some(Found { frame: report.frame, located });

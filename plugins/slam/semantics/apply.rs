@@ -2,8 +2,6 @@
 use super::{Rule, RuleError};
 use crate::input::class::Aliases;
 use crate::input::fusion::FusedClass;
-use crate::mapping::measurements::Measured;
-use crate::mapping::object_key;
 use manifactor_graph::{Direction, FactorEntry, Key};
 use manifactor_quadric::DualQuadric;
 use serde::Serialize;
@@ -23,12 +21,6 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// A measured object that is mapped.
-    pub(crate) fn new(measured: &Measured, start: DualQuadric) -> Self {
-        let (key, class, known) = (object_key(measured.id), measured.class(), measured.prior.is_some());
-        Self { key, class, start, known }
-    }
-
     pub(super) fn class_name(&self) -> &str {
         self.class.as_ref().map_or("", |class| &class.name)
     }

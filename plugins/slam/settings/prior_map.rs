@@ -1,12 +1,11 @@
 use crate::gravity::MapFrame;
+use crate::input::prior_map::PriorMap;
 use crate::input::sequence::Frame;
-use crate::mapping::prior_map::PriorMap;
-use crate::online::Located;
 use manifactor_config::{Errors, Fault, Node};
 use manifactor_geometry::Se3;
-use manifactor_graph::Direction;
 use manifactor_graph::checked::{not_negative, positive};
 use manifactor_graph::loss::{Cauchy, Loss};
+use manifactor_graph::{Direction, Noise};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -104,12 +103,12 @@ impl super::Settings {
     }
 
     /// The same with a start that was found.
-    pub(crate) fn beginning_at(&self, located: &Located) -> Self {
+    pub(crate) fn beginning_at(&self, start: Se3, noise: Noise) -> Self {
         let mut settings = self.clone();
         if let Some(prior) = &mut settings.prior_map {
-            prior.start = Some(located.start);
+            prior.start = Some(start);
         }
-        settings.prior.noise = located.noise.clone();
+        settings.prior.noise = noise;
         settings
     }
 }

@@ -1,6 +1,6 @@
 //! Runs that begin with the map of another run.
 use manifactor_config::{Document, Format};
-use manifactor_geometry::{LieGroup, Se3};
+use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::output::write_whole;

@@ -2,9 +2,9 @@
 //!
 //! Two pairs of objects of like classes, as far apart in the one map as in the other, make a hypothesis where up is known; three, where it
 //! is not. What else fits under it, and what should and does not, is its score; it is believed where no other one comes near.
-use super::PriorMap;
 use crate::association::assignment;
 use crate::input::fusion::Fusion;
+use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::ObjectId;
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::noise::NoiseError;
@@ -13,6 +13,7 @@ use manifactor_quadric::DualQuadric;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use std::collections::HashMap;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// An object by which a place is known again.
 #[derive(Debug, Clone)]
@@ -113,7 +114,7 @@ impl Mark {
 impl Layout {
     /// Of local marks, and up among them, in a map. With `by_name`, one number is one object in both.
     pub(crate) fn new(local: Vec<Mark>, up: Option<Direction>, map: &PriorMap, by_name: bool) -> Self {
-        let mark = |object: &std::sync::Arc<super::PriorObject>| {
+        let mark = |object: &Arc<PriorObject>| {
             let variance = object.covariance().fixed_view::<3, 3>(3, 3).trace() / 3.0;
             Mark::new(object.id, &object.quadric, variance, &object.classes)
         };

@@ -4,20 +4,14 @@
 //! knows it. Boxes that show it are its own, and rules are not asked about it again.
 use crate::input::fusion::Fusion;
 use crate::input::sequence::ObjectId;
-use crate::mapping::object_key;
 use manifactor_config::{Diagnostics, Document, Errors, Fault};
-use manifactor_graph::loss::Loss;
 use manifactor_graph::noise::NoiseError;
-use manifactor_graph::{Direction, FactorEntry, Key, Noise};
-use manifactor_quadric::{DualQuadric, QuadricPrior};
+use manifactor_graph::{Direction, Noise};
+use manifactor_quadric::DualQuadric;
 use nalgebra::{DMatrix, SMatrix};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 use std::sync::Arc;
-
-mod layout;
-
-pub(crate) use layout::{Aligned, Layout, Mark};
 
 /// Objects, and up, in a frame of the map's own.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -120,7 +114,11 @@ impl PriorObject {
         SMatrix::from_fn(|r, c| self.covariance[r][c])
     }
 
-    fn noise(&self) -> Result<Noise, NoiseError> {
+    /// The noise of a factor that holds it.
+    ///
+    /// # Errors
+    /// Where the covariance is none; that of an object which was read is one.
+    pub(crate) fn noise(&self) -> Result<Noise, NoiseError> {
         let noise = Noise::covariance(DMatrix::from_fn(9, 9, |r, c| self.covariance[r][c]))?;
         noise.whitener(9)?;
         Ok(noise)
@@ -135,23 +133,6 @@ impl PriorObject {
             covariance[i][i] += errors[i / 3] * errors[i / 3];
         }
         Self { covariance, ..self.clone() }
-    }
-
-    /// The key of its variable.
-    pub(crate) fn key(&self) -> Key {
-        object_key(self.id)
-    }
-
-    /// The factor that holds it.
-    pub(crate) fn entry(&self, loss: Option<&Arc<dyn Loss>>) -> FactorEntry {
-        FactorEntry {
-            keys: vec![self.key()],
-            name: None,
-            factor: Arc::new(QuadricPrior { value: self.quadric }),
-            // a covariance that was read has a noise
-            noise: self.noise().unwrap_or_default(),
-            loss: loss.cloned(),
-        }
     }
 }
 
