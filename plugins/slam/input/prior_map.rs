@@ -147,3 +147,54 @@ impl Looks {
         Self { expected: self.expected + other.expected, seen: self.seen + other.seen }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(change: impl FnOnce(&mut serde_json::Value)) -> String {
+        let row = |r: usize| (0..9).map(|c| if r == c { 0.01 } else { 0.0 }).collect::<Vec<f64>>();
+        let object = serde_json::json!({
+            "id": 3,
+            "classes": { "scores": { "cup": 2.5 }, "detections": 4 },
+            "quadric": { "translation": [0.0, 1.0, 2.0], "rotation": [0.0, 0.0, 0.0, 1.0], "semi_axes": [0.1, 0.1, 0.1] },
+            "covariance": (0..9).map(row).collect::<Vec<_>>(),
+            "looks": { "expected": 5, "seen": 4 },
+        });
+        let mut map = serde_json::json!({ "version": 1, "up": [0.0, 0.0, 1.0], "objects": [object] });
+        change(&mut map);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("map.json");
+        std::fs::write(&file, map.to_string()).unwrap();
+        PriorMap::read(&file)
+            .map_or_else(|error| error.to_string(), |map| format!("{} objects", map.objects.len()))
+    }
+
+    #[test]
+    fn a_file_that_is_no_map_is_told_at_its_place() {
+        assert_eq!(told(|_| {}), "1 objects");
+        let cases: [(&str, fn(&mut serde_json::Value)); 6] = [
+            ("a map of version 2, and this program reads version 1", |map| map["version"] = 2.into()),
+            ("object 3 is there twice", |map| {
+                let again = map["objects"][0].clone();
+                map["objects"].as_array_mut().unwrap().push(again);
+            }),
+            ("positive definite", |map| map["objects"][0]["covariance"][4][4] = (-1.0).into()),
+            ("a score of 0 or more", |map| map["objects"][0]["classes"]["scores"]["cup"] = (-2.0).into()),
+            ("three semi-axes", |map| map["objects"][0]["quadric"]["semi_axes"][1] = 0.0.into()),
+            ("objects", |map| map["objects"] = "none".into()),
+        ];
+        for (expected, change) in cases {
+            let told = told(change);
+            assert!(told.contains(expected), "{expected}: {told}");
+        }
+    }
+
+    #[test]
+    fn looks_say_how_likely_an_object_is_seen() {
+        let looks = Looks { expected: 8, seen: 8 }.plus(Looks { expected: 10, seen: 0 });
+        assert_eq!(looks, Looks { expected: 18, seen: 8 });
+        assert!((looks.rate() - 0.45).abs() < 1e-12);
+        assert!((Looks::default().rate() - 0.5).abs() < 1e-12);
+    }
+}

@@ -362,3 +362,110 @@ impl Aligned {
         Noise::covariance(covariance)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::class::Aliases;
+    use crate::input::prior_map::Looks;
+    use crate::input::sequence::ClassScores;
+
+    const CLASSES: [&str; 3] = ["cup", "book", "bottle"];
+
+    fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
+        let mut classes = Fusion::default();
+        classes.add(&ClassScores::single(class, 0.8), &Aliases::default());
+        let quadric =
+            DualQuadric { pose: Se3::new(So3::identity(), centre), semi_axes: Vector3::repeat(0.08) };
+        let covariance = std::array::from_fn(|r| std::array::from_fn(|c| if r == c { 1e-4 } else { 0.0 }));
+        Arc::new(PriorObject { id: ObjectId(id), classes, quadric, covariance, looks: Looks::default() })
+    }
+
+    /// Objects on a table, each of one of the classes.
+    fn table(classes: &[&str], up: Option<Direction>) -> PriorMap {
+        let places = [
+            [0.0, 0.0],
+            [0.7, 0.1],
+            [1.5, -0.2],
+            [0.3, 0.9],
+            [1.1, 1.0],
+            [-0.4, 0.6],
+            [1.9, 0.8],
+            [0.8, 1.7],
+        ];
+        let all = places.iter().enumerate().map(|(i, [x, y])| {
+            let height = 0.1 * (i % 3) as f64;
+            object(10 + i as u32, classes[i % classes.len()], Vector3::new(*x, *y, height))
+        });
+        PriorMap::new(up, all.collect())
+    }
+
+    /// The same objects, seen from elsewhere; the first ones are not.
+    fn seen(map: &PriorMap, known_from_local: &Se3, without: usize) -> (Vec<Mark>, Option<Direction>) {
+        let local = known_from_local.inverse();
+        let mark = |object: &Arc<PriorObject>| {
+            let quadric = DualQuadric { pose: local.compose(&object.quadric.pose), ..object.quadric };
+            Mark::new(ObjectId(object.id.0 - 10), &quadric, 1e-4, &object.classes)
+        };
+        let up = map.up.map(|up| Direction::new(local.rotation.act(&up)).unwrap());
+        (map.objects.iter().skip(without).map(mark).collect(), up)
+    }
+
+    fn elsewhere() -> Se3 {
+        Se3::new(So3::exp(&Vector3::new(0.4, -0.7, 1.9)), Vector3::new(2.0, -1.0, 0.5))
+    }
+
+    #[test]
+    fn a_layout_is_found_again_with_and_without_up() {
+        for up in [Some(Direction::Z), None] {
+            let map = table(&CLASSES, up);
+            let (marks, local_up) = seen(&map, &elsewhere(), 2);
+            let found = Layout::new(marks, local_up, &map, false).align().unwrap();
+            let error = found.known_from_local.between(&elsewhere());
+            assert!(error.log().norm() < 1e-6, "{up:?} {error:?}");
+            assert_eq!(found.matches.len(), 6);
+            assert!(
+                found.matches.iter().all(|(local, known)| local.0 + 10 == known.0),
+                "{:?}",
+                found.matches
+            );
+        }
+    }
+
+    #[test]
+    fn what_looks_the_same_from_two_sides_is_nowhere() {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let bottles =
+            square.iter().zip(10..).map(|([x, y], id)| object(id, "bottle", Vector3::new(*x, *y, 0.0)));
+        let map = PriorMap::new(Some(Direction::Z), bottles.collect());
+        let (marks, up) = seen(&map, &elsewhere(), 0);
+        assert!(Layout::new(marks, up, &map, false).align().is_none());
+        // names tell them apart
+        let (mut marks, up) = seen(&map, &elsewhere(), 0);
+        marks.iter_mut().for_each(|mark| mark.id.0 += 10);
+        let found = Layout::new(marks, up, &map, true).align().unwrap();
+        assert!(found.known_from_local.between(&elsewhere()).log().norm() < 1e-6);
+    }
+
+    #[test]
+    fn too_few_objects_or_others_are_nowhere() {
+        let map = table(&CLASSES, Some(Direction::Z));
+        let (marks, up) = seen(&map, &elsewhere(), 5);
+        assert!(Layout::new(marks, up, &map, false).align().is_none());
+        let (marks, up) = seen(&table(&["laptop"], map.up), &elsewhere(), 0);
+        assert!(Layout::new(marks, up, &map, false).align().is_none());
+        assert!(Layout::new(vec![], up, &map, false).align().is_none());
+        let (marks, up) = seen(&map, &elsewhere(), 0);
+        assert!(Layout::new(marks, up, &PriorMap::default(), false).align().is_none());
+    }
+
+    #[test]
+    fn tilt_is_known_better_than_heading() {
+        let map = table(&CLASSES, Some(Direction::Z));
+        let (marks, up) = seen(&map, &elsewhere(), 0);
+        let found = Layout::new(marks, up, &map, false).align().unwrap();
+        let level = Se3::new(elsewhere().rotation.inverse(), Vector3::zeros());
+        let information = found.noise(&level).unwrap().information_matrix(6).unwrap();
+        assert!(information[(0, 0)] > 2.0 * information[(2, 2)], "{information}");
+    }
+}

@@ -1,0 +1,51 @@
+use crate::commands::online::{DESK, LIVE};
+use crate::{fed, folder, manifactor, path};
+use serde_json::Value;
+
+/// The report of a run's only variant.
+fn report(out: &str) -> Value {
+    let text = std::fs::read_to_string(format!("{out}/report.json")).unwrap();
+    serde_json::from_str::<Value>(&text).unwrap()["variants"][0].take()
+}
+
+#[test]
+fn a_second_run_begins_with_the_map_of_the_first() {
+    let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
+    let (desk, first, second) = (path(&folder, "desk.toml"), path(&folder, "first"), path(&folder, "second"));
+    manifactor(&format!("run {desk} --out {first}")).ended(0);
+    let map = format!("{first}/estimate/map.json");
+    let before = std::fs::read(&map).unwrap();
+    let objects = report(&first)["counts"]["objects"].as_u64().unwrap();
+    // names are those of the source in both, so that the place is clear
+    let again = format!("{desk} --out {second} --set prior_map.file={map}");
+    let ran = manifactor(&format!("run {again} --set source.seed=9")).ended(0);
+    assert!(ran.stdout.contains("seen again, none gone"), "{}", ran.stdout);
+    let prior = &report(&second)["prior_map"];
+    assert_eq!(prior["objects"], objects);
+    assert_eq!(prior["is_located"], true);
+    assert_eq!(prior["found"]["matches"].as_array().map(|matches| matches.len() >= 4), Some(true), "{prior}");
+    assert_eq!(std::fs::read(&map).unwrap(), before, "a map that is read is not written");
+    // a stream, from lines; its map can be begun with again
+    let frames = manifactor(&format!("simulate {desk} --lines")).ended(0).stdout;
+    let (live, third) = (path(&folder, "live.toml"), path(&folder, "third"));
+    let map = format!("{second}/estimate/map.json");
+    let ran =
+        fed(&format!("online {live} --out {third} --json --every 1 --set prior_map.file={map}"), &frames);
+    let lines = ran.ended(0).stdout;
+    let located = lines.lines().filter(|line| line.contains("\"located\":{\"start\"")).count();
+    assert_eq!(located, usize::from(report(&third)["prior_map"]["is_located"] == true));
+}
+
+#[test]
+fn a_map_that_cannot_be_read_is_told_before_anything_is_done() {
+    let folder = folder(&[("desk.toml", DESK), ("map.json", "{\"version\": 7, \"objects\": []}")]);
+    let (desk, out) = (path(&folder, "desk.toml"), path(&folder, "out"));
+    let run = |more: &str| manifactor(&format!("run {desk} --out {out} {more}")).ended(2);
+    let told = run("--set prior_map.file=map.json");
+    told.complains("names no map that can be read");
+    told.complains("a map of version 7, and this program reads version 1");
+    run("--set prior_map.file=nowhere.json").complains("nowhere.json");
+    run("--set prior_map.file=map.txt").complains("map.txt");
+    run("--set prior_map.start.translation=[0,0,0]").complains("file");
+    assert!(!std::path::Path::new(&out).exists());
+}
