@@ -4,6 +4,7 @@
 //! the one before, and so skips what a slow browser has no time for. The command never waits for it, but at the end.
 mod access;
 mod address;
+mod answers;
 mod server;
 
 pub(crate) use address::address;

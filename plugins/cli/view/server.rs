@@ -1,17 +1,12 @@
-//! The server: the page, and its events. It answers GET, once for each connection.
+//! The server: connections, and their limits. Each is for one request.
 use super::access::Access;
+use super::answers::{Answers, States};
 use futures_util::future::select;
-use futures_util::stream::{Stream, unfold};
-use http_body_util::combinators::UnsyncBoxBody;
-use http_body_util::{BodyExt, Full, StreamBody};
-use hyper::body::{Bytes, Frame};
-use hyper::header::{ALLOW, HeaderValue};
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
-use hyper::{Method, Request, Response, StatusCode};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
-use manifactor::viz::{LiveMap, live_page};
+use manifactor::viz::LiveMap;
 use std::convert::Infallible;
 use std::future::ready;
 use std::io;
@@ -31,29 +26,10 @@ const MOST: usize = 32;
 const LONGEST: usize = 16 * 1024;
 /// How long a head may take to come; a browser that takes nothing for so long has gone.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// From one state to the next at least; where there is no other, something is sent now and then to find out who has gone.
-const PACE: Duration = Duration::from_millis(100);
-const SILENCE: Duration = Duration::from_secs(15);
+/// Before the next connection is tried where one could not be.
+const PAUSE: Duration = Duration::from_millis(100);
 /// How long the end waits for browsers that have not been told of it yet.
 const FAREWELL: Duration = Duration::from_secs(5);
-/// With every answer: it is kept nowhere, taken for what it says it is, and shown in no other page; the address, which may have
-/// a token, is told nobody.
-const HEADERS: [(&str, &str); 5] = [
-    ("cache-control", "no-store"),
-    ("x-content-type-options", "nosniff"),
-    ("referrer-policy", "no-referrer"),
-    ("cross-origin-resource-policy", "same-origin"),
-    ("content-security-policy", "frame-ancestors 'none'"),
-];
-
-type States = watch::Receiver<Arc<LiveMap>>;
-type Body = UnsyncBoxBody<Bytes, Infallible>;
-
-struct Server {
-    access: Access,
-    states: States,
-    page: Bytes,
-}
 
 /// Serves from now on, in a thread that ends when nobody can change the state any more and browsers know.
 ///
@@ -81,92 +57,38 @@ pub(super) fn watchers(states: &watch::Sender<Arc<LiveMap>>) -> usize {
 }
 
 async fn serve(listener: TcpListener, access: Access, mut states: States) {
-    let server = Arc::new(Server { access, states: states.clone(), page: live_page().into() });
+    let answers = Arc::new(Answers::new(access, states.clone()));
     let connections = GracefulShutdown::new();
     let ended = async { while states.changed().await.is_ok() {} };
-    select(pin!(server.accept(&listener, &connections)), pin!(ended)).await;
+    select(pin!(accept(&listener, &answers, &connections)), pin!(ended)).await;
     // who has not been told by then goes without
     let _ = timeout(FAREWELL, connections.shutdown()).await;
 }
 
-impl Server {
-    async fn accept(self: &Arc<Self>, listener: &TcpListener, connections: &GracefulShutdown) {
-        let mut http = http1::Builder::new();
-        http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(LONGEST).keep_alive(false);
-        let places = Arc::new(Semaphore::new(MOST));
-        loop {
-            let Ok((stream, _)) = listener.accept().await else {
-                // too many files are open, say: that may pass
-                sleep(PACE).await;
-                continue;
-            };
-            let Ok(place) = places.clone().try_acquire_owned() else { continue };
-            // without it, small answers come later
-            let _ = stream.set_nodelay(true);
-            let mut stream = TimeoutStream::new(stream);
-            stream.set_write_timeout(Some(PATIENCE));
-            let server = self.clone();
-            let answer = service_fn(move |request| ready(Ok::<_, Infallible>(server.answer(&request))));
-            let connection = connections.watch(http.serve_connection(TokioIo::new(Box::pin(stream)), answer));
-            tokio::spawn(async move {
-                // what goes wrong is the browser's affair: it has gone, or asks again
-                let _ = connection.await;
-                drop(place);
-            });
-        }
-    }
-
-    fn answer<T>(&self, request: &Request<T>) -> Response<Body> {
-        if !self.access.admits(request) {
-            return words(StatusCode::FORBIDDEN, "open the address as it was told");
-        }
-        match (request.method(), request.uri().path()) {
-            (&Method::GET, "/") => {
-                let page = Full::new(self.page.clone()).boxed_unsync();
-                respond(StatusCode::OK, "text/html; charset=utf-8", page)
-            }
-            (&Method::GET, "/events") => {
-                let events = StreamBody::new(events(self.states.clone())).boxed_unsync();
-                respond(StatusCode::OK, "text/event-stream", events)
-            }
-            (&Method::GET, _) => words(StatusCode::NOT_FOUND, "there is / and no more"),
-            _ => {
-                let mut refusal = words(StatusCode::METHOD_NOT_ALLOWED, "GET alone");
-                refusal.headers_mut().insert(ALLOW, HeaderValue::from_static("GET"));
-                refusal
-            }
-        }
-    }
-}
-
-/// The newest state whenever the browser has taken the one before, from that of now to the last.
-fn events(mut states: States) -> impl Stream<Item = Result<Frame<Bytes>, Infallible>> {
-    states.mark_changed();
-    unfold((states, Duration::ZERO), |(mut states, pause)| async move {
-        sleep(pause).await;
-        let event = match timeout(SILENCE, states.changed()).await {
-            Ok(Ok(())) => {
-                let map = states.borrow_and_update().clone();
-                format!("retry: 1000\ndata: {}\n\n", map.to_json())
-            }
-            Ok(Err(_)) => return None,
-            Err(_) => ":\n\n".to_owned(),
+async fn accept(listener: &TcpListener, answers: &Arc<Answers>, connections: &GracefulShutdown) {
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(LONGEST).keep_alive(false);
+    let places = Arc::new(Semaphore::new(MOST));
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            // too many files are open, say: that may pass
+            sleep(PAUSE).await;
+            continue;
         };
-        Some((Ok(Frame::data(event.into())), (states, PACE)))
-    })
-}
-
-fn words(status: StatusCode, words: &'static str) -> Response<Body> {
-    respond(status, "text/plain", Full::new(Bytes::from_static(words.as_bytes())).boxed_unsync())
-}
-
-fn respond(status: StatusCode, kind: &'static str, body: Body) -> Response<Body> {
-    let mut response = Response::new(body);
-    *response.status_mut() = status;
-    for (name, value) in HEADERS.into_iter().chain([("content-type", kind)]) {
-        response.headers_mut().insert(name, HeaderValue::from_static(value));
+        let Ok(place) = places.clone().try_acquire_owned() else { continue };
+        // without it, small answers come later
+        let _ = stream.set_nodelay(true);
+        let mut stream = TimeoutStream::new(stream);
+        stream.set_write_timeout(Some(PATIENCE));
+        let answers = answers.clone();
+        let answer = service_fn(move |request| ready(Ok::<_, Infallible>(answers.to(&request))));
+        let connection = connections.watch(http.serve_connection(TokioIo::new(Box::pin(stream)), answer));
+        tokio::spawn(async move {
+            // what goes wrong is the browser's affair: it has gone, or asks again
+            let _ = connection.await;
+            drop(place);
+        });
     }
-    response
 }
 
 #[cfg(test)]
@@ -339,7 +261,7 @@ mod tests {
             let silent = tokio::net::TcpStream::connect(address).await.unwrap();
             let first = deaf(address).await;
             while watchers(&feed) > 0 {
-                sleep(PACE).await;
+                sleep(PAUSE).await;
             }
             assert!(begun.elapsed() >= PATIENCE);
             silent.readable().await.unwrap();
