@@ -89,6 +89,13 @@ fn faer_stays_in_solve_and_num_dual_in_graph() {
 }
 
 #[test]
+fn the_command_line_alone_serves() {
+    for library in ["hyper", "hyper-util", "http-body-util", "futures-util", "tokio", "tokio-io-timeout"] {
+        assert_eq!(users_of(library), ["manifactor-cli"], "{library}");
+    }
+}
+
+#[test]
 fn every_dependency_is_in_the_one_table() {
     for package in packages() {
         let manifest = std::fs::read_to_string(&package.manifest_path).unwrap();

@@ -1,11 +1,10 @@
 //! The live view: a page of the map as it grows, served to browsers while a command works.
 //!
-//! The command changes the [state](LiveMap) under a lock that nobody holds for longer than a copy takes. Each browser has a thread
-//! of its own, which sends it the newest state when it has changed, and so skips what a slow browser has no time for.
+//! The command changes the [state](LiveMap); a server in a thread of its own sends each browser the newest whenever that has taken
+//! the one before, and so skips what a slow browser has no time for. The command never waits for it, but at the end.
 mod access;
 mod address;
-mod feed;
-mod request;
+mod answers;
 mod server;
 
 pub(crate) use address::address;
@@ -13,32 +12,33 @@ pub(crate) use address::address;
 use crate::failure::Failure;
 use crate::output;
 use access::Access;
-use feed::Feed;
 use manifactor::slam::estimate::Estimate;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
 use manifactor::slam::sequence::Observation;
 use manifactor::solve::{IterationRecord, Observer};
 use manifactor::viz::{LiveMap, Phase};
 use serde_json::json;
+use std::cell::Cell;
 use std::net::{SocketAddr, TcpListener};
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use tokio::sync::watch;
 
 /// What a command shows of its work.
 pub(crate) struct View {
-    feed: Arc<Feed<LiveMap>>,
+    map: watch::Sender<Arc<LiveMap>>,
+    server: JoinHandle<()>,
     url: String,
     is_everywhere: bool,
     is_told: bool,
     /// When the whole map is looked at again.
-    due: Instant,
+    due: Cell<Instant>,
 }
 
 /// The whole map is looked at no more often than this, and in no more than this share of the time.
 const REFRESH: (Duration, u32) = (Duration::from_millis(500), 50);
-/// How long the end waits for browsers that have not been told of it yet.
-const FAREWELL: Duration = Duration::from_secs(5);
 
 impl View {
     /// Serves the page on this address from now on; port 0 is one that is free.
@@ -53,15 +53,20 @@ impl View {
         let listener = TcpListener::bind(address).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         let access = Access::to(address).map_err(failed)?;
-        let feed = Arc::new(Feed::new(LiveMap::default()));
         let (url, is_everywhere) = (access.url(address), address.ip().is_unspecified());
-        server::serve(listener, access, feed.clone()).map_err(failed)?;
-        Ok(Self { feed, url, is_everywhere, is_told: false, due: Instant::now() })
+        let (map, states) = watch::channel(Arc::default());
+        let server = server::begin(listener, access, states).map_err(failed)?;
+        Ok(Self { map, server, url, is_everywhere, is_told: false, due: Cell::new(Instant::now()) })
+    }
+
+    /// It is copied only while a browser's state is made of it.
+    fn change(&self, change: impl FnOnce(&mut LiveMap)) {
+        self.map.send_modify(|map| change(Arc::make_mut(map)));
     }
 
     /// A run of this title begins with a variant. The first time, the address is told.
     pub(crate) fn begin(&mut self, title: &str, variant: &str, as_json: bool) {
-        self.feed.change(|map| *map = LiveMap::new(title, variant));
+        self.change(|map| *map = LiveMap::new(title, variant));
         if std::mem::replace(&mut self.is_told, true) {
             return;
         }
@@ -75,52 +80,48 @@ impl View {
 
     /// Shows what came of a frame.
     pub(crate) fn frame(
-        &mut self,
+        &self,
         report: Result<&FrameReport, &FrameError>,
         observation: Option<&Observation>,
         mapper: &mut Mapper,
         seconds: f64,
     ) {
-        let is_due = self.feed.watchers() > 0 && Instant::now() >= self.due;
-        self.feed.change(|map| map.frame(report, observation, mapper, seconds));
+        let is_due = server::watchers(&self.map) > 0 && Instant::now() >= self.due.get();
+        self.change(|map| map.frame(report, observation, mapper, seconds));
         if is_due {
             let began = Instant::now();
             self.refresh(mapper);
-            self.due = Instant::now() + REFRESH.0.max(began.elapsed() * REFRESH.1);
+            self.due.set(Instant::now() + REFRESH.0.max(began.elapsed() * REFRESH.1));
         }
     }
 
     /// Shows all of the map as it is now.
     pub(crate) fn refresh(&self, mapper: &mut Mapper) {
-        self.feed.change(|map| map.refresh(mapper));
+        self.change(|map| map.refresh(mapper));
     }
 
     /// Shows the map that all frames together give.
     pub(crate) fn settle(&self, estimate: &Estimate) {
-        self.feed.change(|map| map.settle(estimate));
+        self.change(|map| map.settle(estimate));
     }
 
     /// Tells browsers how it ended, and waits for them, though not for long.
-    pub(crate) fn end(&self, words: &str) {
-        self.feed.end(|map| map.enter(Phase::Ended(words.to_owned()), None), FAREWELL);
+    pub(crate) fn end(self, words: &str) {
+        self.change(|map| map.enter(Phase::Ended(words.to_owned()), None));
+        drop(self.map);
+        // a server that has panicked has told why
+        let _ = self.server.join();
     }
 }
 
 /// Shows the solve of all frames as one batch.
-pub(crate) struct Solve(Option<Arc<Feed<LiveMap>>>);
+pub(crate) struct Solve<'a>(pub(crate) Option<&'a View>);
 
-impl Solve {
-    /// By this view, if there is one.
-    pub(crate) fn shown_by(view: Option<&View>) -> Self {
-        Self(view.map(|view| view.feed.clone()))
-    }
-}
-
-impl Observer for Solve {
+impl Observer for Solve<'_> {
     fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
-        if let Some(feed) = &self.0 {
+        if let Some(view) = self.0 {
             let phase = Phase::Solving { iteration: record.iteration };
-            feed.change(|map| map.enter(phase, Some(record.cost)));
+            view.change(|map| map.enter(phase, Some(record.cost)));
         }
         ControlFlow::Continue(())
     }

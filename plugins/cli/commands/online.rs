@@ -63,17 +63,17 @@ impl Online {
             }
             let mut progress = Progress::new(verbose, &variant.name);
             let interrupted = interrupt.clone();
-            let mut solve = Solve::shown_by(view.as_ref());
+            let mut solve = Solve(view.as_ref());
             let mut observers = All(vec![&mut progress, &mut interrupt, &mut solve]);
             let mut frames =
-                Frames { command: self, interrupt: interrupted, view: view.as_mut(), frames: 0, begun: None };
+                Frames { command: self, interrupt: interrupted, view: view.as_ref(), frames: 0, begun: None };
             let done = run.variant_online(variant, &mut frames, &mut observers)?;
             if let Some(view) = &view {
                 view.settle(&done.0);
             }
             Ok(done)
         });
-        if let Some(view) = &view {
+        if let Some(view) = view {
             view.end(match &report {
                 Ok(report) if report.complete => "all is written",
                 Ok(_) => "interrupted; what there was is written",
@@ -92,7 +92,7 @@ impl Online {
 struct Frames<'a> {
     command: &'a Online,
     interrupt: Interrupt,
-    view: Option<&'a mut View>,
+    view: Option<&'a View>,
     frames: u64,
     /// When the first frame came, and its time stamp.
     begun: Option<(Instant, f64)>,
@@ -151,7 +151,7 @@ impl Watch for Frames<'_> {
         took: f64,
     ) -> ControlFlow<()> {
         self.frames += 1;
-        if let Some(view) = &mut self.view {
+        if let Some(view) = self.view {
             view.frame(report, observation, mapper, took);
         }
         match report {
@@ -167,7 +167,7 @@ impl Watch for Frames<'_> {
     }
 
     fn end(&mut self, mapper: &mut Mapper) {
-        if let Some(view) = &self.view {
+        if let Some(view) = self.view {
             view.refresh(mapper);
         }
     }

@@ -1,5 +1,5 @@
 //! Who may look.
-use super::request::Request;
+use hyper::{Request, header};
 use std::fmt::Write as _;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
@@ -51,16 +51,26 @@ impl Access {
     }
 
     /// Whether a request may be answered.
-    pub(super) fn admits(&self, request: &Request) -> bool {
+    pub(super) fn admits<T>(&self, request: &Request<T>) -> bool {
         match self {
-            Self::Local => request.host.as_deref().is_some_and(is_local),
+            Self::Local => host(request).is_some_and(is_local),
             Self::Token(token) => {
-                let given = request.token.as_deref().unwrap_or_default();
+                let query = request.uri().query().unwrap_or_default();
+                let given = query.split('&').find_map(|pair| pair.strip_prefix("token=")).unwrap_or_default();
                 // in a time that tells nothing of how much of it is right
                 given.as_bytes().ct_eq(token.as_bytes()).into()
             }
         }
     }
+}
+
+/// The host that a request names; `None` for none or several.
+fn host<T>(request: &Request<T>) -> Option<&str> {
+    if let Some(authority) = request.uri().authority() {
+        return Some(authority.as_str());
+    }
+    let mut hosts = request.headers().get_all(header::HOST).iter();
+    hosts.next().filter(|_| hosts.next().is_none())?.to_str().ok()
 }
 
 /// Whether a host, with its port or without, is this machine by its nature: no name server is asked about these.
@@ -106,6 +116,18 @@ mod tests {
         ] {
             assert!(!is_local(host), "{host}");
         }
+    }
+
+    #[test]
+    fn of_two_hosts_neither_counts() {
+        let admitted = |target: &str, hosts: &[&str]| {
+            let request = hosts.iter().fold(Request::get(target), |to, host| to.header(header::HOST, *host));
+            Access::Local.admits(&request.body(()).unwrap())
+        };
+        assert!(admitted("/", &["localhost:80"]) && admitted("http://localhost/", &[]));
+        assert!(!admitted("/", &[]) && !admitted("/", &["localhost", "localhost"]));
+        // what is asked for says more than the header
+        assert!(!admitted("http://example.org/", &["localhost"]));
     }
 
     #[test]

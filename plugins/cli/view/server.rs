@@ -1,129 +1,119 @@
-//! The server: the page, and its events. It answers GET, once for each connection.
+//! The server: connections, and their limits. Each is for one request.
 use super::access::Access;
-use super::feed::Feed;
-use super::request::{NoRequest, Request};
-use manifactor::viz::{LiveMap, live_page};
-use std::io::{self, Write};
-use std::net::{TcpListener, TcpStream};
+use super::answers::{Answers, States};
+use futures_util::future::select;
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
+use manifactor::viz::LiveMap;
+use std::convert::Infallible;
+use std::future::ready;
+use std::io;
+use std::pin::pin;
 use std::sync::Arc;
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
+use tokio::net::TcpListener;
+use tokio::runtime;
+use tokio::sync::{Semaphore, watch};
+use tokio::time::{sleep, timeout};
+use tokio_io_timeout::TimeoutStream;
 
-/// Connections at once; more are turned away.
+/// Connections at once; more are closed.
 const MOST: usize = 32;
-/// A browser that takes nothing for so long has gone.
+/// Bytes of a request's head at most, and about as many as wait for a browser before its next state is made.
+const LONGEST: usize = 16 * 1024;
+/// How long a head may take to come; a browser that takes nothing for so long has gone.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// From one state to the next at least; where there is no other, something is sent now and then to find out who has gone.
-const PACE: Duration = Duration::from_millis(100);
-const SILENCE: Duration = Duration::from_secs(15);
-/// With every answer: it is kept nowhere, taken for what it says it is, and shown in no other page; the address, which may have
-/// a token, is told nobody.
-const HEADERS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
-    Cross-Origin-Resource-Policy: same-origin\r\nContent-Security-Policy: frame-ancestors 'none'\r\nConnection: close\r\n";
+/// Before the next connection is tried where one could not be.
+const PAUSE: Duration = Duration::from_millis(100);
+/// How long the end waits for browsers that have not been told of it yet.
+const FAREWELL: Duration = Duration::from_secs(5);
 
-struct Server {
-    access: Access,
-    feed: Arc<Feed<LiveMap>>,
-    page: String,
-}
-
-/// Serves from now on, until the program ends.
+/// Serves from now on, in a thread that ends when nobody can change the state any more and browsers know.
 ///
 /// # Errors
 /// Where the system has no thread for it.
-pub(super) fn serve(listener: TcpListener, access: Access, feed: Arc<Feed<LiveMap>>) -> io::Result<()> {
-    let server = Arc::new(Server { access, feed, page: live_page() });
-    let accept = move || {
-        for stream in listener.incoming() {
-            let Ok(stream) = stream else {
-                // too many files are open, say: that may pass
-                thread::sleep(PACE);
-                continue;
-            };
-            // each connection has one of these
-            if Arc::strong_count(&server) > MOST {
-                let _ = respond(&stream, "503 Service Unavailable", "", "too many look already");
-                continue;
-            }
-            let server = server.clone();
-            // without a thread the connection is closed
-            let _ = thread::Builder::new().name("view of one".into()).spawn(move || server.answer(stream));
-        }
+pub(super) fn begin(
+    listener: std::net::TcpListener,
+    access: Access,
+    states: States,
+) -> io::Result<JoinHandle<()>> {
+    listener.set_nonblocking(true)?;
+    let runtime = runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+    let listener = {
+        let _within = runtime.enter();
+        TcpListener::from_std(listener)?
     };
-    thread::Builder::new().name("view".into()).spawn(accept).map(drop)
+    let serve = move || runtime.block_on(serve(listener, access, states));
+    thread::Builder::new().name("view".into()).spawn(serve)
 }
 
-impl Server {
-    /// Answers one request. What goes wrong is the browser's affair: it has gone, or asks again.
-    fn answer(&self, mut stream: TcpStream) {
-        let _ = stream.set_write_timeout(Some(PATIENCE)).and_then(|()| stream.set_nodelay(true));
-        let _ = match Request::read(&mut stream) {
-            Ok(request) => self.respond_to(&request, &stream),
-            Err(NoRequest::Malformed) => respond(&stream, "400 Bad Request", "", "this is no HTTP"),
-            Err(NoRequest::TooLong) => {
-                respond(&stream, "431 Request Header Fields Too Large", "", "too long")
-            }
-            Err(NoRequest::Gone) => Ok(()),
+/// How many get events from these states.
+pub(super) fn watchers(states: &watch::Sender<Arc<LiveMap>>) -> usize {
+    // the server has one that it copies, and one that waits for the end
+    states.receiver_count().saturating_sub(2)
+}
+
+async fn serve(listener: TcpListener, access: Access, mut states: States) {
+    let answers = Arc::new(Answers::new(access, states.clone()));
+    let connections = GracefulShutdown::new();
+    let ended = async { while states.changed().await.is_ok() {} };
+    select(pin!(accept(&listener, &answers, &connections)), pin!(ended)).await;
+    // who has not been told by then goes without
+    let _ = timeout(FAREWELL, connections.shutdown()).await;
+}
+
+async fn accept(listener: &TcpListener, answers: &Arc<Answers>, connections: &GracefulShutdown) {
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(LONGEST).keep_alive(false);
+    let places = Arc::new(Semaphore::new(MOST));
+    loop {
+        let Ok((stream, _)) = listener.accept().await else {
+            // too many files are open, say: that may pass
+            sleep(PAUSE).await;
+            continue;
         };
+        let Ok(place) = places.clone().try_acquire_owned() else { continue };
+        // without it, small answers come later
+        let _ = stream.set_nodelay(true);
+        let mut stream = TimeoutStream::new(stream);
+        stream.set_write_timeout(Some(PATIENCE));
+        let answers = answers.clone();
+        let answer = service_fn(move |request| ready(Ok::<_, Infallible>(answers.to(&request))));
+        let connection = connections.watch(http.serve_connection(TokioIo::new(Box::pin(stream)), answer));
+        tokio::spawn(async move {
+            // what goes wrong is the browser's affair: it has gone, or asks again
+            let _ = connection.await;
+            drop(place);
+        });
     }
-
-    fn respond_to(&self, request: &Request, stream: &TcpStream) -> io::Result<()> {
-        if !self.access.admits(request) {
-            return respond(stream, "403 Forbidden", "", "open the address as it was told");
-        }
-        match (request.method.as_str(), request.path.as_str()) {
-            ("GET", "/") => {
-                respond(stream, "200 OK", "Content-Type: text/html; charset=utf-8\r\n", &self.page)
-            }
-            ("GET", "/events") => self.send_events(stream),
-            ("GET", _) => respond(stream, "404 Not Found", "", "there is / and no more"),
-            _ => respond(stream, "405 Method Not Allowed", "Allow: GET\r\n", "GET alone"),
-        }
-    }
-
-    /// Sends each state that is new, at its own pace, until the last or until the browser has gone.
-    fn send_events(&self, mut stream: &TcpStream) -> io::Result<()> {
-        let watcher = self.feed.watch();
-        let head =
-            format!("HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n{HEADERS}\r\nretry: 1000\n\n");
-        stream.write_all(head.as_bytes())?;
-        let mut version = 0;
-        loop {
-            let Some(seen) = watcher.newer(version, SILENCE) else {
-                stream.write_all(b":\n\n")?;
-                continue;
-            };
-            version = seen.version;
-            stream.write_all(format!("data: {}\n\n", seen.value.to_json()).as_bytes())?;
-            if seen.is_last {
-                return Ok(());
-            }
-            thread::sleep(PACE);
-        }
-    }
-}
-
-/// An answer, of plain text unless `headers` say otherwise.
-fn respond(mut stream: &TcpStream, status: &str, headers: &str, body: &str) -> io::Result<()> {
-    let kind = if headers.contains("Content-Type") { "" } else { "Content-Type: text/plain\r\n" };
-    let length = body.len();
-    let head = format!("HTTP/1.1 {status}\r\n{kind}{headers}{HEADERS}Content-Length: {length}\r\n\r\n");
-    stream.write_all(format!("{head}{body}").as_bytes())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use manifactor::viz::Phase;
-    use std::io::{BufRead, BufReader, Read};
-    use std::net::SocketAddr;
+    use std::io::{BufRead, BufReader, Read, Write};
+    use std::net::{SocketAddr, TcpStream};
+    use tokio::time::Instant;
 
-    fn served(access: Access) -> (SocketAddr, Arc<Feed<LiveMap>>) {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    type Feed = watch::Sender<Arc<LiveMap>>;
+
+    fn feed() -> (Feed, States) {
+        watch::channel(Arc::new(LiveMap::new("desk", "only")))
+    }
+
+    fn served(access: Access) -> (SocketAddr, Feed, JoinHandle<()>) {
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
-        let feed = Arc::new(Feed::new(LiveMap::new("desk", "only")));
-        serve(listener, access, feed.clone()).unwrap();
-        (address, feed)
+        let (feed, states) = feed();
+        (address, feed, begin(listener, access, states).unwrap())
+    }
+
+    fn change(feed: &Feed, change: impl FnOnce(&mut LiveMap)) {
+        feed.send_modify(|map| change(Arc::make_mut(map)));
     }
 
     fn asked(address: SocketAddr, request: &str) -> TcpStream {
@@ -143,23 +133,20 @@ mod tests {
 
     #[test]
     fn the_page_is_there_and_nothing_else() {
-        let (address, _) = served(Access::Local);
+        let (address, _feed, _) = served(Access::Local);
         let status = |line: &str| answer(address, line, "localhost").0;
         let (ok, page) = answer(address, "GET /?x=1", &address.to_string());
         assert!(
             ok == 200 && page.contains("<title>Live map</title>") && page.contains("frame-ancestors 'none'")
         );
-        assert_eq!(
-            (status("GET /favicon.ico"), status("GET /../etc/passwd"), status("GET http://x/")),
-            (404, 404, 404)
-        );
+        assert_eq!((status("GET /favicon.ico"), status("GET /../etc/passwd")), (404, 404));
         assert_eq!((status("POST /"), status("HEAD /"), status("DELETE /events")), (405, 405, 405));
-        assert!(answer(address, "PUT /", "localhost").1.contains("\r\nAllow: GET\r\n"));
+        assert!(answer(address, "PUT /", "localhost").1.contains("\r\nallow: GET\r\n"));
     }
 
     #[test]
     fn a_name_that_was_made_to_lead_here_is_refused() {
-        let (address, _) = served(Access::Local);
+        let (address, _feed, _) = served(Access::Local);
         for host in
             ["example.org", "localhost.example.org", &format!("127.0.0.1.example.org:{}", address.port())]
         {
@@ -174,7 +161,7 @@ mod tests {
 
     #[test]
     fn every_request_needs_the_token() {
-        let (address, feed) = served(Access::Token("0123abcd".to_owned()));
+        let (address, _feed, _) = served(Access::Token("0123abcd".to_owned()));
         let status = |line: &str| answer(address, line, "robot.example.org").0;
         for path in [
             "/",
@@ -189,13 +176,18 @@ mod tests {
         }
         assert_eq!(status("POST /"), 403);
         assert_eq!((status("GET /?token=0123abcd"), status("GET /x?token=0123abcd")), (200, 404));
-        feed.end(|_| {}, Duration::ZERO);
-        assert_eq!(status("GET /events?token=0123abcd"), 200);
+        let mut events = BufReader::new(asked(
+            address,
+            "GET /events?token=0123abcd HTTP/1.1\r\nHost: robot.example.org\r\n\r\n",
+        ));
+        let mut first = String::new();
+        events.read_line(&mut first).unwrap();
+        assert!(first.starts_with("HTTP/1.1 200 "), "{first}");
     }
 
     #[test]
     fn what_is_no_request_is_told_so() {
-        let (address, _) = served(Access::Local);
+        let (address, _feed, _) = served(Access::Local);
         let status = |text: &str| {
             let mut answer = String::new();
             asked(address, text).read_to_string(&mut answer).unwrap();
@@ -204,11 +196,13 @@ mod tests {
         assert!(status("\u{16}\u{3}\u{1}\r\n\r\n").starts_with("HTTP/1.1 400 "));
         let many = format!("GET / HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(101));
         assert!(status(&many).starts_with("HTTP/1.1 431 "));
+        let long = format!("GET / HTTP/1.1\r\na: {}", "b".repeat(LONGEST));
+        assert!(status(&long).starts_with("HTTP/1.1 431 "));
     }
 
     #[test]
     fn events_are_whole_states_and_end_with_the_last() {
-        let (address, feed) = served(Access::Local);
+        let (address, feed, server) = served(Access::Local);
         let mut lines =
             BufReader::new(asked(address, "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n")).lines();
         let mut state = || loop {
@@ -218,30 +212,73 @@ mod tests {
             }
         };
         assert_eq!(state().unwrap()["phase"], "waiting");
-        assert_eq!(feed.watchers(), 1);
-        feed.change(|map| map.enter(Phase::Solving { iteration: 2 }, Some(0.5)));
+        assert_eq!(watchers(&feed), 1);
+        change(&feed, |map| map.enter(Phase::Solving { iteration: 2 }, Some(0.5)));
         assert_eq!(state().unwrap()["words"], "iteration 2");
-        feed.end(|map| map.enter(Phase::Ended("done".to_owned()), None), Duration::from_secs(60));
+        change(&feed, |map| map.enter(Phase::Ended("done".to_owned()), None));
+        drop(feed);
+        // nobody has to read for it to end
+        server.join().unwrap();
         assert_eq!(state().unwrap()["words"], "done");
-        assert!(state().is_none() && feed.watchers() == 0);
+        assert!(state().is_none() && TcpStream::connect(address).is_err());
     }
 
     #[test]
     fn who_takes_nothing_holds_up_nobody() {
-        let (address, feed) = served(Access::Local);
+        let (address, feed, _) = served(Access::Local);
         let deaf = asked(address, "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n");
         // more than fits into any buffer on the way
         let long = "x".repeat(1 << 20);
         for i in 0..40 {
-            feed.change(|map| *map = LiveMap::new(&long, &i.to_string()));
+            change(&feed, |map| *map = LiveMap::new(&long, &i.to_string()));
         }
         assert_eq!(answer(address, "GET /", "localhost").0, 200);
         drop(deaf);
     }
 
+    /// One that asks for events and takes none; from then on, the clock goes on to what is due whenever nothing else happens.
+    async fn deaf(address: SocketAddr) -> tokio::net::TcpStream {
+        tokio::time::resume();
+        let stream = tokio::net::TcpStream::connect(address).await.unwrap();
+        stream.writable().await.unwrap();
+        stream.try_write(b"GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+        stream.readable().await.unwrap();
+        tokio::time::pause();
+        stream
+    }
+
+    #[test]
+    fn nobody_is_waited_for_for_ever() {
+        let mut runtime = runtime::Builder::new_current_thread();
+        runtime.enable_all().start_paused(true).build().unwrap().block_on(async {
+            let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+            let address = listener.local_addr().unwrap();
+            let (feed, states) = feed();
+            // longer than all buffers on the way
+            change(&feed, |map| *map = LiveMap::new(&"x".repeat(1 << 25), "only"));
+            let server = tokio::spawn(serve(listener, Access::Local, states));
+            let begun = Instant::now();
+            let silent = tokio::net::TcpStream::connect(address).await.unwrap();
+            let first = deaf(address).await;
+            while watchers(&feed) > 0 {
+                sleep(PAUSE).await;
+            }
+            assert!(begun.elapsed() >= PATIENCE);
+            silent.readable().await.unwrap();
+            assert_eq!(silent.try_read(&mut [0]).unwrap(), 0);
+            // nor at the end
+            let second = deaf(address).await;
+            let begun = Instant::now();
+            drop(feed);
+            server.await.unwrap();
+            assert!((FAREWELL..PATIENCE).contains(&begun.elapsed()));
+            drop((first, second));
+        });
+    }
+
     #[test]
     fn there_is_an_end_to_how_many_look() {
-        let (address, feed) = served(Access::Local);
+        let (address, _feed, _) = served(Access::Local);
         let looks = || asked(address, "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n");
         let heard = |stream: TcpStream| {
             let mut first = String::new();
@@ -252,7 +289,6 @@ mod tests {
         };
         let all: Vec<_> = (0..MOST).map(|_| heard(looks())).collect();
         assert!(all.iter().all(|(first, _)| first.contains("200")));
-        assert!(!heard(looks()).0.contains("200"));
-        feed.end(|_| {}, Duration::ZERO);
+        assert_eq!(heard(looks()).0, "");
     }
 }
