@@ -182,7 +182,7 @@ mod tests {
             ("positive definite", |map| map["objects"][0]["covariance"][4][4] = (-1.0).into()),
             ("a score of 0 or more", |map| map["objects"][0]["classes"]["scores"]["cup"] = (-2.0).into()),
             ("three semi-axes", |map| map["objects"][0]["quadric"]["semi_axes"][1] = 0.0.into()),
-            ("objects", |map| map["objects"] = "none".into()),
+            ("expected an array", |map| map["objects"] = "none".into()),
         ];
         for (expected, change) in cases {
             let told = told(change);

@@ -88,7 +88,7 @@ const MATCHES: usize = 4;
 /// this share of the local ones among the known ones,
 const MOST: f64 = 0.6;
 /// and it is so far ahead, in nats.
-const LEAD: f64 = 8.0;
+const LEAD: f64 = 16.0;
 
 /// How much better than by all marks together up is known.
 const UP: f64 = 10.0;
