@@ -88,8 +88,8 @@ fn a_run_leaves_the_same_bytes_on_any_number_of_threads() {
         out
     });
     let one = timeless(Path::new(&out[0]));
-    // three of the run, and its marker; of each variant nine, and eight charts and four images, each as SVG and as PNG
-    assert_eq!(one.len(), 4 + 2 * (9 + 2 * 12), "{:?}", one.keys());
+    // three of the run, and its marker; of each variant ten, and eight charts and four images, each as SVG and as PNG
+    assert_eq!(one.len(), 4 + 2 * (10 + 2 * 12), "{:?}", one.keys());
     for other in &out[1..] {
         same(&one, &timeless(Path::new(other)), [&out[0], other]);
     }
