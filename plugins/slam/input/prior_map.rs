@@ -170,10 +170,12 @@ mod tests {
             .map_or_else(|error| error.to_string(), |map| format!("{} objects", map.objects.len()))
     }
 
+    type Change = fn(&mut serde_json::Value);
+
     #[test]
     fn a_file_that_is_no_map_is_told_at_its_place() {
         assert_eq!(told(|_| {}), "1 objects");
-        let cases: [(&str, fn(&mut serde_json::Value)); 6] = [
+        let cases: [(&str, Change); 6] = [
             ("a map of version 2, and this program reads version 1", |map| map["version"] = 2.into()),
             ("object 3 is there twice", |map| {
                 let again = map["objects"][0].clone();
