@@ -145,21 +145,24 @@ impl Estimate {
     /// The same, from other values than those of the mapping.
     pub(crate) fn from_start(
         sequence: Arc<Sequence>,
-        mapping: Mapping,
+        mut mapping: Mapping,
         start: Values,
         settings: &Settings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
-        let most = settings.objects.refinements;
+        let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
+        let Some(variance) = &settings.variance_components else {
+            return Ok(Self::solve(sequence, mapping, start, most, settings, observer)?);
+        };
+        Components::begin(&mapping, variance).apply(&mut mapping, variance, loss)?;
         let mut estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-        let Some(variance) = &settings.variance_components else { return Ok(estimate) };
         let (mut components, mut settled): (Vec<Components>, bool) = (vec![], false);
         let interrupted = |of: &Self| of.solution.outcome.termination == Termination::Interrupted;
         while !(settled || interrupted(&estimate) || estimate.mapping.mapped().next().is_none()) {
-            let found = Components::of(&estimate, variance)?;
+            let found = Components::of(&estimate, variance, loss, observer)?;
             settled = components.len() + 1 >= variance.rounds.get()
                 || components.last().is_some_and(|before| found.change(before) < variance.tolerance);
-            found.apply(&mut estimate.mapping, variance, settings.detections.loss.as_ref())?;
+            found.apply(&mut estimate.mapping, variance, loss)?;
             components.push(found);
             let Self { sequence, mapping, mut solution, .. } = estimate;
             let values = std::mem::take(&mut solution.values);

@@ -1,11 +1,11 @@
 //! A run from its document to its report.
 use crate::estimate::{Estimate, EstimateError};
 use crate::input::journal::{JournalError, journaled};
-use crate::input::sequence::Sequence;
+use crate::input::sequence::{Detection, Sequence};
 use crate::input::source::{Folders, SourceError};
 use crate::mapping::{Mapping, MappingError};
 use crate::online::FinishError;
-use crate::output::report::{AssociationReport, Found, RunReport, VariantReport};
+use crate::output::report::{AssociationReport, Found, HeldOutReport, RunReport, VariantReport};
 use crate::settings::Settings;
 use crate::settings::run_document::{RunDocument, Variant};
 use association::associated;
@@ -59,6 +59,8 @@ pub struct Mapped<'a> {
     pub association: Option<AssociationReport>,
     /// Where the run begins in a map that was made before, if that was to be found, and was.
     pub found: Option<Found>,
+    /// Boxes that are not in the graph, and are to be predicted.
+    pub held_out: Vec<Detection>,
 }
 
 impl<'a> Mapped<'a> {
@@ -78,9 +80,13 @@ impl<'a> Mapped<'a> {
             }
             None => Cow::Borrowed(settings),
         };
-        let (sequence, association) = associated(sequence, &settings, observer)?;
+        let (mut sequence, association) = associated(sequence, &settings, observer)?;
+        let held_out = match settings.evaluation.holdout {
+            Some(holdout) => holdout.take_from(Arc::make_mut(&mut sequence)),
+            None => vec![],
+        };
         let mapping = Mapping::new(&sequence, &settings)?;
-        Ok(Self { sequence, mapping, settings, association, found })
+        Ok(Self { sequence, mapping, settings, association, found, held_out })
     }
 }
 
@@ -95,11 +101,12 @@ pub fn estimate(
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
-    let Mapped { sequence, mapping, settings: begun, association, found } =
+    let Mapped { sequence, mapping, settings: begun, association, found, held_out } =
         Mapped::new(sequence, settings, observer)?;
     let estimate = Estimate::new(sequence, mapping, &begun, observer)?;
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;
+    report.held_out = HeldOutReport::new(&estimate, &held_out, settings);
     report.tell_prior_map(&estimate, settings, found);
     report.seconds = clock.elapsed().as_secs_f64();
     Ok((estimate, report))

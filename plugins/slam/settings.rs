@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 mod detections;
 mod evaluation;
+mod holdout;
 mod objects;
 mod own;
 mod poses;
@@ -24,6 +25,7 @@ mod variance;
 
 pub use detections::{CutSides, DetectionSettings};
 pub use evaluation::EvaluationSettings;
+pub use holdout::Holdout;
 pub use objects::ObjectSettings;
 pub use own::OwnGraph;
 pub use poses::{OdometrySettings, PriorSettings};

@@ -1,7 +1,8 @@
 //! The table that a run prints.
 use crate::output::text::{self, Table, on_one_line, seconds};
 use manifactor::slam::mapping::object_key;
-use manifactor::slam::report::{RunReport, VariantReport};
+use manifactor::slam::report::{Mean, Prediction, RunReport, VariantReport};
+use manifactor::slam::variance::{BoxComponent, MotionComponent, Score};
 
 /// What a run came to, in a table and a few lines.
 pub(crate) fn of_run(report: &RunReport) -> String {
@@ -32,6 +33,8 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     }
     for variant in &report.variants {
         out += &association(variant);
+        out += &noise(variant);
+        out += &held_out(variant);
         out += &prior_map(variant);
         out += &stream(variant);
     }
@@ -95,6 +98,47 @@ fn association(variant: &VariantReport) -> String {
             end.true_objects
         );
     }
+    text::wrap(&line) + "\n"
+}
+
+/// The noise that was estimated, and why the odometry was kept, if it was.
+fn noise(variant: &VariantReport) -> String {
+    let Some(found) = variant.variance_components.last() else { return String::new() };
+    let mut parts = vec![];
+    if let Some(choice) = &found.odometry {
+        let Score { cost, deviation } = choice.score;
+        let MotionComponent { rotation, translation, pivot } = choice.noise;
+        let about = if pivot > 0.0 { format!(" about {pivot:.2} m ahead") } else { String::new() };
+        parts.push(if choice.is_kept() {
+            format!("odometry kept: the best correction changes what boxes of other objects cost by {cost:+.1} ± {deviation:.1}")
+        } else {
+            format!("odometry σ {rotation:.1e} rad, {translation:.1e} m{about}: boxes of other objects cost {cost:+.1} ± {deviation:.1}")
+        });
+    }
+    parts.extend(found.boxes.iter().map(|(name, boxes)| {
+        let BoxComponent { sigma_px, correlation_time, .. } = boxes;
+        format!("boxes ({name}) σ {sigma_px:.1} px, {correlation_time:.1} of them worth one")
+    }));
+    text::wrap(&format!("{}: {}", on_one_line(&variant.name), parts.join("; "))) + "\n"
+}
+
+/// How well boxes are predicted that were held out.
+fn held_out(variant: &VariantReport) -> String {
+    let Some(held_out) = &variant.held_out else { return String::new() };
+    let Prediction { boxes, objects, out_of_view, iou, pixels } = held_out.all;
+    let of = |mean: Mean, digits: usize| {
+        let error = mean.error.map(|error| format!(" ± {error:.digits$}")).unwrap_or_default();
+        format!("{:.digits$}{error}", mean.mean)
+    };
+    let line = format!(
+        "{}: boxes held out {} of {}: IoU {}, {} px; {out_of_view} predicted out of view, {} of objects not mapped",
+        on_one_line(&variant.name),
+        boxes,
+        text::count(objects, "object"),
+        of(iou, 3),
+        of(pixels, 1),
+        held_out.unmapped
+    );
     text::wrap(&line) + "\n"
 }
 

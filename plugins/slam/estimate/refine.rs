@@ -120,7 +120,12 @@ fn rank(problem: &Problem) -> (usize, f64) {
 }
 
 fn solver() -> LevenbergMarquardt {
-    let stop = Stopping { max_iterations: 30, relative_cost: 1e-5, ..Stopping::default() };
+    roughly(30, 1e-5)
+}
+
+/// Descends until a step lowers the cost by less than this share of it.
+pub(super) fn roughly(max_iterations: usize, relative_cost: f64) -> LevenbergMarquardt {
+    let stop = Stopping { max_iterations, relative_cost, ..Stopping::default() };
     // damping of one size for all directions: a semi-axis that has all but vanished has next to no derivative, and
     // damping in proportion to that would let it go
     LevenbergMarquardt { diagonal: [1.0, 1.0], initial_lambda: 1e-3, stop, ..LevenbergMarquardt::default() }

@@ -1,11 +1,15 @@
-//! Variance components: how large the noise is, estimated from the data that it is in.
+//! Variance components: how large the noise is, estimated from the data that it is in. No ground truth takes part, and what a
+//! document says of the noise does not either.
 //!
-//! Solve, look at the residuals, scale the noise, solve again (Helmert; Förstner, *Ein Verfahren zur Schätzung von Varianz-
-//! und Kovarianzkomponenten*, 1979). A residual r of standard deviation σ has variance σ²(1 - h) at the estimate, h its
-//! leverage: what is left of an odometry that next to nothing controls says little, however small it is.
-//! No ground truth takes part.
+//! The noise of *boxes* is that of their residuals: one of standard deviation σ has variance σ²(1 - h) at the estimate, h its leverage
+//! (Helmert; Förstner, *Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten*, 1979). The noise of *odometry* is the one
+//! that leads to the trajectory which suits objects best that had no part in it.
 mod components;
 mod correlation;
+mod cross_validation;
+mod motion;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
-pub use components::{Components, VarianceError};
+pub use components::{BoxComponent, Components, VarianceError};
+pub use cross_validation::Score;
+pub use motion::{MotionChoice, MotionComponent};

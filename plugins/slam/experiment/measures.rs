@@ -25,7 +25,7 @@ const BY_ALIGNMENT: [OfTrajectory; 7] = [
 ];
 
 /// What is measured once.
-const ONCE: [OfEstimate; 24] = [
+const ONCE: [OfEstimate; 30] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
     ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),
@@ -37,8 +37,14 @@ const ONCE: [OfEstimate; 24] = [
     ("scored", |_, r| Some(r.landmarks?.objects as f64)),
     ("c_vertical", |e, _| mean_alignment(e, "vertical_orientation")),
     ("c_horizontal", |e, _| mean_alignment(e, "horizontal_orientation")),
-    ("sigma_rotation", |e, _| Some(e.components.last()?.odometry?[0])),
-    ("sigma_translation", |e, _| Some(e.components.last()?.odometry?[1])),
+    ("sigma_rotation", |e, _| Some(e.components.last()?.odometry?.noise.rotation)),
+    ("sigma_translation", |e, _| Some(e.components.last()?.odometry?.noise.translation)),
+    ("held_out_iou", |_, r| Some(r.held_out.as_ref()?.all.iou.mean)),
+    ("held_out_iou_error", |_, r| r.held_out.as_ref()?.all.iou.error),
+    ("held_out_px", |_, r| Some(r.held_out.as_ref()?.all.pixels.mean)),
+    ("pivot", |e, _| Some(e.components.last()?.odometry?.noise.pivot)),
+    ("validation", |e, _| Some(e.components.last()?.odometry?.score.cost)),
+    ("validation_error", |e, _| Some(e.components.last()?.odometry?.score.deviation)),
     ("sigma_box_px", |e, _| {
         let boxes = &e.components.last()?.boxes;
         Some(boxes.values().map(|component| component.effective_px).sum::<f64>() / boxes.len() as f64)

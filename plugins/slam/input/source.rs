@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 
 mod assemble;
 mod camera;
+mod distortion;
 mod json_lines;
 mod recorded;
 mod tum;
 
 pub use camera::CameraChoice;
+pub use distortion::Distortion;
 pub(crate) use json_lines::parse;
 pub use json_lines::{JsonLines, line};
 pub use recorded::Recorded;
@@ -145,6 +147,16 @@ pub enum SourceError {
     ReadBefore {
         /// The stream.
         file: PathBuf,
+    },
+    /// A box that a lens cannot have shown.
+    #[error(
+        "the box {bounds:?} of frame {frame} has no place in the image without the lens's `distortion`: it is not this camera's"
+    )]
+    Distorted {
+        /// Of the box.
+        frame: usize,
+        /// xmin, ymin, xmax, ymax, in pixels.
+        bounds: [f64; 4],
     },
     /// A simulation that cannot be run.
     #[error("the simulation cannot be run: {0}")]

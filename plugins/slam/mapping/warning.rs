@@ -57,6 +57,8 @@ pub enum Warning {
         /// The file of that map.
         file: PathBuf,
     },
+    /// Boxes that were to be held out, and took part.
+    NotHeldOut,
     /// An estimate without the ground truth that it should be compared with.
     NotEvaluated {
         /// Why.
@@ -99,6 +101,9 @@ impl fmt::Display for Warning {
                 "it is not clear where in {} the run begins, so the map is one of its own: too few objects of it were seen, or they may \
                  be in several places; `prior_map.start` says where, if it is known",
                 file.display()
+            ),
+            Self::NotHeldOut => f.write_str(
+                "`evaluation.holdout` is for `manifactor run`, which knows all boxes before it begins: here none was held out",
             ),
             Self::NotEvaluated { reason } => write!(f, "the trajectory is not evaluated: {reason}"),
         }

@@ -10,6 +10,7 @@ use manifactor_solve::{Diagnosis, Outcome, Rejected, Termination, Times};
 use serde::Serialize;
 
 mod association;
+mod held_out;
 mod landmarks;
 mod online;
 mod prior_map;
@@ -18,6 +19,7 @@ mod trajectory;
 
 pub use association::AssociationReport;
 pub(crate) use association::Naming;
+pub use held_out::{HeldOutReport, Mean, Prediction};
 pub use landmarks::LandmarkReport;
 pub use online::OnlineReport;
 pub use prior_map::{Found, PriorMapReport};
@@ -72,6 +74,9 @@ pub struct VariantReport {
     pub trajectory: Vec<TrajectoryReport>,
     /// The objects against the truth, where there is one.
     pub landmarks: Option<LandmarkReport>,
+    /// How well boxes are predicted that the estimate did without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOutReport>,
     /// Each object that was detected, by number.
     pub objects: Vec<ObjectReport>,
     /// What the user should know.
@@ -177,6 +182,7 @@ impl VariantReport {
             solve,
             trajectory,
             landmarks,
+            held_out: None,
             objects,
             warnings,
             seconds,

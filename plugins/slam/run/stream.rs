@@ -4,6 +4,7 @@ use super::location::Search;
 use crate::estimate::Estimate;
 use crate::input::sequence::{Observation, Opening, Sequence};
 use crate::input::stream::Stream;
+use crate::mapping::Warning;
 use crate::online::{FrameError, FrameReport, Mapper};
 use crate::output::report::{Found, Naming, OnlineReport, VariantReport};
 use crate::settings::Settings;
@@ -65,6 +66,9 @@ pub fn online(
     progress.compare(&estimate, &settings.evaluation);
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;
+    if settings.evaluation.holdout.is_some() {
+        report.warnings.push(Warning::NotHeldOut);
+    }
     report.tell_prior_map(&estimate, settings, found);
     report.online = Some(progress);
     report.seconds = clock.elapsed().as_secs_f64();

@@ -1,10 +1,11 @@
+use super::Holdout;
 use crate::metrics::Alignment;
 use manifactor_graph::checked::not_negative;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
-/// `[evaluation]`: how a trajectory is compared with the truth.
+/// `[evaluation]`: what an estimate is compared with: its trajectory with the truth, its map with boxes that it did without.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EvaluationSettings {
@@ -16,11 +17,19 @@ pub struct EvaluationSettings {
     pub max_time_difference: f64,
     /// Over how many frames relative errors are taken.
     pub relative_over: NonZeroUsize,
+    /// Boxes that the estimate does without, and which are then predicted by it; for `manifactor run`. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub holdout: Option<Holdout>,
 }
 
 impl Default for EvaluationSettings {
     fn default() -> Self {
-        Self { alignments: vec![Alignment::Se3], max_time_difference: 0.02, relative_over: NonZeroUsize::MIN }
+        Self {
+            alignments: vec![Alignment::Se3],
+            max_time_difference: 0.02,
+            relative_over: NonZeroUsize::MIN,
+            holdout: None,
+        }
     }
 }
 
@@ -43,6 +52,7 @@ mod tests {
         for (table, field, expected) in [
             ("evaluation = {", "max_time_difference = -1", not_negative),
             ("evaluation = {", "relative_over = 0", count),
+            ("evaluation = { holdout = {", "block = 0 }", count),
             ("variance_components = {", "tolerance = -1", not_negative),
             ("variance_components = {", "rounds = 0", count),
             ("gravity = { type = 'accelerometer',", "window = -1", not_negative),

@@ -3,13 +3,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
-/// `[variance_components]`: the noise of odometry and boxes, estimated from the data. What `[odometry]` and
-/// `[detections]` say of noise is where it begins.
+/// `[variance_components]`: the noise of odometry and boxes, estimated from the data, whatever `[odometry]` and `[detections]` say of
+/// it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VarianceSettings {
-    /// Most estimates of the noise, each followed by a solve. An odometry that is better than boxes can tell by far takes
-    /// many small steps to get there.
+    /// Most estimates of the noise, each followed by a solve.
     pub rounds: NonZeroUsize,
     /// The last round is the one after which no standard deviation changes by more than this share.
     #[serde(deserialize_with = "not_negative")]
@@ -21,14 +20,23 @@ pub struct VarianceSettings {
     /// way in image after image, and no ellipsoid has the outline of a chair. τ such boxes say as much as one alone,
     /// τ their integrated autocorrelation time, so their standard deviation is √τ times as large.
     pub correlation: bool,
-    /// Whether the noise of odometry is estimated; it stays as it is given, otherwise.
+    /// Whether the noise of odometry is estimated; it stays as it is given, otherwise, and with fewer than four objects.
     pub odometry: bool,
+    /// Whether odometry may err by turning about what the camera sees, and not only about the camera.
+    pub pivot: bool,
 }
 
 impl Default for VarianceSettings {
     fn default() -> Self {
-        let rounds = NonZeroUsize::MIN.saturating_add(29);
-        Self { rounds, tolerance: 0.02, boxes: BoxGroups::All, correlation: true, odometry: true }
+        let rounds = NonZeroUsize::MIN.saturating_add(9);
+        Self {
+            rounds,
+            tolerance: 0.02,
+            boxes: BoxGroups::All,
+            correlation: true,
+            odometry: true,
+            pivot: true,
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use manifactor_slam::mapping::Mapping;
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
+use manifactor_slam::variance::MotionChoice;
 use manifactor_solve::{Silent, Stall, Termination};
 use std::path::{Path, PathBuf};
 
@@ -199,6 +200,31 @@ fn at_no_setting_an_estimate_is_unsound() {
             }
         }
     }
+}
+
+/// The gain of ATE and the noise of odometry that is found, where the document says that its noise is `sigma`.
+fn corrected(data: &Path, odometry: &str, sigma: f64) -> (f64, MotionChoice) {
+    let sets = [
+        format!("source.odometry = 'trajectories/{odometry}.txt'"),
+        format!("odometry.noise = {{ sigma = {sigma} }}"),
+        "variance_components = {}".to_owned(),
+        "detections.loss = { type = 'cauchy', scale = 2.8 }".to_owned(),
+    ];
+    let document = document("fr1_desk.toml", &sets.each_ref().map(String::as_str));
+    let (estimate, report) = run(data, &document, "Q");
+    let error = &report.trajectory[0];
+    let gain = 1.0 - error.estimate.ate.rmse / error.odometry.ate.rmse;
+    (gain, estimate.components.last().unwrap().odometry.unwrap())
+}
+
+#[test]
+fn an_odometry_that_drifts_is_corrected_and_a_good_one_is_left() {
+    let Some(data) = data() else { return };
+    let (gain, choice) = corrected(&data, "dvo_vo", 1e-4);
+    assert!(gain > 0.2 && !choice.is_kept(), "{gain}: {choice:?}");
+    assert_eq!(corrected(&data, "dvo_vo", 0.1), (gain, choice));
+    let (gain, choice) = corrected(&data, "orbslam2_rgbd_a_duanyongli", 0.1);
+    assert!(gain > -0.02, "{gain}: {choice:?}");
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! The page of a run: the map in 3D, its variants side by side, and what was done with each object.
-use super::run_tables::{noise, objects, overview, own_variables, words};
+use super::run_tables::{held_out, noise, objects, overview, own_variables, words};
 use super::{page::Page, viewer};
 use crate::drawing::{Palette, Picture, Scene, Viewpoint, map};
 use crate::run::{RESIDUALS, cost, images, maps_and_charts, residual_row};
@@ -124,6 +124,7 @@ fn variant(page: &mut Page, report: &VariantReport, record: &VariantRecord, pale
         .paragraph("At the estimate, in standard deviations of their noise, row by row.");
     page.table(&words(RESIDUALS), &record.residuals.iter().map(residual_row).collect::<Vec<_>>());
     noise(page, report);
+    held_out(page, report);
     own_variables(page, record);
     objects(page, report);
     page.subheading("Files of this variant").files(&files(record));

@@ -3,7 +3,8 @@ use super::page::Page;
 use manifactor_graph::Key;
 use manifactor_slam::mapping::MappedObject;
 use manifactor_slam::record::VariantRecord;
-use manifactor_slam::report::{ObjectReport, Row, RunReport, VariantReport};
+use manifactor_slam::report::{Mean, ObjectReport, Prediction, Row, RunReport, VariantReport};
+use manifactor_slam::variance::{MotionComponent, Score};
 
 pub(super) fn words<const N: usize>(words: [&str; N]) -> Vec<String> {
     words.map(str::to_owned).into()
@@ -53,15 +54,43 @@ pub(super) fn noise(page: &mut Page, report: &VariantReport) {
     let alone =
         |name: &str, sigma: f64| vec![name.to_owned(), format!("{sigma:.3e}"), String::new(), String::new()];
     let mut rows = vec![];
-    if let Some([turn, shift]) = noise.odometry {
-        rows.push(alone("odometry, rotation (rad)", turn));
-        rows.push(alone("odometry, translation (m)", shift));
+    if let Some(choice) = noise.odometry {
+        let MotionComponent { rotation, translation, pivot } = choice.noise;
+        rows.push(alone("odometry, rotation (rad)", rotation));
+        rows.push(alone("odometry, translation (m)", translation));
+        rows.push(alone("odometry, pivot (m)", pivot));
+        let Score { cost, deviation } = choice.score;
+        let kept = if choice.is_kept() { ": kept as it came in" } else { "" };
+        rows.push(alone(&format!("cost of boxes of other objects{kept}"), cost));
+        rows.push(alone("its standard error", deviation));
     }
     rows.extend(noise.boxes.iter().map(|(name, c)| {
         let numbers = [c.sigma_px, c.correlation_time, c.effective_px].map(|x| format!("{x:.2}"));
         std::iter::once(format!("boxes: {name} (px)")).chain(numbers).collect()
     }));
     page.table(&words(["noise", "σ", "correlation time", "σ in the graph"]), &rows);
+}
+
+/// How well boxes are predicted that were held out, by class.
+pub(super) fn held_out(page: &mut Page, report: &VariantReport) {
+    let Some(held_out) = &report.held_out else { return };
+    let unmapped = held_out.unmapped;
+    page.subheading("Boxes held out").paragraph(&format!(
+        "Predicted by an estimate that did without them; {unmapped} more are of objects that are not in the map. Errors are standard \
+         errors over objects."
+    ));
+    let number = |mean: Mean, digits: usize| {
+        let error = mean.error.map(|error| format!(" ± {error:.digits$}")).unwrap_or_default();
+        format!("{:.digits$}{error}", mean.mean)
+    };
+    let row = |name: &str, p: &Prediction| {
+        let counts = [p.boxes, p.objects, p.out_of_view].map(|n| n.to_string());
+        let [boxes, objects, lost] = counts;
+        vec![name.to_owned(), boxes, objects, lost, number(p.iou, 3), number(p.pixels, 1)]
+    };
+    let mut rows = vec![row("all", &held_out.all)];
+    rows.extend(held_out.classes.iter().map(|(class, prediction)| row(class, prediction)));
+    page.table(&words(["class", "boxes", "objects", "out of view", "IoU", "error (px)"]), &rows);
 }
 
 /// The variables that the run's document has added.

@@ -1,8 +1,10 @@
 //! The noise of each group of measurements.
 use super::correlation::autocorrelation_time;
+use super::cross_validation::CrossValidation;
+use super::motion::{self, MotionChoice};
 use super::{BoxGroups, VarianceSettings};
 use crate::estimate::Estimate;
-use crate::mapping::{MappedObject, Mapping};
+use crate::mapping::{MappedObject, Mapping, pose_key};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_graph::batch::FactorState;
@@ -11,7 +13,7 @@ use manifactor_graph::loss::Loss;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{FactorEntry, Key, Noise};
 use manifactor_quadric::DualQuadric;
-use manifactor_solve::CovarianceError;
+use manifactor_solve::{CompileError, CovarianceError, Observer};
 use serde::Serialize;
 use std::any::TypeId;
 use std::collections::HashMap;
@@ -20,8 +22,8 @@ use std::sync::Arc;
 /// Standard deviations, as they are estimated.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Components {
-    /// Of odometry: rotation in rad, translation in m, in each direction; `None` where it is as given.
-    pub odometry: Option<[f64; 2]>,
+    /// Of odometry; `None` where it is as given.
+    pub odometry: Option<MotionChoice>,
     /// Of boxes, by group.
     pub boxes: IndexMap<String, BoxComponent>,
 }
@@ -50,10 +52,13 @@ pub enum VarianceError {
     /// A correlation time that is zero or not finite.
     #[error("the correlation time of the boxes: {0}")]
     CorrelationTime(#[from] NotPositive),
+    /// A graph without some of the objects is none.
+    #[error("the variance components cannot be estimated: {0}")]
+    Compile(#[from] CompileError),
 }
 
 /// What a factor measures.
-enum Measures {
+pub(super) enum Measures {
     Motion,
     Box { object: Key },
     Other,
@@ -65,37 +70,63 @@ const MEDIAN: f64 = 0.674_489_750_196_081_7;
 const LEAST_REDUNDANCY: f64 = 1e-9;
 /// Fewer rows than this have no noise of their own.
 const LEAST_ROWS: usize = 40;
+/// Of boxes, in pixels, where the search begins.
+const BEGIN_PX: f64 = 10.0;
+/// As long as the noise of boxes changes by less than this share, that of odometry stays as it was chosen.
+const SAME_BOXES: f64 = 0.2;
+
+impl BoxComponent {
+    fn of(sigma_px: f64, correlation_time: f64) -> Self {
+        Self { sigma_px, correlation_time, effective_px: sigma_px * correlation_time.sqrt() }
+    }
+}
 
 impl Components {
-    /// Out of the residuals of an estimate.
+    /// What the search begins with, whatever a document says.
+    pub(in crate::estimate) fn begin(mapping: &Mapping, settings: &VarianceSettings) -> Self {
+        let component = BoxComponent::of(BEGIN_PX, 1.0);
+        let boxes = mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given);
+        let boxes = boxes.map(|object| (group(object, settings.boxes), component)).collect();
+        let is_chosen = settings.odometry && CrossValidation::is_possible(mapping);
+        Self { odometry: is_chosen.then(MotionChoice::begin), boxes }
+    }
+
+    /// Out of an estimate: the noise of boxes from their residuals, that of odometry by what objects say of it that take no part.
     ///
     /// # Errors
     /// Where the estimate has no covariance.
-    pub fn of(estimate: &Estimate, settings: &VarianceSettings) -> Result<Self, VarianceError> {
+    pub fn of(
+        estimate: &Estimate,
+        settings: &VarianceSettings,
+        loss: Option<&Arc<dyn Loss>>,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, VarianceError> {
         let graph = &estimate.mapping.graph;
         let leverages = estimate.solution.leverages(graph)?;
-        let mut motion = [Motion::default(); 2];
         let mut boxes: IndexMap<Key, Rows> = IndexMap::new();
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
-            match measures(entry) {
-                Measures::Motion => {
-                    for (row, h) in leverage.iter().enumerate() {
-                        if let Some(part) = motion.get_mut(row / 3) {
-                            part.add(state, row, *h);
-                        }
-                    }
-                }
-                // factors are in the order of the graph: an object's boxes in the order of their frames
-                Measures::Box { object } => {
-                    boxes.entry(object).or_default().add(state, leverage, entry.noise.observed());
-                }
-                Measures::Other => {}
+            // factors are in the order of the graph: an object's boxes in the order of their frames
+            if let Measures::Box { object } = measures(entry) {
+                boxes.entry(object).or_default().add(state, leverage, entry.noise.observed());
             }
         }
-        let before = estimate.components.last().and_then(|components| components.odometry);
-        let odometry = if settings.odometry { odometry(&motion).or(before) } else { None };
-        Ok(Self { odometry, boxes: groups(&estimate.mapping, boxes, settings) })
+        let mut found = Self { odometry: None, boxes: groups(&estimate.mapping, boxes, settings) };
+        if !settings.odometry {
+            return Ok(found);
+        }
+        let before = estimate.components.last();
+        let chosen = before.and_then(|before| before.odometry);
+        found.odometry = chosen;
+        if before.is_none_or(|before| found.change(before) > SAME_BOXES) {
+            let mut mapping = estimate.mapping.clone();
+            found.apply(&mut mapping, settings, loss)?;
+            if let Some(validation) = CrossValidation::new(&mapping, &estimate.solution.values) {
+                let pivot = if settings.pivot { distance(estimate) } else { 0.0 };
+                found.odometry = motion::choose(&validation, pivot, chosen, observer)?;
+            }
+        }
+        Ok(found)
     }
 
     /// Gives the graph this noise, and boxes a loss whose scale is in units of their own σ: ρ(τs)/τ, so that an outlier
@@ -118,9 +149,7 @@ impl Components {
         }
         for entry in mapping.graph.factors_mut() {
             let noise = match (measures(entry), self.odometry) {
-                (Measures::Motion, Some([turn, shift])) => {
-                    Noise::sigmas(&[turn, turn, turn, shift, shift, shift])?
-                }
+                (Measures::Motion, Some(motion)) => motion.noise.noise()?,
                 (Measures::Box { object }, _) => match groups.get(&object) {
                     Some((component, loss)) => {
                         entry.loss.clone_from(loss);
@@ -138,17 +167,16 @@ impl Components {
         Ok(())
     }
 
-    /// The largest change of any standard deviation, as a share of it.
+    /// The largest change of any standard deviation of boxes, as a share of it.
     pub fn change(&self, before: &Self) -> f64 {
-        let motion = self.odometry.iter().flatten().zip(before.odometry.iter().flatten());
         let boxes = self.boxes.iter().filter_map(|(name, now)| {
             before.boxes.get(name).map(|before| (&now.effective_px, &before.effective_px))
         });
-        motion.chain(boxes).map(|(now, before)| (now / before).ln().abs()).fold(0.0, f64::max)
+        boxes.map(|(now, before)| (now / before).ln().abs()).fold(0.0, f64::max)
     }
 }
 
-fn measures(entry: &FactorEntry) -> Measures {
+pub(super) fn measures(entry: &FactorEntry) -> Measures {
     let (pose, object) = (TypeId::of::<Se3>(), TypeId::of::<DualQuadric>());
     let variables = entry.factor.erased().signature().variables;
     match (&entry.keys[..], &variables[..]) {
@@ -156,28 +184,6 @@ fn measures(entry: &FactorEntry) -> Measures {
         ([_, seen], [a, b]) if *a == pose && *b == object => Measures::Box { object: seen.clone() },
         _ => Measures::Other,
     }
-}
-
-/// Three rows of odometry, over all motions.
-#[derive(Clone, Copy, Default)]
-struct Motion {
-    squares: f64,
-    redundancy: f64,
-}
-
-impl Motion {
-    fn add(&mut self, state: &FactorState, row: usize, leverage: f64) {
-        let Some(residual) = state.residual.get(row) else { return };
-        self.squares += state.weight * residual * residual;
-        self.redundancy += (1.0 - leverage).max(0.0);
-    }
-}
-
-/// σ² = Σ r² / Σ (1 - h): unbiased where σ is right, and repeated until it is. `None` for an odometry of which the boxes
-/// control less than a single row: it is better than they can tell.
-fn odometry(parts: &[Motion; 2]) -> Option<[f64; 2]> {
-    let enough = parts.iter().all(|part| part.redundancy > 1.0 && part.squares > 0.0);
-    enough.then(|| parts.map(|part| (part.squares / part.redundancy).sqrt()))
 }
 
 /// Errors of the boxes of an object, in pixels: by side, then in the order of the boxes.
@@ -197,6 +203,19 @@ impl Rows {
             }
         }
     }
+}
+
+/// How far away what the camera sees is, in metres: the median over all boxes.
+fn distance(estimate: &Estimate) -> f64 {
+    let (values, measurements) = (&estimate.solution.values, &estimate.mapping.measurements);
+    let of_object = |landmark: crate::estimate::Landmark<'_>| {
+        let views = measurements.object(landmark.object.id).map_or(&[][..], |measured| &measured.views);
+        let poses = views.iter().filter_map(|view| values.get::<Se3>(pose_key(view.frame)).ok());
+        poses.map(|pose| (pose.translation - landmark.quadric.centroid()).norm()).collect::<Vec<_>>()
+    };
+    let mut distances: Vec<f64> = estimate.landmarks().into_iter().flat_map(of_object).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.get(distances.len() / 2).copied().unwrap_or_default()
 }
 
 /// The group of an object's boxes.
@@ -250,5 +269,5 @@ fn box_component(series: &[Vec<f64>], settings: &VarianceSettings) -> Option<Box
     } else {
         1.0
     };
-    Some(BoxComponent { sigma_px, correlation_time, effective_px: sigma_px * correlation_time.sqrt() })
+    Some(BoxComponent::of(sigma_px, correlation_time))
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
 use std::path::Path;
 
-/// The cameras of TUM RGB-D, 640 × 480; distortion is ignored, as in the paper.
+/// The cameras of TUM RGB-D, 640 × 480; without distortion, as in the paper.
 const PRESETS: [(&str, [f64; 4]); 3] = [
     ("freiburg1", [517.3, 516.5, 318.6, 255.3]),
     ("freiburg2", [520.9, 521.0, 325.1, 249.7]),

@@ -1,5 +1,6 @@
 use super::assemble::{read_ground_truth, read_matched, read_objects};
 use super::camera::CameraChoice;
+use super::distortion::{Distortion, straighten};
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::Sequence;
 use manifactor_graph::checked::not_negative;
@@ -24,6 +25,9 @@ pub struct Recorded {
     pub folder: PathBuf,
     /// The camera.
     pub camera: CameraChoice,
+    /// How its lens bends the image: k₁, k₂, p₁, p₂, k₃ as OpenCV has them. Boxes are freed of it. Default: it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<Distortion>,
     /// The odometry in the folder.
     #[serde(default = "odometry")]
     pub odometry: PathBuf,
@@ -60,21 +64,16 @@ fn exact() -> f64 {
 impl Source for Recorded {
     fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.folder)?;
+        let camera = self.camera.camera();
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
-        let (frames, detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
+        let (frames, mut detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
+        straighten(self.distortion, &camera, &mut detections)?;
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         if self.objects.is_some() || truth.is_some() {
             let objects = read_objects(&folder, self.objects.as_deref())?;
             truth.get_or_insert_default().objects = objects;
         }
-        Ok(Sequence {
-            camera: self.camera.camera(),
-            frames,
-            detections,
-            up: self.up,
-            accelerometer: vec![],
-            ground_truth: truth,
-        })
+        Ok(Sequence { camera, frames, detections, up: self.up, accelerometer: vec![], ground_truth: truth })
     }
 }
 register!(dyn Source, "recorded", Recorded);

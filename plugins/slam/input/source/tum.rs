@@ -1,5 +1,6 @@
 use super::assemble::{read_ground_truth, read_matched};
 use super::camera::{CameraChoice, by_folder};
+use super::distortion::{Distortion, straighten};
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
@@ -35,6 +36,9 @@ pub struct TumRgbd {
     /// The camera: by name, or by its numbers. Default: the one that the folder's name tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraChoice>,
+    /// How its lens bends the image: k₁, k₂, p₁, p₂, k₃ as OpenCV has them. Boxes are freed of it. Default: it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<Distortion>,
     /// How far apart in time a detection and its pose may be, in seconds. Time stamps are written to the
     /// microsecond: as it stands, only equal ones match.
     #[serde(default = "exact", deserialize_with = "not_negative")]
@@ -58,7 +62,8 @@ impl Source for TumRgbd {
             None => by_folder(&folder)?,
         };
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
-        let (frames, detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
+        let (frames, mut detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
+        straighten(self.distortion, &camera, &mut detections)?;
         let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         let file = folder.join("accelerometer.txt");
         let readings = if file.is_file() { accelerometer::read(&file)? } else { vec![] };

@@ -1,0 +1,185 @@
+//! The noise of odometry, and how it is found.
+use super::components::VarianceError;
+use super::cross_validation::{CrossValidation, Score};
+use manifactor_graph::Noise;
+use manifactor_graph::noise::NoiseError;
+use manifactor_solve::Observer;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The noise of a motion: it turns the camera about a point in front of it, and shifts that point.
+///
+/// An odometry that sees errs by turning about what it sees: a rotation that is too large comes with the translation that keeps
+/// the scene in view. Where the pivot is the camera itself, rotation and translation are independent.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MotionComponent {
+    /// σ of the rotation about each axis, in rad.
+    pub rotation: f64,
+    /// σ of the translation of the pivot along each axis, in m.
+    pub translation: f64,
+    /// How far in front of the camera the pivot is, in m.
+    pub pivot: f64,
+}
+
+/// The noise of odometry that leads to the trajectory which suits objects best that had no part in it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MotionChoice {
+    /// What the graph is given: next to no noise, where the odometry is kept.
+    pub noise: MotionComponent,
+    /// What objects say for the best that was found. Where that is no more than chance may have it, the odometry is kept.
+    pub score: Score,
+    #[serde(skip)]
+    place: Place,
+}
+
+/// So small a noise leaves the odometry as it came in: in rad, and in m.
+const KEPT: f64 = 1e-5;
+
+impl MotionComponent {
+    /// Of a motion's residual (ω, v) in the frame of the later camera: v = p × ω + ε, p the pivot.
+    pub(super) fn noise(&self) -> Result<Noise, NoiseError> {
+        let Self { rotation: turn, translation: shift, pivot } = *self;
+        if pivot == 0.0 {
+            return Noise::sigmas(&[turn, turn, turn, shift, shift, shift]);
+        }
+        let about = Vector3::new(0.0, 0.0, pivot).cross_matrix();
+        let (turned, shifted) = (Matrix3::identity() * turn.powi(2), Matrix3::identity() * shift.powi(2));
+        let blocks = [
+            [turned, turned * about.transpose()],
+            [about * turned, about * turned * about.transpose() + shifted],
+        ];
+        let mut covariance = DMatrix::zeros(6, 6);
+        for (i, row) in blocks.iter().enumerate() {
+            for (j, block) in row.iter().enumerate() {
+                covariance.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(block);
+            }
+        }
+        Noise::covariance(covariance)
+    }
+}
+
+impl MotionChoice {
+    /// Before anything is known.
+    pub(super) fn begin() -> Self {
+        Self { noise: component(BEGIN, 0.0), score: Score { cost: 0.0, deviation: 0.0 }, place: BEGIN }
+    }
+
+    /// Whether the odometry is kept as it came in.
+    pub fn is_kept(&self) -> bool {
+        !self.score.is_better()
+    }
+}
+
+/// A place in the grid of noises: half decades of both standard deviations, from 1e-3 on, and whether there is a pivot.
+type Place = (i32, i32, bool);
+
+/// Where the search begins: 1e-3 rad and 1e-3 m, whatever a document says.
+const BEGIN: Place = (0, 0, false);
+/// The grid ends at 1e-5 and at 1.
+const ENDS: [i32; 2] = [-4, 6];
+
+fn component((turn, shift, turns): Place, pivot: f64) -> MotionComponent {
+    let sigma = |half_decades: i32| 10f64.powf(-3.0 + 0.5 * f64::from(half_decades));
+    MotionComponent {
+        rotation: sigma(turn),
+        translation: sigma(shift),
+        pivot: if turns { pivot } else { 0.0 },
+    }
+}
+
+/// What has been tried of the grid.
+struct Search<'a> {
+    observer: &'a mut dyn Observer,
+    validation: &'a CrossValidation<'a>,
+    pivot: f64,
+    scores: BTreeMap<Place, Score>,
+}
+
+impl Search<'_> {
+    fn try_all(&mut self, places: impl Iterator<Item = Place>) -> Result<(), VarianceError> {
+        if self.observer.poll().is_break() {
+            return Ok(());
+        }
+        let is_inside = |at: i32| (ENDS[0]..=ENDS[1]).contains(&at);
+        let new: Vec<Place> = places
+            .filter(|place| is_inside(place.0) && is_inside(place.1) && !self.scores.contains_key(place))
+            .collect();
+        let components: Vec<_> = new.iter().map(|place| component(*place, self.pivot)).collect();
+        self.scores.extend(new.into_iter().zip(self.validation.scores(&components)?));
+        Ok(())
+    }
+
+    fn best(&self) -> Option<(Place, Score)> {
+        // of equals the first
+        let best = self.scores.iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        best.map(|(place, score)| (*place, *score))
+    }
+
+    /// Goes from the best place so far to the best of those around it, as long as there is a better one.
+    fn descend(&mut self, step: i32) -> Result<(), VarianceError> {
+        while let Some(((turn, shift, turns), _)) = self.best() {
+            let steps = [-step, 0, step];
+            let around = steps.into_iter().flat_map(|i| steps.map(|j| (turn + i, shift + j, turns)));
+            let other = (turn, shift, !turns && self.pivot > 0.0);
+            self.try_all(around.chain([other]).collect::<Vec<_>>().into_iter())?;
+            if self.best().is_some_and(|(best, _)| best == (turn, shift, turns)) {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Searches the grid, by decades and then by halves of them; by halves alone from what was chosen `before`, when boxes had another
+/// noise. `pivot` is how far away what the camera sees is, in metres.
+///
+/// # Errors
+/// Where a graph without some objects is none.
+pub(super) fn choose(
+    validation: &CrossValidation<'_>,
+    pivot: f64,
+    before: Option<MotionChoice>,
+    observer: &mut dyn Observer,
+) -> Result<Option<MotionChoice>, VarianceError> {
+    let mut search = Search { observer, validation, pivot, scores: BTreeMap::new() };
+    let begin = before.map_or(BEGIN, |before| before.place);
+    search.try_all([begin].into_iter())?;
+    if before.is_none() {
+        search.descend(2)?;
+    }
+    search.descend(1)?;
+    let chosen = search.best().map(|(place, score)| {
+        let kept = MotionComponent { rotation: KEPT, translation: KEPT, pivot: 0.0 };
+        let noise = if score.is_better() { component(place, pivot) } else { kept };
+        MotionChoice { noise, score, place }
+    });
+    Ok(chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DVector;
+
+    #[test]
+    fn turning_about_the_pivot_moves_what_is_there_by_nothing() {
+        let noise = MotionComponent { rotation: 0.1, translation: 0.01, pivot: 2.0 }.noise().unwrap();
+        let pivot = Vector3::new(0.0, 0.0, 2.0);
+        let squared = |turn: Vector3<f64>, shift: Vector3<f64>| {
+            let r = DVector::from_iterator(6, turn.iter().chain(shift.iter()).copied());
+            (r.transpose() * noise.information_matrix(6).unwrap() * &r)[(0, 0)]
+        };
+        // a point p stays where it is under Exp(ω, v) for v = p × ω
+        let turn = Vector3::new(0.1, -0.2, 0.3);
+        assert!((squared(turn, pivot.cross(&turn)) - turn.norm_squared() / 0.01).abs() < 1e-9);
+        let shift = Vector3::new(0.01, 0.0, 0.02);
+        assert!((squared(turn, pivot.cross(&turn) + shift) - (14.0 + 5.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_a_pivot_rotation_and_translation_are_independent() {
+        let noise = MotionComponent { rotation: 0.1, translation: 0.01, pivot: 0.0 }.noise().unwrap();
+        assert_eq!(noise, Noise::sigmas(&[0.1, 0.1, 0.1, 0.01, 0.01, 0.01]).unwrap());
+    }
+}

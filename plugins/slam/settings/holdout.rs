@@ -1,0 +1,79 @@
+use crate::input::sequence::{Detection, Sequence};
+use manifactor_graph::checked::within;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::num::NonZeroUsize;
+
+/// Boxes that the estimate does without, and which are then predicted by it: how good a map is, where no truth is known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Holdout {
+    /// This share of all boxes, drawn at random: those of a frame that other boxes tell much of.
+    Share(
+        #[serde(deserialize_with = "within::<0, 1, _>")]
+        #[schemars(range(min = 0, max = 1))]
+        f64,
+    ),
+    /// Those of the last frames, this share of all: what the camera sees where it has not been.
+    Last(
+        #[serde(deserialize_with = "within::<0, 1, _>")]
+        #[schemars(range(min = 0, max = 1))]
+        f64,
+    ),
+    /// Those of so many frames in a row, of each five times as many: longer than a detector's errors last.
+    Block(NonZeroUsize),
+}
+
+/// Of so many blocks the last is held out.
+const BLOCKS: usize = 5;
+/// Of the draw.
+const SEED: u64 = 1;
+
+impl Holdout {
+    /// Takes the boxes out of a sequence.
+    pub(crate) fn take_from(self, sequence: &mut Sequence) -> Vec<Detection> {
+        let mut rng = Pcg64::seed_from_u64(SEED);
+        let frames = sequence.frames.len();
+        let mut is_held_out = |detection: &Detection| match self {
+            Self::Share(share) => rng.random_bool(share),
+            Self::Last(share) => detection.frame as f64 >= (1.0 - share) * frames as f64,
+            Self::Block(length) => detection.frame / length.get() % BLOCKS == BLOCKS - 1,
+        };
+        let all = std::mem::take(&mut sequence.detections);
+        let (held_out, used) = all.into_iter().partition(|detection| is_held_out(detection));
+        sequence.detections = used;
+        held_out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::simulator::Simulated;
+
+    #[test]
+    fn boxes_are_held_out_as_it_says_and_none_is_lost() {
+        let whole = Simulated::default().simulate().unwrap();
+        let (boxes, frames) = (whole.detections.len(), whole.frames.len());
+        let split = |holdout: Holdout| {
+            let mut rest = whole.clone();
+            let held_out = holdout.take_from(&mut rest);
+            assert_eq!(held_out.len() + rest.detections.len(), boxes);
+            (held_out, rest.detections)
+        };
+        let (held_out, _) = split(Holdout::Share(0.25));
+        assert!((held_out.len() as f64 / boxes as f64 - 0.25).abs() < 0.05);
+        assert_eq!(split(Holdout::Share(0.0)).0.len() + split(Holdout::Share(1.0)).1.len(), 0);
+        let (held_out, rest) = split(Holdout::Last(0.2));
+        assert!(
+            held_out.iter().all(|d| 5 * d.frame >= 4 * frames)
+                && rest.iter().all(|d| 5 * d.frame < 4 * frames)
+        );
+        let length = NonZeroUsize::new(3).unwrap();
+        let (held_out, rest) = split(Holdout::Block(length));
+        assert!(!held_out.is_empty() && held_out.iter().all(|d| d.frame % 15 >= 12));
+        assert!(rest.iter().all(|d| d.frame % 15 < 12));
+    }
+}
