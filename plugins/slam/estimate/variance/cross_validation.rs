@@ -18,6 +18,8 @@ use serde::Serialize;
 const FOLDS: usize = 5;
 /// Fewer objects than this say nothing of one another.
 const LEAST_OBJECTS: usize = 4;
+/// The best of some twenty is better for more than so many standard errors, and not by chance.
+const CLEAR: f64 = 2.0;
 /// A solve ends after so many iterations, or with one that lowers the cost by less than this share: scores differ by nats.
 const ITERATIONS: usize = 10;
 const SETTLED: f64 = 1e-4;
@@ -36,7 +38,7 @@ pub struct Score {
 impl Score {
     /// Whether the trajectory is better than the odometry, by more than chance may have it.
     pub fn is_better(&self) -> bool {
-        self.cost < -self.deviation
+        self.cost < -CLEAR * self.deviation
     }
 }
 
