@@ -25,7 +25,6 @@
 //! All combinations of all axes are run. Each [`Trial`] is solved on one thread, so that it is the same whatever else
 //! runs; it is written to a [`Journal`] once it is done, and not run again. The tables are made of the journal.
 mod axis;
-mod bootstrap;
 mod check;
 mod document;
 mod journal;
@@ -38,7 +37,7 @@ mod summary_settings;
 mod table;
 mod trial;
 
-pub use bootstrap::{Interval, bootstrap};
+pub use crate::metrics::{Interval, bootstrap};
 pub(crate) use document::ExperimentDocument;
 pub use document::{Documents, Experiment};
 pub use journal::{Journal, JournalError};

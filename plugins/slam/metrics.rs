@@ -4,6 +4,7 @@
 //! [`relative_error`] (RPE). Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM Systems, 2012.
 mod align;
 mod associate;
+mod bootstrap;
 mod error;
 mod identity;
 mod statistics;
@@ -12,6 +13,7 @@ mod tests;
 
 pub use align::{Alignment, Similarity, align};
 pub use associate::{PosePair, associate};
+pub use bootstrap::{Interval, bootstrap, change_of_error};
 pub(crate) use error::relative_errors;
 pub use error::{Pairing, RelativeError, absolute_error, relative_error};
 pub use identity::{ENOUGH, IdentityScores, identity};

@@ -14,10 +14,12 @@ type OfTrajectory = (&'static str, fn(&TrajectoryReport) -> Option<f64>);
 type OfEstimate = (&'static str, fn(&Estimate, &VariantReport) -> Option<f64>);
 
 /// What is measured under each alignment: `ate` is `ate_se3`, `ate_sim3`, ….
-const BY_ALIGNMENT: [OfTrajectory; 7] = [
+const BY_ALIGNMENT: [OfTrajectory; 9] = [
     ("ate", |t| Some(t.estimate.ate.rmse)),
     ("odometry_ate", |t| Some(t.odometry.ate.rmse)),
     ("gain", |t| Some(1.0 - t.estimate.ate.rmse / t.odometry.ate.rmse)),
+    ("gain_low", |t| Some(-t.change?.high?)),
+    ("gain_high", |t| Some(-t.change?.low?)),
     ("rpe_translation", |t| Some(t.estimate.rpe.as_ref()?.translation.rmse)),
     ("rpe_rotation", |t| Some(t.estimate.rpe.as_ref()?.rotation.rmse)),
     ("odometry_rpe_translation", |t| Some(t.odometry.rpe.as_ref()?.translation.rmse)),
@@ -64,7 +66,7 @@ const ONCE: [OfEstimate; 30] = [
 /// Everything that is measured of an estimate, by name. What is not known, or not finite, is left out.
 ///
 /// Lengths are in metres, angles in radians. `ate_*` and `rpe_*` are RMSEs by alignment, `odometry_*` the same of the
-/// odometry alone, `gain_*` by how much of it the ATE fell; `position` is an RMSE, `position_mean` a mean; `shape` and
+/// odometry alone, `gain_*` by how much of it the ATE fell, `gain_low_*` and `gain_high_*` where that lies with 95 % confidence over blocks of ten seconds; `position` is an RMSE, `position_mean` a mean; `shape` and
 /// `quality` are mean Jaccard distances; `initial_*` are of the objects before the solve. `c_vertical` is the mean of
 /// |m · up| over objects that the paper's Table I has as vertical, m their longest axis; `c_horizontal` likewise.
 pub fn measures(estimate: &Estimate, report: &VariantReport) -> IndexMap<String, f64> {

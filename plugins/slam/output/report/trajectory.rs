@@ -1,8 +1,8 @@
 use crate::input::sequence::GroundTruth;
 use crate::mapping::Warning;
 use crate::metrics::{
-    Alignment, MetricsError, Pairing, RelativeError, Statistics, absolute_error, align, associate,
-    relative_error,
+    Alignment, Interval, MetricsError, Pairing, PosePair, RelativeError, Statistics, absolute_error, align,
+    associate, change_of_error, relative_error,
 };
 use crate::settings::EvaluationSettings;
 use manifactor_formats::tum::StampedPose;
@@ -17,6 +17,9 @@ pub struct TrajectoryReport {
     pub odometry: TrajectoryError,
     /// As it is estimated.
     pub estimate: TrajectoryError,
+    /// By how much its ATE is larger than that of odometry, as a share of it; with its interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub change: Option<Interval>,
 }
 
 /// How far a trajectory is from the truth.
@@ -36,18 +39,18 @@ pub(super) fn compare(
     warnings: &mut Vec<Warning>,
 ) -> Vec<TrajectoryReport> {
     let Some(truth) = truth else { return vec![] };
-    let error = |trajectory: &[StampedPose], alignment| -> Result<TrajectoryError, MetricsError> {
+    let aligned = |trajectory: &[StampedPose], alignment| -> Result<Vec<PosePair>, MetricsError> {
         let pairs = associate(&truth.trajectory, trajectory, settings.max_time_difference)?;
-        let (_, aligned) = align(&pairs, alignment)?;
-        let rpe = relative_error(&aligned, settings.relative_over.get(), Pairing::All).ok();
-        Ok(TrajectoryError { ate: absolute_error(&aligned)?, rpe })
+        Ok(align(&pairs, alignment)?.1)
+    };
+    let error = |aligned: &[PosePair]| -> Result<TrajectoryError, MetricsError> {
+        let rpe = relative_error(aligned, settings.relative_over.get(), Pairing::All).ok();
+        Ok(TrajectoryError { ate: absolute_error(aligned)?, rpe })
     };
     let report = |alignment: Alignment| -> Result<TrajectoryReport, MetricsError> {
-        Ok(TrajectoryReport {
-            alignment,
-            odometry: error(before, alignment)?,
-            estimate: error(after, alignment)?,
-        })
+        let (before, after) = (aligned(before, alignment)?, aligned(after, alignment)?);
+        let change = change_of_error(&before, &after);
+        Ok(TrajectoryReport { alignment, odometry: error(&before)?, estimate: error(&after)?, change })
     };
     let mut reports = vec![];
     for alignment in &settings.alignments {

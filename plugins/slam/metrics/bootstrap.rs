@@ -1,7 +1,9 @@
 //! Confidence intervals by the bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, chapter 13).
+use super::PosePair;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// A mean, and where it lies with 95 % confidence: `None`, left out of documents, where there is nothing to draw from,
 /// which is a single cluster or a single sample.
@@ -28,29 +30,54 @@ impl Interval {
 /// replacement. `None` for no values. The same for the same seed.
 pub fn bootstrap(clusters: &[Vec<f64>], resamples: usize, seed: u64) -> Option<Interval> {
     // sums are all that a mean needs of a cluster
-    let sums: Vec<(f64, usize)> =
-        clusters.iter().filter(|c| !c.is_empty()).map(|c| (c.iter().sum(), c.len())).collect();
-    let mean_of = |(sum, count): (f64, usize)| sum / count as f64;
-    let add = |a: (f64, usize), b: &(f64, usize)| (a.0 + b.0, a.1 + b.1);
-    let mean = mean_of(sums.iter().fold((0.0, 0), add));
-    if sums.is_empty() {
-        return None;
-    }
+    let sums = clusters.iter().filter(|c| !c.is_empty()).map(|c| [c.iter().sum(), c.len() as f64]);
+    let sums: Vec<[f64; 2]> = sums.collect();
+    (!sums.is_empty()).then(|| drawn(&sums, |[sum, count]| sum / count, resamples, seed))
+}
+
+/// What `of` makes of the sum over all clusters, and its percentile interval.
+fn drawn(sums: &[[f64; 2]], of: fn([f64; 2]) -> f64, resamples: usize, seed: u64) -> Interval {
+    let add = |a: [f64; 2], b: &[f64; 2]| [a[0] + b[0], a[1] + b[1]];
+    let mean = of(sums.iter().fold([0.0; 2], add));
     if sums.len() < 2 || resamples < 2 {
-        return Some(Interval { mean, low: None, high: None });
+        return Interval { mean, low: None, high: None };
     }
     let mut rng = Pcg64::seed_from_u64(seed);
-    let mut drawn =
-        || mean_of((0..sums.len()).fold((0.0, 0), |a, _| add(a, &sums[rng.random_range(0..sums.len())])));
-    let mut means: Vec<f64> = (0..resamples).map(|_| drawn()).collect();
-    means.sort_by(f64::total_cmp);
-    let quantile = |q: f64| means.get(((means.len() - 1) as f64 * q).round() as usize).copied();
-    Some(Interval { mean, low: quantile(0.025), high: quantile(0.975) })
+    let mut draw =
+        || of((0..sums.len()).fold([0.0; 2], |a, _| add(a, &sums[rng.random_range(0..sums.len())])));
+    let mut all: Vec<f64> = (0..resamples).map(|_| draw()).collect();
+    all.sort_by(f64::total_cmp);
+    let quantile = |q: f64| all.get(((all.len() - 1) as f64 * q).round() as usize).copied();
+    Interval { mean, low: quantile(0.025), high: quantile(0.975) }
+}
+
+/// Errors of a trajectory last: seconds that are drawn together.
+const BLOCK: f64 = 10.0;
+/// How often they are drawn, and the seed of the draw.
+const RESAMPLES: usize = 2000;
+const SEED: u64 = 1;
+
+/// By how much the absolute trajectory error (RMSE of positions) of `after` is larger than that of `before`, as a share of it; with
+/// an interval over blocks of ten seconds, in the alignment of the whole. `None` without a pair or an error to compare with.
+pub fn change_of_error(before: &[PosePair], after: &[PosePair]) -> Option<Interval> {
+    let began = before.first()?.timestamp;
+    let mut blocks: BTreeMap<u64, [f64; 2]> = BTreeMap::new();
+    for (pairs, side) in [(after, 0), (before, 1)] {
+        for pair in pairs {
+            let block = ((pair.timestamp - began).max(0.0) / BLOCK) as u64;
+            let off = (pair.truth.translation - pair.estimate.translation).norm_squared();
+            blocks.entry(block).or_default()[side] += off;
+        }
+    }
+    let sums: Vec<[f64; 2]> = blocks.into_values().collect();
+    let change = drawn(&sums, |[after, before]| (after / before).sqrt() - 1.0, RESAMPLES, SEED);
+    Some(change).filter(|change| change.mean.is_finite())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use manifactor_geometry::{Se3, So3};
 
     fn alone(values: impl IntoIterator<Item = f64>) -> Vec<Vec<f64>> {
         values.into_iter().map(|x| vec![x]).collect()
@@ -92,5 +119,26 @@ mod tests {
             assert!(!interval.excludes_zero());
             assert_eq!(serde_json::to_string(&interval).unwrap(), r#"{"mean":2.0}"#);
         }
+    }
+
+    /// Poses a second apart, so far off.
+    fn off(by: impl Fn(usize) -> f64) -> Vec<PosePair> {
+        let pair = |i: usize| PosePair {
+            timestamp: i as f64,
+            truth: Se3::identity(),
+            estimate: Se3::new(So3::identity(), nalgebra::Vector3::new(by(i), 0.0, 0.0)),
+        };
+        (0..100).map(pair).collect()
+    }
+
+    #[test]
+    fn a_change_that_is_everywhere_is_certain_and_one_in_a_single_block_is_not() {
+        let before = off(|_| 0.1);
+        let certain = change_of_error(&before, &off(|_| 0.08)).unwrap();
+        assert!((certain.mean + 0.2).abs() < 1e-12 && certain.excludes_zero(), "{certain:?}");
+        let uncertain = change_of_error(&before, &off(|i| if i < 10 { 0.0 } else { 0.1 })).unwrap();
+        assert!(uncertain.mean < 0.0 && !uncertain.excludes_zero(), "{uncertain:?}");
+        assert_eq!(change_of_error(&off(|_| 0.0), &before), None);
+        assert_eq!(change_of_error(&[], &[]), None);
     }
 }
