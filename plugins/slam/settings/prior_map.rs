@@ -1,7 +1,7 @@
 use crate::gravity::MapFrame;
 use crate::input::prior_map::PriorMap;
 use crate::input::sequence::Frame;
-use manifactor_config::{Errors, Fault, Node};
+use manifactor_config::{Errors, Fault, Node, Placed};
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::{not_negative, positive};
 use manifactor_graph::loss::{Cauchy, Loss};
@@ -36,6 +36,10 @@ pub struct PriorMapSettings {
     #[serde(skip)]
     #[schemars(skip)]
     pub map: Arc<PriorMap>,
+    /// Where the file was found, and where the document names it.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub(crate) read_from: Option<Placed<PathBuf>>,
 }
 
 fn sigma_scale() -> f64 {
@@ -61,11 +65,15 @@ pub(crate) struct Anchor<'a> {
 impl PriorMapSettings {
     /// Reads the file, from `folder`.
     pub(super) fn read(&mut self, folder: &Path, settings: &Node, errors: &Errors) -> Option<()> {
-        match PriorMap::read(&folder.join(&self.file)) {
-            Ok(map) => self.map = Arc::new(map.trusted(self.sigma_scale, self.shape_error)),
+        let place = settings.field("prior_map").and_then(|prior| prior.field("file"));
+        let place = place.unwrap_or(settings).place.clone();
+        let file = folder.join(&self.file);
+        match PriorMap::read(&file) {
+            Ok(map) => {
+                self.map = Arc::new(map.trusted(self.sigma_scale, self.shape_error));
+                self.read_from = Some(Placed { place, value: file });
+            }
             Err(diagnostics) => {
-                let place = settings.field("prior_map").and_then(|prior| prior.field("file"));
-                let place = place.unwrap_or(settings).place.clone();
                 errors.report(place, Fault::invalid("names no map that can be read"));
                 errors.extend(diagnostics);
                 return None;

@@ -37,6 +37,28 @@ fn a_second_run_begins_with_the_map_of_the_first() {
 }
 
 #[test]
+fn a_run_does_not_write_over_the_map_that_it_reads() {
+    let output = |folder: &tempfile::TempDir| format!("output = {:?}\n{DESK}", path(folder, "out"));
+    let folder = folder(&[("desk.toml", "")]);
+    let (desk, own) = (path(&folder, "desk.toml"), path(&folder, "out/estimate/map.json"));
+    std::fs::write(&desk, output(&folder)).unwrap();
+    manifactor(&format!("run {desk}")).ended(0);
+    let before = std::fs::read(&own).unwrap();
+    // the same command with the map that it has left: another table than the one that is seen, so that the place is not found
+    for command in ["run", "online"] {
+        let again = format!("{command} {desk} --set source.scene.seed=99 --set prior_map.file={own}");
+        let refused = manifactor(&again).ended(2);
+        refused.complains("names a map that this run itself writes");
+        refused.complains("--out");
+        refused.complains("prior_map.file=");
+        assert_eq!(std::fs::read(&own).unwrap(), before);
+    }
+    let elsewhere = path(&folder, "elsewhere");
+    manifactor(&format!("run {desk} --set prior_map.file={own} --out {elsewhere}")).ended(0);
+    assert_eq!(std::fs::read(&own).unwrap(), before);
+}
+
+#[test]
 fn a_map_that_cannot_be_read_is_told_before_anything_is_done() {
     let folder = folder(&[("desk.toml", DESK), ("map.json", "{\"version\": 7, \"objects\": []}")]);
     let (desk, out) = (path(&folder, "desk.toml"), path(&folder, "out"));
