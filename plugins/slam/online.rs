@@ -121,7 +121,8 @@ impl Mapper {
             let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]);
             window.keep.extend(kept.filter_map(|name| ManifoldType::try_from(name.to_owned()).ok()));
         }
-        let known = settings.anchor().map_or(&[][..], |anchor| &anchor.map.objects);
+        let trusted = settings.prior_map.as_ref().filter(|prior| prior.start.is_some());
+        let known = trusted.map(|prior| prior.trusted_map().objects).unwrap_or_default();
         let measurements = Measurements::new(settings.anchor());
         let objects =
             measurements.objects.iter().filter_map(|measured| Some((measured.id, Tracked::known(measured)?)));
@@ -129,7 +130,7 @@ impl Mapper {
             settings: Arc::new(settings.clone()),
             camera: opening.camera,
             session: Session::new(online)?,
-            associator: settings.association.begin(opening.camera, &settings.aliases, known),
+            associator: settings.association.begin(opening.camera, &settings.aliases, &known),
             names: Names::default(),
             pending: vec![],
             up: Up::new(opening),

@@ -94,13 +94,6 @@ impl PriorMap {
         errors.finish(map)
     }
 
-    /// The same, if its objects may be `sigma_scale` times as far off as their covariances say, and `shape_error` besides: rad, and as a
-    /// part of their size.
-    pub(crate) fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
-        let trusted = |object: &Arc<PriorObject>| Arc::new(object.trusted(sigma_scale, shape_error));
-        Self { objects: self.objects.iter().map(trusted).collect(), ..*self }
-    }
-
     /// The object of this number.
     pub fn object(&self, id: ObjectId) -> Option<&Arc<PriorObject>> {
         let place = self.objects.binary_search_by_key(&id, |object| object.id).ok()?;
@@ -125,7 +118,7 @@ impl PriorObject {
     }
 
     /// The same, if it may be `sigma_scale` times as far off as it says, and `shape_error` besides: rad, and as a part of its size.
-    fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
+    pub(crate) fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
         let mut covariance = self.covariance.map(|row| row.map(|entry| entry * sigma_scale * sigma_scale));
         let size = self.quadric.semi_axes.mean();
         let errors = [1.0, size, 1.0].map(|of| shape_error * of);

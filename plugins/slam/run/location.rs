@@ -6,12 +6,12 @@ use crate::online::{FrameReport, Located, Mapper};
 use crate::output::report::Found;
 use crate::settings::Settings;
 use manifactor_solve::Observer;
-use std::sync::Arc;
 
 /// A search for the place of a stream in a map, as long as it is not known.
 #[derive(Debug)]
 pub(super) struct Search {
-    map: Option<Arc<PriorMap>>,
+    /// With its objects as they are trusted.
+    map: Option<PriorMap>,
     /// Frames since it was last looked for.
     frames: usize,
 }
@@ -21,7 +21,7 @@ const FRAMES: usize = 15;
 
 impl Search {
     pub(super) fn new(settings: &Settings) -> Self {
-        Self { map: settings.unknown_start().map(|prior| prior.map.clone()), frames: 0 }
+        Self { map: settings.unknown_start().map(|prior| prior.trusted_map()), frames: 0 }
     }
 
     /// Looks for the place after a frame; it is found once at most.

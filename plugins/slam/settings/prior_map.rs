@@ -1,5 +1,5 @@
 use crate::gravity::MapFrame;
-use crate::input::prior_map::PriorMap;
+use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::Frame;
 use manifactor_config::{Errors, Fault, Node, Placed};
 use manifactor_geometry::Se3;
@@ -32,7 +32,7 @@ pub struct PriorMapSettings {
     /// How much of a large error of them counts. Default: Cauchy's, as things are moved.
     #[serde(default = "loss")]
     pub loss: Arc<dyn Loss>,
-    /// What the file says.
+    /// What the file says, before it is asked how far that is trusted.
     #[serde(skip)]
     #[schemars(skip)]
     pub map: Arc<PriorMap>,
@@ -59,7 +59,6 @@ fn loss() -> Arc<dyn Loss> {
 pub(crate) struct Anchor<'a> {
     pub map: &'a PriorMap,
     pub start: Se3,
-    pub loss: &'a Arc<dyn Loss>,
 }
 
 impl PriorMapSettings {
@@ -70,7 +69,7 @@ impl PriorMapSettings {
         let file = folder.join(&self.file);
         match PriorMap::read(&file) {
             Ok(map) => {
-                self.map = Arc::new(map.trusted(self.sigma_scale, self.shape_error));
+                self.map = Arc::new(map);
                 self.read_from = Some(Placed { place, value: file });
             }
             Err(diagnostics) => {
@@ -84,7 +83,19 @@ impl PriorMapSettings {
 
     /// The map, where it is known where the run begins in it.
     pub(super) fn anchor(&self) -> Option<Anchor<'_>> {
-        Some(Anchor { map: &self.map, start: self.start?, loss: &self.loss })
+        Some(Anchor { map: &self.map, start: self.start? })
+    }
+
+    /// An object of the map, known as well as it is trusted. What is written again is the object as it was read: who reads that has a trust
+    /// of its own.
+    pub(crate) fn trusted(&self, object: &PriorObject) -> PriorObject {
+        object.trusted(self.sigma_scale, self.shape_error)
+    }
+
+    /// The map with its objects as they are trusted.
+    pub(crate) fn trusted_map(&self) -> PriorMap {
+        let objects = self.map.objects.iter().map(|object| Arc::new(self.trusted(object)));
+        PriorMap::new(self.map.up, objects.collect())
     }
 }
 

@@ -2,9 +2,11 @@
 use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
+use manifactor_quadric::QuadricPrior;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
-use manifactor_slam::output::write_whole;
+use manifactor_slam::output::{write_variant, write_whole};
 use manifactor_slam::prior_map::PriorMap;
+use manifactor_slam::record::VariantRecord;
 use manifactor_slam::report::{PriorMapReport, VariantReport};
 use manifactor_slam::run::{Mapped, Watch, estimate, online};
 use manifactor_slam::run_document::RunDocument;
@@ -154,16 +156,11 @@ fn a_batch_finds_the_same_place_as_a_stream() {
 fn a_place_that_is_known_is_not_looked_for() {
     let folder = tempfile::tempdir().unwrap();
     mapped(folder.path(), |_| {});
-    // simulated walks begin at the pose that their odometry begins at
-    let settings = in_map(folder.path(), &["association.type=given"]);
-    let all = sequence(&settings);
+    let all = sequence(&in_map(folder.path(), &["association.type=given"]));
     let first = all.frames[0].world_from_camera;
-    let Se3 { rotation, translation } = first;
-    let rotation = format!("prior_map.start.rotation={:?}", rotation.quaternion_xyzw());
-    let translation = format!("prior_map.start.translation={:?}", translation.as_slice());
     for association in ["likelihood", "projection", "iou"] {
         let by = format!("association.type={association}");
-        let settings = in_map(folder.path(), &[&by, &rotation, &translation]);
+        let settings = begun(folder.path(), &first, &[&by]);
         let mut watch = Found::default();
         let (_, report) = online("again", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
         let prior = told(&report);
@@ -223,4 +220,58 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
     let id = prior.seen[0];
     let looks = |map: &PriorMap| map.object(id).unwrap().looks.expected;
     assert!(looks(&after) > looks(&map));
+    let spread = |map: &PriorMap, id: &ObjectId| map.object(*id).unwrap().covariance().determinant().ln();
+    let better = prior.seen.iter().filter(|id| spread(&after, id) < spread(&map, id)).count();
+    assert!(better + 1 >= prior.seen.len(), "{better} of {}", prior.seen.len());
 }
+
+/// Settings of a run that knows where it begins in the map: simulated walks begin at the pose that their odometry begins at.
+fn begun(folder: &Path, first: &Se3, more: &[&str]) -> Settings {
+    let rotation = format!("prior_map.start.rotation={:?}", first.rotation.quaternion_xyzw());
+    let translation = format!("prior_map.start.translation={:?}", first.translation.as_slice());
+    in_map(folder, &[more, &[&rotation, &translation]].concat())
+}
+
+#[test]
+fn what_is_not_seen_again_does_not_fade() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = mapped(folder.path(), |_| {});
+    for _ in 0..2 {
+        let all = sequence(&in_map(folder.path(), &[]));
+        // too few frames to say that anything is gone
+        let mut few = Sequence::clone(&all);
+        few.frames.truncate(3);
+        few.detections.clear();
+        let settings = begun(folder.path(), &all.frames[0].world_from_camera, &[]);
+        let (estimate, report) = estimate("again", Arc::new(few), &settings, &mut Silent).unwrap();
+        assert!(told(&report).seen.is_empty() && told(&report).gone.is_empty(), "{:?}", told(&report));
+        let after = PriorMap::of(&estimate, &settings).unwrap();
+        let known = |map: &PriorMap| -> Vec<_> {
+            map.objects.iter().map(|o| (o.id, o.classes.clone(), o.quadric, o.covariance)).collect()
+        };
+        assert_eq!(known(&after), known(&map));
+        write_whole(&folder.path().join("map.json"), serde_json::to_string(&after).unwrap()).unwrap();
+        map = after;
+    }
+}
+
+#[test]
+fn an_older_map_does_not_stay_beside_results_without_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut document = Document::parse("table.toml", TABLE, Format::Toml).unwrap();
+    document.set(&["source.trajectory.frames=60"]).unwrap();
+    let mut run = RunDocument::read(&document).unwrap();
+    run.output = folder.path().to_owned();
+    let variant = &run.variants[0];
+    let (mut estimate, report) =
+        estimate(&variant.name, sequence(&variant.settings), &variant.settings, &mut Silent).unwrap();
+    let record = VariantRecord::new(variant, &estimate);
+    let written = write_variant(&run, variant, &estimate, &report, &record).unwrap();
+    assert!(written.join("map.json").is_file());
+    // of a graph with a variable that is not there nothing has a covariance
+    let value = *estimate.landmarks()[0].quadric;
+    estimate.mapping.graph.add(["nowhere"], QuadricPrior { value });
+    write_variant(&run, variant, &estimate, &report, &record).unwrap();
+    assert!(!written.join("map.json").exists() && written.join("objects.json").is_file());
+}
+
