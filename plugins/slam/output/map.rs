@@ -7,7 +7,7 @@ use crate::mapping::object_key;
 use crate::settings::Settings;
 use manifactor_graph::{FactorEntry, Graph, Noise};
 use manifactor_quadric::QuadricPrior;
-use manifactor_solve::{CompileError, CovarianceError, Problem};
+use manifactor_solve::{CompileError, CovarianceError, Problem, WeightError};
 use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,6 +19,9 @@ pub enum MapError {
     /// The graph does not go with the estimate.
     #[error(transparent)]
     Compile(#[from] CompileError),
+    /// The solver's weights do not go with the graph.
+    #[error(transparent)]
+    Weights(#[from] WeightError),
     /// It is not known how well objects are known.
     #[error(transparent)]
     Covariance(#[from] CovarianceError),
@@ -115,6 +118,12 @@ fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, Ma
         });
     }
     let mut problem = Problem::compile(&graph, values)?;
+    let weights = &estimate.solution.weights;
+    if !weights.is_empty() {
+        // what the solver has rejected says nothing; weak priors come last, and count
+        let added = graph.factors().len().saturating_sub(weights.len());
+        problem.set_weights(&[weights.as_slice(), &vec![1.0; added]].concat())?;
+    }
     problem.linearize();
     let all = problem.marginals()?;
     let of_objects = all.into_iter().filter(|(key, _)| keys.contains(&key.as_str()));

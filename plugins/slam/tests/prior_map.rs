@@ -2,7 +2,7 @@
 use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
-use manifactor_quadric::QuadricPrior;
+use manifactor_quadric::{BoundingBox, QuadricPrior};
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::output::{write_variant, write_whole};
 use manifactor_slam::prior_map::PriorMap;
@@ -275,3 +275,32 @@ fn an_older_map_does_not_stay_beside_results_without_one() {
     assert!(!written.join("map.json").exists() && written.join("objects.json").is_file());
 }
 
+#[test]
+fn what_the_solver_has_rejected_says_nothing_in_the_map() {
+    let table = TABLE.replace(", loss = { type = \"cauchy\", scale = 1.0 }", "");
+    let mut document = Document::parse("table.toml", &table, Format::Toml).unwrap();
+    document.set(&["association.type=given", "solver.type=gnc", "source.trajectory.frames=60"]).unwrap();
+    let settings = RunDocument::read(&document).unwrap().variants.remove(0).settings;
+    let mut sequence = Sequence::clone(&sequence(&settings));
+    for detection in sequence.detections.iter_mut().step_by(9) {
+        let b = detection.bounding_box;
+        detection.bounding_box = BoundingBox { xmin: b.xmin - 60.0, xmax: b.xmax - 60.0, ..b };
+    }
+    let (estimate, _) = estimate("gnc", Arc::new(sequence), &settings, &mut Silent).unwrap();
+    let rejected: Vec<usize> =
+        (0..estimate.solution.weights.len()).filter(|i| estimate.solution.weights[*i] == 0.0).collect();
+    assert!(rejected.len() > 5, "{rejected:?}");
+    // the same estimate of a graph that never had what was rejected
+    let mut without = estimate.clone();
+    let mut place = 0;
+    without.mapping.graph.factors_mut().retain(|_| {
+        place += 1;
+        !rejected.contains(&(place - 1))
+    });
+    without.solution.weights.retain(|weight| *weight != 0.0);
+    let [map, without] = [&estimate, &without].map(|of| PriorMap::of(of, &settings).unwrap());
+    for (a, b) in map.objects.iter().zip(&without.objects) {
+        let (a, b) = (a.covariance(), b.covariance());
+        assert!((a - b).norm() < 1e-6 * b.norm(), "{}", (a - b).norm() / b.norm());
+    }
+}
