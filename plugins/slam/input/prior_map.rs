@@ -41,6 +41,9 @@ pub struct PriorObject {
     pub covariance: [[f64; 9]; 9],
     /// How often it was there to be seen.
     pub looks: Looks,
+    /// The smallest size at which it was seen, in pixels: the root of a box's area. Default: not known, as in maps of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "least_px")]
+    pub least_px: Option<f64>,
 }
 
 /// How often an object was looked at from nearby times and places, and how often it was seen then. A detector that misses an object in one frame misses
@@ -61,6 +64,15 @@ fn version<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
     let found = u32::deserialize(from)?;
     let told = || format!("a map of version {found}, and this program reads version {VERSION}");
     if found == VERSION { Ok(found) } else { Err(serde::de::Error::custom(told())) }
+}
+
+fn least_px<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    let told =
+        |size: f64| serde::de::Error::custom(format!("a size of more than 0 pixels is expected, got {size}"));
+    match Option::<f64>::deserialize(from)? {
+        Some(size) if !(size.is_finite() && size > 0.0) => Err(told(size)),
+        size => Ok(size),
+    }
 }
 
 impl PriorMap {
@@ -168,7 +180,7 @@ mod tests {
     #[test]
     fn a_file_that_is_no_map_is_told_at_its_place() {
         assert_eq!(told(|_| {}), "1 objects");
-        let cases: [(&str, Change); 6] = [
+        let cases: [(&str, Change); 7] = [
             ("a map of version 2, and this program reads version 1", |map| map["version"] = 2.into()),
             ("object 3 is there twice", |map| {
                 let again = map["objects"][0].clone();
@@ -177,6 +189,7 @@ mod tests {
             ("positive definite", |map| map["objects"][0]["covariance"][4][4] = (-1.0).into()),
             ("a score of 0 or more", |map| map["objects"][0]["classes"]["scores"]["cup"] = (-2.0).into()),
             ("three semi-axes", |map| map["objects"][0]["quadric"]["semi_axes"][1] = 0.0.into()),
+            ("of more than 0 pixels", |map| map["objects"][0]["least_px"] = 0.0.into()),
             ("expected an array", |map| map["objects"] = "none".into()),
         ];
         for (expected, change) in cases {

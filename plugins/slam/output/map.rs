@@ -59,6 +59,7 @@ impl PriorMap {
                 quadric: *quadric,
                 covariance: covariances.remove(object.key.as_str())?,
                 looks: before.plus(looks),
+                least_px: measured.least_px(),
             }))
         };
         let objects = estimate.landmarks().into_iter().filter_map(object).collect();

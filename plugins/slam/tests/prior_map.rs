@@ -5,7 +5,7 @@ use manifactor_graph::Direction;
 use manifactor_quadric::{BoundingBox, QuadricPrior};
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::output::{write_variant, write_whole};
-use manifactor_slam::prior_map::PriorMap;
+use manifactor_slam::prior_map::{PriorMap, PriorObject};
 use manifactor_slam::record::VariantRecord;
 use manifactor_slam::report::{PriorMapReport, VariantReport};
 use manifactor_slam::run::{Mapped, Watch, estimate, online};
@@ -302,5 +302,27 @@ fn what_the_solver_has_rejected_says_nothing_in_the_map() {
     for (a, b) in map.objects.iter().zip(&without.objects) {
         let (a, b) = (a.covariance(), b.covariance());
         assert!((a - b).norm() < 1e-6 * b.norm(), "{}", (a - b).norm() / b.norm());
+    }
+}
+
+#[test]
+fn what_is_too_far_away_to_be_seen_is_not_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = mapped(folder.path(), |_| {});
+    assert!(map.objects.iter().all(|object| object.least_px.is_some_and(|size| size > 5.0)));
+    // a map of things that were seen from close by only
+    let near = map.objects.iter().map(|object| {
+        let object = PriorObject { least_px: Some(1000.0), ..PriorObject::clone(object) };
+        Arc::new(object)
+    });
+    let near = PriorMap::new(map.up, near.collect());
+    let first = sequence(&in_map(folder.path(), &[])).frames[0].world_from_camera;
+    for (map, is_gone) in [(&map, true), (&near, false)] {
+        write_whole(&folder.path().join("map.json"), serde_json::to_string(map).unwrap()).unwrap();
+        let settings = begun(folder.path(), &first, &[]);
+        let mut blind = Sequence::clone(&sequence(&settings));
+        blind.detections.clear();
+        let (_, report) = estimate("blind", Arc::new(blind), &settings, &mut Silent).unwrap();
+        assert_eq!(told(&report).gone.is_empty(), !is_gone, "{:?}", told(&report));
     }
 }

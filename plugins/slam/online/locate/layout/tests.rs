@@ -15,7 +15,8 @@ fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
         classes,
         quadric,
         covariance,
-        looks: Looks::default()
+        looks: Looks::default(),
+        least_px: None,
     })
 }
 
