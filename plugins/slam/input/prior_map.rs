@@ -2,6 +2,7 @@
 //!
 //! Each object of it is a variable from the first frame on, with a factor that holds it where the map has it, as well as the map
 //! knows it. Boxes that show it are its own, and rules are not asked about it again.
+use crate::input::class::Aliases;
 use crate::input::fusion::Fusion;
 use crate::input::sequence::ObjectId;
 use manifactor_config::{Diagnostics, Document, Errors, Fault};
@@ -96,6 +97,12 @@ impl PriorMap {
                     let place = node.field("covariance").unwrap_or(node).place.clone();
                     errors.report(place, Fault::invalid(error.to_string()));
                 }
+                if object.id.0 == u32::MAX {
+                    let place = node.field("id").unwrap_or(node).place.clone();
+                    let told =
+                        format!("an object's number is below {}, so that new ones have room", u32::MAX);
+                    errors.report(place, Fault::invalid(told));
+                }
                 if map.objects[..i].iter().any(|other| other.id == object.id) {
                     let place = node.field("id").unwrap_or(node).place.clone();
                     errors.report(place, Fault::invalid(format!("object {} is there twice", object.id)));
@@ -104,6 +111,15 @@ impl PriorMap {
             Self::new(map.up, map.objects)
         });
         errors.finish(map)
+    }
+
+    /// The same with classes by the names of `aliases`.
+    pub(crate) fn with_classes(mut self, aliases: &Aliases) -> Self {
+        for object in &mut self.objects {
+            let object = Arc::make_mut(object);
+            object.classes = object.classes.canonical(aliases);
+        }
+        self
     }
 
     /// The object of this number.
@@ -180,7 +196,7 @@ mod tests {
     #[test]
     fn a_file_that_is_no_map_is_told_at_its_place() {
         assert_eq!(told(|_| {}), "1 objects");
-        let cases: [(&str, Change); 7] = [
+        let cases: [(&str, Change); 8] = [
             ("a map of version 2, and this program reads version 1", |map| map["version"] = 2.into()),
             ("object 3 is there twice", |map| {
                 let again = map["objects"][0].clone();
@@ -189,6 +205,7 @@ mod tests {
             ("positive definite", |map| map["objects"][0]["covariance"][4][4] = (-1.0).into()),
             ("a score of 0 or more", |map| map["objects"][0]["classes"]["scores"]["cup"] = (-2.0).into()),
             ("three semi-axes", |map| map["objects"][0]["quadric"]["semi_axes"][1] = 0.0.into()),
+            ("below 4294967295", |map| map["objects"][0]["id"] = u32::MAX.into()),
             ("of more than 0 pixels", |map| map["objects"][0]["least_px"] = 0.0.into()),
             ("expected an array", |map| map["objects"] = "none".into()),
         ];

@@ -1,4 +1,5 @@
 use crate::gravity::MapFrame;
+use crate::input::class::Aliases;
 use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::Frame;
 use manifactor_config::{Errors, Fault, Node, Placed};
@@ -62,14 +63,20 @@ pub(crate) struct Anchor<'a> {
 }
 
 impl PriorMapSettings {
-    /// Reads the file, from `folder`.
-    pub(super) fn read(&mut self, folder: &Path, settings: &Node, errors: &Errors) -> Option<()> {
+    /// Reads the file, from `folder`; classes in it are called as `aliases` call them.
+    pub(super) fn read(
+        &mut self,
+        folder: &Path,
+        aliases: &Aliases,
+        settings: &Node,
+        errors: &Errors,
+    ) -> Option<()> {
         let place = settings.field("prior_map").and_then(|prior| prior.field("file"));
         let place = place.unwrap_or(settings).place.clone();
         let file = folder.join(&self.file);
         match PriorMap::read(&file) {
             Ok(map) => {
-                self.map = Arc::new(map);
+                self.map = Arc::new(map.with_classes(aliases));
                 self.read_from = Some(Placed { place, value: file });
             }
             Err(diagnostics) => {

@@ -276,6 +276,25 @@ fn an_older_map_does_not_stay_beside_results_without_one() {
 }
 
 #[test]
+fn classes_of_a_map_are_called_as_the_run_calls_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = mapped(folder.path(), |_| {});
+    let plain = in_map(folder.path(), &[]);
+    let other = in_map(folder.path(), &["aliases={ bottle = \"flask\" }"]);
+    let count = |settings: &Settings, class: &str| {
+        let map = &settings.prior_map.as_ref().unwrap().map;
+        map.objects
+            .iter()
+            .filter(|object| object.classes.best().is_some_and(|best| best.name == class))
+            .count()
+    };
+    assert_eq!(plain.prior_map.as_ref().unwrap().map.objects.len(), map.objects.len());
+    let bottles = count(&plain, "bottle");
+    assert!(bottles >= 2);
+    assert_eq!((count(&other, "bottle"), count(&other, "flask")), (0, bottles));
+}
+
+#[test]
 fn what_the_solver_has_rejected_says_nothing_in_the_map() {
     let table = TABLE.replace(", loss = { type = \"cauchy\", scale = 1.0 }", "");
     let mut document = Document::parse("table.toml", &table, Format::Toml).unwrap();
