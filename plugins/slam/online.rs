@@ -20,7 +20,6 @@ use crate::mapping::measurements::{Measured, Measurements};
 use crate::mapping::{Mapping, MappingError, object_key, pose_key, rejection};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
-use association::Known;
 use gravity::Up;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -168,12 +167,10 @@ impl Mapper {
         observation: &Observation,
         names: &[Option<ObjectId>],
     ) -> Vec<Option<ObjectId>> {
-        let newest = (self.live.len(), Se3::identity());
-        let known = Known { newest, live: &self.live, session: &self.session };
-        let Some(pose) = known.pose(frame) else { return names.to_vec() };
+        let none = (self.live.len(), Se3::identity());
+        let Some(pose) = self.known(none).pose(frame) else { return names.to_vec() };
         let (timestamp, detections) = (observation.frame.timestamp, observation.detections.as_slice());
-        let known = Known { newest: (frame, pose), ..known };
-        self.associator.reconsider(&Image { frame, timestamp, detections }, names, &known)
+        self.associator.reconsider(&Image { frame, timestamp, detections }, names, &self.known((frame, pose)))
     }
 
     /// Names of objects that turned out to be others.

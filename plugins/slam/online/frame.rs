@@ -123,8 +123,7 @@ impl Mapper {
         values.insert(pose_key(report.frame), report.pose);
         let detections = &observation.detections;
         let image = Image { frame: report.frame, timestamp, detections };
-        let predicted =
-            Known { newest: (report.frame, report.pose), live: &self.live, session: &self.session };
+        let predicted = self.known((report.frame, report.pose));
         report.names = self.associator.associate(&image, &predicted);
         let named = report.names.iter().zip(detections);
         let named = named.map(|(object, d)| Detection { frame: report.frame, object: *object, ..d.clone() });
@@ -148,7 +147,8 @@ impl Mapper {
                 self.measurements.add(detection, &self.camera, detections, aliases);
             }
             let newest = (report.frame, self.pose(report.frame).unwrap_or(report.pose));
-            let known = Known { newest, live: &self.live, session: &self.session };
+            let (live, session, measurements) = (&self.live, &self.session, &self.measurements);
+            let known = Known { newest, live, session, measurements };
             seen.learned = self.associator.learn(&image, &report.names, &known);
         } else {
             seen.boxes.clear();

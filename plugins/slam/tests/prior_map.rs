@@ -74,10 +74,11 @@ fn in_map(folder: &Path, more: &[&str]) -> Settings {
     settings(&[&AGAIN[..], more, &[&file]].concat())
 }
 
-/// Notes the poses, and when the place was found.
+/// Notes the poses, the names in the first frame, and when the place was found.
 #[derive(Default)]
 struct Found {
     poses: Vec<Se3>,
+    first: Vec<ObjectId>,
     at: Option<usize>,
 }
 
@@ -90,6 +91,9 @@ impl Watch for Found {
         _: f64,
     ) -> ControlFlow<()> {
         let report = report.unwrap();
+        if self.poses.is_empty() {
+            self.first = report.names.iter().copied().flatten().collect();
+        }
         self.poses.push(report.pose);
         self.at = self.at.or(report.located.as_ref().map(|_| report.frame));
         ControlFlow::Continue(())
@@ -155,7 +159,7 @@ fn a_batch_finds_the_same_place_as_a_stream() {
 #[test]
 fn a_place_that_is_known_is_not_looked_for() {
     let folder = tempfile::tempdir().unwrap();
-    mapped(folder.path(), |_| {});
+    let map = mapped(folder.path(), |_| {});
     let all = sequence(&in_map(folder.path(), &["association.type=given"]));
     let first = all.frames[0].world_from_camera;
     for association in ["likelihood", "projection", "iou"] {
@@ -167,8 +171,10 @@ fn a_place_that_is_known_is_not_looked_for() {
         assert!(watch.at.is_none() && prior.found.is_none() && prior.is_located);
         let error = first.between(&watch.poses[0]);
         assert!(error.log().norm() < 1e-3, "{error:?}");
+        let known = watch.first.iter().filter(|id| map.object(**id).is_some()).count();
+        assert!(2 * known > watch.first.len(), "{association}: {:?} in the first frame", watch.first);
         // overlap needs what was seen just before, or what is mapped well
-        assert!(prior.seen.len() >= 8, "{association} {prior:?}");
+        assert!(prior.seen.len() >= 8 && prior.added.len() <= 2, "{association} {prior:?}");
     }
 }
 
