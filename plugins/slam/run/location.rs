@@ -52,14 +52,14 @@ pub(super) fn find(
         return Ok(None);
     }
     let mut mapper = Mapper::new(sequence.opening(), settings)?;
-    for (frame, observation) in sequence.observations().enumerate() {
+    for observation in sequence.observations() {
         if observer.poll().is_break() {
             break;
         }
         // what cannot be taken is told when all is mapped
-        let report = mapper.take(&observation).ok();
-        if let Some(located) = report.and_then(|report| search.look(&report, &mapper)) {
-            return Ok(Some(Found { frame, located }));
+        let Ok(report) = mapper.take(&observation) else { continue };
+        if let Some(located) = search.look(&report, &mapper) {
+            return Ok(Some(Found { frame: report.frame, located }));
         }
     }
     Ok(None)

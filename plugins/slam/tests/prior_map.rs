@@ -152,6 +152,12 @@ fn a_batch_finds_the_same_place_as_a_stream() {
     let (_, report) =
         online("stream", all.clone().into(), &settings, &mut Found::default(), &mut Silent).unwrap();
     assert_eq!(mapped.found, told(&report).found);
+    // what the map was until then is not counted: all that was born since is there in the end, or was merged or withdrawn
+    let known = begun(folder.path(), &told(&report).found.as_ref().unwrap().located.start, &[]);
+    let (_, alone) = online("known", all.clone().into(), &known, &mut Found::default(), &mut Silent).unwrap();
+    let [found, alone] = [report.online.unwrap(), alone.online.unwrap()];
+    assert_eq!(found.seconds.len(), all.frames.len());
+    assert!(found.born.abs_diff(alone.born) <= 2, "{} and {}", found.born, alone.born);
     let (_, report) = estimate("batch", all, &settings, &mut Silent).unwrap();
     assert!(told(&report).seen.len() >= 10 && told(&report).gone.is_empty());
 }
@@ -279,6 +285,42 @@ fn an_older_map_does_not_stay_beside_results_without_one() {
     estimate.mapping.graph.add(["nowhere"], QuadricPrior { value });
     write_variant(&run, variant, &estimate, &report, &record).unwrap();
     assert!(!written.join("map.json").exists() && written.join("objects.json").is_file());
+}
+
+/// Frames that cannot be taken at both sides of the place where it is found.
+#[test]
+fn a_frame_that_is_left_out_counts_once_and_in_no_number() {
+    let folder = tempfile::tempdir().unwrap();
+    mapped(folder.path(), |_| {});
+    let settings = in_map(folder.path(), &[]);
+    let mut all = Sequence::clone(&part(&sequence(&settings), 40..240));
+    all.frames[2].world_from_camera.translation.x = f64::NAN;
+    let all = Arc::new(all);
+    let mut watch = Left(0, None);
+    let (_, report) = online("stream", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
+    let online = report.online.as_ref().unwrap();
+    assert_eq!((online.refusals, online.refused.len(), watch.0), (1, 1, 1));
+    let mapped = Mapped::new(all, &settings, &mut Silent);
+    // a batch takes no frame that is not finite: it is the place that is compared, by the number of frames that were taken
+    let found = mapped.map(|mapped| mapped.found.unwrap().frame);
+    assert_eq!(found.ok().or(watch.1), watch.1);
+}
+
+/// Counts frames that are left out, and notes when the place was found.
+struct Left(usize, Option<usize>);
+
+impl Watch for Left {
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        _: Option<&Observation>,
+        _: &mut Mapper,
+        _: f64,
+    ) -> ControlFlow<()> {
+        self.0 += usize::from(report.is_err());
+        self.1 = self.1.or(report.ok().filter(|report| report.located.is_some()).map(|report| report.frame));
+        ControlFlow::Continue(())
+    }
 }
 
 #[test]
