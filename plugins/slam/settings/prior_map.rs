@@ -18,8 +18,8 @@ use std::sync::Arc;
 pub struct PriorMapSettings {
     /// Its file: `map.json` in the folder of a variant.
     pub file: PathBuf,
-    /// The pose of the first camera in the map's frame; how well that is known is for `[prior]` to say. Default: it is not known, and
-    /// found by the objects that are seen.
+    /// The pose of the first camera in the map's frame. `[prior]` says how well it is known: by default to 0.001 rad and 1 mm, so that a start
+    /// that was measured by hand wants a `prior.noise` of its own. Default: it is not known, and found by the objects that are seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<Se3>,
     /// How many times as far off its objects may be as their covariances say: a detector's errors last for many frames.
