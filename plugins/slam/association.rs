@@ -24,7 +24,7 @@ pub use overlap::{Iou, Projection};
 /// A way to associate boxes with objects.
 #[typetag::serialize(tag = "type")]
 pub trait Association: Debug + Send + Sync {
-    /// Begins, with the objects of an earlier map, where there is one.
+    /// Begins, with the objects of an earlier map, where there is one, known as well as they are trusted.
     fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator>;
 
     /// Whether it takes the names that the source gives. Where it does not, they may serve to score it.

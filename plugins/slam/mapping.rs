@@ -252,15 +252,17 @@ pub(crate) fn prior_entry(value: Se3, settings: &Settings) -> FactorEntry {
     }
 }
 
-/// The factor that holds an object of an earlier map.
+/// The factor that holds an object of an earlier map, as far as that is trusted.
 pub(crate) fn known_entry(object: &PriorObject, settings: &Settings) -> FactorEntry {
+    let prior_map = settings.prior_map.as_ref();
+    let noise = prior_map.and_then(|prior| prior.trusted(object).noise().ok());
     FactorEntry {
         keys: vec![object_key(object.id)],
         name: None,
         factor: Arc::new(QuadricPrior { value: object.quadric }),
         // what was read has one
-        noise: object.noise().unwrap_or_default(),
-        loss: settings.anchor().map(|anchor| anchor.loss.clone()),
+        noise: noise.unwrap_or_default(),
+        loss: prior_map.map(|prior| prior.loss.clone()),
     }
 }
 

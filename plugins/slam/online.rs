@@ -20,7 +20,6 @@ use crate::mapping::measurements::{Measured, Measurements};
 use crate::mapping::{Mapping, MappingError, object_key, pose_key, rejection};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
-use association::Known;
 use gravity::Up;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -121,7 +120,8 @@ impl Mapper {
             let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]);
             window.keep.extend(kept.filter_map(|name| ManifoldType::try_from(name.to_owned()).ok()));
         }
-        let known = settings.anchor().map_or(&[][..], |anchor| &anchor.map.objects);
+        let trusted = settings.prior_map.as_ref().filter(|prior| prior.start.is_some());
+        let known = trusted.map(|prior| prior.trusted_map().objects).unwrap_or_default();
         let measurements = Measurements::new(settings.anchor());
         let objects =
             measurements.objects.iter().filter_map(|measured| Some((measured.id, Tracked::known(measured)?)));
@@ -129,7 +129,7 @@ impl Mapper {
             settings: Arc::new(settings.clone()),
             camera: opening.camera,
             session: Session::new(online)?,
-            associator: settings.association.begin(opening.camera, &settings.aliases, known),
+            associator: settings.association.begin(opening.camera, &settings.aliases, &known),
             names: Names::default(),
             pending: vec![],
             up: Up::new(opening),
@@ -167,12 +167,10 @@ impl Mapper {
         observation: &Observation,
         names: &[Option<ObjectId>],
     ) -> Vec<Option<ObjectId>> {
-        let newest = (self.live.len(), Se3::identity());
-        let known = Known { newest, live: &self.live, session: &self.session };
-        let Some(pose) = known.pose(frame) else { return names.to_vec() };
+        let none = (self.live.len(), Se3::identity());
+        let Some(pose) = self.known(none).pose(frame) else { return names.to_vec() };
         let (timestamp, detections) = (observation.frame.timestamp, observation.detections.as_slice());
-        let known = Known { newest: (frame, pose), ..known };
-        self.associator.reconsider(&Image { frame, timestamp, detections }, names, &known)
+        self.associator.reconsider(&Image { frame, timestamp, detections }, names, &self.known((frame, pose)))
     }
 
     /// Names of objects that turned out to be others.

@@ -23,11 +23,16 @@ use std::path::{Path, PathBuf};
 
 mod folder;
 mod map;
+mod own_map;
 pub mod record;
 pub mod report;
 
 pub use folder::{FolderError, OutputFolder};
 pub use map::MapError;
+pub use own_map::refuse_own_maps;
+
+/// The name of the file with a variant's map.
+const MAP: &str = "map.json";
 
 /// Why results could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -82,6 +87,16 @@ pub fn write_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputE
     whole::write_whole(path, content.as_ref()).map_err(fail)
 }
 
+/// Removes a file, if it is there.
+fn remove(path: &Path) -> Result<(), OutputError> {
+    match std::fs::remove_file(path) {
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
+            Err(OutputError::Io { path: path.to_owned(), source })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes the report and the record of a run.
 ///
 /// # Errors
@@ -117,8 +132,12 @@ pub fn write_variant(
     let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);
     write_document(&file("graph.json"), graph)?;
     match PriorMap::of(estimate, &variant.settings) {
-        Ok(map) => write_document(&file("map.json"), results(&map))?,
-        Err(error) => tracing::warn!("there is no map.json: {error}"),
+        Ok(map) => write_document(&file(MAP), results(&map))?,
+        Err(error) => {
+            tracing::warn!("there is no {MAP}: {error}");
+            // that of an earlier run would be taken for the map of these results
+            remove(&file(MAP))?;
+        }
     }
     write_whole(&file("iterations.csv"), iterations(&estimate.solution.outcome.history))?;
     write_document(&file("metrics.json"), results(report))?;

@@ -119,7 +119,7 @@ impl Settings {
             let semantics = read_semantics(section.take("semantics"), folder, &own.values, &errors);
             let mut settings = Self { semantics, own, ..section.rest()? };
             if let Some(prior) = &mut settings.prior_map {
-                prior.read(folder, node, &errors)?;
+                prior.read(folder, &settings.aliases, node, &errors)?;
             }
             Some(settings)
         });

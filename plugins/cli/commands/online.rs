@@ -35,7 +35,7 @@ pub(crate) struct Online {
     /// the same map.
     #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
-    /// Tell of every N-th frame on stderr; with --json, in a line of JSON each.
+    /// Tell of every N-th frame on stderr, and of the one that shows the place in a prior map; with --json, in a line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
     /// Serve a page of the map as it grows, and tell its address on stderr. Default: for browsers of this machine, at a free port;
@@ -157,7 +157,14 @@ impl Watch for Frames<'_> {
         match report {
             Ok(report) => {
                 report.refused.iter().for_each(|refused| output::note(refused));
-                if self.frames.is_multiple_of(self.command.every) {
+                if let Some(located) = &report.located {
+                    let (frames, objects) =
+                        (count(report.frame + 1, "frame"), count(located.matches.len(), "object"));
+                    output::note(&format!(
+                        "after {frames} the place in the prior map is found, by {objects}: names and poses are those of that map from now on"
+                    ));
+                }
+                if self.frames.is_multiple_of(self.command.every) || report.located.is_some() {
                     self.tell(report, mapper, took);
                 }
             }

@@ -8,7 +8,7 @@ use crate::output::{self, table};
 use crate::status::Status;
 use clap::Args;
 use manifactor::slam::estimate::Estimate;
-use manifactor::slam::output::{OutputFolder, write_report, write_variant, write_whole};
+use manifactor::slam::output::{OutputFolder, refuse_own_maps, write_report, write_variant, write_whole};
 use manifactor::slam::record::{RunRecord, VariantRecord};
 use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::slam::run::{Run as Running, RunError};
@@ -73,6 +73,7 @@ impl RunOptions {
         if let Some(out) = &self.out {
             document.output.clone_from(out);
         }
+        refuse_own_maps(&document)?;
         // held to the end
         let _claimed = OutputFolder::claim(&document.output, command, &self.run.config, self.force)?;
         let (mut records, mut configs) = (vec![], vec![]);

@@ -71,6 +71,15 @@ impl Fusion {
         }
     }
 
+    /// The same by the names of `aliases`: what was written under others is counted together.
+    pub(crate) fn canonical(&self, aliases: &Aliases) -> Self {
+        let mut sums = IndexMap::new();
+        for (class, sum) in &self.sums {
+            *sums.entry(aliases.canonical(class)).or_default() += sum;
+        }
+        Self { sums, detections: self.detections }
+    }
+
     /// The classes that were named, each with its part of all scores; for none, nothing.
     pub(crate) fn shares(&self) -> impl Iterator<Item = (&str, f64)> {
         let all: f64 = self.sums.values().sum();

@@ -2,6 +2,7 @@
 //!
 //! Each object of it is a variable from the first frame on, with a factor that holds it where the map has it, as well as the map
 //! knows it. Boxes that show it are its own, and rules are not asked about it again.
+use crate::input::class::Aliases;
 use crate::input::fusion::Fusion;
 use crate::input::sequence::ObjectId;
 use manifactor_config::{Diagnostics, Document, Errors, Fault};
@@ -41,6 +42,9 @@ pub struct PriorObject {
     pub covariance: [[f64; 9]; 9],
     /// How often it was there to be seen.
     pub looks: Looks,
+    /// The smallest size at which it was seen, in pixels: the root of a box's area. Default: not known, as in maps of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "least_px")]
+    pub least_px: Option<f64>,
 }
 
 /// How often an object was looked at from nearby times and places, and how often it was seen then. A detector that misses an object in one frame misses
@@ -61,6 +65,15 @@ fn version<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
     let found = u32::deserialize(from)?;
     let told = || format!("a map of version {found}, and this program reads version {VERSION}");
     if found == VERSION { Ok(found) } else { Err(serde::de::Error::custom(told())) }
+}
+
+fn least_px<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    let told =
+        |size: f64| serde::de::Error::custom(format!("a size of more than 0 pixels is expected, got {size}"));
+    match Option::<f64>::deserialize(from)? {
+        Some(size) if !(size.is_finite() && size > 0.0) => Err(told(size)),
+        size => Ok(size),
+    }
 }
 
 impl PriorMap {
@@ -84,6 +97,12 @@ impl PriorMap {
                     let place = node.field("covariance").unwrap_or(node).place.clone();
                     errors.report(place, Fault::invalid(error.to_string()));
                 }
+                if object.id.0 == u32::MAX {
+                    let place = node.field("id").unwrap_or(node).place.clone();
+                    let told =
+                        format!("an object's number is below {}, so that new ones have room", u32::MAX);
+                    errors.report(place, Fault::invalid(told));
+                }
                 if map.objects[..i].iter().any(|other| other.id == object.id) {
                     let place = node.field("id").unwrap_or(node).place.clone();
                     errors.report(place, Fault::invalid(format!("object {} is there twice", object.id)));
@@ -94,11 +113,13 @@ impl PriorMap {
         errors.finish(map)
     }
 
-    /// The same, if its objects may be `sigma_scale` times as far off as their covariances say, and `shape_error` besides: rad, and as a
-    /// part of their size.
-    pub(crate) fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
-        let trusted = |object: &Arc<PriorObject>| Arc::new(object.trusted(sigma_scale, shape_error));
-        Self { objects: self.objects.iter().map(trusted).collect(), ..*self }
+    /// The same with classes by the names of `aliases`.
+    pub(crate) fn with_classes(mut self, aliases: &Aliases) -> Self {
+        for object in &mut self.objects {
+            let object = Arc::make_mut(object);
+            object.classes = object.classes.canonical(aliases);
+        }
+        self
     }
 
     /// The object of this number.
@@ -125,7 +146,7 @@ impl PriorObject {
     }
 
     /// The same, if it may be `sigma_scale` times as far off as it says, and `shape_error` besides: rad, and as a part of its size.
-    fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
+    pub(crate) fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
         let mut covariance = self.covariance.map(|row| row.map(|entry| entry * sigma_scale * sigma_scale));
         let size = self.quadric.semi_axes.mean();
         let errors = [1.0, size, 1.0].map(|of| shape_error * of);
@@ -175,7 +196,7 @@ mod tests {
     #[test]
     fn a_file_that_is_no_map_is_told_at_its_place() {
         assert_eq!(told(|_| {}), "1 objects");
-        let cases: [(&str, Change); 6] = [
+        let cases: [(&str, Change); 8] = [
             ("a map of version 2, and this program reads version 1", |map| map["version"] = 2.into()),
             ("object 3 is there twice", |map| {
                 let again = map["objects"][0].clone();
@@ -184,6 +205,8 @@ mod tests {
             ("positive definite", |map| map["objects"][0]["covariance"][4][4] = (-1.0).into()),
             ("a score of 0 or more", |map| map["objects"][0]["classes"]["scores"]["cup"] = (-2.0).into()),
             ("three semi-axes", |map| map["objects"][0]["quadric"]["semi_axes"][1] = 0.0.into()),
+            ("below 4294967295", |map| map["objects"][0]["id"] = u32::MAX.into()),
+            ("of more than 0 pixels", |map| map["objects"][0]["least_px"] = 0.0.into()),
             ("expected an array", |map| map["objects"] = "none".into()),
         ];
         for (expected, change) in cases {

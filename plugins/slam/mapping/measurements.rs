@@ -197,6 +197,12 @@ impl Measured {
         self.fusion.best()
     }
 
+    /// The smallest size at which it was ever seen, in pixels: the root of a box's area; `None` where that is not known.
+    pub(crate) fn least_px(&self) -> Option<f64> {
+        let seen = self.views.iter().map(|view| view.bounding_box.area().sqrt()).filter(|size| *size > 0.0);
+        seen.chain(self.prior.as_ref().and_then(|prior| prior.least_px)).reduce(f64::min)
+    }
+
     /// The larger of the standard deviations of the boxes' widths and heights, in pixels; 0 for no box.
     pub fn box_deviation(&self) -> f64 {
         let of = |size: fn(&BoundingBox) -> f64| {

@@ -4,7 +4,7 @@ use super::frame::FrameReport;
 use super::object::Tracked;
 use crate::association::{Map, Merge, Names};
 use crate::input::sequence::ObjectId;
-use crate::mapping::measurements::ObjectBox;
+use crate::mapping::measurements::{Measurements, ObjectBox};
 use crate::mapping::{box_entry, object_key, pose_key};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -19,6 +19,7 @@ pub(super) struct Known<'a> {
     pub newest: (usize, Se3),
     pub live: &'a [StampedPose],
     pub session: &'a Session,
+    pub measurements: &'a Measurements,
 }
 
 impl Map for Known<'_> {
@@ -32,11 +33,18 @@ impl Map for Known<'_> {
     }
 
     fn object(&self, id: ObjectId) -> Option<DualQuadric> {
-        self.session.get(object_key(id).as_str()).ok()
+        let now = self.session.get(object_key(id).as_str()).ok();
+        // the first frame is named before the objects of an earlier map are in the session
+        now.or_else(|| Some(self.measurements.object(id)?.prior.as_ref()?.quadric))
     }
 }
 
 impl Mapper {
+    /// What has been estimated so far, with a newest frame and its pose.
+    pub(super) fn known(&self, newest: (usize, Se3)) -> Known<'_> {
+        Known { newest, live: &self.live, session: &self.session, measurements: &self.measurements }
+    }
+
     /// Makes one of objects that turn out to be one. Returns the names as they are then.
     pub(super) fn unite_all(&mut self, merges: &[Merge], report: &mut FrameReport) -> Names {
         let (mut names, mut owners) = (self.names.clone(), vec![]);

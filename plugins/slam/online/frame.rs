@@ -25,7 +25,8 @@ pub struct FrameReport {
     /// The pose as it is estimated now, in the map's frame.
     pub pose: Se3,
     /// Where the stream began in a map that was made before, if this frame has shown it: all names are those of that map from now on,
-    /// and poses in its frame.
+    /// and poses in its frame. All frames were taken again then, and what this report tells of objects, refusals and updates is of all of them:
+    /// what was told before is of a map that is no more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub located: Option<Located>,
     /// Boxes that passed the filters.
@@ -78,6 +79,24 @@ impl FrameReport {
             updates: vec![],
         }
     }
+
+    /// Tells what has happened in an earlier frame as well.
+    pub(crate) fn tell_after(&mut self, before: Self) {
+        fn put<T>(mut first: Vec<T>, last: &mut Vec<T>) {
+            first.append(last);
+            *last = first;
+        }
+        put(before.forgotten, &mut self.forgotten);
+        put(before.merged, &mut self.merged);
+        put(before.born, &mut self.born);
+        put(before.withdrawn, &mut self.withdrawn);
+        put(before.revised, &mut self.revised);
+        put(before.refused, &mut self.refused);
+        let is_told = |update: &Report| {
+            update.solved_batch || !(update.rejected.is_empty() && update.readmitted.is_empty())
+        };
+        put(before.updates.into_iter().filter(is_told).collect(), &mut self.updates);
+    }
 }
 
 impl Mapper {
@@ -123,8 +142,7 @@ impl Mapper {
         values.insert(pose_key(report.frame), report.pose);
         let detections = &observation.detections;
         let image = Image { frame: report.frame, timestamp, detections };
-        let predicted =
-            Known { newest: (report.frame, report.pose), live: &self.live, session: &self.session };
+        let predicted = self.known((report.frame, report.pose));
         report.names = self.associator.associate(&image, &predicted);
         let named = report.names.iter().zip(detections);
         let named = named.map(|(object, d)| Detection { frame: report.frame, object: *object, ..d.clone() });
@@ -148,7 +166,8 @@ impl Mapper {
                 self.measurements.add(detection, &self.camera, detections, aliases);
             }
             let newest = (report.frame, self.pose(report.frame).unwrap_or(report.pose));
-            let known = Known { newest, live: &self.live, session: &self.session };
+            let (live, session, measurements) = (&self.live, &self.session, &self.measurements);
+            let known = Known { newest, live, session, measurements };
             seen.learned = self.associator.learn(&image, &report.names, &known);
         } else {
             seen.boxes.clear();

@@ -37,7 +37,8 @@ const OVERLAP: f64 = 0.4;
 const UNKNOWN: f64 = 0.04;
 
 impl Mapper {
-    /// Where the stream begins in `map`, by the objects that it has mapped; `None` as long as that is not clear.
+    /// Where the stream begins in `map`, by the objects that it has mapped, if objects there are known as well as their covariances say; `None`
+    /// as long as that is not clear.
     pub fn locate(&self, map: &PriorMap) -> Option<Located> {
         let first = self.pose_of(0)?;
         let marks = self.objects().filter_map(|(measured, quadric)| self.mark(measured, &quadric));

@@ -3,10 +3,12 @@ use crate::estimate::looks::looks;
 use crate::estimate::{Estimate, Landmark};
 use crate::input::prior_map::{Looks, PriorMap, PriorObject};
 use crate::mapping::measurements::Measured;
+use crate::mapping::object_key;
 use crate::settings::Settings;
-use manifactor_graph::{FactorEntry, Noise};
+use manifactor_graph::{FactorEntry, Graph, Noise};
 use manifactor_quadric::QuadricPrior;
-use manifactor_solve::{CompileError, CovarianceError, Problem};
+use manifactor_solve::{CompileError, CovarianceError, Problem, WeightError};
+use nalgebra::DMatrix;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -17,16 +19,22 @@ pub enum MapError {
     /// The graph does not go with the estimate.
     #[error(transparent)]
     Compile(#[from] CompileError),
+    /// The solver's weights do not go with the graph.
+    #[error(transparent)]
+    Weights(#[from] WeightError),
     /// It is not known how well objects are known.
     #[error(transparent)]
     Covariance(#[from] CovarianceError),
 }
 
+/// A factor whose loss gives it less counts this much.
+const LEAST_WEIGHT: f64 = 1e-9;
 /// As well as an object is known of which nothing is known: rad, m, and the logarithm of its axes.
 const UNKNOWN: [f64; 9] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0];
 
 impl PriorMap {
-    /// The map of an estimate, without those objects of an earlier map that are gone.
+    /// The map of an estimate, without those objects of an earlier map that are gone. Objects of that map without new views are as they were
+    /// read, so that a map does not fade from run to run.
     ///
     /// # Errors
     /// Where there are no covariances.
@@ -41,12 +49,17 @@ impl PriorMap {
                 return None;
             }
             let before = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default();
+            if let Some(prior) = measured.prior.as_ref().filter(|_| measured.views.is_empty()) {
+                let (classes, looks) = (measured.classes().clone(), before.plus(looks));
+                return Some(Arc::new(PriorObject { classes, looks, ..PriorObject::clone(prior) }));
+            }
             Some(Arc::new(PriorObject {
                 id: object.id,
                 classes: measured.classes().clone(),
                 quadric: *quadric,
                 covariance: covariances.remove(object.key.as_str())?,
                 looks: before.plus(looks),
+                least_px: measured.least_px(),
             }))
         };
         let objects = estimate.landmarks().into_iter().filter_map(object).collect();
@@ -66,6 +79,27 @@ pub(super) fn is_gone(measured: &Measured, looks: Looks) -> bool {
     measured.views.is_empty() && looks.seen == 0 && looks.expected >= LOOKS && missed < MISSED
 }
 
+/// Has the factors of an earlier map count by the covariances that were read, and not by those that were trusted: what is written says again
+/// what white noise would leave. Their loss gives them as much weight as in the solve.
+fn as_written(graph: &mut Graph, estimate: &Estimate) {
+    let weights: HashMap<usize, f64> =
+        estimate.solution.factors.iter().map(|f| (f.entry, f.weight)).collect();
+    let known = |entry: &FactorEntry| {
+        let held = entry.factor.erased().as_any().downcast_ref::<QuadricPrior>()?;
+        let priors = estimate.mapping.measurements.objects.iter().filter_map(|object| object.prior.as_ref());
+        let mut priors = priors.filter(|prior| entry.keys == [object_key(prior.id)]);
+        priors.next().filter(|prior| prior.quadric == held.value)
+    };
+    for (place, entry) in graph.factors_mut().iter_mut().enumerate() {
+        let Some(prior) = known(entry) else { continue };
+        let weight = weights.get(&place).copied().unwrap_or(1.0).max(LEAST_WEIGHT);
+        let noise = Noise::covariance(DMatrix::from_fn(9, 9, |r, c| prior.covariance[r][c] / weight));
+        // what was read has one
+        entry.noise = noise.unwrap_or_default();
+        entry.loss = None;
+    }
+}
+
 /// The covariance of each object, by its key. Directions that nothing determines are known as badly as can be.
 fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, MapError> {
     let (mut graph, values) = (estimate.mapping.graph.clone(), &estimate.solution.values);
@@ -73,6 +107,7 @@ fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, Ma
     if keys.is_empty() {
         return Ok(HashMap::new());
     }
+    as_written(&mut graph, estimate);
     for landmark in estimate.landmarks() {
         graph.push(FactorEntry {
             keys: vec![landmark.object.key.clone()],
@@ -84,9 +119,15 @@ fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, Ma
         });
     }
     let mut problem = Problem::compile(&graph, values)?;
+    let weights = &estimate.solution.weights;
+    if !weights.is_empty() {
+        // what the solver has rejected says nothing; weak priors come last, and count
+        let added = graph.factors().len().saturating_sub(weights.len());
+        problem.set_weights(&[weights.as_slice(), &vec![1.0; added]].concat())?;
+    }
     problem.linearize();
     let all = problem.marginals()?;
     let of_objects = all.into_iter().filter(|(key, _)| keys.contains(&key.as_str()));
-    let entries = |m: nalgebra::DMatrix<f64>| std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]));
+    let entries = |m: DMatrix<f64>| std::array::from_fn(|r| std::array::from_fn(|c| m[(r, c)]));
     Ok(of_objects.map(|(key, covariance)| (key.to_string(), entries(covariance))).collect())
 }

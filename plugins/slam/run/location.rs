@@ -6,12 +6,12 @@ use crate::online::{FrameReport, Located, Mapper};
 use crate::output::report::Found;
 use crate::settings::Settings;
 use manifactor_solve::Observer;
-use std::sync::Arc;
 
 /// A search for the place of a stream in a map, as long as it is not known.
 #[derive(Debug)]
 pub(super) struct Search {
-    map: Option<Arc<PriorMap>>,
+    /// With its objects as they are trusted.
+    map: Option<PriorMap>,
     /// Frames since it was last looked for.
     frames: usize,
 }
@@ -21,7 +21,7 @@ const FRAMES: usize = 15;
 
 impl Search {
     pub(super) fn new(settings: &Settings) -> Self {
-        Self { map: settings.unknown_start().map(|prior| prior.map.clone()), frames: 0 }
+        Self { map: settings.unknown_start().map(|prior| prior.trusted_map()), frames: 0 }
     }
 
     /// Looks for the place after a frame; it is found once at most.
@@ -52,14 +52,14 @@ pub(super) fn find(
         return Ok(None);
     }
     let mut mapper = Mapper::new(sequence.opening(), settings)?;
-    for (frame, observation) in sequence.observations().enumerate() {
+    for observation in sequence.observations() {
         if observer.poll().is_break() {
             break;
         }
         // what cannot be taken is told when all is mapped
-        let report = mapper.take(&observation).ok();
-        if let Some(located) = report.and_then(|report| search.look(&report, &mapper)) {
-            return Ok(Some(Found { frame, located }));
+        let Ok(report) = mapper.take(&observation) else { continue };
+        if let Some(located) = search.look(&report, &mapper) {
+            return Ok(Some(Found { frame: report.frame, located }));
         }
     }
     Ok(None)

@@ -44,6 +44,7 @@ pub fn online(
         {
             let known = settings.beginning_at(located.start, located.noise.clone());
             taken = taken.again(&known, report)?;
+            progress.begin_again();
             report.located = Some(located.clone());
             found = Some(Found { frame: report.frame, located });
         }
@@ -96,15 +97,23 @@ impl Taken {
         Ok(report)
     }
 
-    /// The same frames with other settings; `report` becomes that of the last, and tells of all that is refused now.
+    /// The same frames with other settings; `report` becomes that of the last, and tells of all that has happened to the new map.
     fn again(self, settings: &Settings, report: &mut FrameReport) -> Result<Self, SettingError> {
-        let mut again = Self::new(self.sequence.opening(), settings)?;
+        let (mut again, mut before) = (Self::new(self.sequence.opening(), settings)?, None);
         let mut refused = vec![];
         for observation in self.sequence.observations() {
             match again.take(&observation) {
-                Ok(taken) => *report = taken,
+                Ok(mut taken) => {
+                    if let Some(before) = before {
+                        taken.tell_after(before);
+                    }
+                    before = Some(taken);
+                }
                 Err(error) => refused.push(error.to_string()),
             }
+        }
+        if let Some(last) = before {
+            *report = last;
         }
         report.refused.extend(refused);
         Ok(again)

@@ -1,7 +1,8 @@
 use crate::gravity::MapFrame;
-use crate::input::prior_map::PriorMap;
+use crate::input::class::Aliases;
+use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::Frame;
-use manifactor_config::{Errors, Fault, Node};
+use manifactor_config::{Errors, Fault, Node, Placed};
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::{not_negative, positive};
 use manifactor_graph::loss::{Cauchy, Loss};
@@ -17,8 +18,8 @@ use std::sync::Arc;
 pub struct PriorMapSettings {
     /// Its file: `map.json` in the folder of a variant.
     pub file: PathBuf,
-    /// The pose of the first camera in the map's frame; how well that is known is for `[prior]` to say. Default: it is not known, and
-    /// found by the objects that are seen.
+    /// The pose of the first camera in the map's frame. `[prior]` says how well it is known: by default to 0.001 rad and 1 mm, so that a start
+    /// that was measured by hand wants a `prior.noise` of its own. Default: it is not known, and found by the objects that are seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<Se3>,
     /// How many times as far off its objects may be as their covariances say: a detector's errors last for many frames.
@@ -32,10 +33,14 @@ pub struct PriorMapSettings {
     /// How much of a large error of them counts. Default: Cauchy's, as things are moved.
     #[serde(default = "loss")]
     pub loss: Arc<dyn Loss>,
-    /// What the file says.
+    /// What the file says, before it is asked how far that is trusted.
     #[serde(skip)]
     #[schemars(skip)]
     pub map: Arc<PriorMap>,
+    /// Where the file was found, and where the document names it.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub(crate) read_from: Option<Placed<PathBuf>>,
 }
 
 fn sigma_scale() -> f64 {
@@ -55,17 +60,26 @@ fn loss() -> Arc<dyn Loss> {
 pub(crate) struct Anchor<'a> {
     pub map: &'a PriorMap,
     pub start: Se3,
-    pub loss: &'a Arc<dyn Loss>,
 }
 
 impl PriorMapSettings {
-    /// Reads the file, from `folder`.
-    pub(super) fn read(&mut self, folder: &Path, settings: &Node, errors: &Errors) -> Option<()> {
-        match PriorMap::read(&folder.join(&self.file)) {
-            Ok(map) => self.map = Arc::new(map.trusted(self.sigma_scale, self.shape_error)),
+    /// Reads the file, from `folder`; classes in it are called as `aliases` call them.
+    pub(super) fn read(
+        &mut self,
+        folder: &Path,
+        aliases: &Aliases,
+        settings: &Node,
+        errors: &Errors,
+    ) -> Option<()> {
+        let place = settings.field("prior_map").and_then(|prior| prior.field("file"));
+        let place = place.unwrap_or(settings).place.clone();
+        let file = folder.join(&self.file);
+        match PriorMap::read(&file) {
+            Ok(map) => {
+                self.map = Arc::new(map.with_classes(aliases));
+                self.read_from = Some(Placed { place, value: file });
+            }
             Err(diagnostics) => {
-                let place = settings.field("prior_map").and_then(|prior| prior.field("file"));
-                let place = place.unwrap_or(settings).place.clone();
                 errors.report(place, Fault::invalid("names no map that can be read"));
                 errors.extend(diagnostics);
                 return None;
@@ -76,7 +90,19 @@ impl PriorMapSettings {
 
     /// The map, where it is known where the run begins in it.
     pub(super) fn anchor(&self) -> Option<Anchor<'_>> {
-        Some(Anchor { map: &self.map, start: self.start?, loss: &self.loss })
+        Some(Anchor { map: &self.map, start: self.start? })
+    }
+
+    /// An object of the map, known as well as it is trusted. What is written again is the object as it was read: who reads that has a trust
+    /// of its own.
+    pub(crate) fn trusted(&self, object: &PriorObject) -> PriorObject {
+        object.trusted(self.sigma_scale, self.shape_error)
+    }
+
+    /// The map with its objects as they are trusted.
+    pub(crate) fn trusted_map(&self) -> PriorMap {
+        let objects = self.map.objects.iter().map(|object| Arc::new(self.trusted(object)));
+        PriorMap::new(self.map.up, objects.collect())
     }
 }
 

@@ -2,9 +2,11 @@
 use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
+use manifactor_quadric::{BoundingBox, QuadricPrior};
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
-use manifactor_slam::output::write_whole;
-use manifactor_slam::prior_map::PriorMap;
+use manifactor_slam::output::{write_variant, write_whole};
+use manifactor_slam::prior_map::{PriorMap, PriorObject};
+use manifactor_slam::record::VariantRecord;
 use manifactor_slam::report::{PriorMapReport, VariantReport};
 use manifactor_slam::run::{Mapped, Watch, estimate, online};
 use manifactor_slam::run_document::RunDocument;
@@ -72,10 +74,11 @@ fn in_map(folder: &Path, more: &[&str]) -> Settings {
     settings(&[&AGAIN[..], more, &[&file]].concat())
 }
 
-/// Notes the poses, and when the place was found.
+/// Notes the poses, the names in the first frame, and when the place was found.
 #[derive(Default)]
 struct Found {
     poses: Vec<Se3>,
+    first: Vec<ObjectId>,
     at: Option<usize>,
 }
 
@@ -88,6 +91,9 @@ impl Watch for Found {
         _: f64,
     ) -> ControlFlow<()> {
         let report = report.unwrap();
+        if self.poses.is_empty() {
+            self.first = report.names.iter().copied().flatten().collect();
+        }
         self.poses.push(report.pose);
         self.at = self.at.or(report.located.as_ref().map(|_| report.frame));
         ControlFlow::Continue(())
@@ -146,6 +152,12 @@ fn a_batch_finds_the_same_place_as_a_stream() {
     let (_, report) =
         online("stream", all.clone().into(), &settings, &mut Found::default(), &mut Silent).unwrap();
     assert_eq!(mapped.found, told(&report).found);
+    // what the map was until then is not counted: all that was born since is there in the end, or was merged or withdrawn
+    let known = begun(folder.path(), &told(&report).found.as_ref().unwrap().located.start, &[]);
+    let (_, alone) = online("known", all.clone().into(), &known, &mut Found::default(), &mut Silent).unwrap();
+    let [found, alone] = [report.online.unwrap(), alone.online.unwrap()];
+    assert_eq!(found.seconds.len(), all.frames.len());
+    assert!(found.born.abs_diff(alone.born) <= 2, "{} and {}", found.born, alone.born);
     let (_, report) = estimate("batch", all, &settings, &mut Silent).unwrap();
     assert!(told(&report).seen.len() >= 10 && told(&report).gone.is_empty());
 }
@@ -153,25 +165,22 @@ fn a_batch_finds_the_same_place_as_a_stream() {
 #[test]
 fn a_place_that_is_known_is_not_looked_for() {
     let folder = tempfile::tempdir().unwrap();
-    mapped(folder.path(), |_| {});
-    // simulated walks begin at the pose that their odometry begins at
-    let settings = in_map(folder.path(), &["association.type=given"]);
-    let all = sequence(&settings);
+    let map = mapped(folder.path(), |_| {});
+    let all = sequence(&in_map(folder.path(), &["association.type=given"]));
     let first = all.frames[0].world_from_camera;
-    let Se3 { rotation, translation } = first;
-    let rotation = format!("prior_map.start.rotation={:?}", rotation.quaternion_xyzw());
-    let translation = format!("prior_map.start.translation={:?}", translation.as_slice());
     for association in ["likelihood", "projection", "iou"] {
         let by = format!("association.type={association}");
-        let settings = in_map(folder.path(), &[&by, &rotation, &translation]);
+        let settings = begun(folder.path(), &first, &[&by]);
         let mut watch = Found::default();
         let (_, report) = online("again", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
         let prior = told(&report);
         assert!(watch.at.is_none() && prior.found.is_none() && prior.is_located);
         let error = first.between(&watch.poses[0]);
         assert!(error.log().norm() < 1e-3, "{error:?}");
+        let known = watch.first.iter().filter(|id| map.object(**id).is_some()).count();
+        assert!(2 * known > watch.first.len(), "{association}: {:?} in the first frame", watch.first);
         // overlap needs what was seen just before, or what is mapped well
-        assert!(prior.seen.len() >= 8, "{association} {prior:?}");
+        assert!(prior.seen.len() >= 8 && prior.added.len() <= 2, "{association} {prior:?}");
     }
 }
 
@@ -223,4 +232,164 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
     let id = prior.seen[0];
     let looks = |map: &PriorMap| map.object(id).unwrap().looks.expected;
     assert!(looks(&after) > looks(&map));
+    let spread = |map: &PriorMap, id: &ObjectId| map.object(*id).unwrap().covariance().determinant().ln();
+    let better = prior.seen.iter().filter(|id| spread(&after, id) < spread(&map, id)).count();
+    assert!(better + 1 >= prior.seen.len(), "{better} of {}", prior.seen.len());
+}
+
+/// Settings of a run that knows where it begins in the map: simulated walks begin at the pose that their odometry begins at.
+fn begun(folder: &Path, first: &Se3, more: &[&str]) -> Settings {
+    let rotation = format!("prior_map.start.rotation={:?}", first.rotation.quaternion_xyzw());
+    let translation = format!("prior_map.start.translation={:?}", first.translation.as_slice());
+    in_map(folder, &[more, &[&rotation, &translation]].concat())
+}
+
+#[test]
+fn what_is_not_seen_again_does_not_fade() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = mapped(folder.path(), |_| {});
+    for _ in 0..2 {
+        let all = sequence(&in_map(folder.path(), &[]));
+        // too few frames to say that anything is gone
+        let mut few = Sequence::clone(&all);
+        few.frames.truncate(3);
+        few.detections.clear();
+        let settings = begun(folder.path(), &all.frames[0].world_from_camera, &[]);
+        let (estimate, report) = estimate("again", Arc::new(few), &settings, &mut Silent).unwrap();
+        assert!(told(&report).seen.is_empty() && told(&report).gone.is_empty(), "{:?}", told(&report));
+        let after = PriorMap::of(&estimate, &settings).unwrap();
+        let known = |map: &PriorMap| -> Vec<_> {
+            map.objects.iter().map(|o| (o.id, o.classes.clone(), o.quadric, o.covariance)).collect()
+        };
+        assert_eq!(known(&after), known(&map));
+        write_whole(&folder.path().join("map.json"), serde_json::to_string(&after).unwrap()).unwrap();
+        map = after;
+    }
+}
+
+#[test]
+fn an_older_map_does_not_stay_beside_results_without_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut document = Document::parse("table.toml", TABLE, Format::Toml).unwrap();
+    document.set(&["source.trajectory.frames=60"]).unwrap();
+    let mut run = RunDocument::read(&document).unwrap();
+    run.output = folder.path().to_owned();
+    let variant = &run.variants[0];
+    let (mut estimate, report) =
+        estimate(&variant.name, sequence(&variant.settings), &variant.settings, &mut Silent).unwrap();
+    let record = VariantRecord::new(variant, &estimate);
+    let written = write_variant(&run, variant, &estimate, &report, &record).unwrap();
+    assert!(written.join("map.json").is_file());
+    // of a graph with a variable that is not there nothing has a covariance
+    let value = *estimate.landmarks()[0].quadric;
+    estimate.mapping.graph.add(["nowhere"], QuadricPrior { value });
+    write_variant(&run, variant, &estimate, &report, &record).unwrap();
+    assert!(!written.join("map.json").exists() && written.join("objects.json").is_file());
+}
+
+/// Frames that cannot be taken at both sides of the place where it is found.
+#[test]
+fn a_frame_that_is_left_out_counts_once_and_in_no_number() {
+    let folder = tempfile::tempdir().unwrap();
+    mapped(folder.path(), |_| {});
+    let settings = in_map(folder.path(), &[]);
+    let mut all = Sequence::clone(&part(&sequence(&settings), 40..240));
+    all.frames[2].world_from_camera.translation.x = f64::NAN;
+    let all = Arc::new(all);
+    let mut watch = Left(0, None);
+    let (_, report) = online("stream", all.clone().into(), &settings, &mut watch, &mut Silent).unwrap();
+    let online = report.online.as_ref().unwrap();
+    assert_eq!((online.refusals, online.refused.len(), watch.0), (1, 1, 1));
+    let mapped = Mapped::new(all, &settings, &mut Silent);
+    // a batch takes no frame that is not finite: it is the place that is compared, by the number of frames that were taken
+    let found = mapped.map(|mapped| mapped.found.unwrap().frame);
+    assert_eq!(found.ok().or(watch.1), watch.1);
+}
+
+/// Counts frames that are left out, and notes when the place was found.
+struct Left(usize, Option<usize>);
+
+impl Watch for Left {
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        _: Option<&Observation>,
+        _: &mut Mapper,
+        _: f64,
+    ) -> ControlFlow<()> {
+        self.0 += usize::from(report.is_err());
+        self.1 = self.1.or(report.ok().filter(|report| report.located.is_some()).map(|report| report.frame));
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn classes_of_a_map_are_called_as_the_run_calls_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = mapped(folder.path(), |_| {});
+    let plain = in_map(folder.path(), &[]);
+    let other = in_map(folder.path(), &["aliases={ bottle = \"flask\" }"]);
+    let count = |settings: &Settings, class: &str| {
+        let map = &settings.prior_map.as_ref().unwrap().map;
+        map.objects
+            .iter()
+            .filter(|object| object.classes.best().is_some_and(|best| best.name == class))
+            .count()
+    };
+    assert_eq!(plain.prior_map.as_ref().unwrap().map.objects.len(), map.objects.len());
+    let bottles = count(&plain, "bottle");
+    assert!(bottles >= 2);
+    assert_eq!((count(&other, "bottle"), count(&other, "flask")), (0, bottles));
+}
+
+#[test]
+fn what_the_solver_has_rejected_says_nothing_in_the_map() {
+    let table = TABLE.replace(", loss = { type = \"cauchy\", scale = 1.0 }", "");
+    let mut document = Document::parse("table.toml", &table, Format::Toml).unwrap();
+    document.set(&["association.type=given", "solver.type=gnc", "source.trajectory.frames=60"]).unwrap();
+    let settings = RunDocument::read(&document).unwrap().variants.remove(0).settings;
+    let mut sequence = Sequence::clone(&sequence(&settings));
+    for detection in sequence.detections.iter_mut().step_by(9) {
+        let b = detection.bounding_box;
+        detection.bounding_box = BoundingBox { xmin: b.xmin - 60.0, xmax: b.xmax - 60.0, ..b };
+    }
+    let (estimate, _) = estimate("gnc", Arc::new(sequence), &settings, &mut Silent).unwrap();
+    let rejected: Vec<usize> =
+        (0..estimate.solution.weights.len()).filter(|i| estimate.solution.weights[*i] == 0.0).collect();
+    assert!(rejected.len() > 5, "{rejected:?}");
+    // the same estimate of a graph that never had what was rejected
+    let mut without = estimate.clone();
+    let mut place = 0;
+    without.mapping.graph.factors_mut().retain(|_| {
+        place += 1;
+        !rejected.contains(&(place - 1))
+    });
+    without.solution.weights.retain(|weight| *weight != 0.0);
+    let [map, without] = [&estimate, &without].map(|of| PriorMap::of(of, &settings).unwrap());
+    for (a, b) in map.objects.iter().zip(&without.objects) {
+        let (a, b) = (a.covariance(), b.covariance());
+        assert!((a - b).norm() < 1e-6 * b.norm(), "{}", (a - b).norm() / b.norm());
+    }
+}
+
+#[test]
+fn what_is_too_far_away_to_be_seen_is_not_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = mapped(folder.path(), |_| {});
+    assert!(map.objects.iter().all(|object| object.least_px.is_some_and(|size| size > 5.0)));
+    // a map of things that were seen from close by only
+    let near = map.objects.iter().map(|object| {
+        let object = PriorObject { least_px: Some(1000.0), ..PriorObject::clone(object) };
+        Arc::new(object)
+    });
+    let near = PriorMap::new(map.up, near.collect());
+    let first = sequence(&in_map(folder.path(), &[])).frames[0].world_from_camera;
+    for (map, is_gone) in [(&map, true), (&near, false)] {
+        write_whole(&folder.path().join("map.json"), serde_json::to_string(map).unwrap()).unwrap();
+        let settings = begun(folder.path(), &first, &[]);
+        let mut blind = Sequence::clone(&sequence(&settings));
+        blind.detections.clear();
+        let (_, report) = estimate("blind", Arc::new(blind), &settings, &mut Silent).unwrap();
+        assert_eq!(told(&report).gone.is_empty(), !is_gone, "{:?}", told(&report));
+    }
 }

@@ -97,7 +97,7 @@ impl LiveMap {
         self.phase = Phase::Running;
         let report = match report {
             Ok(report) => report,
-            Err(error) => return self.notes.refused(self.frames, &error.to_string()),
+            Err(error) => return self.notes.left_out(self.frames, &error.to_string()),
         };
         if self.seconds.len() == LATENCIES {
             self.seconds.pop_front();
@@ -105,6 +105,11 @@ impl LiveMap {
         self.seconds.push_back(seconds);
         (self.frames, self.timestamp) = (report.frame + 1, report.timestamp);
         self.boxes_so_far += report.boxes;
+        if let Some(located) = &report.located {
+            // frames before this one were taken again, in the frame of another map
+            self.path.begin_odometry_at(&located.start);
+            self.path.correct(|frame| mapper.pose_of(frame));
+        }
         self.notes.take(report, |id| mapper.names().now(id));
         let parked = report.updates.last().map(|update| (&update.parked, &update.undetermined));
         if let Some((parked, undetermined)) = parked {

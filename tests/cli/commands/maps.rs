@@ -25,15 +25,49 @@ fn a_second_run_begins_with_the_map_of_the_first() {
     assert_eq!(prior["is_located"], true);
     assert_eq!(prior["found"]["matches"].as_array().map(|matches| matches.len() >= 4), Some(true), "{prior}");
     assert_eq!(std::fs::read(&map).unwrap(), before, "a map that is read is not written");
-    // a stream, from lines; its map can be begun with again
+    // a stream, from lines with names; its map can be begun with again, and the frame that shows the place is told whatever others are
     let frames = manifactor(&format!("simulate {desk} --lines")).ended(0).stdout;
     let (live, third) = (path(&folder, "live.toml"), path(&folder, "third"));
     let map = format!("{second}/estimate/map.json");
-    let ran =
-        fed(&format!("online {live} --out {third} --json --every 1 --set prior_map.file={map}"), &frames);
-    let lines = ran.ended(0).stdout;
-    let located = lines.lines().filter(|line| line.contains("\"located\":{\"start\"")).count();
-    assert_eq!(located, usize::from(report(&third)["prior_map"]["is_located"] == true));
+    let online =
+        format!("online {live} --set association.type=given --set prior_map.file={map} --every 1000");
+    let ran = fed(&format!("{online} --out {third} --json"), &frames);
+    ran.complains("the place in the prior map is found, by");
+    let lines: Vec<Value> =
+        ran.ended(0).stdout.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 2, "the frame that shows the place, and the report");
+    assert!(lines[0]["report"]["located"]["start"].is_object(), "{}", lines[0]);
+    let prior = &report(&third)["prior_map"];
+    assert_eq!(
+        (&prior["is_located"], &prior["found"]["frame"]),
+        (&true.into(), &lines[0]["report"]["frame"])
+    );
+    let ran = fed(&format!("{online} --out {}", path(&folder, "fourth")), &frames).ended(0);
+    let frame = lines[0]["report"]["frame"].as_u64().unwrap() + 1;
+    ran.complains(&format!("after {frame} frames the place in the prior map is found, by"));
+    ran.complains(&format!(" {frame} frames: "));
+}
+
+#[test]
+fn a_run_does_not_write_over_the_map_that_it_reads() {
+    let output = |folder: &tempfile::TempDir| format!("output = {:?}\n{DESK}", path(folder, "out"));
+    let folder = folder(&[("desk.toml", "")]);
+    let (desk, own) = (path(&folder, "desk.toml"), path(&folder, "out/estimate/map.json"));
+    std::fs::write(&desk, output(&folder)).unwrap();
+    manifactor(&format!("run {desk}")).ended(0);
+    let before = std::fs::read(&own).unwrap();
+    // the same command with the map that it has left: another table than the one that is seen, so that the place is not found
+    for command in ["run", "online"] {
+        let again = format!("{command} {desk} --set source.scene.seed=99 --set prior_map.file={own}");
+        let refused = manifactor(&again).ended(2);
+        refused.complains("names a map that this run itself writes");
+        refused.complains("--out");
+        refused.complains("prior_map.file=");
+        assert_eq!(std::fs::read(&own).unwrap(), before);
+    }
+    let elsewhere = path(&folder, "elsewhere");
+    manifactor(&format!("run {desk} --set prior_map.file={own} --out {elsewhere}")).ended(0);
+    assert_eq!(std::fs::read(&own).unwrap(), before);
 }
 
 #[test]

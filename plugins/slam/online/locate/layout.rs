@@ -15,6 +15,8 @@ use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+mod hypotheses;
+
 /// An object by which a place is known again.
 #[derive(Debug, Clone)]
 pub(crate) struct Mark {
@@ -36,6 +38,8 @@ pub(crate) struct Layout {
     pairs: Vec<Pair>,
     /// Logarithm of the volume that the known marks lie in, m³.
     log_volume: f64,
+    /// How far known marks usually are from the next.
+    gap: f64,
 }
 
 /// A mark in both sets.
@@ -43,7 +47,8 @@ pub(crate) struct Layout {
 struct Pair {
     local: usize,
     known: usize,
-    /// What their classes say for it, in nats.
+    /// What speaks for it before places are looked at, in nats: their classes, and that it is one of all known marks that the local one may
+    /// be, where its name does not say which.
     evidence: f64,
     /// How far apart the two may be, in metres.
     sigma: f64,
@@ -75,9 +80,7 @@ const CLASSES: f64 = 20.0;
 const GATE: f64 = 3.0;
 /// What it costs, in nats, that a local mark among the known ones has no match.
 const NEW: f64 = 1.6;
-/// Pairs that make hypotheses: those whose classes say most.
-const SEEDS: usize = 60;
-/// Hypotheses that are looked at closely.
+/// Hypotheses that are looked at closely, no two of the same place.
 const LOOKED_AT: usize = 40;
 /// Rounds in which matches are found and the place by them.
 const ROUNDS: usize = 5;
@@ -88,7 +91,7 @@ const MATCHES: usize = 4;
 /// this share of the local ones among the known ones,
 const MOST: f64 = 0.6;
 /// and it is so far ahead, in nats.
-const LEAD: f64 = 16.0;
+const LEAD: f64 = 12.0;
 
 /// How much better than by all marks together up is known.
 const UP: f64 = 10.0;
@@ -127,7 +130,8 @@ impl Layout {
         };
         let log_volume = (0..3).map(|axis| sides(axis).ln()).sum();
         let up = up.zip(map.up).map(|(local, known)| [local, known]);
-        let mut layout = Self { local, known, up, pairs: vec![], log_volume };
+        let gap = gap(&known);
+        let mut layout = Self { local, known, up, pairs: vec![], log_volume, gap };
         layout.pairs = layout.pairs(by_name);
         layout
     }
@@ -139,7 +143,7 @@ impl Layout {
                 *usual.entry(class).or_default() += share / self.known.len() as f64;
             }
         }
-        let doubt = CLASS_ERROR / CLASSES;
+        let (doubt, one_of_all) = (CLASS_ERROR / CLASSES, (self.known.len() as f64).ln());
         let mut pairs = vec![];
         for (l, local) in self.local.iter().enumerate() {
             let mut classes: Vec<_> = local.classes.iter().collect();
@@ -152,10 +156,14 @@ impl Layout {
             for (k, known) in self.known.iter().enumerate() {
                 let alike: f64 =
                     classes.iter().map(|(class, share)| (*share * known.share(class)).sqrt()).sum();
+                // what was never given a class may be anything
+                let is_nameless = local.classes.is_empty() || known.classes.is_empty();
                 let evidence = match by_name {
-                    true if local.id == known.id => (self.known.len() as f64).ln(),
+                    true if local.id == known.id => 0.0,
+                    false if is_nameless => -one_of_all,
                     false if alike >= ALIKE => {
-                        (((1.0 - CLASS_ERROR) * over(&|class| known.share(class)) + doubt) / by_chance).ln()
+                        let by_class = (1.0 - CLASS_ERROR) * over(&|class| known.share(class)) + doubt;
+                        (by_class / by_chance).ln() - one_of_all
                     }
                     _ => continue,
                 };
@@ -168,20 +176,7 @@ impl Layout {
 
     /// Where the local marks lie, if there is one place for them.
     pub(crate) fn align(&self) -> Option<Aligned> {
-        let mut rough: Vec<(f64, Se3)> =
-            self.hypotheses().into_iter().map(|place| (self.at_most(&place), place)).collect();
-        rough.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-        let mut places: Vec<(f64, Se3, Vec<Pair>)> = vec![];
-        for (_, place) in rough.into_iter().take(LOOKED_AT) {
-            let Some((score, place, matches)) = self.refined(place) else { continue };
-            match places.iter_mut().find(|(_, other, _)| self.is_same(other, &place)) {
-                Some(other) if score > other.0 => *other = (score, place, matches),
-                Some(_) => {}
-                None => places.push((score, place, matches)),
-            }
-        }
-        places.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
-        let mut places = places.into_iter();
+        let mut places = self.ranked().into_iter();
         let (score, place, matches) = places.next()?;
         let lead = score - places.next().map_or(0.0, |(next, ..)| next.max(0.0));
         let among = self.local.iter().filter(|mark| self.is_among(&place.act(&mark.centre))).count();
@@ -190,22 +185,33 @@ impl Layout {
         is_clear.then(|| self.aligned(place, &matches, lead))
     }
 
-    /// Places at which a few marks match.
-    fn hypotheses(&self) -> Vec<Se3> {
-        let seeds = &self.pairs[..self.pairs.len().min(SEEDS)];
-        let mut places = vec![];
-        for (i, a) in seeds.iter().enumerate() {
-            for (j, b) in seeds.iter().enumerate().skip(i + 1) {
-                if !self.go_together(a, b) {
-                    continue;
-                }
-                if self.up.is_some() {
-                    places.extend(self.place(&[*a, *b]));
-                    continue;
-                }
-                let third =
-                    seeds[j + 1..].iter().filter(|c| self.go_together(a, c) && self.go_together(b, c));
-                places.extend(third.filter_map(|c| self.place(&[*a, *b, *c])));
+    /// Places where the local marks may lie, each with its score and its matches, the best first.
+    fn ranked(&self) -> Vec<(f64, Se3, Vec<Pair>)> {
+        let mut places: Vec<(f64, Se3, Vec<Pair>)> = vec![];
+        for place in self.promising() {
+            let Some((score, place, matches)) = self.refined(place) else { continue };
+            match places.iter_mut().find(|(_, other, _)| self.is_same(other, &place)) {
+                Some(other) if score > other.0 => *other = (score, place, matches),
+                Some(_) => {}
+                None => places.push((score, place, matches)),
+            }
+        }
+        places.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
+        places
+    }
+
+    /// The places that may score most. Many hypotheses are of one place; each counts once, so that the next best place is among them.
+    fn promising(&self) -> Vec<Se3> {
+        let hypotheses = self.hypotheses().into_iter();
+        let mut rough: Vec<(f64, Se3)> = hypotheses.map(|place| (self.at_most(&place), place)).collect();
+        rough.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let mut places: Vec<Se3> = vec![];
+        for (_, place) in rough {
+            if places.len() == LOOKED_AT {
+                break;
+            }
+            if !places.iter().any(|other| self.is_same(other, &place)) {
+                places.push(place);
             }
         }
         places
@@ -226,6 +232,9 @@ impl Layout {
 
     /// The place that brings pairs closest, in the mean square (Umeyama); `None` where it is not determined.
     fn place(&self, pairs: &[Pair]) -> Option<Se3> {
+        if pairs.len() < 2 {
+            return None;
+        }
         let weight = |pair: &Pair| pair.sigma.powi(-2);
         let all: f64 = pairs.iter().map(weight).sum();
         let mean = |of: &dyn Fn(&Pair) -> Vector3<f64>| {
@@ -247,7 +256,7 @@ impl Layout {
         let (Some(u), Some(vt)) = (svd.u, svd.v_t) else { return None };
         let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
         values.sort_by(|a, b| b.total_cmp(a));
-        if values[1] < FLAT * values[0] {
+        if values[1] <= FLAT * values[0] {
             return None;
         }
         let sign = (u.determinant() * vt.determinant()).signum();
@@ -279,11 +288,11 @@ impl Layout {
 
     /// The place near this one that fits its matches best, with its score and its matches.
     fn refined(&self, mut place: Se3) -> Option<(f64, Se3, Vec<Pair>)> {
-        let mut matches = vec![];
         for _ in 0..ROUNDS {
-            matches = self.matches(&place);
-            place = self.place(&matches)?;
+            place = self.place(&self.matches(&place))?;
         }
+        // what the last move has taken out of reach is no match
+        let matches = self.matches(&place);
         let gained: f64 = matches.iter().filter_map(|pair| self.gain(&place, pair)).sum();
         let is_matched = |l: usize| matches.iter().any(|pair: &Pair| pair.local == l);
         let alone = (0..self.local.len())
@@ -313,18 +322,7 @@ impl Layout {
     fn is_among(&self, point: &Vector3<f64>) -> bool {
         let nearest =
             self.known.iter().map(|mark| (mark.centre - point).norm()).fold(f64::INFINITY, f64::min);
-        nearest < self.gap()
-    }
-
-    /// How far known marks usually are from the next.
-    fn gap(&self) -> f64 {
-        let to_next = |mark: &Mark| {
-            let others = self.known.iter().filter(|other| other.id != mark.id);
-            others.map(|other| (other.centre - mark.centre).norm()).fold(f64::INFINITY, f64::min)
-        };
-        let mut gaps: Vec<f64> = self.known.iter().map(to_next).collect();
-        gaps.sort_by(f64::total_cmp);
-        gaps.get(gaps.len() / 2).copied().unwrap_or_default()
+        nearest < self.gap
     }
 
     fn aligned(&self, place: Se3, matches: &[Pair], lead: f64) -> Aligned {
@@ -343,6 +341,17 @@ impl Layout {
             up: self.up.map(|[_, up]| up),
         }
     }
+}
+
+/// How far marks usually are from the next: the median.
+fn gap(marks: &[Mark]) -> f64 {
+    let to_next = |mark: &Mark| {
+        let others = marks.iter().filter(|other| other.id != mark.id);
+        others.map(|other| (other.centre - mark.centre).norm()).fold(f64::INFINITY, f64::min)
+    };
+    let mut gaps: Vec<f64> = marks.iter().map(to_next).collect();
+    gaps.sort_by(f64::total_cmp);
+    gaps.get(gaps.len() / 2).copied().unwrap_or_default()
 }
 
 impl Aligned {
@@ -364,108 +373,4 @@ impl Aligned {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::input::class::Aliases;
-    use crate::input::prior_map::Looks;
-    use crate::input::sequence::ClassScores;
-
-    const CLASSES: [&str; 3] = ["cup", "book", "bottle"];
-
-    fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
-        let mut classes = Fusion::default();
-        classes.add(&ClassScores::single(class, 0.8), &Aliases::default());
-        let quadric =
-            DualQuadric { pose: Se3::new(So3::identity(), centre), semi_axes: Vector3::repeat(0.08) };
-        let covariance = std::array::from_fn(|r| std::array::from_fn(|c| if r == c { 1e-4 } else { 0.0 }));
-        Arc::new(PriorObject { id: ObjectId(id), classes, quadric, covariance, looks: Looks::default() })
-    }
-
-    /// Objects on a table, each of one of the classes.
-    fn table(classes: &[&str], up: Option<Direction>) -> PriorMap {
-        let places = [
-            [0.0, 0.0],
-            [0.7, 0.1],
-            [1.5, -0.2],
-            [0.3, 0.9],
-            [1.1, 1.0],
-            [-0.4, 0.6],
-            [1.9, 0.8],
-            [0.8, 1.7],
-        ];
-        let all = places.iter().enumerate().map(|(i, [x, y])| {
-            let height = 0.1 * (i % 3) as f64;
-            object(10 + i as u32, classes[i % classes.len()], Vector3::new(*x, *y, height))
-        });
-        PriorMap::new(up, all.collect())
-    }
-
-    /// The same objects, seen from elsewhere; the first ones are not.
-    fn seen(map: &PriorMap, known_from_local: &Se3, without: usize) -> (Vec<Mark>, Option<Direction>) {
-        let local = known_from_local.inverse();
-        let mark = |object: &Arc<PriorObject>| {
-            let quadric = DualQuadric { pose: local.compose(&object.quadric.pose), ..object.quadric };
-            Mark::new(ObjectId(object.id.0 - 10), &quadric, 1e-4, &object.classes)
-        };
-        let up = map.up.map(|up| Direction::new(local.rotation.act(&up)).unwrap());
-        (map.objects.iter().skip(without).map(mark).collect(), up)
-    }
-
-    fn elsewhere() -> Se3 {
-        Se3::new(So3::exp(&Vector3::new(0.4, -0.7, 1.9)), Vector3::new(2.0, -1.0, 0.5))
-    }
-
-    #[test]
-    fn a_layout_is_found_again_with_and_without_up() {
-        for up in [Some(Direction::Z), None] {
-            let map = table(&CLASSES, up);
-            let (marks, local_up) = seen(&map, &elsewhere(), 2);
-            let found = Layout::new(marks, local_up, &map, false).align().unwrap();
-            let error = found.known_from_local.between(&elsewhere());
-            assert!(error.log().norm() < 1e-6, "{up:?} {error:?}");
-            assert_eq!(found.matches.len(), 6);
-            assert!(
-                found.matches.iter().all(|(local, known)| local.0 + 10 == known.0),
-                "{:?}",
-                found.matches
-            );
-        }
-    }
-
-    #[test]
-    fn what_looks_the_same_from_two_sides_is_nowhere() {
-        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        let bottles =
-            square.iter().zip(10..).map(|([x, y], id)| object(id, "bottle", Vector3::new(*x, *y, 0.0)));
-        let map = PriorMap::new(Some(Direction::Z), bottles.collect());
-        let (marks, up) = seen(&map, &elsewhere(), 0);
-        assert!(Layout::new(marks, up, &map, false).align().is_none());
-        // names tell them apart
-        let (mut marks, up) = seen(&map, &elsewhere(), 0);
-        marks.iter_mut().for_each(|mark| mark.id.0 += 10);
-        let found = Layout::new(marks, up, &map, true).align().unwrap();
-        assert!(found.known_from_local.between(&elsewhere()).log().norm() < 1e-6);
-    }
-
-    #[test]
-    fn too_few_objects_or_others_are_nowhere() {
-        let map = table(&CLASSES, Some(Direction::Z));
-        let (marks, up) = seen(&map, &elsewhere(), 5);
-        assert!(Layout::new(marks, up, &map, false).align().is_none());
-        let (marks, up) = seen(&table(&["laptop"], map.up), &elsewhere(), 0);
-        assert!(Layout::new(marks, up, &map, false).align().is_none());
-        assert!(Layout::new(vec![], up, &map, false).align().is_none());
-        let (marks, up) = seen(&map, &elsewhere(), 0);
-        assert!(Layout::new(marks, up, &PriorMap::default(), false).align().is_none());
-    }
-
-    #[test]
-    fn tilt_is_known_better_than_heading() {
-        let map = table(&CLASSES, Some(Direction::Z));
-        let (marks, up) = seen(&map, &elsewhere(), 0);
-        let found = Layout::new(marks, up, &map, false).align().unwrap();
-        let level = Se3::new(elsewhere().rotation.inverse(), Vector3::zeros());
-        let information = found.noise(&level).unwrap().information_matrix(6).unwrap();
-        assert!(information[(0, 0)] > 2.0 * information[(2, 2)], "{information}");
-    }
-}
+mod tests;

@@ -30,6 +30,9 @@ pub struct OnlineReport {
     pub refused: Vec<String>,
     /// How many these are.
     pub refusals: usize,
+    /// Those of them that are frames, in words and all.
+    #[serde(skip)]
+    left_out: (Vec<String>, usize),
     /// Updates that ended in a batch solve, as shorter steps did not help.
     pub solved_batch: usize,
     /// Objects in the map after the last frame.
@@ -46,6 +49,13 @@ pub struct OnlineReport {
 const TOLD: usize = 20;
 
 impl OnlineReport {
+    /// Forgets what was counted of a map that is made anew, of the same frames: how long they took, and those that were left out, stay.
+    pub(crate) fn begin_again(&mut self) {
+        let Self { seconds, left_out, .. } = std::mem::take(self);
+        let (refused, refusals) = left_out.clone();
+        *self = Self { seconds, left_out, refused, refusals, ..Self::default() };
+    }
+
     /// Counts a frame in.
     pub(crate) fn count(&mut self, report: Result<&FrameReport, &FrameError>, seconds: f64) {
         self.seconds.push(seconds);
@@ -57,7 +67,12 @@ impl OnlineReport {
                 self.solved_batch += report.updates.iter().filter(|update| update.solved_batch).count();
                 report.refused.clone()
             }
-            Err(error) => vec![error.to_string()],
+            Err(error) => {
+                let (told, all) = &mut self.left_out;
+                *all += 1;
+                told.extend(Some(error.to_string()).filter(|_| told.len() < TOLD));
+                vec![error.to_string()]
+            }
         };
         self.refusals += refused.len();
         let room = TOLD.saturating_sub(self.refused.len());

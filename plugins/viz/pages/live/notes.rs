@@ -17,6 +17,8 @@ pub(super) struct Notes {
     merged: usize,
     forgotten: usize,
     refused: usize,
+    /// Frames, of the refused.
+    left_out: usize,
     rejected: usize,
     /// Each with the frame that it belongs to.
     newest: VecDeque<(usize, String)>,
@@ -26,6 +28,13 @@ impl Notes {
     /// Takes in what came of a frame; `now` is what an object is called now.
     pub(super) fn take(&mut self, report: &FrameReport, now: impl Fn(ObjectId) -> ObjectId) {
         let frame = report.frame;
+        if let Some(located) = &report.located {
+            // what was told is of a map that is no more, and this report tells of all frames
+            let (frames, newest) = (self.left_out, std::mem::take(&mut self.newest));
+            *self = Self { left_out: frames, refused: frames, newest, ..Self::default() };
+            let matches = located.matches.len();
+            self.note(frame, &format!("the place in the prior map is found, by {matches} objects: names and poses are of that map from now on"));
+        }
         self.born += report.born.len();
         self.withdrawn += report.withdrawn.len();
         self.merged += report.merged.len();
@@ -57,8 +66,14 @@ impl Notes {
         }
     }
 
+    /// A frame that could not be taken.
+    pub(super) fn left_out(&mut self, frame: usize, text: &str) {
+        self.left_out += 1;
+        self.refused(frame, text);
+    }
+
     /// Something that could not be taken.
-    pub(super) fn refused(&mut self, frame: usize, text: &str) {
+    fn refused(&mut self, frame: usize, text: &str) {
         self.refused += 1;
         self.note(frame, text);
     }

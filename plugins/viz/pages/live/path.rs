@@ -49,6 +49,15 @@ impl Path {
         }
     }
 
+    /// Moves the path of odometry as a whole, so that it begins at this pose.
+    pub(super) fn begin_odometry_at(&mut self, start: &Se3) {
+        let Some(first) = self.kept.first() else { return };
+        let moved = start.compose(&first.odometry.pose.inverse());
+        for frame in self.kept.iter_mut().chain(self.last.iter_mut().map(|(_, frame)| frame)) {
+            frame.odometry.pose = moved.compose(&frame.odometry.pose);
+        }
+    }
+
     /// Those that are kept, then the last one.
     pub(super) fn frames(&self) -> impl Iterator<Item = &FrameRecord> {
         let last = self.last.iter().filter(|(number, _)| !number.is_multiple_of(self.every));
@@ -96,6 +105,22 @@ mod tests {
             assert_eq!(times, expected);
             assert!(times.len() <= MOST + 1);
         }
+    }
+
+    #[test]
+    fn odometry_moves_as_a_whole() {
+        let at = |x: f64, turn: f64| {
+            let turn = nalgebra::Vector3::new(0.0, 0.0, turn);
+            Se3::new(manifactor_geometry::So3::exp(&turn), nalgebra::Vector3::new(x, 0.0, 0.0))
+        };
+        let mut path = path(3);
+        path.begin_odometry_at(&at(1.0, 0.5));
+        path.kept[2].odometry.pose = at(1.0, 0.5).compose(&at(2.0, 0.1));
+        path.begin_odometry_at(&at(-3.0, 0.7));
+        let between = path.kept[0].odometry.pose.between(&path.kept[2].odometry.pose);
+        let error = [at(-3.0, 0.7).between(&path.kept[0].odometry.pose), at(2.0, 0.1).between(&between)];
+        assert!(error.iter().all(|error| error.log().norm() < 1e-12), "{error:?}");
+        assert_eq!(path.kept[1].estimate.pose, Se3::identity());
     }
 
     #[test]

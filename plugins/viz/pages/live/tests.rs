@@ -1,4 +1,12 @@
 use super::*;
+use manifactor_geometry::Se3;
+use manifactor_slam::prior_map::PriorMap;
+use manifactor_slam::run::{Watch, estimate, online};
+use manifactor_slam::settings::Settings;
+use manifactor_slam::source::Folders;
+use manifactor_solve::Silent;
+use std::ops::ControlFlow;
+use std::sync::Arc;
 
 #[test]
 fn before_the_first_frame_there_is_a_map_of_nothing() {
@@ -26,4 +34,78 @@ fn a_box_has_its_label_behind_what_is_drawn() {
     assert_eq!(nameless.to_json(), json!([null, [1, 2, 3, 4.5], null, "<script>"]));
     let seen = SeenBox::new(ObjectId(7), measured, None, &NO_CAMERA);
     assert_eq!(LiveBox::Named(seen, "cup 7".to_owned()).to_json(), json!([7, [1, 2, 3, 4.5], null, "cup 7"]));
+}
+
+/// Shows a stream that finds its place in an earlier map, and looks closely at the frame that shows it.
+struct Shown {
+    live: LiveMap,
+    located: usize,
+}
+
+impl Watch for Shown {
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        observation: Option<&Observation>,
+        mapper: &mut Mapper,
+        seconds: f64,
+    ) -> ControlFlow<()> {
+        let before: Vec<Se3> = self.live.path.frames().map(|frame| frame.odometry.pose).collect();
+        self.live.frame(report, observation, mapper, seconds);
+        let Some(located) = report.ok().and_then(|report| report.located.as_ref()) else {
+            return ControlFlow::Continue(());
+        };
+        self.located += 1;
+        let odometry: Vec<Se3> = self.live.path.frames().map(|frame| frame.odometry.pose).collect();
+        assert!(odometry[0].between(&located.start).log().norm() < 1e-9);
+        assert!(before[0].between(&located.start).log().norm() > 0.1, "it began elsewhere");
+        for (before, after) in before.windows(2).zip(odometry.windows(2)) {
+            let change = before[0].between(&before[1]).between(&after[0].between(&after[1]));
+            assert!(change.log().norm() < 1e-9, "odometry is moved and not bent");
+        }
+        for (i, frame) in self.live.path.frames().enumerate() {
+            assert_eq!(Some(frame.estimate.pose), mapper.pose_of(i));
+        }
+        let notes = self.live.notes.to_json();
+        assert!(notes["newest"].to_string().contains("the place in the prior map is found"), "{notes}");
+        // those that were born in the map that is no more are not counted
+        assert_eq!(notes["counts"]["born"], report.map_or(0, |report| report.born.len()));
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn what_was_shown_moves_into_the_map_that_is_found() {
+    let settings = |seed: u32| -> Settings {
+        serde_json::from_value(json!({
+            "association": { "type": "likelihood" },
+            "odometry": { "noise": { "sigma": 0.005 } },
+            "detections": { "noise": { "sigma": 6.0 }, "loss": { "type": "cauchy", "scale": 1.0 } },
+            "source": {
+                "type": "simulated",
+                "seed": seed,
+                "scene": { "objects": 12, "seed": 6, "classes": ["bottle", "book", "cup"], "gap": 0.05, "area": [1.6, 1.2] },
+                "trajectory": { "frames": 240, "seed": seed },
+            },
+            "prior_map": { "file": "map.json" },
+        }))
+        .unwrap()
+    };
+    let mut first = settings(1);
+    first.prior_map = None;
+    let sequence = |settings: &Settings| Arc::new(settings.source.load(&Folders::default()).unwrap());
+    let (made, _) = estimate("first", sequence(&first), &first, &mut Silent).unwrap();
+    let mut second = settings(2);
+    second.prior_map.as_mut().unwrap().map = Arc::new(PriorMap::of(&made, &first).unwrap());
+    // its odometry begins elsewhere
+    let (mut stream, all) = (sequence(&second).opening().into_sequence(), sequence(&second));
+    let begin = all.frames[0].world_from_camera;
+    stream.up = all.up.and_then(|up| Direction::new(begin.rotation.inverse().act(&up)).ok());
+    for mut observation in all.observations() {
+        observation.frame.world_from_camera = begin.between(&observation.frame.world_from_camera);
+        stream.push(observation);
+    }
+    let mut shown = Shown { live: LiveMap::new("table", "only"), located: 0 };
+    online("second", Arc::new(stream).into(), &second, &mut shown, &mut Silent).unwrap();
+    assert_eq!(shown.located, 1);
 }

@@ -1,0 +1,83 @@
+//! Places at which a few marks match.
+use super::{Layout, Pair};
+use manifactor_geometry::Se3;
+
+/// Hypotheses that are made at most,
+const HYPOTHESES: usize = 2000;
+/// of so many groups of local marks.
+const GROUPS: usize = 2000;
+
+impl Layout {
+    /// Places at which two local marks match known ones; three, where up is unknown. Each group of local marks is tried with all known ones
+    /// that it may show: with many objects of one class, a few pairs of each would hardly ever hold two that are right.
+    pub(super) fn hypotheses(&self) -> Vec<Se3> {
+        let (options, size) = (self.options(), if self.up.is_some() { 2 } else { 3 });
+        let mut places = vec![];
+        for group in groups(options.len(), size).take(GROUPS) {
+            let mut chosen: Vec<Vec<Pair>> = vec![vec![]];
+            for member in group {
+                chosen = chosen.iter().flat_map(|some| self.with_one_more(some, &options[member])).collect();
+            }
+            places.extend(chosen.iter().filter_map(|pairs| self.place(pairs)));
+            if places.len() >= HYPOTHESES {
+                break;
+            }
+        }
+        places.truncate(HYPOTHESES);
+        places
+    }
+
+    /// The pairs of each local mark that has any; first of the marks whose classes say most.
+    fn options(&self) -> Vec<Vec<Pair>> {
+        let mut options = vec![vec![]; self.local.len()];
+        for pair in &self.pairs {
+            options[pair.local].push(*pair);
+        }
+        options.retain(|pairs| !pairs.is_empty());
+        // those of a mark are in order, and so are equals
+        options.sort_by(|a, b| b[0].evidence.total_cmp(&a[0].evidence));
+        options
+    }
+
+    /// Pairs, with each of these that goes together with all of them.
+    fn with_one_more<'a>(
+        &'a self,
+        pairs: &'a [Pair],
+        more: &'a [Pair],
+    ) -> impl Iterator<Item = Vec<Pair>> + 'a {
+        let fits = more.iter().filter(|new| pairs.iter().all(|pair| self.go_together(pair, new)));
+        fits.map(|new| pairs.iter().chain([new]).copied().collect())
+    }
+}
+
+/// Groups of two or three of so many marks, each in order; the first ones are in the first groups, and none is in all of these.
+fn groups(marks: usize, size: usize) -> impl Iterator<Item = Vec<usize>> {
+    let pairs = move |sum: usize, from: usize| {
+        let firsts = from..sum.div_ceil(2);
+        firsts.map(move |a| [a, sum - a]).filter(move |[_, b]| *b < marks)
+    };
+    (1..size * marks).flat_map(move |sum| -> Box<dyn Iterator<Item = Vec<usize>>> {
+        if size == 2 {
+            return Box::new(pairs(sum, 0).map(Vec::from));
+        }
+        let with_first = move |a: usize| pairs(sum - a, a + 1).map(move |[b, c]| vec![a, b, c]);
+        Box::new((0..sum.min(marks)).flat_map(with_first))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::groups;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn each_group_comes_once_and_the_first_marks_first() {
+        for (marks, size, expected) in [(0, 2, 0), (1, 2, 0), (5, 2, 10), (8, 2, 28), (2, 3, 0), (6, 3, 20)] {
+            let all: Vec<_> = groups(marks, size).collect();
+            let distinct: BTreeSet<_> = all.iter().collect();
+            assert_eq!((all.len(), distinct.len()), (expected, expected), "{all:?}");
+            assert!(all.iter().all(|group| group.len() == size && group.is_sorted_by(|a, b| a < b)));
+            assert!(all.iter().map(|group| group.iter().sum::<usize>()).is_sorted());
+        }
+    }
+}
