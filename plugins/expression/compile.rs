@@ -2,8 +2,9 @@
 use crate::mistake::Mistake;
 use crate::program::{Code, Pass, Program, Step};
 use crate::resolve::Library;
-use crate::scope::{Named, Scope, UP};
+use crate::scope::{Named, Scope, UP, check_name};
 use crate::syntax::{Formula, Node, parse};
+use indexmap::IndexMap;
 use manifactor_graph::TextError;
 use manifactor_graph::quantity::{Function, Quantity, Shape};
 use std::collections::{BTreeSet, HashMap};
@@ -27,10 +28,16 @@ impl Value {
 /// Compiles formulas, and says whether they use `up`.
 pub(crate) fn compile(
     scope: &Scope,
+    define: &IndexMap<String, String>,
     residual: &[String],
     domain: &[String],
 ) -> Result<(Program, bool), TextError> {
     let mut compiler = Compiler::new(scope);
+    for (name, text) in define {
+        compiler.define(name).map_err(|mistake| mistake.within(name))?;
+        let value = parse(text).and_then(|formula| compiler.value(&formula));
+        compiler.names.insert(name, value.map_err(|mistake| mistake.within(text))?);
+    }
     for text in residual {
         compiler.residual(text).map_err(|mistake| mistake.within(text))?;
     }
@@ -45,7 +52,8 @@ struct Compiler<'a> {
     scope: &'a Scope,
     library: &'static Library,
     code: Code,
-    names: HashMap<&'a str, Value>,
+    /// In the order in which they came, for messages.
+    names: IndexMap<&'a str, Value>,
     uses_up: bool,
     /// The arguments and the result of each call.
     calls: Vec<(Vec<Value>, Value)>,
@@ -57,7 +65,7 @@ struct Compiler<'a> {
 
 impl<'a> Compiler<'a> {
     fn new(scope: &'a Scope) -> Self {
-        let (mut code, mut names) = (Code::default(), HashMap::new());
+        let (mut code, mut names) = (Code::default(), IndexMap::new());
         for (name, what) in &scope.names {
             let at = code.values.len();
             let (shape, depends) = match what {
@@ -78,6 +86,18 @@ impl<'a> Compiler<'a> {
         }
         let (library, calls, rows, known) = (Library::linked(), vec![], vec![], HashMap::new());
         Self { scope, library, code, names, uses_up: false, calls, rows, known }
+    }
+
+    /// Checks the name of a part of formulas.
+    fn define(&self, name: &str) -> Result<(), Mistake> {
+        check_name(name)?;
+        match self.names.contains_key(name) {
+            true => {
+                let message = format!("`{name}` is a variable or a constant already: choose another name");
+                Err(Mistake::new(0..name.len(), message))
+            }
+            false => Ok(()),
+        }
     }
 
     /// Rows of the residual.
@@ -124,7 +144,10 @@ impl<'a> Compiler<'a> {
                     self.uses_up |= name == UP;
                     Ok(*value)
                 }
-                None => Err(self.library.unknown_name(name, formula.span.clone(), self.scope)),
+                None => {
+                    let known = self.names.keys().copied();
+                    Err(self.library.unknown_name(name, formula.span.clone(), known))
+                }
             },
             Node::Call { name, at, arguments } => {
                 let values: Vec<Value> = arguments.iter().map(|a| self.value(a)).collect::<Result<_, _>>()?;

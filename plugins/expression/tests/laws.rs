@@ -41,6 +41,30 @@ jacobian_laws! {
     formulas_in_the_plane_agree: (any_se2(), any_se2()).prop_map(|(a, b)| (plane(), a, b));
 }
 
+fn with_parts(document: serde_json::Value) -> Expression {
+    serde_json::from_value(document).unwrap()
+}
+
+#[test]
+fn a_part_that_has_a_name_is_the_formula_that_it_stands_for() {
+    let parts = with_parts(serde_json::json!({
+        "variables": { "x": "se3", "p": "point3" },
+        "define": { "seen": "inverse(x) * p", "far": "norm(seen)" },
+        "residual": ["seen / far - up", "where(far - 2, far, 2)"],
+        "domain": ["far"],
+    }));
+    let long = with_parts(serde_json::json!({
+        "variables": { "x": "se3", "p": "point3" },
+        "residual": ["inverse(x) * p / norm(inverse(x) * p) - up", "where(norm(inverse(x) * p) - 2, norm(inverse(x) * p), 2)"],
+    }));
+    check((any_se3(), any_point3()), |(x, p)| {
+        same(&parts, &long, &[&x, &p], 0.0);
+        Ok(())
+    });
+    let read: Expression = serde_json::from_str(&serde_json::to_string(&parts).unwrap()).unwrap();
+    assert_eq!(serde_json::to_value(&read).unwrap(), serde_json::to_value(&parts).unwrap());
+}
+
 /// Both say the same, and so do their derivatives.
 fn same(
     formula: &Expression,
