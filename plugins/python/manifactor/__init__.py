@@ -30,8 +30,63 @@ from .losses import *
 from .report import Report, Summary, experiment, run
 from .solvers import auto, dogleg, gauss_newton, gnc, levenberg_marquardt
 from .traced import Check, TracedFactor, check_factor, factor
-from .variables import BY_TYPE as _types_of_variables
 from .variables import *
+
+__all__ = [
+    "ArgumentError",
+    "BatchFactor",
+    "Check",
+    "DocumentError",
+    "Factor",
+    "FactorId",
+    "Graph",
+    "GraphError",
+    "Loss",
+    "ManifactorError",
+    "Noise",
+    "Report",
+    "Session",
+    "Solution",
+    "SolveError",
+    "Solver",
+    "Start",
+    "Summary",
+    "TraceError",
+    "TracedFactor",
+    "Values",
+    "Variable",
+    "__version__",
+    "auto",
+    "batch",
+    "check_factor",
+    "dogleg",
+    "enable_logging",
+    "errors",
+    "experiment",
+    "factor",
+    "factors",
+    "functions",
+    "gauss_newton",
+    "gnc",
+    "levenberg_marquardt",
+    "load",
+    "losses",
+    "poses",
+    "require",
+    "rotations",
+    "run",
+    "save",
+    "solve",
+    "solvers",
+    "starts",
+    "to_pandas",
+    "types",
+    "variables",
+    "where",
+]
+__all__ += factors.__all__
+__all__ += losses.__all__
+__all__ += variables.__all__
 
 
 def load(path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True) -> tuple[Graph, Values]:

@@ -212,7 +212,6 @@ def module_of_variables(entries: list[Schema], functions: list[Schema], types: T
     parts = []
     for entry in entries:
         fields = parameters(entry, types, {})
-        fields = [(name, hint, value, needed) for name, hint, value, needed in fields]
         name = camel(entry["name"])
         tangent = ", ".join(f'"{direction}"' for direction in entry["tangent"])
         tangent = f"({tangent},)" if len(entry["tangent"]) == 1 else f"({tangent})"
@@ -224,7 +223,7 @@ def module_of_variables(entries: list[Schema], functions: list[Schema], types: T
             f'    SHAPE: ClassVar[str] = "{entry["quantity"] or ""}"',
             f"    TANGENT: ClassVar[tuple[str, ...]] = {tangent}",
             "",
-            signature("    def __new__(cls", fields, name),
+            signature("    def __new__(cls", fields, "Self"),
             f'        return super().__new__(cls, "variable", "{entry["name"]}", {fields_of(fields)})',
         ]
         own = {field for field, *_ in fields}
@@ -247,8 +246,9 @@ def module_of_variables(entries: list[Schema], functions: list[Schema], types: T
     named = "\n\n\n#: The class of each type of variables, by its name in documents.\nBY_TYPE: dict[str, type[Variable]] = {\n"
     named += "".join(f'    "{entry["name"]}": {camel(entry["name"])},\n' for entry in entries) + "}\n"
     head = HEADER.format(about="Every type of variables that is linked, as a class of its values.")
-    head += "\nfrom typing import Any, ClassVar\n\nimport numpy as np\nfrom numpy.typing import NDArray\n"
+    head += "\nfrom typing import Any, ClassVar, Self\n\nimport numpy as np\nfrom numpy.typing import NDArray\n"
     head += "\nfrom .chosen import Numbers, Variable, in_formulas\n"
+    head += "\n__all__ = [\n" + "".join(f'    "{camel(entry["name"])}",\n' for entry in entries) + "]\n"
     return head + "\n\n" + body + named
 
 
@@ -267,10 +267,10 @@ def module_of_types(types: Types) -> str:
             lines.append(f"    {field}: " + (f"Required[{hint}]" if field in required else hint))
         parts.append("\n".join(lines))
     body = "\n\n\n".join(parts)
-    standard = "\nfrom collections.abc import Sequence\n" if "Sequence[" in body else ""
+    sequences = "\nfrom collections.abc import Sequence\n" if "Sequence[" in body else ""
     typing = [name for name in ("Any", "Literal", "Required") if f"{name}[" in body or f": {name}" in body]
     head = HEADER.format(about="Tables of fields within factors, losses and solvers.")
-    head += standard + f"from typing import {', '.join([*typing, 'TypedDict'])}\n"
+    head += sequences + f"from typing import {', '.join([*typing, 'TypedDict'])}\n"
     if "Noise" in body:
         head += "\nfrom ._native import Noise"
     names = [n for n in ("Factor", "Fields", "Loss", "Numbers", "Solver", "Variable") if f"{n} " in body or f"{n}\n" in body or f"{n}]" in body]
@@ -288,7 +288,6 @@ def module_of_functions(functions: list[Schema]) -> str:
         for function in overloads:
             arguments = ", ".join(f"{argument}: {shape}" for argument, shape in function["arguments"])
             lines.append(f"{name}({arguments}) -> {function['result']}: {one_line(function['summary'])}")
-        arguments = "a, b, c".split(", ")
         arities = sorted({len(function["arguments"]) for function in overloads})
         if arities == [1]:
             taken, given = "a: Any, /", "a"

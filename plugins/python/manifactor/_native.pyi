@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Self, final
+from typing import Any, Self, TypeVar, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,7 @@ from .chosen import Factor, Loss, Solver, Start, Variable
 
 __version__: str
 
+_V = TypeVar("_V", bound=Variable)
 _Array = NDArray[np.float64]
 _Keys = str | Sequence[str]
 _KeyRows = Sequence[str] | Sequence[Sequence[str]] | NDArray[Any]
@@ -264,13 +265,17 @@ def solve(
 def read(path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True) -> tuple[Graph, Values, list[str]]: ...
 def catalogue() -> str: ...
 def functions() -> str: ...
-def retract(x: Variable, delta: ArrayLike) -> Variable: ...
+def retract(x: _V, delta: ArrayLike) -> _V: ...
 def local(x: Variable, to: Variable) -> _Array: ...
 def tangent(x: Variable) -> list[str]: ...
 def linearize(of: Factor, at: Sequence[Variable]) -> tuple[_Array, list[_Array]]: ...
 def rho(of: Loss, squared: ArrayLike) -> tuple[_Array, _Array]: ...
 def check_factor(
-    of: Factor, around: Sequence[Variable] | None = None, points: int = 256, seed: int = 0
+    of: Factor,
+    around: Sequence[Variable] | None = None,
+    names: Sequence[str] | None = None,
+    points: int = 256,
+    seed: int = 0,
 ) -> tuple[bool, str, dict[str, Any]]: ...
 def run(
     config: str,
@@ -278,7 +283,7 @@ def run(
     set: Sequence[str],
     data: str | None,
     observer: Callable[[dict[str, Any]], bool | None] | None = None,
-) -> tuple[str, str, str]: ...
+) -> tuple[str, str, str, str]: ...
 def experiment(
     config: str,
     json: str | None,
@@ -288,7 +293,25 @@ def experiment(
     force: bool,
     retry_failed: bool,
     threads: int | None,
+    shard: str | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> tuple[str, str]: ...
+) -> tuple[str | None, str]: ...
 def main(arguments: Sequence[str]) -> int: ...
 def log_to(log: Callable[[int, str, str], None], level: int) -> None: ...
+
+@final
+class Sweep:
+    def __new__(
+        cls,
+        config: str,
+        json: str | None,
+        set: Sequence[str],
+        data: str | None,
+        out: str | None,
+        force: bool,
+        is_driver: bool,
+    ) -> Self: ...
+    def open(self) -> list[int]: ...
+    def run(self, number: int) -> str: ...
+    def keep(self, line: str) -> None: ...
+    def write(self) -> tuple[str, str]: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from inspect import Parameter
@@ -22,6 +23,9 @@ class BatchFactor:
     """A factor as a function of arrays. Called with its constants, it is a `Factor`."""
 
     def __init__(self, function: Callable[..., Any], rows: int, jacobian: Callable[..., Any] | str | None) -> None:
+        if isinstance(jacobian, str) and jacobian not in ("jax", "differences"):
+            message = f'expected a function, "jax" or "differences", got {jacobian!r}'
+            raise ArgumentError(function.__name__, [Mistake("jacobian", message)])
         self.function = function
         self.variables, self.constants = parameters(function)
         self.rows = rows
@@ -30,9 +34,6 @@ class BatchFactor:
         self.__wrapped__ = function
         if jacobian == "jax" or (jacobian is None and uses_jax(function)):
             self.jacobian: Callable[..., Any] | None = by_jax(function, len(self.variables), len(self.constants))
-        elif isinstance(jacobian, str) and jacobian != "differences":
-            message = f'expected a function, "jax" or "differences", got {jacobian!r}'
-            raise ArgumentError(self.__name__, [Mistake("jacobian", message)])
         else:
             self.jacobian = jacobian if callable(jacobian) else None
         #: By the shapes of the constants.
@@ -109,8 +110,8 @@ def uses_jax(function: Callable[..., Any]) -> bool:
     """Whether a function names a module of JAX's."""
     if "jax" not in sys.modules:
         return False
-    used = function.__code__.co_names
-    modules = [value for name, value in function.__globals__.items() if name in used]
+    named = inspect.getclosurevars(function)
+    modules = [*named.globals.values(), *named.nonlocals.values()]
     return any(getattr(module, "__name__", "").startswith("jax") for module in modules)
 
 
@@ -119,7 +120,7 @@ def by_jax(function: Callable[..., Any], variables: int, constants: int) -> Call
     import jax
     import jax.numpy as jnp
 
-    jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 
     def one(*arguments: Any) -> Any:
         returned = jnp.asarray(function(*(argument[None] for argument in arguments)))

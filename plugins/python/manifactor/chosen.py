@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._native import Chosen
+from .errors import Mistake, TraceError
 
 #: Numbers in a row: a list, a tuple, an array of one axis.
 Numbers = Sequence[float] | NDArray[Any]
@@ -20,7 +21,7 @@ Fields = Mapping[str, Any]
 class Factor(Chosen):
     """A residual with its parameters; keys, noise and loss are given to `Graph.add`."""
 
-    def __new__(cls, name: str, fields: Fields | None = None) -> Factor:
+    def __new__(cls, name: str, fields: Fields | None = None) -> Self:
         return super().__new__(cls, "factor", name, None if fields is None else dict(fields))
 
     def linearize(self, *variables: Variable) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
@@ -35,7 +36,7 @@ class Factor(Chosen):
 class Loss(Chosen):
     """A robust loss ρ: a factor with the squared whitened norm s costs ½ρ(s)."""
 
-    def __new__(cls, name: str, fields: Fields | None = None) -> Loss:
+    def __new__(cls, name: str, fields: Fields | None = None) -> Self:
         return super().__new__(cls, "loss", name, None if fields is None else dict(fields))
 
     def rho(self, squared: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -46,14 +47,14 @@ class Loss(Chosen):
 class Solver(Chosen):
     """What moves an estimate to a minimum."""
 
-    def __new__(cls, name: str, fields: Fields | None = None) -> Solver:
+    def __new__(cls, name: str, fields: Fields | None = None) -> Self:
         return super().__new__(cls, "solver", name, None if fields is None else dict(fields))
 
 
 class Start(Chosen):
     """Where a solve begins."""
 
-    def __new__(cls, name: str, fields: Fields | None = None) -> Start:
+    def __new__(cls, name: str, fields: Fields | None = None) -> Self:
         return super().__new__(cls, "start", name, None if fields is None else dict(fields))
 
 
@@ -67,11 +68,32 @@ class Variable(Chosen):
     #: Names of its tangent directions, in their order.
     TANGENT: ClassVar[tuple[str, ...]] = ()
 
-    def retract(self, delta: ArrayLike) -> Variable:
+    if TYPE_CHECKING:
+        # what an argument of a traced factor or of a batch is good for, for checkers of types: a value has none of it
+        def __add__(self, other: Any) -> Any: ...
+        def __radd__(self, other: Any) -> Any: ...
+        def __sub__(self, other: Any) -> Any: ...
+        def __rsub__(self, other: Any) -> Any: ...
+        def __mul__(self, other: Any) -> Any: ...
+        def __rmul__(self, other: Any) -> Any: ...
+        def __truediv__(self, other: Any) -> Any: ...
+        def __matmul__(self, other: Any) -> Any: ...
+        def __rmatmul__(self, other: Any) -> Any: ...
+        def __pow__(self, other: Any) -> Any: ...
+        def __neg__(self) -> Any: ...
+        def __abs__(self) -> Any: ...
+        def __lt__(self, other: Any) -> Any: ...
+        def __gt__(self, other: Any) -> Any: ...
+        def __le__(self, other: Any) -> Any: ...
+        def __ge__(self, other: Any) -> Any: ...
+        def __getitem__(self, index: Any) -> Any: ...
+        def __len__(self) -> int: ...
+
+    def retract(self, delta: ArrayLike) -> Self:
         """The point that a tangent vector, shape (dim,), leads to."""
         return _native.retract(self, delta)
 
-    def local(self, to: Variable) -> NDArray[np.float64]:
+    def local(self, to: Self) -> NDArray[np.float64]:
         """The tangent vector, shape (dim,), that leads to another point of the same type."""
         return _native.local(self, to)
 
@@ -97,6 +119,5 @@ def untagged(value: Any) -> Any:
 
 def in_formulas(value: Variable, name: str) -> Any:
     """For attributes that a value has in traced factors only."""
-    raise AttributeError(
-        f"`{name}` is a function of formulas: it is there in a factor that is written in Python, not in a value of {value.type}"
-    )
+    help = "it is there in a factor that is written in Python"
+    raise TraceError("", [Mistake("", f"`{name}` is a function of formulas, and this is a value of {value.type}", help)])

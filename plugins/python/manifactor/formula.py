@@ -208,15 +208,15 @@ class Expr:
         return Condition(lambda a, b: call("where", self - other, a, b))
 
     def __le__(self, other: Any) -> Condition:
-        return ~(self > other)
+        return ~self.__gt__(other)
 
     def __ge__(self, other: Any) -> Condition:
-        return ~(self < other)
+        return ~self.__lt__(other)
 
-    def __eq__(self, other: object) -> NoReturn:  # type: ignore[override]
+    def __eq__(self, other: object) -> NoReturn:
         wrong("values of variables are never tested for equality", "compare by < or >")
 
-    def __ne__(self, other: object) -> NoReturn:  # type: ignore[override]
+    def __ne__(self, other: object) -> NoReturn:
         self.__eq__(other)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
@@ -267,7 +267,7 @@ def require(condition: Any) -> None:
         wrong("this requirement never holds")
 
 
-def call(name: str, *arguments: Any) -> Any:
+def call(name: str, *arguments: Any) -> Expr:
     """A function of formulas, by the types of its arguments; numbers where none of them is a variable's."""
     trace = next((argument.trace for argument in arguments if isinstance(argument, Expr)), None)
     if trace is None:

@@ -37,8 +37,10 @@ class Trajectory:
 class Variant:
     """One variant of a run: `report` has its figures, `record` all that there is to draw; both as their files have it."""
 
-    def __init__(self, report: dict[str, Any], record: dict[str, Any]) -> None:
+    def __init__(self, report: dict[str, Any], row: dict[str, Any], record: dict[str, Any]) -> None:
         self.report, self.record = report, record
+        #: Its line in the table of the run: costs, errors at the estimate where there is a truth, seconds.
+        self.row = row
         self.name: str = report["name"]
 
     def __repr__(self) -> str:
@@ -49,23 +51,12 @@ class Variant:
         """Whether its solve has ended at a minimum."""
         return bool(self.report["solve"]["termination"]["status"] == "converged")
 
-    @property
-    def metrics(self) -> dict[str, float]:
-        """Errors at the estimate, by name; none, where there is no truth."""
-        found: dict[str, float] = {}
-        for trajectory in self.report["trajectory"]:
-            found[f"ate_{trajectory['alignment']}"] = trajectory["after"]["ate"]["rmse"]
-        landmarks = self.report["landmarks"]
-        if landmarks:
-            found |= {name: value for name, value in landmarks["after"].items() if isinstance(value, float)}
-        return found
-
     def trajectory(self, which: str = "estimate") -> Trajectory:
         """The poses: of the `estimate`, of `odometry`, or of the `truth`."""
         frames = [frame for frame in self.record["frames"] if frame.get(which) is not None]
         poses = [frame[which].get("pose", frame[which]) for frame in frames]
         return Trajectory(
-            np.array([frame["time"] for frame in frames], dtype=float),
+            np.array([frame["timestamp"] for frame in frames], dtype=float),
             np.array([pose["translation"] for pose in poses], dtype=float).reshape(-1, 3),
             np.array([pose["rotation"] for pose in poses], dtype=float).reshape(-1, 4),
         )
@@ -79,11 +70,13 @@ class Variant:
 class Report:
     """What a run has to tell."""
 
-    def __init__(self, report: dict[str, Any], record: dict[str, Any], page: str) -> None:
+    def __init__(
+        self, report: dict[str, Any], table: list[dict[str, Any]], record: dict[str, Any], page: str
+    ) -> None:
         self.title: str = report["title"]
         self.complete: bool = report["complete"]
         self.seconds: float = report["seconds"]
-        self.variants = [Variant(*both) for both in zip(report["variants"], record["variants"], strict=True)]
+        self.variants = [Variant(*of) for of in zip(report["variants"], table, record["variants"], strict=True)]
         #: The page with the map in 3D, as HTML that needs no network.
         self.html = page
 
@@ -112,10 +105,10 @@ class Report:
         Path(path).write_text(self.html, encoding="utf-8")
 
     def to_pandas(self) -> Any:
-        """The metrics as a `pandas.DataFrame`, a row for each variant."""
+        """The table of the run as a `pandas.DataFrame`, a row for each variant."""
         import pandas
 
-        return pandas.DataFrame([variant.metrics for variant in self], index=[variant.name for variant in self])
+        return pandas.DataFrame([variant.row for variant in self]).set_index("variant")
 
     def to_rerun(self, path: str | os.PathLike[str] | None = None, *, name: str = "manifactor") -> None:
         """Shows the run in the viewer rerun, or writes it to a `.rrd` file; needs `manifactor[rerun]`."""
@@ -175,12 +168,12 @@ def run(
     dict after each step of a solve, and ends it where it returns `False`. `manifactor run` writes a folder with pictures.
     """
     path, text = opened(config, "run")
-    report, record, page = _native.run(path, text, overrides(set), data_folder(data), observer)
-    return Report(json.loads(report), json.loads(record), page)
+    report, table, record, page = _native.run(path, text, overrides(set), data_folder(data), observer)
+    return Report(json.loads(report), json.loads(table), json.loads(record), page)
 
 
 class Summary:
-    """What an experiment came to: `summary` as `summary.json` has it, and the folder of the tables."""
+    """What an experiment came to: `summary` as `summary.json` has it, empty for a part, and the folder of the tables."""
 
     def __init__(self, summary: dict[str, Any], folder: Path) -> None:
         self.summary, self.folder = summary, folder
@@ -204,16 +197,18 @@ def experiment(
     force: bool = False,
     retry_failed: bool = False,
     threads: int | None = None,
+    shard: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Summary:
     """Runs the trials of an experiment that are not done yet, and writes its tables.
 
     Trials that are done are kept in `trials.jsonl` of its folder: after Ctrl-C, or a kill, the same call goes on. `progress`
-    is called with the trials that are done, and all.
+    is called with the trials that are done, and all. `shard="2/8"` runs the second of eight parts, which has a folder of its own
+    and no tables; the same call without it takes over what all parts have done. `manifactor.ray` spreads trials over a cluster.
     """
     path, text = opened(config, "experiment")
     out = None if out is None else os.fspath(out)
     summary, folder = _native.experiment(
-        path, text, overrides(set), data_folder(data), out, force, retry_failed, threads, progress
+        path, text, overrides(set), data_folder(data), out, force, retry_failed, threads, shard, progress
     )
-    return Summary(json.loads(summary), Path(folder))
+    return Summary(json.loads(summary or "{}"), Path(folder))

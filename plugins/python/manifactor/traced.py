@@ -146,7 +146,7 @@ class TracedFactor:
 
 def plain(value: Any) -> Any:
     """A constant as a document has it; an array with a row for each factor stays one."""
-    return value.to_dict() if isinstance(value, Variable) else value if isinstance(value, np.ndarray) else value
+    return value.to_dict() if isinstance(value, Variable) else value
 
 
 def rows_of(trace: Trace, returned: Any, function: Callable[..., Any]) -> list[Expr]:
@@ -182,7 +182,7 @@ def factor(function: Callable[..., Any]) -> TracedFactor:
 
         graph.add("q0", stands(), noise=0.1)
 
-    Branches are `mf.where(condition, a, b)`, for a `for` loop has to run the same way every time.
+    Branches are `mf.where(condition, a, b)`; loops are unrolled.
     """
     return TracedFactor(function)
 
@@ -205,18 +205,18 @@ class Check:
         return self.holds
 
 
-def check_factor(
-    of: Any, *around: Variable, points: int = 256, seed: int = 0, **constants: Any
-) -> Check:
+def check_factor(of: Any, *around: Variable, points: int = 256, seed: int = 0, **constants: Any) -> Check:
     """Checks a factor before a solver meets it, as `manifactor check-factor` does.
 
     Its Jacobian against differences, what it leaves free, its kinks and jumps, at random points: around the values that are
     given or the examples of their types, and wherever these draw. `of` is a `Factor`, or a function that makes one, with its
     constants.
     """
+    names: list[str] | None = None
     if not isinstance(of, Factor):
+        names = list(getattr(of, "variables", ())) or None
         of = of(**constants)
     elif constants:
         raise TypeError(f"a factor that is made has its constants: {', '.join(constants)}")
-    holds, text, report = _native.check_factor(of, list(around) or None, points, seed)
+    holds, text, report = _native.check_factor(of, list(around) or None, names, points, seed)
     return Check(holds, text, report)

@@ -4,12 +4,26 @@ Written by `python -m manifactor._generate` from the catalogue."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .chosen import Numbers, Variable, in_formulas
+
+__all__ = [
+    "BalCamera",
+    "DualQuadric",
+    "Plane",
+    "Point1",
+    "Point2",
+    "Point3",
+    "S2",
+    "Se2",
+    "Se3",
+    "So2",
+    "So3",
+]
 
 
 class BalCamera(Variable):
@@ -49,7 +63,7 @@ class BalCamera(Variable):
         focal_length: float,
         k1: float,
         k2: float,
-    ) -> BalCamera:
+    ) -> Self:
         return super().__new__(cls, "variable", "bal_camera", {"translation": translation, "rotation": rotation, "focal_length": focal_length, "k1": k1, "k2": k2})
 
     @property
@@ -101,7 +115,7 @@ class DualQuadric(Variable):
     SHAPE: ClassVar[str] = "dual_quadric"
     TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z", "log_a", "log_b", "log_c")
 
-    def __new__(cls, *, translation: Numbers, rotation: Numbers, semi_axes: Numbers) -> DualQuadric:
+    def __new__(cls, *, translation: Numbers, rotation: Numbers, semi_axes: Numbers) -> Self:
         return super().__new__(cls, "variable", "dual_quadric", {"translation": translation, "rotation": rotation, "semi_axes": semi_axes})
 
     @property
@@ -155,7 +169,7 @@ class Plane(Variable):
     SHAPE: ClassVar[str] = "plane"
     TANGENT: ClassVar[tuple[str, ...]] = ("a", "b", "offset")
 
-    def __new__(cls, *, normal: Numbers, offset: float) -> Plane:
+    def __new__(cls, *, normal: Numbers, offset: float) -> Self:
         return super().__new__(cls, "variable", "plane", {"normal": normal, "offset": offset})
 
     @property
@@ -187,7 +201,7 @@ class Point1(Variable):
     SHAPE: ClassVar[str] = "number"
     TANGENT: ClassVar[tuple[str, ...]] = ("x",)
 
-    def __new__(cls, *, position: Numbers) -> Point1:
+    def __new__(cls, *, position: Numbers) -> Self:
         return super().__new__(cls, "variable", "point1", {"position": position})
 
     @property
@@ -274,7 +288,7 @@ class Point2(Variable):
     SHAPE: ClassVar[str] = "vector2"
     TANGENT: ClassVar[tuple[str, ...]] = ("x", "y")
 
-    def __new__(cls, *, position: Numbers) -> Point2:
+    def __new__(cls, *, position: Numbers) -> Self:
         return super().__new__(cls, "variable", "point2", {"position": position})
 
     @property
@@ -336,7 +350,7 @@ class Point3(Variable):
     SHAPE: ClassVar[str] = "vector3"
     TANGENT: ClassVar[tuple[str, ...]] = ("x", "y", "z")
 
-    def __new__(cls, *, position: Numbers) -> Point3:
+    def __new__(cls, *, position: Numbers) -> Self:
         return super().__new__(cls, "variable", "point3", {"position": position})
 
     @property
@@ -425,7 +439,7 @@ class S2(Variable):
     SHAPE: ClassVar[str] = "vector3"
     TANGENT: ClassVar[tuple[str, ...]] = ("a", "b")
 
-    def __new__(cls, *, direction: Numbers) -> S2:
+    def __new__(cls, *, direction: Numbers) -> Self:
         return super().__new__(cls, "variable", "s2", {"direction": direction})
 
     @property
@@ -514,7 +528,7 @@ class Se2(Variable):
     SHAPE: ClassVar[str] = "se2"
     TANGENT: ClassVar[tuple[str, ...]] = ("x", "y", "theta")
 
-    def __new__(cls, *, translation: Numbers, angle: float) -> Se2:
+    def __new__(cls, *, translation: Numbers, angle: float) -> Self:
         return super().__new__(cls, "variable", "se2", {"translation": translation, "angle": angle})
 
     @property
@@ -568,7 +582,7 @@ class Se3(Variable):
     SHAPE: ClassVar[str] = "se3"
     TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z")
 
-    def __new__(cls, *, translation: Numbers, rotation: Numbers) -> Se3:
+    def __new__(cls, *, translation: Numbers, rotation: Numbers) -> Self:
         return super().__new__(cls, "variable", "se3", {"translation": translation, "rotation": rotation})
 
     @property
@@ -615,7 +629,7 @@ class So2(Variable):
     SHAPE: ClassVar[str] = "so2"
     TANGENT: ClassVar[tuple[str, ...]] = ("theta",)
 
-    def __new__(cls, *, angle: float) -> So2:
+    def __new__(cls, *, angle: float) -> Self:
         return super().__new__(cls, "variable", "so2", {"angle": angle})
 
     @property
@@ -658,7 +672,7 @@ class So3(Variable):
     SHAPE: ClassVar[str] = "so3"
     TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz")
 
-    def __new__(cls, *, rotation: Numbers) -> So3:
+    def __new__(cls, *, rotation: Numbers) -> Self:
         return super().__new__(cls, "variable", "so3", {"rotation": rotation})
 
     @property

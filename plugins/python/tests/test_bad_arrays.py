@@ -134,19 +134,20 @@ def test_single_values() -> None:
     with pytest.raises(mf.ArgumentError, match=r"delta: expected an array of shape \(2,\), got \(3,\)"):
         x.retract(np.zeros(3))
     with pytest.raises(mf.ArgumentError, match="to: expected a point2, got a point1"):
-        x.local(mf.Point1(position=[0]))
+        x.local(mf.Point1(position=[0]))  # type: ignore[arg-type]
 
 
 def test_what_cannot_be_in_a_document() -> None:
     recursive: list[Any] = []
     recursive.append(recursive)
-    for value, message in [
+    cases: list[tuple[Any, str]] = [
         (object(), "position: expected numbers, texts, lists, dicts or arrays, got object"),
         (recursive, "nested more than 64 levels deep"),
         ({1: 2}, "position: expected names as keys, got 1"),
         ("here", 'position: expected an array, found the text "here"'),
         (10**400, "position: expected a number of at most 64 bits"),
-    ]:
+    ]
+    for value, message in cases:
         with pytest.raises(mf.ArgumentError, match=message):
             mf.Point2(position=value)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import manifactor as mf
 import manifactor.functions as fn
@@ -35,7 +35,6 @@ def test_a_factor_is_its_formula() -> None:
     fields = stands().to_dict()
     assert fields["variables"] == {"q": "dual_quadric"}
     assert fields["residual"] == ["1.0 - abs(dot(major_axis(q), up))"]
-    assert stands() == mf.expression(variables={"q": "dual_quadric"}, residual=["1 - abs(dot(major_axis(q), up))"]) or True
     assert stands(up=(0, 1, 0)).to_dict()["up"] == [0, 1, 0]
     assert repr(stands) == "<factor stands(q: DualQuadric, up)>" and stands.__doc__ == "A bottle stands."
 
@@ -108,7 +107,7 @@ def test_more_than_nine_rows_are_solved() -> None:
 
 def test_the_jacobian_holds() -> None:
     check = mf.check_factor(stands)
-    assert check and check.holds and "major" not in check.text[:0]
+    assert check and check.holds
     assert "Jacobian" in repr(check) and check.report["defined"] > 100
     check = mf.check_factor(everything, gain=0.5, offset=[0.5, 0.0, -1.0])
     assert check.text
@@ -123,7 +122,7 @@ def test_the_jacobian_holds() -> None:
 def test_what_is_used_twice_is_computed_once() -> None:
     @mf.factor
     def doubled(p: mf.Point1) -> Any:
-        x = p
+        x: Any = p
         for _ in range(100):
             x = np.sin(x) + x
         return x
@@ -168,8 +167,8 @@ def test_a_pose_as_a_constant() -> None:
     def at_anchor(x: mf.Se3, anchor: Any) -> Any:
         return fn.log(fn.between(anchor, x))
 
-    x, anchor = quadric().to_dict(), mf.Se3(translation=[1, 2, 3], rotation=[0, 0, 0.6, 0.8])
-    x = mf.Se3(translation=[0, 1, 0], rotation=x["rotation"])
+    anchor = mf.Se3(translation=[1, 2, 3], rotation=[0, 0, 0.6, 0.8])
+    x = mf.Se3(translation=[0, 1, 0], rotation=quadric().rotation)
     np.testing.assert_allclose(at_anchor(anchor=anchor).residual(x), mf.prior_se3(value=anchor).residual(x), atol=1e-12)
 
 
@@ -202,8 +201,11 @@ def line_of(error: BaseException) -> str:
 MISTAKES: list[tuple[Any, type[Exception], str, str]] = []
 
 
-def mistake(error: type[Exception], message: str, line: str) -> Any:
-    def enter(function: Any) -> Any:
+F = TypeVar("F")
+
+
+def mistake(error: type[Exception], message: str, line: str) -> Callable[[F], F]:
+    def enter(function: F) -> F:
         MISTAKES.append((function, error, message, line))
         return function
 
@@ -224,7 +226,7 @@ def two_and_three(q: mf.DualQuadric) -> Any:
 
 @mistake(AttributeError, "a dual_quadric has no `axis`.*what takes it: .*major_axis", "return q.axis")
 def misspelt(q: mf.DualQuadric) -> Any:
-    return q.axis  # type: ignore[attr-defined]
+    return q.axis
 
 
 @mistake(mf.TraceError, r"`\+` is not defined between vector3 and number", "return q.centroid + 1")
@@ -285,9 +287,10 @@ def test_a_formula_is_a_factor_too() -> None:
 
 
 def test_the_command_line_runs_what_was_written_in_python(tmp_path: Path) -> None:
-    graph, values = mf.Graph(), mf.Values({"q0": quadric()})
-    graph.add("q0", stands(up=[0, 0, 1]), noise=0.1)
-    graph.add("q0", mf.prior_quadric(value=quadric()), noise=1.0)
+    graph, values = mf.Graph(), mf.Values({"q3": quadric()})
+    # the key of the examples, which reports name
+    graph.add("q3", stands(up=[0, 0, 1]), noise=0.1)
+    graph.add("q3", mf.prior_quadric(value=quadric()), noise=1.0)
     mf.save(tmp_path / "graph.toml", graph, values)
     solution = mf.solve(graph, values)
     done = subprocess.run(

@@ -79,10 +79,10 @@ def test_noise_by_rows(form: str) -> None:
     fields = {"relative": {"translation": (1.0, 0.0), "angle": 0.0}}
     graph.add_many(mf.between_se2, keys, fields, noise={form: array})
     for i in range(5):
-        one = mf.Noise(**{form: array[i]})  # type: ignore[arg-type]
+        one = mf.Noise(**{form: array[i]})
         assert graph[i]["noise"] == one.to_dict()
     expected = {"sigmas": np.diag(array[0] ** -2), "covariance": np.linalg.inv(array[0]) if form != "sigmas" else 0}
-    np.testing.assert_allclose(mf.Noise(**{form: array[0]}).information_matrix(3), expected.get(form, array[0]))  # type: ignore[arg-type]
+    np.testing.assert_allclose(mf.Noise(**{form: array[0]}).information_matrix(3), expected.get(form, array[0]))
 
 
 def test_a_hundred_thousand_factors_take_no_time() -> None:
