@@ -45,13 +45,15 @@ pub(crate) fn compile(
     for text in domain {
         compiler.condition(text).map_err(|mistake| mistake.within(text))?;
     }
-    Ok((Program::new(compiler.code), compiler.uses_up))
+    Ok((Program::new(compiler.code, compiler.values), compiler.uses_up))
 }
 
 struct Compiler<'a> {
     scope: &'a Scope,
     library: &'static Library,
     code: Code,
+    /// Constants and what follows from them; room for what depends on variables.
+    values: Vec<f64>,
     /// In the order in which they came, for messages.
     names: IndexMap<&'a str, Value>,
     uses_up: bool,
@@ -65,17 +67,18 @@ struct Compiler<'a> {
 
 impl<'a> Compiler<'a> {
     fn new(scope: &'a Scope) -> Self {
-        let (mut code, mut names) = (Code::default(), IndexMap::new());
+        let (mut code, mut values, mut names) = (Code::default(), vec![], IndexMap::new());
         for (name, what) in &scope.names {
-            let at = code.values.len();
+            let at = values.len();
             let (shape, depends) = match what {
                 Named::Constant(shape, flat) => {
-                    code.values.extend_from_slice(flat);
+                    values.extend_from_slice(flat);
+                    code.constants.push(at);
                     (*shape, 0)
                 }
                 Named::Variable(quantity) => {
                     let number = code.inputs.len();
-                    code.values.resize(at + quantity.shape.size, 0.0);
+                    values.resize(at + quantity.shape.size, 0.0);
                     code.types.push((quantity.type_id)());
                     code.dimensions.push(quantity.dimension);
                     code.inputs.push((quantity, at));
@@ -85,7 +88,7 @@ impl<'a> Compiler<'a> {
             names.insert(name.as_str(), Value { shape, at, depends });
         }
         let (library, calls, rows, known) = (Library::linked(), vec![], vec![], HashMap::new());
-        Self { scope, library, code, names, uses_up: false, calls, rows, known }
+        Self { scope, library, code, values, names, uses_up: false, calls, rows, known }
     }
 
     /// Checks the name of a part of formulas.
@@ -136,8 +139,8 @@ impl<'a> Compiler<'a> {
     fn value(&mut self, formula: &Formula) -> Result<Value, Mistake> {
         match &formula.node {
             Node::Number(x) => {
-                self.code.values.push(*x);
-                Ok(Value { shape: f64::SHAPE, at: self.code.values.len() - 1, depends: 0 })
+                self.values.push(*x);
+                Ok(Value { shape: f64::SHAPE, at: self.values.len() - 1, depends: 0 })
             }
             Node::Name(name) => match self.names.get(name.as_str()) {
                 Some(value) => {
@@ -176,18 +179,18 @@ impl<'a> Compiler<'a> {
             return Ok(*value);
         }
         let depends = arguments.iter().fold(0, |all, value| all | value.depends);
-        let value = Value { shape: function.result, at: self.code.values.len(), depends };
-        self.code.values.resize(value.range().end, 0.0);
+        let value = Value { shape: function.result, at: self.values.len(), depends };
+        self.values.resize(value.range().end, 0.0);
+        let at = key.1.clone().into_boxed_slice();
+        let (numbers, lanes) = (function.over_numbers, function.over_lanes);
+        let step = Step { numbers, lanes, at, to: value.range() };
         if depends == 0 {
-            let (from, to) = self.code.values.split_at_mut(value.at);
-            (function.over_numbers)(from, &key.1, to);
-            if !to.iter().all(|x| x.is_finite()) {
+            if !step.run(&mut self.values) {
                 return Err(Mistake::new(span.clone(), "this is not a finite number"));
             }
+            self.code.folded.push(step);
         } else {
-            let at = key.1.clone().into_boxed_slice();
-            let (numbers, lanes) = (function.over_numbers, function.over_lanes);
-            self.code.calls.push(Step { numbers, lanes, at, to: value.range() });
+            self.code.calls.push(step);
             self.calls.push((arguments, value));
         }
         self.known.insert(key, value);

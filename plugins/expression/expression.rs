@@ -1,5 +1,5 @@
 //! The factor.
-use crate::compile::compile;
+use crate::cache::program;
 use crate::constant::Constant;
 use crate::language::page;
 use crate::program::Program;
@@ -76,7 +76,7 @@ impl TryFrom<Document> for Expression {
             return Err(ExpressionError::WrongVariables(variables.len()));
         }
         let scope = Scope::new(variables, constants, *up.unwrap_or_default())?;
-        let (program, uses_up) = compile(&scope, define, residual, domain)?;
+        let (program, uses_up) = program(&scope, define, residual, domain)?;
         let program = Dynamic::new(program)?;
         // written down with the up that it uses, so that the document is complete
         document.up = document.up.or(uses_up.then(Up::default));

@@ -62,21 +62,30 @@ def log(recording: Any, variant: Variant) -> None:
         recording.log(f"{at}/camera", rr.Transform3D(translation=pose["translation"], quaternion=turned))
         if frame["estimate"].get("error") is not None:
             recording.log(f"{at}/error", rr.Scalars(frame["estimate"]["error"]))
-        boxes = [box["measured"] for box in frame["boxes"]]
+        seen = [box["measured"] for box in frame["boxes"]]
         names = [str(box["object"]) for box in frame["boxes"]]
-        recording.log(f"{at}/camera/boxes", rr.Boxes2D(array=boxes, array_format=rr.Box2DFormat.XYXY, labels=names))
+        recording.log(f"{at}/camera/boxes", rr.Boxes2D(array=seen, array_format=rr.Box2DFormat.XYXY, labels=names))
     recording.disable_timeline(TIME)
-    for which in ("initial", "estimate", "truth"):
-        solids = [(thing, thing[which]) for thing in record["objects"] if thing.get(which) is not None]
+    for which in ("initial", "estimate"):
+        solids = [(thing["class"], thing[which]) for thing in record["objects"] if thing.get(which) is not None]
         if solids:
             ellipsoids = rr.Ellipsoids3D(
                 centers=[solid["translation"] for _, solid in solids],
                 half_sizes=[solid["semi_axes"] for _, solid in solids],
                 quaternions=[rr.Quaternion(xyzw=solid["rotation"]) for _, solid in solids],
-                labels=[thing["class"] for thing, _ in solids],
+                labels=[name for name, _ in solids],
                 colors=[COLOURS.get(which, (255, 127, 14))] * len(solids),
             )
             recording.log(f"{at}/objects/{which}", ellipsoids, static=True)
+    truth = [thing["truth"] for thing in record["objects"] if thing.get("truth") is not None]
+    if truth:
+        boxes = rr.Boxes3D(
+            centers=[box["pose"]["translation"] for box in truth],
+            half_sizes=[box["half_extents"] for box in truth],
+            quaternions=[rr.Quaternion(xyzw=box["pose"]["rotation"]) for box in truth],
+            colors=[COLOURS["truth"]] * len(truth),
+        )
+        recording.log(f"{at}/objects/truth", boxes, static=True)
     for step, cost in enumerate(record["cost"]):
         recording.set_time(ITERATION, sequence=step)
         recording.log(f"{at}/cost", rr.Scalars(cost))
