@@ -4,6 +4,7 @@ use crate::program::Program;
 use crate::scope::{Named, Scope};
 use indexmap::IndexMap;
 use manifactor_graph::TextError;
+use std::any::TypeId;
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -14,7 +15,7 @@ const MOST: usize = 256;
 #[derive(PartialEq, Eq, Hash)]
 struct Formulas {
     /// Names, types of the variables and shapes of the constants.
-    names: Vec<(String, &'static str)>,
+    names: Vec<(String, &'static str, Option<TypeId>)>,
     define: Vec<(String, String)>,
     residual: Vec<String>,
     domain: Vec<String>,
@@ -31,9 +32,9 @@ pub(crate) fn program(
     domain: &[String],
 ) -> Result<(Program, bool), TextError> {
     let names = scope.names.iter().map(|(name, named)| match named {
-        // types of variables may have one shape
-        Named::Variable(quantity) => (name.clone() + ":", manifactor_graph::manifold_name((quantity.type_id)())),
-        Named::Constant(shape, _) => (name.clone(), shape.name),
+        // several types of variables may have one shape
+        Named::Variable(quantity) => (name.clone(), quantity.shape.name, Some((quantity.type_id)())),
+        Named::Constant(shape, _) => (name.clone(), shape.name, None),
     });
     let define_pairs = define.iter().map(|(name, text)| (name.clone(), text.clone()));
     let formulas = Formulas {

@@ -159,7 +159,7 @@ def linearizing(n: int = 5_000, points: int = 200) -> None:
     at, custom, built_in = gtsam.Values(), gtsam.NonlinearFactorGraph(), gtsam.NonlinearFactorGraph()
     for i in range(points):
         at.insert(i, gtsam.Pose3(gtsam.Rot3(), x[i]))
-        at.insert(points + i, p[i])
+        at.insertPoint3(points + i, p[i])
     for (i, j), distance in list(zip(keys, measured, strict=True))[:few]:
         function = lambda *given, distance=distance: ranges(distance, *given)  # noqa: E731
         custom.add(gtsam.CustomFactor(noise, [int(i), points + int(j)], function))
