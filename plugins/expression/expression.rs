@@ -113,7 +113,8 @@ impl Expression {
         let variables = variables.into_iter().map(|(name, of)| (name.to_owned(), of.to_owned())).collect();
         let constants = constants.into_iter().map(|(name, is)| (name.to_owned(), is)).collect();
         let residual = residual.into_iter().map(str::to_owned).collect();
-        Document { variables, residual, define: IndexMap::new(), constants, up: None, domain: vec![] }.try_into()
+        Document { variables, residual, define: IndexMap::new(), constants, up: None, domain: vec![] }
+            .try_into()
     }
     /// With another direction for up.
     ///

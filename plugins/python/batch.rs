@@ -129,7 +129,14 @@ impl BatchFunction {
     /// `evaluate(arrays, constants, derivatives)` gives the residuals, shape (n, rows), and None or a Jacobian for each
     /// variable, shape (n, rows, size), by its numbers. `constants` are the lengths of these.
     #[new]
-    fn new(name: String, variables: Vec<String>, rows: usize, constants: Vec<usize>, evaluate: Py<PyAny>, has_jacobian: bool) -> PyResult<Self> {
+    fn new(
+        name: String,
+        variables: Vec<String>,
+        rows: usize,
+        constants: Vec<usize>,
+        evaluate: Py<PyAny>,
+        has_jacobian: bool,
+    ) -> PyResult<Self> {
         let mut quantities = vec![];
         for of in &variables {
             crate::chosen::known("variable", of)?;
@@ -141,7 +148,8 @@ impl BatchFunction {
                 }
             }
         }
-        let function = Arc::new(Function::new(name.clone(), quantities, rows, constants, evaluate, has_jacobian));
+        let function =
+            Arc::new(Function::new(name.clone(), quantities, rows, constants, evaluate, has_jacobian));
         let like = Dynamic::new(Cached { function, number: 0, results: Results::default() });
         like.map(Self).map_err(|error| errors::argument(&name, "rows", error))
     }
@@ -169,7 +177,8 @@ impl Rows {
         let like = function.get().0.clone();
         let function = &like.get().function;
         let width = function.constants.iter().sum();
-        let constants = crate::input::numbers(&function.name, "constants", &constants, &[Some(rows), Some(width)])?;
+        let constants =
+            crate::input::numbers(&function.name, "constants", &constants, &[Some(rows), Some(width)])?;
         Ok(Self { like, constants })
     }
 

@@ -64,7 +64,11 @@ impl Chosen {
     /// By kind, name and fields; or the same as another, as an object of a class of its own.
     #[new]
     #[pyo3(signature = (kind, name = None, fields = None))]
-    fn new(kind: &Bound<'_, PyAny>, name: Option<&str>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(
+        kind: &Bound<'_, PyAny>,
+        name: Option<&str>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
         if let Ok(other) = kind.cast::<Self>() {
             return Ok(Self(other.get().0.clone()));
         }
@@ -112,9 +116,13 @@ impl Chosen {
             }
             Some(value) => json_to_python(py, value),
             None => {
-                let fields: Vec<&str> = json.as_object().map(|o| o.keys().map(String::as_str).collect()).unwrap_or_default();
+                let fields: Vec<&str> =
+                    json.as_object().map(|o| o.keys().map(String::as_str).collect()).unwrap_or_default();
                 let (_, of) = slf.get().0.names();
-                Err(PyAttributeError::new_err(format!("`{of}` has no field `{name}`: there are {}", fields.join(", "))))
+                Err(PyAttributeError::new_err(format!(
+                    "`{of}` has no field `{name}`: there are {}",
+                    fields.join(", ")
+                )))
             }
         }
     }
@@ -170,7 +178,8 @@ pub(crate) fn known(kind: &str, name: &str) -> PyResult<()> {
     }
     let names: Vec<&str> = entries(kind).iter().map(|entry| entry.name).collect();
     let mistake = Mistake::at("type", format!("no {kind} is called `{name}`"));
-    let meant = nearest(name, names.iter().copied()).map_or(String::new(), |near| format!("did you mean `{near}`? "));
+    let meant =
+        nearest(name, names.iter().copied()).map_or(String::new(), |near| format!("did you mean `{near}`? "));
     Err(errors::arguments("", vec![mistake.help(format!("{meant}there are {}", names.join(", ")))]))
 }
 
@@ -227,7 +236,10 @@ fn tangent(x: &Bound<'_, PyAny>) -> PyResult<Vec<&'static str>> {
 
 /// The residual of a factor and its Jacobian by each variable, not whitened.
 #[pyfunction]
-fn linearize<'py>(of: &Bound<'py, PyAny>, at: &Bound<'py, PyAny>) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Vec<Bound<'py, PyArrayDyn<f64>>>)> {
+fn linearize<'py>(
+    of: &Bound<'py, PyAny>,
+    at: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Vec<Bound<'py, PyArrayDyn<f64>>>)> {
     let (py, of, at) = (of.py(), factor("factor", of)?, variables(at)?);
     let linearization = py.detach(|| {
         let refs: Vec<&dyn Variable> = at.iter().map(|x| &**x).collect();
@@ -249,7 +261,10 @@ fn linearize<'py>(of: &Bound<'py, PyAny>, at: &Bound<'py, PyAny>) -> PyResult<(B
 
 /// ρ and ρ' of a loss at squared norms of whitened residuals.
 #[pyfunction]
-fn rho<'py>(of: &Bound<'py, PyAny>, squared: &Bound<'py, PyAny>) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+fn rho<'py>(
+    of: &Bound<'py, PyAny>,
+    squared: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
     let (py, of) = (of.py(), loss("loss", of)?);
     let axes = array("rho", "squared", squared)?.shape().len();
     let squared = numbers("rho", "squared", squared, &vec![None; axes])?;
@@ -280,7 +295,11 @@ fn check_factor<'py>(
         let around = variables(around)?;
         if around.len() != subject.around.len() {
             let (expected, found) = (subject.around.len(), around.len());
-            return Err(errors::argument("check_factor", "around", format!("expected {expected} values, got {found}")));
+            return Err(errors::argument(
+                "check_factor",
+                "around",
+                format!("expected {expected} values, got {found}"),
+            ));
         }
         subject.around = around.iter().map(|x| x.erased().clone_box()).collect();
     }

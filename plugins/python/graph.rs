@@ -153,7 +153,10 @@ impl Graph {
     }
 
     fn _repr_html_(&self) -> String {
-        html(&["factor", "number"], self.types().into_iter().map(|(name, n)| [name.to_owned(), n.to_string()]))
+        html(
+            &["factor", "number"],
+            self.types().into_iter().map(|(name, n)| [name.to_owned(), n.to_string()]),
+        )
     }
 
     /// How many factors there are of each type.
@@ -181,7 +184,10 @@ pub(crate) fn html(header: &[&str], rows: impl IntoIterator<Item = [String; 2]>)
 enum Factors {
     /// One for all.
     Same(Arc<dyn Factor>),
-    Read { name: String, columns: Columns },
+    Read {
+        name: String,
+        columns: Columns,
+    },
     /// Those of a function of Python.
     Python(crate::batch::Rows),
 }
@@ -206,7 +212,8 @@ impl Factors {
             Err(_) if factor.is_callable() => factor.getattr("__name__")?.extract()?,
             Err(_) if fields.is_none() => return Ok(Self::Same(self::factor("factor", factor)?)),
             Err(_) => {
-                let message = "expected the name of a factor, or the function that makes it, where `fields` are given";
+                let message =
+                    "expected the name of a factor, or the function that makes it, where `fields` are given";
                 return Err(errors::argument("add_many", "factor", message));
             }
         };

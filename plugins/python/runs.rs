@@ -100,14 +100,16 @@ fn experiment_of(
         }
     };
     let done = py.detach(|| {
-        let claimed = OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(|e| e.to_string())?;
+        let claimed =
+            OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(|e| e.to_string())?;
         let mut journal = Journal::open(claimed).map_err(|error| error.to_string())?;
         journal.take_over_shards().map_err(|error| error.to_string())?;
         if retry_failed {
             journal.retry_failed();
         }
         let threads = threads.unwrap_or_else(rayon::current_num_threads);
-        experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show).map_err(|e| e.to_string())?;
+        experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show)
+            .map_err(|e| e.to_string())?;
         // a part has no tables
         if shard.is_some() {
             return Ok(None);
@@ -148,7 +150,8 @@ impl Sweep {
         }
         let folders = Folders { data, document: sweep.folder.clone() };
         let journal = is_driver.then(|| {
-            let claimed = OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(errors::solve)?;
+            let claimed =
+                OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(errors::solve)?;
             Journal::open(claimed).map_err(errors::solve)
         });
         Ok(Self { journal: journal.transpose()?, sweep, folders })
@@ -156,7 +159,8 @@ impl Sweep {
 
     /// Numbers of the trials that are not done yet.
     fn open(&self) -> Vec<usize> {
-        let is_open = |trial: &Trial| self.journal.as_ref().is_none_or(|journal| journal.find(trial).is_none());
+        let is_open =
+            |trial: &Trial| self.journal.as_ref().is_none_or(|journal| journal.find(trial).is_none());
         self.sweep.trials.iter().enumerate().filter(|(_, trial)| is_open(trial)).map(|(i, _)| i).collect()
     }
 
@@ -174,7 +178,8 @@ impl Sweep {
 
     /// Keeps a trial that is done: its line of the journal.
     fn keep(&mut self, line: &str) -> PyResult<()> {
-        let record = serde_json::from_str(line).map_err(|error| errors::argument("Sweep.keep", "line", error))?;
+        let record =
+            serde_json::from_str(line).map_err(|error| errors::argument("Sweep.keep", "line", error))?;
         self.journal.as_mut().map_or(Ok(()), |journal| journal.append(record).map_err(errors::solve))
     }
 

@@ -110,7 +110,11 @@ impl Session {
     }
 
     /// The joint covariance of a few variables, in the order of `keys` and of their tangent directions.
-    fn covariance<'py>(&self, py: Python<'py>, keys: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    fn covariance<'py>(
+        &self,
+        py: Python<'py>,
+        keys: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let keys = self::keys("covariance", keys)?;
         let names: Vec<&str> = keys.iter().map(Key::as_str).collect();
         let joint = py.detach(|| self.0.covariance(&names).map_err(|error| error.to_string()));

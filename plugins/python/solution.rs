@@ -4,7 +4,9 @@ use crate::errors;
 use crate::graph::{Graph, Values, html, optional_keys};
 use crate::input::{json_to_python, to_array, to_python};
 use manifactor::graph::Key;
-use manifactor::solve::{Auto, Given, IterationRecord, Observer, Optimizer, Solution as Inner, Start, solve as solve_inner};
+use manifactor::solve::{
+    Auto, Given, IterationRecord, Observer, Optimizer, Solution as Inner, Start, solve as solve_inner,
+};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -81,8 +83,10 @@ fn solve(
     start: Option<&Bound<'_, PyAny>>,
     observer: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Solution> {
-    let solver: Arc<dyn Optimizer> = solver.map_or_else(|| Ok(Arc::new(Auto::default()) as _), |s| self::solver("solver", s))?;
-    let start: Arc<dyn Start> = start.map_or_else(|| Ok(Arc::new(Given::default()) as _), |s| self::start("start", s))?;
+    let solver: Arc<dyn Optimizer> =
+        solver.map_or_else(|| Ok(Arc::new(Auto::default()) as _), |s| self::solver("solver", s))?;
+    let start: Arc<dyn Start> =
+        start.map_or_else(|| Ok(Arc::new(Given::default()) as _), |s| self::start("start", s))?;
     let mut watch = Watch::new(observer);
     let solved = {
         let (graph, values) = (graph.borrow(py), values.borrow(py));
@@ -177,7 +181,11 @@ impl Solution {
     /// Marginal covariances at the estimate, by key: of the variables that are named, or of all. Rows and columns are the
     /// tangent directions of the variable, in their order and units.
     #[pyo3(signature = (keys = None))]
-    fn covariances<'py>(&self, py: Python<'py>, keys: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyDict>> {
+    fn covariances<'py>(
+        &self,
+        py: Python<'py>,
+        keys: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let keys = optional_keys("covariances", keys)?;
         let marginals = {
             let graph = self.graph.borrow(py);
@@ -187,13 +195,20 @@ impl Solution {
         let dict = PyDict::new(py);
         for marginal in marginals.map_err(errors::solve)? {
             let n = marginal.covariance.nrows();
-            dict.set_item(marginal.key.as_str(), to_array(py, &[n, n], marginal.covariance.as_slice().to_vec())?)?;
+            dict.set_item(
+                marginal.key.as_str(),
+                to_array(py, &[n, n], marginal.covariance.as_slice().to_vec())?,
+            )?;
         }
         Ok(dict)
     }
 
     /// The joint covariance of a few variables at the estimate, in the order of `keys` and of their tangent directions.
-    fn joint_covariance<'py>(&self, py: Python<'py>, keys: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    fn joint_covariance<'py>(
+        &self,
+        py: Python<'py>,
+        keys: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let keys = crate::input::keys("joint_covariance", keys)?;
         let joint = {
             let graph = self.graph.borrow(py);

@@ -79,7 +79,9 @@ impl Experiment {
         let status = if complete { Status::Done } else { Status::Interrupted };
         if self.shard.is_some() {
             let (trials, folder) = (count(sweep.trials.len(), "trial"), sweep.output.display());
-            output::say(&format!("This part has {trials}: {folder}. The same command without --shard makes the tables."));
+            output::say(&format!(
+                "This part has {trials}: {folder}. The same command without --shard makes the tables."
+            ));
             return Ok(status);
         }
         let summary = experiment::write(&sweep, &journal)?;

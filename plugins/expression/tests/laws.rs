@@ -86,7 +86,10 @@ fn formulas_that_differ_in_constants_are_told_apart() {
         "constants": { "offset": -1.0 },
     });
     let error = serde_json::from_value::<Expression>(document).unwrap_err().to_string();
-    assert!(error.contains("this is not a finite number") && error.contains("norm(p) - sqrt(offset)"), "{error}");
+    assert!(
+        error.contains("this is not a finite number") && error.contains("norm(p) - sqrt(offset)"),
+        "{error}"
+    );
     let plane = |of: &str| {
         let document = serde_json::json!({ "variables": { "p": of }, "residual": ["norm(p) - 1"] });
         let factor: Expression = serde_json::from_value(document).unwrap();

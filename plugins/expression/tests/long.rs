@@ -43,7 +43,8 @@ fn eleven_rows_weigh_as_those_of_shorter_ones() {
     let noise = |rows: std::ops::Range<usize>| Noise::sigmas(&sigmas[rows]).unwrap();
     let (long_graph, long) = solved(&[(residual(&SHORT), noise(0..11))], false);
     // the first alone does not depend on p
-    let first = (residual(&[SHORT[0], SHORT[2]]), Noise::sigmas(&[&sigmas[..6], &sigmas[9..]].concat()).unwrap());
+    let first =
+        (residual(&[SHORT[0], SHORT[2]]), Noise::sigmas(&[&sigmas[..6], &sigmas[9..]].concat()).unwrap());
     let (_, short) = solved(&[first, (residual(&[SHORT[1]]), noise(6..9))], false);
     assert!(long.outcome.termination.is_converged());
     assert!((long.outcome.final_cost - short.outcome.final_cost).abs() < 1e-12 * long.outcome.final_cost);

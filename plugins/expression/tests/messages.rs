@@ -197,7 +197,8 @@ fn constants_are_checked() {
 /// The message of a formula over `x`, a pose, with a part that has this name.
 fn says_of_part(name: &str, part: &str, residual: &str) -> String {
     let define: std::collections::BTreeMap<_, _> = [(name, part)].into();
-    let document = serde_json::json!({ "variables": { "x": "se3" }, "define": define, "residual": [residual] });
+    let document =
+        serde_json::json!({ "variables": { "x": "se3" }, "define": define, "residual": [residual] });
     serde_json::from_value::<Expression>(document).map_or_else(|e| e.to_string(), |_| "nothing".to_owned())
 }
 
@@ -208,7 +209,9 @@ fn parts_of_formulas_are_checked() {
         says_of_part("p", "postion(x)", "norm(p)"),
         "unknown function `postion`\n  postion(x)\n  ^^^^^^^\ndid you mean `position`?"
     );
-    assert!(says_of_part("x", "position(x)", "norm(x)").starts_with("`x` is a variable or a constant already"));
+    assert!(
+        says_of_part("x", "position(x)", "norm(x)").starts_with("`x` is a variable or a constant already")
+    );
     assert!(says_of_part("up", "position(x)", "norm(up)").starts_with("`up` means something already"));
     assert!(says_of_part("a b", "position(x)", "1").starts_with("`a b` is not a name"));
     assert!(says_of_part("p", "position(x)", "norm(q)").contains("there are x, up, pi, p"));

@@ -76,7 +76,8 @@ impl Function {
     /// The residuals, and the Jacobian blocks by each variable's tangent.
     pub(super) fn linearized(&self, points: &[Point]) -> Linearized {
         let sizes = self.dimensions.iter().map(|n| self.rows * n);
-        let mut all: Linearized = (vec![], sizes.clone().map(|size| Vec::with_capacity(size * points.len())).collect());
+        let mut all: Linearized =
+            (vec![], sizes.clone().map(|size| Vec::with_capacity(size * points.len())).collect());
         let each = if self.has_jacobian { 1 } else { 1 + 2 * self.dimensions.iter().sum::<usize>() };
         for points in points.chunks((MOST / each).max(1)) {
             let done = if self.has_jacobian { self.by_python(points) } else { self.by_differences(points) };
@@ -104,7 +105,12 @@ impl Function {
                     (quantity.gradients)(x.erased().as_any(), &mut gradients);
                 }
                 for column in 0..n {
-                    let entry = |row: &[f64]| row.iter().zip(gradients.iter().skip(column).step_by(n)).map(|(a, b)| a * b).sum::<f64>();
+                    let entry = |row: &[f64]| {
+                        row.iter()
+                            .zip(gradients.iter().skip(column).step_by(n))
+                            .map(|(a, b)| a * b)
+                            .sum::<f64>()
+                    };
                     of_variable.extend(by_numbers.chunks_exact(size).map(entry));
                 }
             }
@@ -152,10 +158,24 @@ impl Function {
         Python::attach(|py| {
             let array = |width: &usize, values: &Vec<f64>| to_array(py, &[n, *width], values.clone());
             let sizes: Vec<usize> = self.quantities.iter().map(|quantity| quantity.shape.size).collect();
-            let variables = sizes.iter().zip(&inputs.variables).map(|(w, v)| array(w, v)).collect::<PyResult<Vec<_>>>()?;
-            let constants = self.constants.iter().zip(&inputs.constants).map(|(w, v)| array(w, v)).collect::<PyResult<Vec<_>>>()?;
-            let returned = self.evaluate.bind(py).call1((PyList::new(py, variables)?, PyList::new(py, constants)?, derivatives))?;
-            let (residuals, jacobians): (Bound<'_, PyAny>, Bound<'_, PyAny>) = returned.cast::<PyTuple>()?.extract()?;
+            let variables = sizes
+                .iter()
+                .zip(&inputs.variables)
+                .map(|(w, v)| array(w, v))
+                .collect::<PyResult<Vec<_>>>()?;
+            let constants = self
+                .constants
+                .iter()
+                .zip(&inputs.constants)
+                .map(|(w, v)| array(w, v))
+                .collect::<PyResult<Vec<_>>>()?;
+            let returned = self.evaluate.bind(py).call1((
+                PyList::new(py, variables)?,
+                PyList::new(py, constants)?,
+                derivatives,
+            ))?;
+            let (residuals, jacobians): (Bound<'_, PyAny>, Bound<'_, PyAny>) =
+                returned.cast::<PyTuple>()?.extract()?;
             let residuals = read(&self.name, "the residual", &residuals, &[n, self.rows])?;
             if !derivatives {
                 return Ok((residuals, vec![]));
@@ -167,7 +187,11 @@ impl Function {
             match blocks.len() == sizes.len() {
                 true => Ok((residuals, blocks)),
                 false => {
-                    let message = format!("expected a Jacobian for each of {} variables, got {}", sizes.len(), blocks.len());
+                    let message = format!(
+                        "expected a Jacobian for each of {} variables, got {}",
+                        sizes.len(),
+                        blocks.len()
+                    );
                     Err(errors::argument(&self.name, "the Jacobian", message))
                 }
             }
@@ -181,7 +205,6 @@ fn read(what: &str, name: &str, value: &Bound<'_, PyAny>, shape: &[usize]) -> Py
     Ok(numbers_or_nan(what, name, value, &shape)?.values)
 }
 
-
 /// What a call is given: by variable and by constant, the numbers of all points.
 struct Inputs {
     count: usize,
@@ -191,14 +214,20 @@ struct Inputs {
 
 impl Inputs {
     fn new<'p>(function: &Function, points: impl Iterator<Item = &'p Point>) -> Self {
-        let (variables, constants) = (vec![vec![]; function.types.len()], vec![vec![]; function.constants.len()]);
+        let (variables, constants) =
+            (vec![vec![]; function.types.len()], vec![vec![]; function.constants.len()]);
         let mut inputs = Self { count: 0, variables, constants };
         inputs.extend(function, points, None);
         inputs
     }
 
     /// Adds points, with one variable moved where that is said.
-    fn extend<'p>(&mut self, function: &Function, points: impl Iterator<Item = &'p Point>, moved: Option<(usize, &[f64])>) {
+    fn extend<'p>(
+        &mut self,
+        function: &Function,
+        points: impl Iterator<Item = &'p Point>,
+        moved: Option<(usize, &[f64])>,
+    ) {
         for point in points {
             self.count += 1;
             for (v, (quantity, to)) in function.quantities.iter().zip(&mut self.variables).enumerate() {
@@ -206,7 +235,8 @@ impl Inputs {
                 let at = to.len();
                 to.resize(at + quantity.shape.size, 0.0);
                 let to = to.get_mut(at..).unwrap_or_default();
-                match moved.filter(|(which, _)| *which == v).and_then(|(_, delta)| x.erased().retract(delta)) {
+                match moved.filter(|(which, _)| *which == v).and_then(|(_, delta)| x.erased().retract(delta))
+                {
                     Some(x) => (quantity.values)(x.erased().as_any(), to),
                     None => (quantity.values)(x.erased().as_any(), to),
                 }

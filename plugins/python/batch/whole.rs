@@ -134,7 +134,12 @@ impl Batch for Whole {
         self.members.swap_remove(index);
         self.inner.remove(index)
     }
-    fn linearize_at(&mut self, indices: &[u32], columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation {
+    fn linearize_at(
+        &mut self,
+        indices: &[u32],
+        columns: &Columns,
+        to: &mut NormalEquations<'_>,
+    ) -> Evaluation {
         self.compute(Some(indices), columns, true);
         self.inner.linearize_at(indices, columns, to)
     }

@@ -163,7 +163,7 @@ def linearizing(n: int = 5_000, points: int = 200) -> None:
     for (i, j), distance in list(zip(keys, measured, strict=True))[:few]:
         function = lambda *given, distance=distance: ranges(distance, *given)  # noqa: E731
         custom.add(gtsam.CustomFactor(noise, [int(i), points + int(j)], function))
-        built_in.add(gtsam.RangeFactorPose3(int(i), points + int(j), distance, noise))
+        built_in.add(gtsam.RangeFactor3D(int(i), points + int(j), distance, noise))
     for name, graph in [("gtsam's C++", built_in), ("gtsam's CustomFactor", custom)]:
         row(f"linearized, {name}", 1e6 * least(lambda: seconds(lambda: graph.linearize(at))) / few, "µs a factor")
 

@@ -9,7 +9,12 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 
 /// A graph as a document.
-pub(crate) fn document(py: Python<'_>, graph: &InnerGraph, values: &InnerValues, format: &str) -> PyResult<String> {
+pub(crate) fn document(
+    py: Python<'_>,
+    graph: &InnerGraph,
+    values: &InnerValues,
+    format: &str,
+) -> PyResult<String> {
     let format = match format {
         "toml" => Format::Toml,
         "json" => Format::Json,
@@ -19,7 +24,8 @@ pub(crate) fn document(py: Python<'_>, graph: &InnerGraph, values: &InnerValues,
             return Err(errors::argument("to_document", "format", message));
         }
     };
-    py.detach(|| write_graph(graph, values, format)).map_err(|error| errors::argument("to_document", "graph", error))
+    py.detach(|| write_graph(graph, values, format))
+        .map_err(|error| errors::argument("to_document", "graph", error))
 }
 
 /// Reads a graph from a file: a literal graph in TOML, JSON or YAML, or one in another format that is linked. Returns the
@@ -49,7 +55,10 @@ fn read(py: Python<'_>, path: PathBuf, repair: &str, anchor: bool) -> PyResult<(
     match read.map_err(unreadable)? {
         Some(read) => Ok((Graph(read.graph), Values(read.values), read.notes)),
         None => {
-            let message = format!("{}: neither its extension nor its first line tells a format of graphs", path.display());
+            let message = format!(
+                "{}: neither its extension nor its first line tells a format of graphs",
+                path.display()
+            );
             Err(errors::argument("load", "path", message))
         }
     }

@@ -37,7 +37,9 @@ impl Noise {
                 made("Noise", name, name, &numbers.values)?
             }
             [(first, _), (second, _), ..] => {
-                let message = format!("expected one of sigma, sigmas, covariance, information; got {first} and {second}");
+                let message = format!(
+                    "expected one of sigma, sigmas, covariance, information; got {first} and {second}"
+                );
                 return Err(errors::argument("Noise", second, message));
             }
         };
@@ -87,9 +89,11 @@ fn read(
     let shape: Vec<_> = rows.into_iter().map(Some).chain(std::iter::repeat_n(None, axes)).collect();
     let numbers = numbers(what, name, value, &shape)?;
     match numbers.shape.as_slice() {
-        [.., r, c] if axes == 2 && r != c => {
-            Err(errors::argument(what, name, format!("expected a square matrix, got {r} rows and {c} columns")))
-        }
+        [.., r, c] if axes == 2 && r != c => Err(errors::argument(
+            what,
+            name,
+            format!("expected a square matrix, got {r} rows and {c} columns"),
+        )),
         _ => Ok(numbers),
     }
 }
@@ -142,7 +146,11 @@ impl Rows {
         let found = array(what, &name, &value)?.shape().first().copied();
         if found != Some(rows) {
             let found = found.map_or("no axis".to_owned(), |n| format!("{n} rows"));
-            return Err(errors::argument(what, &name, format!("expected an array of {rows} rows, one for each, got {found}")));
+            return Err(errors::argument(
+                what,
+                &name,
+                format!("expected an array of {rows} rows, one for each, got {found}"),
+            ));
         }
         let numbers = read(what, &name, form, &value, Some(rows))?;
         Ok(Self::Each { form, numbers })

@@ -1,6 +1,6 @@
 //! Values of variables.
-use crate::chosen::{What, known, variable};
 use super::html;
+use crate::chosen::{What, known, variable};
 use crate::errors;
 use crate::input::{Columns, key_rows, to_array};
 use manifactor::graph::catalogue::find;
@@ -81,7 +81,11 @@ impl Values {
         };
         let (keys, width) = key_rows("insert_many", keys, prefix)?;
         if width != 1 {
-            return Err(errors::argument("insert_many", "keys", format!("expected one key for each, got {width}")));
+            return Err(errors::argument(
+                "insert_many",
+                "keys",
+                format!("expected one key for each, got {width}"),
+            ));
         }
         known("variable", &name)?;
         let entry = find("variable", &name).ok_or_else(|| errors::internal(&name))?;
@@ -96,7 +100,10 @@ impl Values {
     }
 
     fn _repr_html_(&self) -> String {
-        html(&["variable", "number"], self.types().into_iter().map(|(name, n)| [name.to_owned(), n.to_string()]))
+        html(
+            &["variable", "number"],
+            self.types().into_iter().map(|(name, n)| [name.to_owned(), n.to_string()]),
+        )
     }
 
     /// How many there are of each type.
@@ -109,7 +116,11 @@ impl Values {
     }
 
     /// Keys and fields of all values of one type: each field an array with a row for each.
-    fn columns<'py>(&self, py: Python<'py>, r#type: &Bound<'py, PyAny>) -> PyResult<(Bound<'py, PyList>, Bound<'py, PyDict>)> {
+    fn columns<'py>(
+        &self,
+        py: Python<'py>,
+        r#type: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyList>, Bound<'py, PyDict>)> {
         let name: String = match r#type.extract() {
             Ok(name) => name,
             Err(_) => r#type.getattr("TYPE")?.extract()?,

@@ -31,12 +31,17 @@ fn in_words(shape: &[usize]) -> String {
 }
 
 /// An argument as an array of numpy; an array that is one already is not copied.
-pub(crate) fn array<'py>(what: &str, name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyUntypedArray>> {
+pub(crate) fn array<'py>(
+    what: &str,
+    name: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
     if let Ok(array) = value.cast::<PyUntypedArray>() {
         return Ok(array.clone());
     }
     let made = value.py().import("numpy")?.call_method1("asarray", (value,));
-    let made = made.map_err(|error| errors::argument(what, name, format!("expected an array of numbers: {error}")))?;
+    let made =
+        made.map_err(|error| errors::argument(what, name, format!("expected an array of numbers: {error}")))?;
     Ok(made.cast_into::<PyUntypedArray>()?)
 }
 
@@ -65,8 +70,11 @@ fn shaped<'py>(
     if !fits {
         let sizes: Vec<_> = shape.iter().map(|n| n.map_or("any".to_owned(), |n| n.to_string())).collect();
         let comma = if sizes.len() == 1 { "," } else { "" };
-        let message =
-            format!("expected an array of shape ({}{comma}), got {}", sizes.join(", "), in_words(array.shape()));
+        let message = format!(
+            "expected an array of shape ({}{comma}), got {}",
+            sizes.join(", "),
+            in_words(array.shape())
+        );
         return Err(errors::argument(what, name, message));
     }
     Ok(array)

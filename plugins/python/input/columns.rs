@@ -103,7 +103,8 @@ fn table(
 fn column(what: &str, rows: usize, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<Numbers> {
     if array.shape().first() != Some(&rows) {
         let found = array.shape().first().map_or("no axis".to_owned(), |n| format!("{n} rows"));
-        let mistake = Mistake::at(name, format!("expected an array of {rows} rows, one for each, got {found}"));
+        let mistake =
+            Mistake::at(name, format!("expected an array of {rows} rows, one for each, got {found}"));
         let help = "an array is a column; write what is the same for all as a number, a list or a tuple";
         return Err(errors::arguments(what, vec![mistake.help(help)]));
     }

@@ -12,7 +12,8 @@ pub(crate) fn keys(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Key>> {
     if let Ok(key) = value.cast::<PyString>() {
         return Ok(vec![key.to_cow()?.as_ref().into()]);
     }
-    let expected = || errors::argument(what, "keys", "expected a text, or several: \"x0\", or [\"x0\", \"x1\"]");
+    let expected =
+        || errors::argument(what, "keys", "expected a text, or several: \"x0\", or [\"x0\", \"x1\"]");
     let items = value.try_iter().map_err(|_| expected())?;
     let text = |item: PyResult<Bound<'_, PyAny>>| {
         Ok(item?.cast::<PyString>().map_err(|_| expected())?.to_cow()?.as_ref().into())
@@ -29,7 +30,11 @@ pub(crate) fn key_rows(
 ) -> PyResult<(Vec<Key>, usize)> {
     let of_texts = || {
         let items = value.try_iter().map_err(|_| {
-            errors::argument(what, "keys", "expected texts by rows, or an array of whole numbers with `prefix`")
+            errors::argument(
+                what,
+                "keys",
+                "expected texts by rows, or an array of whole numbers with `prefix`",
+            )
         })?;
         let (mut all, mut width) = (vec![], None);
         for (row, item) in items.enumerate() {
@@ -62,14 +67,21 @@ pub(crate) fn key_rows(
         }
     };
     if !numbers.whole {
-        return Err(errors::argument(what, "keys", "expected texts or whole numbers, got numbers with fractions"));
+        return Err(errors::argument(
+            what,
+            "keys",
+            "expected texts or whole numbers, got numbers with fractions",
+        ));
     }
     let prefixes = match prefix {
         None => vec!["x".into()],
-        Some(prefix) => keys(what, prefix).map_err(|_| errors::argument(what, "prefix", "expected a text, or one for each column of `keys`"))?,
+        Some(prefix) => keys(what, prefix).map_err(|_| {
+            errors::argument(what, "prefix", "expected a text, or one for each column of `keys`")
+        })?,
     };
     if prefixes.len() != 1 && prefixes.len() != width {
-        let message = format!("expected a text, or {width}: one for each column of `keys`, got {}", prefixes.len());
+        let message =
+            format!("expected a text, or {width}: one for each column of `keys`, got {}", prefixes.len());
         return Err(errors::argument(what, "prefix", message));
     }
     // a variable is named by many factors: its key is made once

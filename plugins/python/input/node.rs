@@ -125,7 +125,10 @@ pub(crate) fn json_to_node(path: &str, json: &Json) -> PyResult<Node> {
 }
 
 /// What serde writes, as dicts, lists and numbers.
-pub(crate) fn to_python<'py>(py: Python<'py>, value: &(impl serde::Serialize + ?Sized)) -> PyResult<Bound<'py, PyAny>> {
+pub(crate) fn to_python<'py>(
+    py: Python<'py>,
+    value: &(impl serde::Serialize + ?Sized),
+) -> PyResult<Bound<'py, PyAny>> {
     json_to_python(py, &serde_json::to_value(value).map_err(errors::internal)?)
 }
 

@@ -62,7 +62,6 @@ def experiment(
         path = os.path.abspath(path)
     of = (path, text, tuple(overrides(set)), data_folder(data))
     sweep = _native.Sweep(path, text, list(of[2]), of[3], None if out is None else os.fspath(out), force, True)
-    waiting = sweep.open()
     own = not ray.is_initialized()
     if own and address is None:
         # a cluster of this machine alone is not seen by others
@@ -70,6 +69,7 @@ def experiment(
     elif own:
         ray.init(address=address, log_to_driver=False)
     try:
+        waiting = sweep.open()
         trial = ray.remote(num_cpus=1, max_retries=RETRIES)(run_trial)
         running = {trial.remote(of, number): number for number in waiting}
         total = len(waiting)
@@ -79,10 +79,12 @@ def experiment(
             sweep.keep(ray.get(done))
             if progress is not None:
                 progress(total - len(running), total)
+        summary, folder = sweep.write()
     finally:
+        # a traceback would keep it, and with it the lock of the folder
+        del sweep
         if own:
             ray.shutdown()
-    summary, folder = sweep.write()
     return Summary(json.loads(summary), Path(folder))
 
 

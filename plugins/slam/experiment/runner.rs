@@ -62,11 +62,7 @@ pub fn run(
 }
 
 /// A trial on one thread: its solver has a pool of one. `None` where the observer stopped it.
-pub fn alone(
-    trial: &Trial,
-    folders: &Folders,
-    observer: &mut (dyn Observer + Send),
-) -> Option<TrialRecord> {
+pub fn alone(trial: &Trial, folders: &Folders, observer: &mut (dyn Observer + Send)) -> Option<TrialRecord> {
     let failed = |reason: String| TrialRecord {
         labels: trial.labels.clone(),
         fingerprint: trial.fingerprint(),

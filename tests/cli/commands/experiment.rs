@@ -141,5 +141,9 @@ fn parts_of_a_sweep_end_with_the_same_tables_when_they_are_put_together() {
     assert!(ran.stderr.contains("7 of 12 trials done, 7 of them before"), "{}", ran.stderr);
     assert_eq!(tables(&parts), tables(&whole));
     let ran = part("4/3").ended(2);
-    assert!(ran.stderr.contains("expected K/N, the K-th of N parts, such as 2/8; got `4/3`"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("expected K/N, the K-th of N parts, such as 2/8; got `4/3`"),
+        "{}",
+        ran.stderr
+    );
 }
