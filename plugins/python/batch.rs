@@ -21,31 +21,8 @@ use manifactor::typetag;
 use pyo3::prelude::*;
 use serde::{Serialize, Serializer};
 use std::any::{Any, TypeId};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use whole::Whole;
-
-/// What a function of Python has raised within a solve, until the solve has ended.
-static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
-
-/// Whether a function of Python has raised something since [`raise`] was called.
-pub(crate) fn has_raised() -> bool {
-    RAISED.lock().is_ok_and(|raised| raised.is_some())
-}
-
-/// Raises what a function of Python has raised.
-pub(crate) fn raise() -> PyResult<()> {
-    match RAISED.lock().ok().and_then(|mut raised| raised.take()) {
-        Some(error) => Err(error),
-        None => Ok(()),
-    }
-}
-
-/// Keeps what was raised until the solve has ended; the first counts.
-fn keep(error: PyErr) {
-    if let Ok(mut raised) = RAISED.lock() {
-        raised.get_or_insert(error);
-    }
-}
 
 /// A factor whose residual is a function of Python. It can be solved, and not be written into a document.
 #[derive(Debug, Clone)]

@@ -13,6 +13,9 @@ use pyo3::types::PyDict;
 use serde_json::Value as Json;
 use std::sync::Arc;
 
+/// An array of numpy.
+type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
+
 /// Something that is chosen by name, as an object that does not change. Its classes in Python are one for each kind.
 #[pyclass(module = "manifactor._native", frozen, subclass)]
 pub(crate) struct Chosen(pub What);
@@ -219,7 +222,7 @@ fn retract<'py>(x: &Bound<'py, PyAny>, delta: &Bound<'py, PyAny>) -> PyResult<Bo
 
 /// The tangent vector that leads to another point.
 #[pyfunction]
-fn local<'py>(x: &Bound<'py, PyAny>, to: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+fn local<'py>(x: &Bound<'py, PyAny>, to: &Bound<'py, PyAny>) -> PyResult<Floats<'py>> {
     let (x_point, to_point) = (variable("x", x)?, variable("to", to)?);
     let Some(delta) = x_point.erased().local(&*to_point) else {
         let message = format!("expected a {}, got a {}", x_point.typetag_name(), to_point.typetag_name());
@@ -239,7 +242,7 @@ fn tangent(x: &Bound<'_, PyAny>) -> PyResult<Vec<&'static str>> {
 fn linearize<'py>(
     of: &Bound<'py, PyAny>,
     at: &Bound<'py, PyAny>,
-) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Vec<Bound<'py, PyArrayDyn<f64>>>)> {
+) -> PyResult<(Floats<'py>, Vec<Floats<'py>>)> {
     let (py, of, at) = (of.py(), factor("factor", of)?, variables(at)?);
     let linearization = py.detach(|| {
         let refs: Vec<&dyn Variable> = at.iter().map(|x| &**x).collect();
@@ -250,7 +253,7 @@ fn linearize<'py>(
         let message = format!("`{}` does not take ({})", of.typetag_name(), types.join(", "));
         return Err(errors::argument("linearize", "variables", message));
     };
-    crate::batch::raise()?;
+    crate::raised::raise()?;
     let by_rows = |m: &manifactor::nalgebra::DMatrix<f64>| {
         to_array(py, &[m.nrows(), m.ncols()], m.transpose().as_slice().to_vec())
     };
@@ -261,10 +264,7 @@ fn linearize<'py>(
 
 /// ρ and ρ' of a loss at squared norms of whitened residuals.
 #[pyfunction]
-fn rho<'py>(
-    of: &Bound<'py, PyAny>,
-    squared: &Bound<'py, PyAny>,
-) -> PyResult<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)> {
+fn rho<'py>(of: &Bound<'py, PyAny>, squared: &Bound<'py, PyAny>) -> PyResult<(Floats<'py>, Floats<'py>)> {
     let (py, of) = (of.py(), loss("loss", of)?);
     let axes = array("rho", "squared", squared)?.shape().len();
     let squared = numbers("rho", "squared", squared, &vec![None; axes])?;
@@ -304,7 +304,7 @@ fn check_factor<'py>(
         subject.around = around.iter().map(|x| x.erased().clone_box()).collect();
     }
     let report = py.detach(|| FactorCheck { points, seed, ..FactorCheck::default() }.run(&subject));
-    crate::batch::raise()?;
+    crate::raised::raise()?;
     Ok((report.holds(), report.to_string(), to_python(py, &report)?))
 }
 

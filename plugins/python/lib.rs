@@ -12,6 +12,7 @@ mod errors;
 mod graph;
 mod input;
 mod log;
+mod raised;
 mod runs;
 mod session;
 mod solution;

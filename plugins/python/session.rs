@@ -75,7 +75,7 @@ impl Session {
     fn update<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let inner = &mut self.0;
         let report = py.detach(|| inner.update().map_err(|error| error.to_string()));
-        crate::batch::raise()?;
+        crate::raised::raise()?;
         to_python(py, &report.map_err(errors::solve)?)
     }
 
@@ -105,7 +105,7 @@ impl Session {
     fn cost(&mut self, py: Python<'_>) -> PyResult<f64> {
         let inner = &mut self.0;
         let cost = py.detach(|| inner.cost());
-        crate::batch::raise()?;
+        crate::raised::raise()?;
         Ok(cost)
     }
 

@@ -28,12 +28,12 @@ impl Watch {
     /// Raises what ended the solve, if something of Python's did.
     pub(crate) fn finish(self) -> PyResult<()> {
         self.raised.map_or(Ok(()), Err)?;
-        crate::batch::raise()
+        crate::raised::raise()
     }
 
     fn flow(&mut self, looked: PyResult<bool>) -> ControlFlow<()> {
         match looked {
-            Ok(true) if !crate::batch::has_raised() => ControlFlow::Continue(()),
+            Ok(true) if !crate::raised::has_raised() => ControlFlow::Continue(()),
             Ok(_) => ControlFlow::Break(()),
             Err(error) => {
                 self.raised = Some(error);

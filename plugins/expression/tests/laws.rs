@@ -58,7 +58,10 @@ fn a_part_that_has_a_name_is_the_formula_that_it_stands_for() {
         "residual": ["inverse(x) * p / norm(inverse(x) * p) - up", "where(norm(inverse(x) * p) - 2, norm(inverse(x) * p), 2)"],
     }));
     check((any_se3(), any_point3()), |(x, p)| {
-        same(&parts, &long, &[&x, &p], 0.0);
+        // no direction leads from the pose to a point in the same place
+        if parts.erased().is_defined(&[&x, &p]) == Some(true) {
+            same(&parts, &long, &[&x, &p], 0.0);
+        }
         Ok(())
     });
     let read: Expression = serde_json::from_str(&serde_json::to_string(&parts).unwrap()).unwrap();

@@ -1,7 +1,7 @@
 //! Calls of a function of Python, over many points at once.
-use super::keep;
 use crate::errors;
 use crate::input::{numbers_or_nan, to_array};
+use crate::raised::keep;
 use manifactor::graph::Variable;
 use manifactor::graph::quantity::VariableQuantity;
 use pyo3::prelude::*;

@@ -50,7 +50,7 @@ fn read(py: Python<'_>, path: PathBuf, repair: &str, anchor: bool) -> PyResult<(
     let read = py.detach(|| {
         let text = read_text(&path)?;
         let format = GraphFormat::of(&path, &text);
-        Ok(format.map(|format| (format.parse)(&text, &path, Reading { repair, anchor })).transpose()?)
+        format.map(|format| (format.parse)(&text, &path, Reading { repair, anchor })).transpose()
     });
     match read.map_err(unreadable)? {
         Some(read) => Ok((Graph(read.graph), Values(read.values), read.notes)),

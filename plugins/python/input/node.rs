@@ -1,6 +1,5 @@
 //! Values of Python as nodes of a document, and back.
 use super::arrays::any_numbers;
-use crate::chosen::Chosen;
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
 use numpy::PyUntypedArray;
@@ -63,8 +62,6 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
         let items = value.try_iter()?.enumerate();
         let item = |(i, item): (usize, PyResult<_>)| nested(what, &format!("{path}[{i}]"), &item?, depth + 1);
         Value::Array(items.map(item).collect::<PyResult<_>>()?)
-    } else if let Ok(chosen) = value.cast::<Chosen>() {
-        return json_to_node(path, &chosen.get().json()?);
     } else if value.cast::<PyUntypedArray>().is_ok() || value.hasattr("__array__")? {
         let array = super::array(what, path, value)?;
         let numbers = any_numbers(what, path, &array)?;
@@ -96,32 +93,6 @@ pub(crate) fn array_node(place: &Place, shape: &[usize], values: &[f64], whole: 
 
 pub(crate) fn number(x: f64, whole: bool) -> Value {
     if whole { Value::Integer(x as i64) } else { Value::Float(x) }
-}
-
-/// What serde has written, as a node.
-pub(crate) fn json_to_node(path: &str, json: &Json) -> PyResult<Node> {
-    let value = match json {
-        Json::Null => Value::Null,
-        Json::Bool(value) => Value::Bool(*value),
-        Json::Number(number) => match number.as_i64() {
-            Some(whole) => Value::Integer(whole),
-            None => Value::Float(number.as_f64().unwrap_or(f64::NAN)),
-        },
-        Json::String(text) => return Ok(Node::new(place(path, text), Value::String(text.clone()))),
-        Json::Array(items) => {
-            let item = |(i, item)| json_to_node(&format!("{path}[{i}]"), item);
-            Value::Array(items.iter().enumerate().map(item).collect::<PyResult<_>>()?)
-        }
-        Json::Object(fields) => {
-            let field = |(name, value): (&String, &Json)| {
-                let inner = within(path, name);
-                let node = json_to_node(&inner, value)?;
-                Ok((name.clone(), Field { key: place(&inner, ""), node }))
-            };
-            Value::Table(Box::new(fields.iter().map(field).collect::<PyResult<_>>()?))
-        }
-    };
-    Ok(Node::new(place(path, ""), value))
 }
 
 /// What serde writes, as dicts, lists and numbers.
