@@ -75,8 +75,16 @@ fn the_command_line_knows_the_facade_alone() {
 }
 
 #[test]
+fn the_python_package_knows_the_facade_and_the_command_line_and_is_known_to_nothing() {
+    only("python", &["manifactor", "cli"]);
+    assert!(users_of("manifactor-python").is_empty());
+    assert_eq!(users_of("pyo3"), ["manifactor-python"]);
+}
+
+#[test]
 fn every_package_has_its_place() {
-    let known: Vec<_> = FOR_PLUGINS.iter().chain(&PLUGINS).chain(&["cli", "manifactor"]).copied().collect();
+    let tops = ["cli", "manifactor", "python"];
+    let known: Vec<_> = FOR_PLUGINS.iter().chain(&PLUGINS).chain(&tops).copied().collect();
     for (package, _) in arrows() {
         assert!(known.contains(&package.as_str()), "{package} is new: say in this test where it stands");
     }

@@ -10,7 +10,6 @@ use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use serde_json::{Value, json};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// What keeps a command from doing what it was asked to do.
 #[derive(Debug, thiserror::Error)]
@@ -59,17 +58,17 @@ impl Failure {
     }
 
     /// That of a command line that is wrong: 2.
-    pub(crate) fn usage() -> ExitCode {
-        ExitCode::from(2)
+    pub(crate) fn usage() -> u8 {
+        2
     }
 
     /// That of files that could not be written or read: 3.
-    pub(crate) fn files() -> ExitCode {
-        ExitCode::from(3)
+    pub(crate) fn files() -> u8 {
+        3
     }
 
     /// 2 for bad input, 3 for files that are not there or cannot be read or written, whoever names them.
-    pub fn exit_code(&self) -> ExitCode {
+    pub fn exit_code(&self) -> u8 {
         let unreadable = |one: &Diagnostic| matches!(one.fault, Fault::Unreadable(_));
         match self {
             Self::Documents(list) if list.iter().all(unreadable) => Self::files(),

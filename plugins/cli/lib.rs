@@ -30,13 +30,20 @@ pub use failure::Failure;
 pub use status::Status;
 
 use clap::Parser;
+use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
 /// Reads the command line, does what it says, and says how it ended.
 pub fn main() -> ExitCode {
+    main_with(std::env::args_os()).into()
+}
+
+/// The same for a command line that is given, the name of the program first. It returns the exit code as a number, for a
+/// host that is no Rust program.
+pub fn main_with(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> u8 {
     interrupt::fail_at_the_limit_of_files();
-    let cli = match Cli::try_parse() {
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) if error.use_stderr() => {
             output::say(error.render().to_string().trim_end());
@@ -44,7 +51,7 @@ pub fn main() -> ExitCode {
         }
         Err(help) => {
             output::printed(help.print().and_then(|()| std::io::stdout().flush()));
-            return if output::is_lost() { Failure::files() } else { ExitCode::SUCCESS };
+            return if output::is_lost() { Failure::files() } else { Status::Done.into() };
         }
     };
     match cli.run() {

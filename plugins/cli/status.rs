@@ -1,7 +1,6 @@
 //! Exit codes.
 use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::solve::{Stall, Termination};
-use std::process::ExitCode;
 
 /// How a command ended that did what it was asked to do.
 ///
@@ -47,12 +46,12 @@ impl From<&VariantReport> for Status {
     }
 }
 
-impl From<Status> for ExitCode {
-    fn from(status: Status) -> ExitCode {
+impl From<Status> for u8 {
+    fn from(status: Status) -> u8 {
         match status {
-            Status::Done => ExitCode::SUCCESS,
-            Status::NotConverged | Status::NothingMapped | Status::Broken => ExitCode::from(1),
-            Status::Interrupted => ExitCode::from(130),
+            Status::Done => 0,
+            Status::NotConverged | Status::NothingMapped | Status::Broken => 1,
+            Status::Interrupted => 130,
         }
     }
 }

@@ -2,8 +2,9 @@
 use crate::mistake::Mistake;
 use crate::program::{Code, Pass, Program, Step};
 use crate::resolve::Library;
-use crate::scope::{Named, Scope, UP};
+use crate::scope::{Named, Scope, UP, check_name};
 use crate::syntax::{Formula, Node, parse};
+use indexmap::IndexMap;
 use manifactor_graph::TextError;
 use manifactor_graph::quantity::{Function, Quantity, Shape};
 use std::collections::{BTreeSet, HashMap};
@@ -27,10 +28,16 @@ impl Value {
 /// Compiles formulas, and says whether they use `up`.
 pub(crate) fn compile(
     scope: &Scope,
+    define: &IndexMap<String, String>,
     residual: &[String],
     domain: &[String],
 ) -> Result<(Program, bool), TextError> {
     let mut compiler = Compiler::new(scope);
+    for (name, text) in define {
+        compiler.define(name).map_err(|mistake| mistake.within(name))?;
+        let value = parse(text).and_then(|formula| compiler.value(&formula));
+        compiler.names.insert(name, value.map_err(|mistake| mistake.within(text))?);
+    }
     for text in residual {
         compiler.residual(text).map_err(|mistake| mistake.within(text))?;
     }
@@ -38,14 +45,17 @@ pub(crate) fn compile(
     for text in domain {
         compiler.condition(text).map_err(|mistake| mistake.within(text))?;
     }
-    Ok((Program::new(compiler.code), compiler.uses_up))
+    Ok((Program::new(compiler.code, compiler.values), compiler.uses_up))
 }
 
 struct Compiler<'a> {
     scope: &'a Scope,
     library: &'static Library,
     code: Code,
-    names: HashMap<&'a str, Value>,
+    /// Constants and what follows from them; room for what depends on variables.
+    values: Vec<f64>,
+    /// In the order in which they came, for messages.
+    names: IndexMap<&'a str, Value>,
     uses_up: bool,
     /// The arguments and the result of each call.
     calls: Vec<(Vec<Value>, Value)>,
@@ -57,17 +67,18 @@ struct Compiler<'a> {
 
 impl<'a> Compiler<'a> {
     fn new(scope: &'a Scope) -> Self {
-        let (mut code, mut names) = (Code::default(), HashMap::new());
+        let (mut code, mut values, mut names) = (Code::default(), vec![], IndexMap::new());
         for (name, what) in &scope.names {
-            let at = code.values.len();
+            let at = values.len();
             let (shape, depends) = match what {
                 Named::Constant(shape, flat) => {
-                    code.values.extend_from_slice(flat);
+                    values.extend_from_slice(flat);
+                    code.constants.push(at);
                     (*shape, 0)
                 }
                 Named::Variable(quantity) => {
                     let number = code.inputs.len();
-                    code.values.resize(at + quantity.shape.size, 0.0);
+                    values.resize(at + quantity.shape.size, 0.0);
                     code.types.push((quantity.type_id)());
                     code.dimensions.push(quantity.dimension);
                     code.inputs.push((quantity, at));
@@ -77,7 +88,19 @@ impl<'a> Compiler<'a> {
             names.insert(name.as_str(), Value { shape, at, depends });
         }
         let (library, calls, rows, known) = (Library::linked(), vec![], vec![], HashMap::new());
-        Self { scope, library, code, names, uses_up: false, calls, rows, known }
+        Self { scope, library, code, values, names, uses_up: false, calls, rows, known }
+    }
+
+    /// Checks the name of a part of formulas.
+    fn define(&self, name: &str) -> Result<(), Mistake> {
+        check_name(name)?;
+        match self.names.contains_key(name) {
+            true => {
+                let message = format!("`{name}` is a variable or a constant already: choose another name");
+                Err(Mistake::new(0..name.len(), message))
+            }
+            false => Ok(()),
+        }
     }
 
     /// Rows of the residual.
@@ -116,15 +139,18 @@ impl<'a> Compiler<'a> {
     fn value(&mut self, formula: &Formula) -> Result<Value, Mistake> {
         match &formula.node {
             Node::Number(x) => {
-                self.code.values.push(*x);
-                Ok(Value { shape: f64::SHAPE, at: self.code.values.len() - 1, depends: 0 })
+                self.values.push(*x);
+                Ok(Value { shape: f64::SHAPE, at: self.values.len() - 1, depends: 0 })
             }
             Node::Name(name) => match self.names.get(name.as_str()) {
                 Some(value) => {
                     self.uses_up |= name == UP;
                     Ok(*value)
                 }
-                None => Err(self.library.unknown_name(name, formula.span.clone(), self.scope)),
+                None => {
+                    let known = self.names.keys().copied();
+                    Err(self.library.unknown_name(name, formula.span.clone(), known))
+                }
             },
             Node::Call { name, at, arguments } => {
                 let values: Vec<Value> = arguments.iter().map(|a| self.value(a)).collect::<Result<_, _>>()?;
@@ -153,18 +179,18 @@ impl<'a> Compiler<'a> {
             return Ok(*value);
         }
         let depends = arguments.iter().fold(0, |all, value| all | value.depends);
-        let value = Value { shape: function.result, at: self.code.values.len(), depends };
-        self.code.values.resize(value.range().end, 0.0);
+        let value = Value { shape: function.result, at: self.values.len(), depends };
+        self.values.resize(value.range().end, 0.0);
+        let at = key.1.clone().into_boxed_slice();
+        let (numbers, lanes) = (function.over_numbers, function.over_lanes);
+        let step = Step { numbers, lanes, at, to: value.range() };
         if depends == 0 {
-            let (from, to) = self.code.values.split_at_mut(value.at);
-            (function.over_numbers)(from, &key.1, to);
-            if !to.iter().all(|x| x.is_finite()) {
+            if !step.run(&mut self.values) {
                 return Err(Mistake::new(span.clone(), "this is not a finite number"));
             }
+            self.code.folded.push(step);
         } else {
-            let at = key.1.clone().into_boxed_slice();
-            let (numbers, lanes) = (function.over_numbers, function.over_lanes);
-            self.code.calls.push(Step { numbers, lanes, at, to: value.range() });
+            self.code.calls.push(step);
             self.calls.push((arguments, value));
         }
         self.known.insert(key, value);

@@ -1,5 +1,5 @@
 //! The factor.
-use crate::compile::compile;
+use crate::cache::program;
 use crate::constant::Constant;
 use crate::language::page;
 use crate::program::Program;
@@ -28,6 +28,10 @@ struct Document {
     variables: IndexMap<String, String>,
     /// Formulas, each a row or, where it is a vector, several.
     residual: Vec<String>,
+    /// Parts of formulas by name, for all formulas and for the parts behind them.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    #[schemars(with = "std::collections::BTreeMap<String, String>")]
+    define: IndexMap<String, String>,
     /// Numbers, vectors and other values that formulas use by name.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     #[schemars(with = "std::collections::BTreeMap<String, Constant>")]
@@ -64,7 +68,7 @@ const MOST: usize = 32;
 impl TryFrom<Document> for Expression {
     type Error = ExpressionError;
     fn try_from(mut document: Document) -> Result<Self, ExpressionError> {
-        let Document { variables, residual, constants, up, domain } = &document;
+        let Document { variables, residual, define, constants, up, domain } = &document;
         if residual.is_empty() {
             return Err(ExpressionError::NoResidual);
         }
@@ -72,7 +76,7 @@ impl TryFrom<Document> for Expression {
             return Err(ExpressionError::WrongVariables(variables.len()));
         }
         let scope = Scope::new(variables, constants, *up.unwrap_or_default())?;
-        let (program, uses_up) = compile(&scope, residual, domain)?;
+        let (program, uses_up) = program(&scope, define, residual, domain)?;
         let program = Dynamic::new(program)?;
         // written down with the up that it uses, so that the document is complete
         document.up = document.up.or(uses_up.then(Up::default));
@@ -109,7 +113,8 @@ impl Expression {
         let variables = variables.into_iter().map(|(name, of)| (name.to_owned(), of.to_owned())).collect();
         let constants = constants.into_iter().map(|(name, is)| (name.to_owned(), is)).collect();
         let residual = residual.into_iter().map(str::to_owned).collect();
-        Document { variables, residual, constants, up: None, domain: vec![] }.try_into()
+        Document { variables, residual, define: IndexMap::new(), constants, up: None, domain: vec![] }
+            .try_into()
     }
     /// With another direction for up.
     ///

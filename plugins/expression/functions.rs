@@ -60,6 +60,9 @@ register_functions! {
     /// The greater of two, the first of equals.
     fn max(a: f64, b: f64) -> f64 { if b > a { b } else { a } }
 
+    /// A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
+    "where" fn branch(positive: f64, a: f64, b: f64) -> f64 { if positive > T::zero() { a } else { b } }
+
     /// The vector of these; `[x, y]` is short for it.
     fn vector(x: f64, y: f64) -> Vector2<f64> { Vector2::new(x, y) }
 
@@ -143,6 +146,9 @@ macro_rules! vectors {
             let squared = (a - b).norm_squared();
             if squared > T::zero() { squared.sqrt() } else { squared }
         }
+
+        /// A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
+        "where" fn branch(positive: f64, a: $vector, b: $vector) -> $vector { if positive > T::zero() { a } else { b } }
 
         /// The sum of the components.
         fn sum(v: $vector) -> f64 { v.iter().fold(T::zero(), |sum, x| sum + *x) }

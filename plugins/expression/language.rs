@@ -9,7 +9,7 @@ A formula of named variables: a factor in a config, without a compiler.
 `variables` names the factor's keys, in their order, and says of which type each is. Each formula of `residual` is a \
 number or a vector, one row or several. Numbers are `1`, `0.5`, `1e-3`; vectors `[0, 0, 1]`; operators `+ - * / ^`, of \
 which `^` binds most. Names are those of the variables, of `constants`, `pi`, and `up`, the world's up: where a semantic \
-rule leaves it open, it gets the run's gravity. A constant may be a number, a vector, or a value with its `type`. \
+rule leaves it open, it gets the run's gravity. A constant may be a number, a vector, or a value with its `type`; `define` gives names to parts of formulas. \
 Formulas are checked when they are read, and compiled once; their derivatives are exact.
 
 It is defined where all formulas of `domain` are above zero, and everywhere, where there are none. Division by zero, \

@@ -5,6 +5,7 @@
 //! see [`manifactor_graph::quantity`].
 // strangers' input comes in here: no place of it is taken for granted
 #![warn(clippy::indexing_slicing)]
+mod cache;
 #[allow(clippy::indexing_slicing, reason = "a formula is checked by now")]
 mod compile;
 mod constant;

@@ -95,15 +95,21 @@ impl Library {
     }
 
     /// A name that is neither a variable nor a constant.
-    pub(crate) fn unknown_name(&self, name: &str, at: Range<usize>, scope: &Scope) -> Mistake {
+    pub(crate) fn unknown_name<'n>(
+        &self,
+        name: &str,
+        at: Range<usize>,
+        known: impl Iterator<Item = &'n str>,
+    ) -> Mistake {
         if let Some(function) = self.named(name).first() {
             let arguments: Vec<_> = function.arguments.iter().map(|(name, _)| *name).collect();
             let help = format!("write {name}({})", arguments.join(", "));
             return Mistake::new(at, format!("`{name}` is a function")).help(help);
         }
-        let known = || scope.names.keys().map(String::as_str);
-        let meant = nearest(name, known()).map_or(String::new(), |near| format!("did you mean `{near}`? "));
-        let help = format!("{meant}there are {}", known().collect::<Vec<_>>().join(", "));
+        let known: Vec<&str> = known.collect();
+        let meant = nearest(name, known.iter().copied());
+        let meant = meant.map_or(String::new(), |near| format!("did you mean `{near}`? "));
+        let help = format!("{meant}there are {}", known.join(", "));
         Mistake::new(at, format!("unknown name `{name}`")).help(help)
     }
 

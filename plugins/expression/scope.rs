@@ -63,19 +63,26 @@ impl Scope {
 
     fn add(&mut self, name: &str, named: Named) -> Result<(), TextError> {
         let wrong = |message: String| Mistake::new(0..name.len(), message).within(name);
-        let letter = |c: char| c.is_alphabetic() || c == '_';
-        let plain = name.starts_with(letter) && name.chars().all(|c| letter(c) || c.is_numeric());
-        if !plain {
-            return Err(wrong(format!("`{name}` is not a name: expected letters, digits and `_`")));
-        }
-        if TAKEN.contains(&name) {
-            return Err(wrong(format!("`{name}` means something already: choose another name")));
-        }
+        check_name(name).map_err(|mistake| mistake.within(name))?;
         match self.names.insert(name.to_owned(), named) {
             None => Ok(()),
             Some(_) => Err(wrong(format!("`{name}` is a variable and a constant: rename one of them"))),
         }
     }
+}
+
+/// Checks that a name can be one of a formula's own.
+pub(crate) fn check_name(name: &str) -> Result<(), Mistake> {
+    let wrong = |message: String| Mistake::new(0..name.len(), message);
+    let letter = |c: char| c.is_alphabetic() || c == '_';
+    let plain = name.starts_with(letter) && name.chars().all(|c| letter(c) || c.is_numeric());
+    if !plain {
+        return Err(wrong(format!("`{name}` is not a name: expected letters, digits and `_`")));
+    }
+    if TAKEN.contains(&name) {
+        return Err(wrong(format!("`{name}` means something already: choose another name")));
+    }
+    Ok(())
 }
 
 fn quantity_of(name: &str) -> Result<&'static VariableQuantity, TextError> {

@@ -4,7 +4,7 @@ mod change;
 mod pass;
 mod threads;
 
-use crate::algebra::Block;
+use crate::algebra::{Block, Dimension};
 use crate::factor::kernel::Kernel;
 use crate::loss::{Loss, LossColumn};
 use crate::noise::{Whitener, Whiteners};
@@ -101,6 +101,11 @@ pub trait Batch: Send + Sync {
     }
     /// Whether a factor of the same type belongs here, by its noise and loss.
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool;
+    /// Whether a factor of the same type belongs here, by its parameters. Any does, as a rule; not where a batch is evaluated
+    /// in one call, of which those have to be the same.
+    fn takes(&self, _factor: &dyn Any) -> bool {
+        true
+    }
     /// Reserves room for `factors` more factors, with `variables` variables in total.
     fn reserve(&mut self, factors: usize, variables: usize);
     /// Adds a factor of this batch's type; others are left out.
@@ -317,9 +322,11 @@ impl<F: Kernel> Batch for BatchOf<F> {
             let x = self.factors[i].load(columns, &self.index[Self::range(&self.ends, i)]);
             let defined = self.factors[i].is_defined(x.clone());
             let value = self.factors[i].value(&x);
-            let residual = value.as_ref().to_vec();
+            let mut residual = value.as_ref().to_vec();
             let mut whitened = residual.clone();
             self.whiteners.whiten(i, &mut whitened);
+            residual.truncate(self.factors[i].rows());
+            whitened.truncate(residual.len());
             let mut weight = [if defined { whitened.iter().map(|x| x * x).sum() } else { 0.0 }];
             let cost = self.weigh(i, &mut weight, &[defined]);
             let cost = if defined { cost } else { 0.0 };
@@ -344,14 +351,16 @@ impl<F: Kernel> Batch for BatchOf<F> {
             for (k, _) in active.iter().enumerate().filter(|(_, active)| **active) {
                 let i = n * CHUNK + k;
                 let (starts, root) = (&self.starts[Self::range(&self.ends, i)], work.w[k].sqrt());
+                let rows = self.factors[i].rows();
                 work.r[k].as_mut_slice().iter_mut().for_each(|x| *x *= root);
                 let mut blocks = vec![];
                 F::each(&mut work.j[k], |a, block| {
                     if starts[a] != FIXED {
-                        blocks.push((starts[a] as usize, block.iter().map(|x| x * root).collect()));
+                        let columns = block.chunks_exact(F::Dim::N).flat_map(|column| &column[..rows]);
+                        blocks.push((starts[a] as usize, columns.map(|x| x * root).collect()));
                     }
                 });
-                let residual = work.r[k].as_slice();
+                let residual = &work.r[k].as_slice()[..rows];
                 visit(FactorRows { entry: self.entries[i] as usize, residual, blocks });
             }
         }

@@ -15,8 +15,9 @@ use smallvec::SmallVec;
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
 
-/// The most rows that a [`DynamicResidual`] may have: its loops are compiled once for each number of rows.
-pub const MAX_ROWS: usize = 9;
+/// The most rows that a [`DynamicResidual`] may have. Its loops are compiled for each number of rows up to nine, and for some
+/// above: between those, rows of zeros are put behind its own.
+pub const MAX_ROWS: usize = 48;
 
 /// A residual that says at run time how many rows it has and what types its variables are of.
 ///
@@ -63,6 +64,17 @@ impl DynamicBlocks {
         }));
         self.values.resize(end, 0.0);
     }
+    /// Puts zeros behind the rows of each column.
+    fn pad(&mut self, rows: usize, to: usize) {
+        let columns = self.values.len() / rows;
+        self.values.resize(columns * to, 0.0);
+        // from the last column on, so that none is overwritten before it has moved
+        for column in (0..columns).rev() {
+            self.values.copy_within(column * rows..(column + 1) * rows, column * to);
+            self.values[column * to + rows..(column + 1) * to].fill(0.0);
+        }
+        self.ends.iter_mut().for_each(|end| *end = *end / rows * to);
+    }
     fn range(&self, variable: usize) -> std::ops::Range<usize> {
         let first = if variable == 0 { 0 } else { self.ends[variable - 1] };
         first..self.ends[variable]
@@ -101,14 +113,14 @@ impl<F: DynamicResidual> Dynamic<F> {
     }
 }
 
-/// Calls with the number of rows as a type.
+/// Calls with the number of rows as a type, or with the next that there is.
 macro_rules! with_rows {
     ($rows:expr, $n:ident => $call:expr) => {
-        with_rows!(@arms $rows, $n => $call, 2 3 4 5 6 7 8 9)
+        with_rows!(@arms $rows, $n => $call, 2=2 3=3 4=4 5=5 6=6 7=7 8=8 9=9 10=12 13=16 17=24 25=48)
     };
-    (@arms $rows:expr, $n:ident => $call:expr, $($each:literal)+) => {
+    (@arms $rows:expr, $n:ident => $call:expr, $($first:literal = $last:literal)+) => {
         match $rows {
-            $($each => { const $n: usize = $each; $call })+
+            $($first..=$last => { const $n: usize = $last; $call })+
             _ => { const $n: usize = 1; $call }
         }
     };
@@ -162,7 +174,7 @@ impl<F: DynamicResidual> Dynamic<F> {
     }
 }
 
-/// A [`DynamicResidual`] of `N` rows, in a batch.
+/// A [`DynamicResidual`] of up to `N` rows, in a batch. Rows behind its own are zeros.
 #[derive(Clone)]
 struct Rows<F, const N: usize>(F);
 
@@ -185,18 +197,25 @@ impl<F: DynamicResidual, const N: usize> Kernel for Rows<F, N> {
     fn is_defined(&self, x: List<&dyn Any>) -> bool {
         self.0.is_defined(&x)
     }
+    fn rows(&self) -> usize {
+        self.0.rows()
+    }
     fn value(&self, x: &List<&dyn Any>) -> Vector<Const<N>> {
         let mut residual = <Const<N> as Dimension>::vector(|_| 0.0);
-        self.0.residual(x, residual.as_mut_slice());
+        self.0.residual(x, &mut residual.as_mut_slice()[..self.0.rows()]);
         residual
     }
     fn blocks() -> DynamicBlocks {
         DynamicBlocks::default()
     }
     fn linearize(&self, x: List<&dyn Any>, free: &[bool], blocks: &mut DynamicBlocks) -> Vector<Const<N>> {
-        blocks.resize(N, self.0.dimensions());
+        let rows = self.0.rows();
+        blocks.resize(rows, self.0.dimensions());
         let mut residual = <Const<N> as Dimension>::vector(|_| 0.0);
-        self.0.linearize(&x, free, residual.as_mut_slice(), blocks);
+        self.0.linearize(&x, free, &mut residual.as_mut_slice()[..rows], blocks);
+        if rows < N {
+            blocks.pad(rows, N);
+        }
         residual
     }
     fn each(blocks: &mut DynamicBlocks, mut visit: impl FnMut(usize, &mut [f64])) {

@@ -24,6 +24,10 @@ pub(crate) trait Kernel: Clone + Send + Sync + 'static {
         None
     }
     fn columns(columns: &Columns) -> Self::Columns<'_>;
+    /// Number of rows of the residual itself: those behind are zeros.
+    fn rows(&self) -> usize {
+        Self::Dim::N
+    }
     /// The variables, by their places in their columns.
     fn load<'a>(&self, columns: Self::Columns<'a>, index: &[u32]) -> Self::Refs<'a>;
     fn is_defined(&self, x: Self::Refs<'_>) -> bool;

@@ -41,10 +41,16 @@ impl<D: Dimension> Whiteners<D> {
     pub(crate) fn push(&mut self, one: &Whitener) {
         match (self, one) {
             (Self::Isotropic(all), Whitener::Isotropic(w)) => all.push(*w),
-            (Self::Diagonal(all), Whitener::Diagonal(w)) => all.push(D::vector(|i| w[i])),
+            // rows behind those of the noise are not observed
+            (Self::Diagonal(all), Whitener::Diagonal(w)) => {
+                all.push(D::vector(|i| w.get(i).copied().unwrap_or(0.0)));
+            }
             (Self::Full(all), Whitener::Full(w)) => {
                 let mut block = <Matrix<D, D> as Block>::zeros();
-                block.as_mut_slice().copy_from_slice(w.as_slice());
+                let columns = block.as_mut_slice().chunks_exact_mut(D::N).zip(w.column_iter());
+                columns.for_each(|(to, from)| {
+                    to.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = *from);
+                });
                 all.push(block);
             }
             _ => {}

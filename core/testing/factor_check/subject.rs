@@ -70,6 +70,8 @@ impl Subject {
     pub(super) fn graph(&self, point: &[Box<dyn Variable>]) -> Value {
         let variables: Vec<_> =
             self.keys.iter().zip(point).map(|(key, value)| json!({ "key": key, "value": value })).collect();
-        json!({ "variables": variables, "factors": [{ "keys": self.keys, "factor": self.factor }] })
+        // one that no document can hold says why
+        let factor = serde_json::to_value(&*self.factor).unwrap_or_else(|error| json!(error.to_string()));
+        json!({ "variables": variables, "factors": [{ "keys": self.keys, "factor": factor }] })
     }
 }

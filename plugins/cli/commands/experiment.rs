@@ -9,7 +9,7 @@ use crate::status::Status;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use manifactor::slam::experiment::{self, Experiment as Sweep, Journal, Progress, Summary};
+use manifactor::slam::experiment::{self, Experiment as Sweep, Journal, Progress, Shard, Summary};
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::slam::source::Folders;
 use manifactor::viz::{experiment_page, experiment_pictures};
@@ -42,6 +42,11 @@ pub(crate) struct Experiment {
     /// Run the trials again that failed before.
     #[arg(long)]
     retry_failed: bool,
+    /// Run one part of the trials only, the K-th of N, and keep what is done in a folder of its own: for several machines
+    /// that write to one disk, as in `--shard $SLURM_ARRAY_TASK_ID/8`. The same command without it takes over what all parts have
+    /// done, runs what is left, and writes the tables.
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
     /// Print JSON: the summary that is also written.
     #[arg(long)]
     pub(crate) json: bool,
@@ -55,9 +60,13 @@ impl Experiment {
         if let Some(out) = &self.out {
             sweep.output.clone_from(out);
         }
+        if let Some(shard) = self.shard {
+            sweep.keep(shard);
+        }
         let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
         let mut journal = Journal::open(claimed)?;
+        journal.take_over_shards()?;
         if self.retry_failed {
             journal.retry_failed();
         }
@@ -67,6 +76,14 @@ impl Experiment {
         let show = |progress| bar.show(progress);
         let complete = experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show)?;
         drop(bar);
+        let status = if complete { Status::Done } else { Status::Interrupted };
+        if self.shard.is_some() {
+            let (trials, folder) = (count(sweep.trials.len(), "trial"), sweep.output.display());
+            output::say(&format!(
+                "This part has {trials}: {folder}. The same command without --shard makes the tables."
+            ));
+            return Ok(status);
+        }
         let summary = experiment::write(&sweep, &journal)?;
         let trials = experiment::trials_table(&sweep, &journal);
         let look = Look::default();
@@ -75,7 +92,7 @@ impl Experiment {
         let page = experiment_page(&sweep, &summary, &trials, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);
-        Ok(if complete { Status::Done } else { Status::Interrupted })
+        Ok(status)
     }
 
     fn tell(&self, sweep: &Sweep, summary: &Summary) {

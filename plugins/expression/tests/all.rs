@@ -8,4 +8,5 @@
     clippy::print_stderr
 )]
 mod laws;
+mod long;
 mod messages;

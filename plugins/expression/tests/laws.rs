@@ -41,6 +41,66 @@ jacobian_laws! {
     formulas_in_the_plane_agree: (any_se2(), any_se2()).prop_map(|(a, b)| (plane(), a, b));
 }
 
+fn with_parts(document: serde_json::Value) -> Expression {
+    serde_json::from_value(document).unwrap()
+}
+
+#[test]
+fn a_part_that_has_a_name_is_the_formula_that_it_stands_for() {
+    let parts = with_parts(serde_json::json!({
+        "variables": { "x": "se3", "p": "point3" },
+        "define": { "seen": "inverse(x) * p", "far": "norm(seen)" },
+        "residual": ["seen / far - up", "where(far - 2, far, 2)"],
+        "domain": ["far"],
+    }));
+    let long = with_parts(serde_json::json!({
+        "variables": { "x": "se3", "p": "point3" },
+        "residual": ["inverse(x) * p / norm(inverse(x) * p) - up", "where(norm(inverse(x) * p) - 2, norm(inverse(x) * p), 2)"],
+    }));
+    check((any_se3(), any_point3()), |(x, p)| {
+        // no direction leads from the pose to a point in the same place
+        if parts.erased().is_defined(&[&x, &p]) == Some(true) {
+            same(&parts, &long, &[&x, &p], 0.0);
+        }
+        Ok(())
+    });
+    let read: Expression = serde_json::from_str(&serde_json::to_string(&parts).unwrap()).unwrap();
+    assert_eq!(serde_json::to_value(&read).unwrap(), serde_json::to_value(&parts).unwrap());
+}
+
+#[test]
+fn formulas_that_differ_in_constants_are_told_apart() {
+    let of = |offset: f64, up: [f64; 3]| {
+        with_parts(serde_json::json!({
+            "variables": { "p": "point3" },
+            "residual": ["dot(p, up) - offset ^ 2 * 3", "norm(p) - sqrt(offset)"],
+            "constants": { "offset": offset },
+            "up": up,
+        }))
+    };
+    let p = manifactor_geometry::Point3::new([1.0, 2.0, 2.0]);
+    let residual = |factor: &Expression| factor.erased().residual(&[&p]).unwrap();
+    assert_eq!(residual(&of(4.0, [0.0, 0.0, 1.0])), [2.0 - 48.0, 3.0 - 2.0]);
+    assert_eq!(residual(&of(9.0, [0.0, 1.0, 0.0])), [2.0 - 243.0, 3.0 - 3.0]);
+    // what follows from one constant is no number, though it was for the others
+    let document = serde_json::json!({
+        "variables": { "p": "point3" },
+        "residual": ["dot(p, up) - offset ^ 2 * 3", "norm(p) - sqrt(offset)"],
+        "constants": { "offset": -1.0 },
+    });
+    let error = serde_json::from_value::<Expression>(document).unwrap_err().to_string();
+    assert!(
+        error.contains("this is not a finite number") && error.contains("norm(p) - sqrt(offset)"),
+        "{error}"
+    );
+    let plane = |of: &str| {
+        let document = serde_json::json!({ "variables": { "p": of }, "residual": ["norm(p) - 1"] });
+        let factor: Expression = serde_json::from_value(document).unwrap();
+        factor.erased().signature().variables
+    };
+    assert_ne!(plane("point3"), plane("point2"));
+}
+
 /// Both say the same, and so do their derivatives.
 fn same(
     formula: &Expression,

@@ -160,7 +160,7 @@ fn types_and_names_are_checked_too() {
 }
 
 #[test]
-fn a_residual_has_one_to_nine_rows() {
+fn a_residual_has_one_row_at_least_and_not_too_many() {
     let says = |residual: &[&'static str]| {
         Expression::new([("x", "se3")], residual.iter().copied()).unwrap_err().to_string()
     };
@@ -169,8 +169,8 @@ fn a_residual_has_one_to_nine_rows() {
         "`residual` is empty: expected at least one formula, such as \"norm(position(x)) - 1\""
     );
     assert_eq!(
-        says(&["log(x)", "log(x)"]),
-        "`residual`: expected a residual of 1 to 9 rows, got 12; a longer one can be split over several factors"
+        says(&["log(x)"; 9]),
+        "`residual`: expected a residual of 1 to 48 rows, got 54; a longer one can be split over several factors"
     );
 }
 
@@ -192,4 +192,27 @@ fn constants_are_checked() {
     ] {
         assert_eq!(says(name, constant), message);
     }
+}
+
+/// The message of a formula over `x`, a pose, with a part that has this name.
+fn says_of_part(name: &str, part: &str, residual: &str) -> String {
+    let define: std::collections::BTreeMap<_, _> = [(name, part)].into();
+    let document =
+        serde_json::json!({ "variables": { "x": "se3" }, "define": define, "residual": [residual] });
+    serde_json::from_value::<Expression>(document).map_or_else(|e| e.to_string(), |_| "nothing".to_owned())
+}
+
+#[test]
+fn parts_of_formulas_are_checked() {
+    assert_eq!(says_of_part("p", "position(x)", "norm(p) - 1"), "nothing");
+    assert_eq!(
+        says_of_part("p", "postion(x)", "norm(p)"),
+        "unknown function `postion`\n  postion(x)\n  ^^^^^^^\ndid you mean `position`?"
+    );
+    assert!(
+        says_of_part("x", "position(x)", "norm(x)").starts_with("`x` is a variable or a constant already")
+    );
+    assert!(says_of_part("up", "position(x)", "norm(up)").starts_with("`up` means something already"));
+    assert!(says_of_part("a b", "position(x)", "1").starts_with("`a b` is not a name"));
+    assert!(says_of_part("p", "position(x)", "norm(q)").contains("there are x, up, pi, p"));
 }

@@ -4,6 +4,7 @@
 //! A file that is no such log is refused and not touched. Of several lines for one trial the last counts, as a trial that
 //! failed may be run again, and lines of trials that the experiment does not have any more are passed over, so that a
 //! changed experiment runs what is new and keeps what is not.
+use super::shard::folders;
 use super::{Trial, TrialRecord};
 use crate::output::OutputFolder;
 use manifactor_formats::whole::open_regular;
@@ -72,6 +73,33 @@ impl Journal {
             file.set_len(whole as u64).map_err(io)?;
         }
         Ok(Self { path, file, records, _folder: folder })
+    }
+
+    /// Takes over what the shards of the experiment have done and this log does not have.
+    ///
+    /// # Errors
+    /// Where the log of a shard cannot be read or is none, or this one cannot be written.
+    pub fn take_over_shards(&mut self) -> Result<(), JournalError> {
+        let output = self.path.parent().map(Path::to_owned).unwrap_or_default();
+        for folder in folders(&output) {
+            let path = folder.join(NAME);
+            let bytes = match std::fs::read(&path) {
+                Ok(bytes) => bytes,
+                // one that has not begun
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(source) => return Err(JournalError::Io { path, source }),
+            };
+            // it may be at work: what its last line is to be is not whole yet
+            let (records, _) = read(&bytes, &path)?;
+            let mut records: Vec<_> = records.into_iter().collect();
+            records.sort_by(|a, b| a.0.cmp(&b.0));
+            for (key, record) in records {
+                if !self.records.contains_key(&key) {
+                    self.append(record)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// What a trial came to, if it is done.

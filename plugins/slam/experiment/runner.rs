@@ -1,7 +1,7 @@
 //! Trials on all cores, each on one thread.
 use super::{Experiment, Journal, JournalError, Trial, TrialOutcome, TrialRecord};
 use crate::input::source::Folders;
-use manifactor_solve::Interrupt;
+use manifactor_solve::{Interrupt, Observer};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
@@ -42,7 +42,7 @@ pub fn run(
             scope.spawn(move || {
                 while !interrupt.0.load(Ordering::Relaxed)
                     && let Some(trial) = open.get(next.fetch_add(1, Ordering::Relaxed))
-                    && let Some(record) = alone(trial, folders, interrupt)
+                    && let Some(record) = alone(trial, folders, &mut interrupt.clone())
                     && send.send(record).is_ok()
                 {}
             });
@@ -61,8 +61,8 @@ pub fn run(
     written.map(|()| done == trials)
 }
 
-/// A trial on one thread: its solver has a pool of one.
-fn alone(trial: &Trial, folders: &Folders, interrupt: &Interrupt) -> Option<TrialRecord> {
+/// A trial on one thread: its solver has a pool of one. `None` where the observer stopped it.
+pub fn alone(trial: &Trial, folders: &Folders, observer: &mut (dyn Observer + Send)) -> Option<TrialRecord> {
     let failed = |reason: String| TrialRecord {
         labels: trial.labels.clone(),
         fingerprint: trial.fingerprint(),
@@ -73,7 +73,7 @@ fn alone(trial: &Trial, folders: &Folders, interrupt: &Interrupt) -> Option<Tria
         Ok(pool) => pool,
         Err(error) => return Some(failed(error.to_string())),
     };
-    let run = || pool.install(|| trial.run(folders, &mut interrupt.clone()));
+    let run = || pool.install(|| trial.run(folders, observer));
     // a defect shows in one row, and does not take the others with it
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|_| Some(failed("the trial panicked".into())))
 }

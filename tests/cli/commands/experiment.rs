@@ -119,3 +119,31 @@ fn mistakes_of_an_experiment_are_told_at_their_line() {
     std::fs::write(&config, SWEEP.replace("base.toml", "bass.toml")).unwrap();
     run(["experiment", &config], &[]).ended(3).complains("bass.toml");
 }
+
+#[test]
+fn parts_of_a_sweep_end_with_the_same_tables_when_they_are_put_together() {
+    let folder = folder(&[("base.toml", BASE), ("sweep.toml", SWEEP)]);
+    let (whole, parts) = (path(&folder, "whole"), path(&folder, "parts"));
+    sweep(&folder, &whole, 2).ended(0);
+    let part = |text: &str| {
+        manifactor(&format!("experiment {} --out {parts} --shard {text}", path(&folder, "sweep.toml")))
+    };
+    // one is left for the end, and one was torn
+    for text in ["1/3", "3/3"] {
+        let ran = part(text).ended(0);
+        assert!(ran.stderr.contains("This part has 4 trials") && ran.stdout.is_empty(), "{}", ran.stderr);
+    }
+    assert!(!Path::new(&parts).exists());
+    let log = format!("{parts}.shards/3-of-3/trials.jsonl");
+    let text = std::fs::read_to_string(&log).unwrap();
+    std::fs::write(&log, &text[..text.len() - 20]).unwrap();
+    let ran = sweep(&folder, &parts, 1).ended(0);
+    assert!(ran.stderr.contains("7 of 12 trials done, 7 of them before"), "{}", ran.stderr);
+    assert_eq!(tables(&parts), tables(&whole));
+    let ran = part("4/3").ended(2);
+    assert!(
+        ran.stderr.contains("expected K/N, the K-th of N parts, such as 2/8; got `4/3`"),
+        "{}",
+        ran.stderr
+    );
+}

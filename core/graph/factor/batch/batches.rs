@@ -22,7 +22,8 @@ impl Batches {
         loss: Option<&dyn Loss>,
     ) -> usize {
         let of_type = self.of_type.entry(residual.type_id()).or_default();
-        let found = of_type.iter().copied().find(|b| self.all[*b as usize].fits(noise, loss));
+        let fits = |batch: &dyn Batch| batch.fits(noise, loss) && batch.takes(residual.as_any());
+        let found = of_type.iter().copied().find(|b| fits(&*self.all[*b as usize]));
         let place = found.unwrap_or_else(|| {
             self.all.push(residual.new_batch(noise, loss));
             of_type.push(self.all.len() as u32 - 1);

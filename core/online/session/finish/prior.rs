@@ -3,12 +3,15 @@
 use crate::model::Prior;
 use manifactor_graph::__private::typetag;
 use manifactor_graph::{
-    Dynamic, DynamicBlocks, DynamicResidual, ErasedResidual, Factor, MAX_ROWS, Variable, as_variable,
+    Dynamic, DynamicBlocks, DynamicResidual, ErasedResidual, Factor, Variable, as_variable,
 };
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::Serialize;
 use std::any::{Any, TypeId};
 use std::sync::Arc;
+
+/// Rows of a factor: a few, so that no zeros are put behind them.
+const ROWS: usize = 9;
 
 /// Eigenvalues below this share of the largest are rounding.
 const RANK: f64 = 1e-13;
@@ -76,7 +79,7 @@ pub(super) fn factors(prior: &Prior, points: Vec<Box<dyn Variable>>) -> Vec<Arc<
         let rows = Dynamic::new(Rows { root, offset, ..all.clone() }).ok()?;
         Some(Arc::new(BatchPrior { rows }) as Arc<dyn Factor>)
     };
-    rows.chunks(MAX_ROWS).filter_map(some).collect()
+    rows.chunks(ROWS).filter_map(some).collect()
 }
 
 impl Rows {

@@ -1,0 +1,252 @@
+//! Calls of a function of Python, over many points at once.
+use crate::errors;
+use crate::input::{numbers_or_nan, to_array};
+use crate::raised::keep;
+use manifactor::graph::Variable;
+use manifactor::graph::quantity::VariableQuantity;
+use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
+use std::any::TypeId;
+use std::fmt;
+use std::sync::Arc;
+
+/// Half of what central differences are taken over: the cube root of the precision.
+const STEP: f64 = 6e-6;
+/// Points in one call, about: more take memory, and are no faster.
+const MOST: usize = 1 << 15;
+
+/// The residual of a factor as a function of Python.
+pub(super) struct Function {
+    pub name: String,
+    quantities: Vec<&'static VariableQuantity>,
+    pub types: Vec<TypeId>,
+    pub dimensions: Vec<usize>,
+    pub rows: usize,
+    /// Lengths of the constants.
+    pub constants: Vec<usize>,
+    evaluate: Py<PyAny>,
+    has_jacobian: bool,
+}
+
+/// Where a factor is evaluated.
+pub(super) struct Point {
+    pub variables: Vec<Box<dyn Variable>>,
+    pub constants: Arc<[f64]>,
+}
+
+/// The residuals of points, and for each variable the Jacobians, by columns.
+pub(super) type Linearized = (Vec<f64>, Vec<Vec<f64>>);
+
+impl fmt::Debug for Function {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+impl Function {
+    pub(super) fn new(
+        name: String,
+        quantities: Vec<&'static VariableQuantity>,
+        rows: usize,
+        constants: Vec<usize>,
+        evaluate: Py<PyAny>,
+        has_jacobian: bool,
+    ) -> Self {
+        let types = quantities.iter().map(|quantity| (quantity.type_id)()).collect();
+        let dimensions = quantities.iter().map(|quantity| quantity.dimension).collect();
+        Self { name, quantities, types, dimensions, rows, constants, evaluate, has_jacobian }
+    }
+
+    /// The residuals of these points, one after the other; not a number where Python has raised something.
+    pub(super) fn residuals(&self, points: &[Point]) -> Vec<f64> {
+        let mut all = Vec::with_capacity(points.len() * self.rows);
+        for points in points.chunks(MOST) {
+            let inputs = Inputs::new(self, points.iter());
+            match self.call(&inputs, false) {
+                Ok((residuals, _)) => all.extend(residuals),
+                Err(error) => {
+                    keep(error);
+                    all.resize(all.len() + points.len() * self.rows, f64::NAN);
+                }
+            }
+        }
+        all
+    }
+
+    /// The residuals, and the Jacobian blocks by each variable's tangent.
+    pub(super) fn linearized(&self, points: &[Point]) -> Linearized {
+        let sizes = self.dimensions.iter().map(|n| self.rows * n);
+        let mut all: Linearized =
+            (vec![], sizes.clone().map(|size| Vec::with_capacity(size * points.len())).collect());
+        let each = if self.has_jacobian { 1 } else { 1 + 2 * self.dimensions.iter().sum::<usize>() };
+        for points in points.chunks((MOST / each).max(1)) {
+            let done = if self.has_jacobian { self.by_python(points) } else { self.by_differences(points) };
+            let (residuals, blocks) = done.unwrap_or_else(|error| {
+                keep(error);
+                let nothing = |size: usize| vec![f64::NAN; size * points.len()];
+                (nothing(self.rows), sizes.clone().map(nothing).collect())
+            });
+            all.0.extend(residuals);
+            all.1.iter_mut().zip(blocks).for_each(|(all, some)| all.extend(some));
+        }
+        all
+    }
+
+    /// Python's Jacobians are by the numbers of the variables: those by the tangent follow by the chain rule.
+    fn by_python(&self, points: &[Point]) -> PyResult<Linearized> {
+        let (residuals, jacobians) = self.call(&Inputs::new(self, points.iter()), true)?;
+        let mut blocks = vec![];
+        for (v, (quantity, jacobian)) in self.quantities.iter().zip(&jacobians).enumerate() {
+            let (size, n) = (quantity.shape.size, quantity.dimension);
+            let mut gradients = vec![0.0; size * n];
+            let mut of_variable = Vec::with_capacity(points.len() * self.rows * n);
+            for (point, by_numbers) in points.iter().zip(jacobian.chunks_exact(self.rows * size)) {
+                if let Some(x) = point.variables.get(v) {
+                    (quantity.gradients)(x.erased().as_any(), &mut gradients);
+                }
+                for column in 0..n {
+                    let entry = |row: &[f64]| {
+                        row.iter()
+                            .zip(gradients.iter().skip(column).step_by(n))
+                            .map(|(a, b)| a * b)
+                            .sum::<f64>()
+                    };
+                    of_variable.extend(by_numbers.chunks_exact(size).map(entry));
+                }
+            }
+            blocks.push(of_variable);
+        }
+        Ok((residuals, blocks))
+    }
+
+    /// One call for the points and for all that are a small step away from them.
+    fn by_differences(&self, points: &[Point]) -> PyResult<Linearized> {
+        let mut around = Inputs::new(self, points.iter());
+        for (v, n) in self.dimensions.iter().enumerate() {
+            for direction in 0..*n {
+                for step in [STEP, -STEP] {
+                    let mut delta = vec![0.0; *n];
+                    delta.iter_mut().skip(direction).take(1).for_each(|x| *x = step);
+                    around.extend(self, points.iter(), Some((v, &delta)));
+                }
+            }
+        }
+        let (all, _) = self.call(&around, false)?;
+        let mut parts = all.chunks_exact((self.rows * points.len()).max(1));
+        let residuals = parts.next().unwrap_or_default().to_vec();
+        let mut blocks = vec![];
+        for n in &self.dimensions {
+            let size = self.rows * n;
+            let mut of_variable = vec![0.0; size * points.len()];
+            for direction in 0..*n {
+                let (Some(ahead), Some(behind)) = (parts.next(), parts.next()) else { continue };
+                for (i, (a, b)) in ahead.iter().zip(behind).enumerate() {
+                    let (point, row) = (i / self.rows, i % self.rows);
+                    if let Some(entry) = of_variable.get_mut(point * size + direction * self.rows + row) {
+                        *entry = (a - b) / (2.0 * STEP);
+                    }
+                }
+            }
+            blocks.push(of_variable);
+        }
+        Ok((residuals, blocks))
+    }
+
+    /// One call: the residuals, and the Jacobians where they are asked for, as they lie in Python's arrays.
+    fn call(&self, inputs: &Inputs, derivatives: bool) -> PyResult<(Vec<f64>, Vec<Vec<f64>>)> {
+        let n = inputs.count;
+        Python::attach(|py| {
+            let array = |width: &usize, values: &Vec<f64>| to_array(py, &[n, *width], values.clone());
+            let sizes: Vec<usize> = self.quantities.iter().map(|quantity| quantity.shape.size).collect();
+            let variables = sizes
+                .iter()
+                .zip(&inputs.variables)
+                .map(|(w, v)| array(w, v))
+                .collect::<PyResult<Vec<_>>>()?;
+            let constants = self
+                .constants
+                .iter()
+                .zip(&inputs.constants)
+                .map(|(w, v)| array(w, v))
+                .collect::<PyResult<Vec<_>>>()?;
+            let returned = self.evaluate.bind(py).call1((
+                PyList::new(py, variables)?,
+                PyList::new(py, constants)?,
+                derivatives,
+            ))?;
+            let (residuals, jacobians): (Bound<'_, PyAny>, Bound<'_, PyAny>) =
+                returned.cast::<PyTuple>()?.extract()?;
+            let residuals = read(&self.name, "the residual", &residuals, &[n, self.rows])?;
+            if !derivatives {
+                return Ok((residuals, vec![]));
+            }
+            let mut blocks = vec![];
+            for (size, jacobian) in sizes.iter().zip(jacobians.try_iter()?) {
+                blocks.push(read(&self.name, "the Jacobian", &jacobian?, &[n, self.rows, *size])?);
+            }
+            match blocks.len() == sizes.len() {
+                true => Ok((residuals, blocks)),
+                false => {
+                    let message = format!(
+                        "expected a Jacobian for each of {} variables, got {}",
+                        sizes.len(),
+                        blocks.len()
+                    );
+                    Err(errors::argument(&self.name, "the Jacobian", message))
+                }
+            }
+        })
+    }
+}
+
+/// Numbers that a function has returned. Rows that are not numbers say that the factor means nothing there.
+fn read(what: &str, name: &str, value: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Vec<f64>> {
+    let shape: Vec<_> = shape.iter().copied().map(Some).collect();
+    Ok(numbers_or_nan(what, name, value, &shape)?.values)
+}
+
+/// What a call is given: by variable and by constant, the numbers of all points.
+struct Inputs {
+    count: usize,
+    variables: Vec<Vec<f64>>,
+    constants: Vec<Vec<f64>>,
+}
+
+impl Inputs {
+    fn new<'p>(function: &Function, points: impl Iterator<Item = &'p Point>) -> Self {
+        let (variables, constants) =
+            (vec![vec![]; function.types.len()], vec![vec![]; function.constants.len()]);
+        let mut inputs = Self { count: 0, variables, constants };
+        inputs.extend(function, points, None);
+        inputs
+    }
+
+    /// Adds points, with one variable moved where that is said.
+    fn extend<'p>(
+        &mut self,
+        function: &Function,
+        points: impl Iterator<Item = &'p Point>,
+        moved: Option<(usize, &[f64])>,
+    ) {
+        for point in points {
+            self.count += 1;
+            for (v, (quantity, to)) in function.quantities.iter().zip(&mut self.variables).enumerate() {
+                let Some(x) = point.variables.get(v) else { continue };
+                let at = to.len();
+                to.resize(at + quantity.shape.size, 0.0);
+                let to = to.get_mut(at..).unwrap_or_default();
+                match moved.filter(|(which, _)| *which == v).and_then(|(_, delta)| x.erased().retract(delta))
+                {
+                    Some(x) => (quantity.values)(x.erased().as_any(), to),
+                    None => (quantity.values)(x.erased().as_any(), to),
+                }
+            }
+            let mut rest = &*point.constants;
+            for (width, to) in function.constants.iter().zip(&mut self.constants) {
+                let (own, behind) = rest.split_at_checked(*width).unwrap_or_default();
+                to.extend(own);
+                rest = behind;
+            }
+        }
+    }
+}

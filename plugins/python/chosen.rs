@@ -1,0 +1,318 @@
+//! What is chosen by name: factors, losses, solvers, starts and values of variables.
+use crate::errors::{self, Mistake};
+use crate::input::{array, json_to_python, node, numbers, to_array, to_python};
+use manifactor::config::{Errors, Field, Node, Place, Value, nearest};
+use manifactor::graph::catalogue::{entries, find};
+use manifactor::graph::loss::Loss;
+use manifactor::graph::{Factor, Variable};
+use manifactor::solve::{Optimizer, Start};
+use numpy::{PyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyAttributeError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::Value as Json;
+use std::sync::Arc;
+
+/// An array of numpy.
+type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
+
+/// Something that is chosen by name, as an object that does not change. Its classes in Python are one for each kind.
+#[pyclass(module = "manifactor._native", frozen, subclass)]
+pub(crate) struct Chosen(pub What);
+
+/// By kind.
+#[derive(Clone)]
+pub(crate) enum What {
+    Factor(Arc<dyn Factor>),
+    Loss(Arc<dyn Loss>),
+    Solver(Arc<dyn Optimizer>),
+    Start(Arc<dyn Start>),
+    Variable(Arc<dyn Variable>),
+}
+
+impl What {
+    /// The kind, as the catalogue has it, and the name in documents.
+    pub(crate) fn names(&self) -> (&'static str, &'static str) {
+        match self {
+            Self::Factor(x) => ("factor", x.typetag_name()),
+            Self::Loss(x) => ("loss", x.typetag_name()),
+            Self::Solver(x) => ("solver", x.typetag_name()),
+            Self::Start(x) => ("start", x.typetag_name()),
+            Self::Variable(x) => ("variable", x.typetag_name()),
+        }
+    }
+
+    fn read(kind: &str, node: &Node, errors: &Errors) -> Option<Self> {
+        match kind {
+            "factor" => node.read::<Box<dyn Factor>>(errors).map(|x| Self::Factor(x.into())),
+            "loss" => node.read::<Box<dyn Loss>>(errors).map(|x| Self::Loss(x.into())),
+            "solver" => node.read::<Box<dyn Optimizer>>(errors).map(|x| Self::Solver(x.into())),
+            "start" => node.read::<Box<dyn Start>>(errors).map(|x| Self::Start(x.into())),
+            "variable" => node.read::<Box<dyn Variable>>(errors).map(|x| Self::Variable(x.into())),
+            _ => None,
+        }
+    }
+
+    /// As an object of the class that Python has for it.
+    pub(crate) fn into_python(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        let (kind, name) = self.names();
+        let class = py.import("manifactor.chosen")?.call_method1("class_of", (kind, name))?;
+        let made = Bound::new(py, Chosen(self))?;
+        py.get_type::<Chosen>().call_method1("__new__", (class, made))
+    }
+}
+
+#[pymethods]
+impl Chosen {
+    /// By kind, name and fields; or the same as another, as an object of a class of its own.
+    #[new]
+    #[pyo3(signature = (kind, name = None, fields = None))]
+    fn new(
+        kind: &Bound<'_, PyAny>,
+        name: Option<&str>,
+        fields: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        if let Ok(other) = kind.cast::<Self>() {
+            return Ok(Self(other.get().0.clone()));
+        }
+        let (kind, name) = (kind.extract::<String>()?, name.unwrap_or_default());
+        known(&kind, name)?;
+        let mut table = manifactor::config::Table::default();
+        let field = |node| Field { key: Place::nowhere(), node };
+        table.insert("type".into(), field(Node::new(Place::nowhere(), Value::String(name.to_owned()))));
+        for (field_name, value) in fields.into_iter().flatten() {
+            if !value.is_none() {
+                let field_name: String = field_name.extract()?;
+                let value = node(name, &field_name, &value)?;
+                table.insert(field_name, Field { key: value.place.clone(), node: value });
+            }
+        }
+        let (node, errors) = (Node::new(Place::nowhere(), Value::Table(table)), Errors::new());
+        let what = What::read(&kind, &node, &errors);
+        errors.finish(what).map(Self).map_err(|diagnostics| errors::read(name, &diagnostics))
+    }
+
+    /// What it is: `"factor"`, `"loss"`, `"solver"`, `"start"` or `"variable"`.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.0.names().0
+    }
+
+    /// Its name in documents.
+    #[getter]
+    fn r#type(&self) -> &'static str {
+        self.0.names().1
+    }
+
+    /// Its fields with its `type`, as a document has them.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        json_to_python(py, &self.json()?)
+    }
+
+    /// A field: numbers as an array.
+    fn __getattr__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let (py, json) = (slf.py(), slf.get().json()?);
+        match json.get(name) {
+            Some(Json::Array(items)) if is_numeric(items) => {
+                let list = json_to_python(py, &Json::Array(items.clone()))?;
+                py.import("numpy")?.call_method1("array", (list, "float64"))
+            }
+            Some(value) => json_to_python(py, value),
+            None => {
+                let fields: Vec<&str> =
+                    json.as_object().map(|o| o.keys().map(String::as_str).collect()).unwrap_or_default();
+                let (_, of) = slf.get().0.names();
+                Err(PyAttributeError::new_err(format!(
+                    "`{of}` has no field `{name}`: there are {}",
+                    fields.join(", ")
+                )))
+            }
+        }
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        // a function of Python has no fields
+        let Ok(json) = self.json() else { return Ok(format!("{}(…)", self.0.names().1)) };
+        let fields = json.as_object().into_iter().flatten().filter(|(name, _)| *name != "type");
+        let fields: Vec<_> = fields.map(|(name, value)| format!("{name}={value}")).collect();
+        Ok(format!("{}({})", self.0.names().1, fields.join(", ")))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> PyResult<bool> {
+        match other.cast::<Self>() {
+            Ok(other) => Ok(self.0.names() == other.get().0.names() && self.json()? == other.get().json()?),
+            Err(_) => Ok(false),
+        }
+    }
+
+    fn __hash__(&self) -> isize {
+        use std::hash::{DefaultHasher, Hash, Hasher};
+        let mut hasher = DefaultHasher::new();
+        self.0.names().hash(&mut hasher);
+        hasher.finish() as isize
+    }
+}
+
+fn is_numeric(items: &[Json]) -> bool {
+    !items.is_empty()
+        && items.iter().all(|item| match item {
+            Json::Array(inner) => is_numeric(inner),
+            other => other.is_number(),
+        })
+}
+
+impl Chosen {
+    pub(crate) fn json(&self) -> PyResult<Json> {
+        let json = match &self.0 {
+            What::Factor(x) => serde_json::to_value(&**x),
+            What::Loss(x) => serde_json::to_value(&**x),
+            What::Solver(x) => serde_json::to_value(&**x),
+            What::Start(x) => serde_json::to_value(&**x),
+            What::Variable(x) => serde_json::to_value(&**x),
+        };
+        json.map_err(|error| errors::argument(self.0.names().1, "", error))
+    }
+}
+
+/// Checks that there is such a name.
+pub(crate) fn known(kind: &str, name: &str) -> PyResult<()> {
+    if find(kind, name).is_some() {
+        return Ok(());
+    }
+    let names: Vec<&str> = entries(kind).iter().map(|entry| entry.name).collect();
+    let mistake = Mistake::at("type", format!("no {kind} is called `{name}`"));
+    let meant =
+        nearest(name, names.iter().copied()).map_or(String::new(), |near| format!("did you mean `{near}`? "));
+    Err(errors::arguments("", vec![mistake.help(format!("{meant}there are {}", names.join(", ")))]))
+}
+
+/// An argument of a kind that is chosen by name.
+macro_rules! argument {
+    ($function:ident, $variant:ident, $type:ty, $noun:literal) => {
+        #[doc = concat!("An argument that is ", $noun, ".")]
+        pub(crate) fn $function(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Arc<$type>> {
+            match value.cast::<Chosen>().map(|chosen| &chosen.get().0) {
+                Ok(What::$variant(x)) => Ok(x.clone()),
+                _ => {
+                    let found = value.get_type().name()?;
+                    Err(PyTypeError::new_err(format!("{name}: expected {}, got {found}", $noun)))
+                }
+            }
+        }
+    };
+}
+argument!(factor, Factor, dyn Factor, "a factor");
+argument!(loss, Loss, dyn Loss, "a loss");
+argument!(solver, Solver, dyn Optimizer, "a solver");
+argument!(start, Start, dyn Start, "a start");
+argument!(variable, Variable, dyn Variable, "a value such as Se3(…)");
+
+fn variables(value: &Bound<'_, PyAny>) -> PyResult<Vec<Arc<dyn Variable>>> {
+    value.try_iter()?.map(|item| variable("variables", &item?)).collect()
+}
+
+/// The point that a tangent vector leads to.
+#[pyfunction]
+fn retract<'py>(x: &Bound<'py, PyAny>, delta: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let point = variable("x", x)?;
+    let delta = numbers("retract", "delta", delta, &[Some(point.erased().dim())])?;
+    let moved = point.erased().retract(&delta.values).ok_or_else(|| errors::internal("retract"))?;
+    What::Variable(moved.into()).into_python(x.py())
+}
+
+/// The tangent vector that leads to another point.
+#[pyfunction]
+fn local<'py>(x: &Bound<'py, PyAny>, to: &Bound<'py, PyAny>) -> PyResult<Floats<'py>> {
+    let (x_point, to_point) = (variable("x", x)?, variable("to", to)?);
+    let Some(delta) = x_point.erased().local(&*to_point) else {
+        let message = format!("expected a {}, got a {}", x_point.typetag_name(), to_point.typetag_name());
+        return Err(errors::argument("local", "to", message));
+    };
+    to_array(x.py(), &[delta.len()], delta)
+}
+
+/// Names of the tangent directions.
+#[pyfunction]
+fn tangent(x: &Bound<'_, PyAny>) -> PyResult<Vec<&'static str>> {
+    Ok(variable("x", x)?.erased().tangent().to_vec())
+}
+
+/// The residual of a factor and its Jacobian by each variable, not whitened.
+#[pyfunction]
+fn linearize<'py>(
+    of: &Bound<'py, PyAny>,
+    at: &Bound<'py, PyAny>,
+) -> PyResult<(Floats<'py>, Vec<Floats<'py>>)> {
+    let (py, of, at) = (of.py(), factor("factor", of)?, variables(at)?);
+    let linearization = py.detach(|| {
+        let refs: Vec<&dyn Variable> = at.iter().map(|x| &**x).collect();
+        of.erased().linearize(&refs)
+    });
+    let Some(linearization) = linearization else {
+        let types: Vec<_> = at.iter().map(|x| x.typetag_name()).collect();
+        let message = format!("`{}` does not take ({})", of.typetag_name(), types.join(", "));
+        return Err(errors::argument("linearize", "variables", message));
+    };
+    crate::raised::raise()?;
+    let by_rows = |m: &manifactor::nalgebra::DMatrix<f64>| {
+        to_array(py, &[m.nrows(), m.ncols()], m.transpose().as_slice().to_vec())
+    };
+    let rows = linearization.residual.len();
+    let jacobians = linearization.jacobians.iter().map(by_rows).collect::<PyResult<_>>()?;
+    Ok((to_array(py, &[rows], linearization.residual)?, jacobians))
+}
+
+/// ρ and ρ' of a loss at squared norms of whitened residuals.
+#[pyfunction]
+fn rho<'py>(of: &Bound<'py, PyAny>, squared: &Bound<'py, PyAny>) -> PyResult<(Floats<'py>, Floats<'py>)> {
+    let (py, of) = (of.py(), loss("loss", of)?);
+    let axes = array("rho", "squared", squared)?.shape().len();
+    let squared = numbers("rho", "squared", squared, &vec![None; axes])?;
+    let (rho, weight) = squared.values.iter().map(|s| of.erased().rho(*s)).unzip();
+    Ok((to_array(py, &squared.shape, rho)?, to_array(py, &squared.shape, weight)?))
+}
+
+/// Checks a factor at random points, as `manifactor check-factor` does: whether it holds, the report as text and as a dict.
+#[pyfunction]
+#[pyo3(signature = (of, around = None, names = None, points = 256, seed = 0))]
+fn check_factor<'py>(
+    of: &Bound<'py, PyAny>,
+    around: Option<&Bound<'py, PyAny>>,
+    names: Option<Vec<String>>,
+    points: usize,
+    seed: u64,
+) -> PyResult<(bool, String, Bound<'py, PyAny>)> {
+    use manifactor::testing::{FactorCheck, Subject};
+    let (py, of) = (of.py(), factor("factor", of)?);
+    // a function of Python is not in the catalogue: what is asked of the entry is the examples of the variables
+    let entry = find("factor", of.typetag_name()).or_else(|| find("factor", "expression"));
+    let entry = entry.ok_or_else(|| errors::internal("no entry `expression`"))?;
+    let mut subject = Subject::around_examples(entry, of).map_err(errors::solve)?;
+    if let Some(names) = names.filter(|names| names.len() == subject.keys.len()) {
+        subject.keys = names;
+    }
+    if let Some(around) = around {
+        let around = variables(around)?;
+        if around.len() != subject.around.len() {
+            let (expected, found) = (subject.around.len(), around.len());
+            return Err(errors::argument(
+                "check_factor",
+                "around",
+                format!("expected {expected} values, got {found}"),
+            ));
+        }
+        subject.around = around.iter().map(|x| x.erased().clone_box()).collect();
+    }
+    let report = py.detach(|| FactorCheck { points, seed, ..FactorCheck::default() }.run(&subject));
+    crate::raised::raise()?;
+    Ok((report.holds(), report.to_string(), to_python(py, &report)?))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(retract, module)?)?;
+    module.add_function(wrap_pyfunction!(local, module)?)?;
+    module.add_function(wrap_pyfunction!(tangent, module)?)?;
+    module.add_function(wrap_pyfunction!(linearize, module)?)?;
+    module.add_function(wrap_pyfunction!(rho, module)?)?;
+    module.add_function(wrap_pyfunction!(check_factor, module)?)
+}

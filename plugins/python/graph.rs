@@ -1,0 +1,253 @@
+//! Graphs, values and noise.
+mod files;
+mod noise;
+mod values;
+
+use crate::chosen::{What, factor, known, loss};
+use crate::errors;
+use crate::input::{Columns, key_rows, keys, to_python};
+use manifactor::graph::catalogue::find;
+use manifactor::graph::{Factor, FactorEntry, Fixed, Graph as Inner, Key};
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+pub(crate) use files::{document, register};
+pub(crate) use noise::Noise;
+pub(crate) use values::Values;
+
+/// Factors between named variables, and which variables are held.
+#[pyclass(module = "manifactor")]
+#[derive(Default)]
+pub(crate) struct Graph(pub Inner);
+
+#[pymethods]
+impl Graph {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a factor between variables, and returns its place in the graph, from 0.
+    ///
+    /// `keys` are the names of its variables, in the order of the residual's. `noise` defaults to a standard deviation of 1 in
+    /// every row, `loss` to none, `name`, which reports use, to that of the factor's type.
+    #[pyo3(signature = (keys, factor, *, noise = None, loss = None, name = None))]
+    fn add(
+        &mut self,
+        keys: &Bound<'_, PyAny>,
+        factor: &Bound<'_, PyAny>,
+        noise: Option<&Bound<'_, PyAny>>,
+        loss: Option<&Bound<'_, PyAny>>,
+        name: Option<&str>,
+    ) -> PyResult<usize> {
+        let keys = self::keys("add", keys)?;
+        let factor = self::factor("factor", factor)?;
+        let noise = noise::one("add", noise)?;
+        let loss = loss.map(|loss| self::loss("loss", loss)).transpose()?;
+        self.0.push(FactorEntry { keys, name: name.map(Into::into), factor, noise, loss });
+        Ok(self.0.factors().len() - 1)
+    }
+
+    /// Adds many factors of one type, and returns the range of their places.
+    #[pyo3(signature = (factor, keys, fields = None, *, prefix = None, noise = None, loss = None))]
+    fn add_many(
+        &mut self,
+        factor: &Bound<'_, PyAny>,
+        keys: &Bound<'_, PyAny>,
+        fields: Option<&Bound<'_, PyDict>>,
+        prefix: Option<&Bound<'_, PyAny>>,
+        noise: Option<&Bound<'_, PyAny>>,
+        loss: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<(usize, usize)> {
+        let (keys, width) = key_rows("add_many", keys, prefix)?;
+        let rows = keys.len() / width.max(1);
+        let loss = loss.map(|loss| self::loss("loss", loss)).transpose()?;
+        let mut noises = noise::Rows::new("add_many", rows, noise)?;
+        let mut factors = Factors::new(factor, rows, fields)?;
+        let first = self.0.factors().len();
+        // all or none
+        let mut entries = Vec::with_capacity(rows);
+        for (row, keys) in keys.chunks_exact(width.max(1)).enumerate() {
+            let (keys, factor, noise) = (keys.to_vec(), factors.row(row)?, noises.row(row)?);
+            entries.push(FactorEntry { keys, name: None, factor, noise, loss: loss.clone() });
+        }
+        self.0.factors_mut().append(&mut entries);
+        Ok((first, first + rows))
+    }
+
+    /// Holds a variable at its initial value: all of it, or the directions of its tangent space that are named.
+    #[pyo3(signature = (key, directions = None))]
+    fn fix(&mut self, key: &str, directions: Option<Vec<String>>) {
+        self.0.set_fixed(key, directions.map_or(Fixed::Whole(true), Fixed::Directions));
+    }
+
+    /// Lets a variable move again.
+    fn free(&mut self, key: &str) {
+        self.0.set_fixed(key, Fixed::Whole(false));
+    }
+
+    /// The variables that are held: `True`, or names of directions, by key.
+    #[getter]
+    fn fixed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        for (key, fixed) in self.0.fixed() {
+            match fixed {
+                Fixed::Whole(whole) => dict.set_item(key.as_str(), PyBool::new(py, *whole))?,
+                Fixed::Directions(names) => dict.set_item(key.as_str(), names)?,
+            }
+        }
+        Ok(dict)
+    }
+
+    /// Everything that is wrong between the graph and these values; empty where it can be solved.
+    fn check(&self, py: Python<'_>, values: PyRef<'_, Values>) -> Vec<String> {
+        let values = &values.0;
+        py.detach(|| self.0.check(values).iter().map(ToString::to_string).collect())
+    }
+
+    /// The factor at a place, from 0, as it stands in documents: `keys`, `factor`, `noise`, `loss`, `name`.
+    fn __getitem__<'py>(&self, py: Python<'py>, at: isize) -> PyResult<Bound<'py, PyAny>> {
+        let count = self.0.factors().len();
+        let place = if at < 0 { at.checked_add_unsigned(count) } else { Some(at) };
+        let entry = place.and_then(|place| self.0.factors().get(usize::try_from(place).ok()?));
+        match entry {
+            Some(entry) => to_python(py, entry),
+            None => {
+                let message = format!("there is no factor {at}: the graph has {count}, from 0");
+                Err(pyo3::exceptions::PyIndexError::new_err(message))
+            }
+        }
+    }
+
+    /// The factor at a place, from 0, as an object.
+    fn factor<'py>(&self, py: Python<'py>, at: usize) -> PyResult<Bound<'py, PyAny>> {
+        match self.0.factors().get(at) {
+            Some(entry) => What::Factor(entry.factor.clone()).into_python(py),
+            None => Err(pyo3::exceptions::PyIndexError::new_err(format!("there is no factor {at}"))),
+        }
+    }
+
+    /// The graph and its values as a document, in `toml`, `json` or `yaml`; `manifactor solve` reads it.
+    #[pyo3(signature = (values, format = "toml"))]
+    fn to_document(&self, py: Python<'_>, values: PyRef<'_, Values>, format: &str) -> PyResult<String> {
+        document(py, &self.0, &values.0, format)
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.factors().len()
+    }
+
+    fn __copy__(&self) -> Self {
+        Self(self.0.clone())
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        Self(self.0.clone())
+    }
+
+    fn __repr__(&self) -> String {
+        let types: Vec<_> = self.types().into_iter().map(|(name, n)| format!("{n} {name}")).collect();
+        format!("Graph({} factors: {})", self.0.factors().len(), types.join(", "))
+    }
+
+    fn _repr_html_(&self) -> String {
+        html(
+            &["factor", "number"],
+            self.types().into_iter().map(|(name, n)| [name.to_owned(), n.to_string()]),
+        )
+    }
+
+    /// How many factors there are of each type.
+    fn types(&self) -> BTreeMap<&'static str, usize> {
+        let mut types = BTreeMap::new();
+        for entry in self.0.factors() {
+            *types.entry(entry.factor.typetag_name()).or_default() += 1;
+        }
+        types
+    }
+}
+
+/// A table for notebooks.
+pub(crate) fn html(header: &[&str], rows: impl IntoIterator<Item = [String; 2]>) -> String {
+    let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
+    let header: String = header.iter().map(|cell| format!("<th>{}</th>", escape(cell))).collect();
+    let row = |cells: [String; 2]| {
+        let cells: String = cells.iter().map(|cell| format!("<td>{}</td>", escape(cell))).collect();
+        format!("<tr>{cells}</tr>")
+    };
+    format!("<table><tr>{header}</tr>{}</table>", rows.into_iter().map(row).collect::<String>())
+}
+
+/// Factors row by row.
+enum Factors {
+    /// One for all.
+    Same(Arc<dyn Factor>),
+    Read {
+        name: String,
+        columns: Columns,
+    },
+    /// Those of a function of Python.
+    Python(crate::batch::Rows),
+}
+
+impl Factors {
+    /// By a factor, which is the same for all, or by the name of a type and fields of which arrays are columns.
+    fn new(factor: &Bound<'_, PyAny>, rows: usize, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let py = factor.py();
+        let name = match factor.extract::<String>() {
+            Ok(name) => name,
+            Err(_) if factor.hasattr("__manifactor_fields__")? => {
+                // a factor that is written in Python knows its fields, given its constants
+                let given = fields.cloned().unwrap_or_else(|| PyDict::new(py));
+                let fields = factor.call_method1("__manifactor_fields__", (given,))?;
+                return Self::read("expression".to_owned(), rows, fields.cast()?);
+            }
+            Err(_) if factor.hasattr("__manifactor_rows__")? => {
+                let given = fields.cloned().unwrap_or_else(|| PyDict::new(py));
+                let made = factor.call_method1("__manifactor_rows__", (rows, given))?;
+                return crate::batch::Rows::new(rows, &made).map(Self::Python);
+            }
+            Err(_) if factor.is_callable() => factor.getattr("__name__")?.extract()?,
+            Err(_) if fields.is_none() => return Ok(Self::Same(self::factor("factor", factor)?)),
+            Err(_) => {
+                let message =
+                    "expected the name of a factor, or the function that makes it, where `fields` are given";
+                return Err(errors::argument("add_many", "factor", message));
+            }
+        };
+        match fields {
+            Some(fields) => Self::read(name, rows, fields),
+            None => Self::read(name, rows, &PyDict::new(py)),
+        }
+    }
+
+    fn read(name: String, rows: usize, fields: &Bound<'_, PyDict>) -> PyResult<Self> {
+        known("factor", &name)?;
+        let mut columns = Columns::new(&name, rows, fields)?;
+        if columns.is_constant() && rows > 0 {
+            return Ok(Self::Same(read(&name, &mut columns, 0)?));
+        }
+        Ok(Self::Read { name, columns })
+    }
+
+    fn row(&mut self, row: usize) -> PyResult<Arc<dyn Factor>> {
+        match self {
+            Self::Same(factor) => Ok(factor.clone()),
+            Self::Read { name, columns } => read(name, columns, row),
+            Self::Python(rows) => Ok(rows.row(row)),
+        }
+    }
+}
+
+fn read(name: &str, columns: &mut Columns, row: usize) -> PyResult<Arc<dyn Factor>> {
+    let entry = find("factor", name).ok_or_else(|| errors::internal(name))?;
+    let read = entry.read::<dyn Factor>(columns.row(row));
+    read.map(Arc::from).map_err(|error| errors::row(name, row, &error, "fields"))
+}
+
+/// As many keys as a text or a list names; `None` for all.
+pub(crate) fn optional_keys(what: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Key>> {
+    value.map_or(Ok(vec![]), |value| keys(what, value))
+}

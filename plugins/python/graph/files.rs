@@ -1,0 +1,79 @@
+//! Graphs in files: documents, and the formats of others.
+use super::{Graph, Values};
+use crate::errors;
+use manifactor::config::{Document, Format, read_graph, write_graph};
+use manifactor::formats::{FormatError, GraphFormat, Reading, Repair, read_text};
+use manifactor::graph::{Graph as InnerGraph, Values as InnerValues};
+use pyo3::exceptions::PyOSError;
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// A graph as a document.
+pub(crate) fn document(
+    py: Python<'_>,
+    graph: &InnerGraph,
+    values: &InnerValues,
+    format: &str,
+) -> PyResult<String> {
+    let format = match format {
+        "toml" => Format::Toml,
+        "json" => Format::Json,
+        "yaml" => Format::Yaml,
+        other => {
+            let message = format!("expected \"toml\", \"json\" or \"yaml\", got {other:?}");
+            return Err(errors::argument("to_document", "format", message));
+        }
+    };
+    py.detach(|| write_graph(graph, values, format))
+        .map_err(|error| errors::argument("to_document", "graph", error))
+}
+
+/// Reads a graph from a file: a literal graph in TOML, JSON or YAML, or one in another format that is linked. Returns the
+/// graph, its values, and notes of what the reader had to decide.
+#[pyfunction]
+#[pyo3(signature = (path, *, repair = "error", anchor = true))]
+fn read(py: Python<'_>, path: PathBuf, repair: &str, anchor: bool) -> PyResult<(Graph, Values, Vec<String>)> {
+    let repair = match repair {
+        "error" => Repair::Error,
+        "reject" => Repair::Reject,
+        "clamp" => Repair::Clamp,
+        other => {
+            let message = format!("expected \"error\", \"reject\" or \"clamp\", got {other:?}");
+            return Err(errors::argument("load", "repair", message));
+        }
+    };
+    if Format::of_path(&path).is_some() {
+        let read = py.detach(|| Document::open(&path).and_then(|document| read_graph(&document)));
+        let (graph, values) = read.map_err(|error| errors::document(&error))?;
+        return Ok((Graph(graph), Values(values), vec![]));
+    }
+    let read = py.detach(|| {
+        let text = read_text(&path)?;
+        let format = GraphFormat::of(&path, &text);
+        format.map(|format| (format.parse)(&text, &path, Reading { repair, anchor })).transpose()
+    });
+    match read.map_err(unreadable)? {
+        Some(read) => Ok((Graph(read.graph), Values(read.values), read.notes)),
+        None => {
+            let message = format!(
+                "{}: neither its extension nor its first line tells a format of graphs",
+                path.display()
+            );
+            Err(errors::argument("load", "path", message))
+        }
+    }
+}
+
+fn unreadable(error: FormatError) -> PyErr {
+    match error {
+        FormatError::Io { path, source } => {
+            let code = source.raw_os_error().unwrap_or_default();
+            PyOSError::new_err((code, source.to_string(), path))
+        }
+        other => errors::argument("load", "path", other),
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(read, module)?)
+}

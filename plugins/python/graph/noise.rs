@@ -1,0 +1,167 @@
+//! Noise, of one factor and of many.
+use crate::errors;
+use crate::input::{Numbers, array, numbers, to_array, to_python};
+use manifactor::graph::Noise as Inner;
+use manifactor::nalgebra::DMatrix;
+use numpy::{PyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyFloat, PyInt};
+
+/// Gaussian noise of a measurement. Default: a standard deviation of 1 in every row of the residual.
+#[pyclass(module = "manifactor", frozen)]
+pub(crate) struct Noise(Inner);
+
+const FORMS: [&str; 4] = ["sigma", "sigmas", "covariance", "information"];
+
+#[pymethods]
+impl Noise {
+    /// One of `sigma` (a standard deviation for all rows), `sigmas` (one for each row, shape (m,)), `covariance` and
+    /// `information` (shape (m, m), symmetric and positive definite), in the units of the residual's rows. `observed` says
+    /// which rows were measured.
+    #[new]
+    #[pyo3(signature = (sigma = None, *, sigmas = None, covariance = None, information = None, observed = None))]
+    fn new(
+        sigma: Option<&Bound<'_, PyAny>>,
+        sigmas: Option<&Bound<'_, PyAny>>,
+        covariance: Option<&Bound<'_, PyAny>>,
+        information: Option<&Bound<'_, PyAny>>,
+        observed: Option<Vec<bool>>,
+    ) -> PyResult<Self> {
+        let given = FORMS.into_iter().zip([sigma, sigmas, covariance, information]);
+        let given: Vec<_> = given.filter_map(|(name, value)| Some((name, value?))).collect();
+        let noise = match given.as_slice() {
+            [] => Inner::unit(),
+            [(name, value)] => {
+                let numbers = read("Noise", name, name, value, None)?;
+                made("Noise", name, name, &numbers.values)?
+            }
+            [(first, _), (second, _), ..] => {
+                let message = format!(
+                    "expected one of sigma, sigmas, covariance, information; got {first} and {second}"
+                );
+                return Err(errors::argument("Noise", second, message));
+            }
+        };
+        Ok(Self(observed.map_or(noise.clone(), |rows| noise.observing(&rows))))
+    }
+
+    /// The information matrix of a residual of so many rows, shape (rows, rows).
+    fn information_matrix<'py>(&self, py: Python<'py>, rows: usize) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let matrix = self.0.information_matrix(rows).map_err(errors::graph)?;
+        to_array(py, &[rows, rows], matrix.as_slice().to_vec())
+    }
+
+    /// As a document has it.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &self.0)
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let json = serde_json::to_value(&self.0).map_err(errors::internal)?;
+        let fields = json.as_object().into_iter().flatten();
+        let fields: Vec<_> = fields.map(|(name, value)| format!("{name}={value}")).collect();
+        Ok(format!("Noise({})", fields.join(", ")))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| other.get().0 == self.0)
+    }
+
+    fn __hash__(&self) -> isize {
+        0
+    }
+}
+
+/// The numbers of one of the forms, with a row for each factor where `rows` are given; `name` is what errors call them.
+fn read(
+    what: &str,
+    name: &str,
+    form: &str,
+    value: &Bound<'_, PyAny>,
+    rows: Option<usize>,
+) -> PyResult<Numbers> {
+    let axes = match form {
+        "sigma" => 0,
+        "sigmas" => 1,
+        _ => 2,
+    };
+    let shape: Vec<_> = rows.into_iter().map(Some).chain(std::iter::repeat_n(None, axes)).collect();
+    let numbers = numbers(what, name, value, &shape)?;
+    match numbers.shape.as_slice() {
+        [.., r, c] if axes == 2 && r != c => Err(errors::argument(
+            what,
+            name,
+            format!("expected a square matrix, got {r} rows and {c} columns"),
+        )),
+        _ => Ok(numbers),
+    }
+}
+
+/// The noise of one factor.
+fn made(what: &str, name: &str, form: &str, values: &[f64]) -> PyResult<Inner> {
+    let size = (values.len() as f64).sqrt().round() as usize;
+    let matrix = || DMatrix::from_row_slice(size, size, values);
+    let noise = match form {
+        "sigma" => Inner::sigma(values.first().copied().unwrap_or(f64::NAN)),
+        "sigmas" => Inner::sigmas(values),
+        "covariance" => Inner::covariance(matrix()),
+        _ => Inner::information(matrix()),
+    };
+    noise.map_err(|error| errors::argument(what, name, error))
+}
+
+/// The argument `noise` of one factor: a `Noise`, or a number, which is its sigma.
+pub(super) fn one(what: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Inner> {
+    let Some(value) = value else { return Ok(Inner::unit()) };
+    if let Ok(noise) = value.cast::<Noise>() {
+        return Ok(noise.get().0.clone());
+    }
+    if value.is_instance_of::<PyFloat>() || value.is_instance_of::<PyInt>() {
+        return made(what, "noise", "sigma", &[value.extract()?]);
+    }
+    let found = value.get_type().name()?;
+    Err(PyTypeError::new_err(format!("noise: expected a Noise or a standard deviation, got {found}")))
+}
+
+/// The noise of many factors.
+pub(super) enum Rows {
+    Same(Inner),
+    Each { form: &'static str, numbers: Numbers },
+}
+
+impl Rows {
+    /// As [`one`]; or a dict of one form, whose array has a row for each factor.
+    pub(super) fn new(what: &str, rows: usize, value: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let Some(fields) = value.and_then(|value| value.cast::<PyDict>().ok()) else {
+            return one(what, value).map(Self::Same);
+        };
+        let mut given = FORMS.into_iter().filter_map(|form| Some((form, fields.get_item(form).ok()??)));
+        let (Some((form, value)), None, 1) = (given.next(), given.next(), fields.len()) else {
+            let message = "expected a dict of one of sigma, sigmas, covariance, information with an array: a row for each factor";
+            return Err(errors::argument(what, "noise", message));
+        };
+        let name = format!("noise.{form}");
+        // its length is looked at before it is copied
+        let found = array(what, &name, &value)?.shape().first().copied();
+        if found != Some(rows) {
+            let found = found.map_or("no axis".to_owned(), |n| format!("{n} rows"));
+            return Err(errors::argument(
+                what,
+                &name,
+                format!("expected an array of {rows} rows, one for each, got {found}"),
+            ));
+        }
+        let numbers = read(what, &name, form, &value, Some(rows))?;
+        Ok(Self::Each { form, numbers })
+    }
+
+    pub(super) fn row(&mut self, row: usize) -> PyResult<Inner> {
+        match self {
+            Self::Same(noise) => Ok(noise.clone()),
+            Self::Each { form, numbers } => {
+                made("add_many", &format!("noise.{form}, row {row}"), form, numbers.row(row))
+            }
+        }
+    }
+}

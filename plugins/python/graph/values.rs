@@ -1,0 +1,203 @@
+//! Values of variables.
+use super::html;
+use crate::chosen::{What, known, variable};
+use crate::errors;
+use crate::input::{Columns, key_rows, to_array};
+use manifactor::graph::catalogue::find;
+use manifactor::graph::{Key, Values as Inner, Variable};
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use serde_json::Value as Json;
+use std::collections::BTreeMap;
+
+/// A value for each variable, by its key, in the order in which they were put in.
+#[pyclass(module = "manifactor", mapping)]
+#[derive(Default)]
+pub(crate) struct Values(pub Inner);
+
+#[pymethods]
+impl Values {
+    /// None, or those of a dict.
+    #[new]
+    #[pyo3(signature = (values = None))]
+    fn new(values: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut made = Self::default();
+        for (key, value) in values.into_iter().flatten() {
+            made.__setitem__(&key.extract::<String>()?, &value)?;
+        }
+        Ok(made)
+    }
+
+    fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+        match self.0.variable(key) {
+            Some(value) => What::Variable(value.erased().clone_box().into()).into_python(py),
+            None => Err(PyKeyError::new_err(format!("there is no variable `{key}`"))),
+        }
+    }
+
+    fn __setitem__(&mut self, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+        let value = variable("value", value)?;
+        self.0.insert_boxed(key.into(), value.erased().clone_box());
+        Ok(())
+    }
+
+    fn __delitem__(&mut self, key: &str) -> PyResult<()> {
+        match self.0.remove(key) {
+            Some(_) => Ok(()),
+            None => Err(PyKeyError::new_err(format!("there is no variable `{key}`"))),
+        }
+    }
+
+    fn __contains__(&self, key: &str) -> bool {
+        self.0.contains(key)
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.len()
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.keys(py)?.try_iter()?.into_any())
+    }
+
+    /// All keys, in order.
+    fn keys<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        PyList::new(py, self.0.iter().map(|(key, _)| key.as_str()))
+    }
+
+    /// Puts in many values of one type.
+    #[pyo3(signature = (keys, r#type, fields, *, prefix = None))]
+    fn insert_many(
+        &mut self,
+        keys: &Bound<'_, PyAny>,
+        r#type: &Bound<'_, PyAny>,
+        fields: &Bound<'_, PyDict>,
+        prefix: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let name: String = match r#type.extract() {
+            Ok(name) => name,
+            Err(_) => r#type.getattr("TYPE")?.extract()?,
+        };
+        let (keys, width) = key_rows("insert_many", keys, prefix)?;
+        if width != 1 {
+            return Err(errors::argument(
+                "insert_many",
+                "keys",
+                format!("expected one key for each, got {width}"),
+            ));
+        }
+        known("variable", &name)?;
+        let entry = find("variable", &name).ok_or_else(|| errors::internal(&name))?;
+        let mut columns = Columns::new(&name, keys.len(), fields)?;
+        let mut made: Vec<(Key, Box<dyn Variable>)> = Vec::with_capacity(keys.len());
+        for (row, key) in keys.into_iter().enumerate() {
+            let read = entry.read::<dyn Variable>(columns.row(row));
+            made.push((key, read.map_err(|error| errors::row(&name, row, &error, "fields"))?));
+        }
+        made.into_iter().for_each(|(key, value)| drop(self.0.insert_boxed(key, value)));
+        Ok(())
+    }
+
+    fn _repr_html_(&self) -> String {
+        html(
+            &["variable", "number"],
+            self.types().into_iter().map(|(name, n)| [name.to_owned(), n.to_string()]),
+        )
+    }
+
+    /// How many there are of each type.
+    fn types(&self) -> BTreeMap<&'static str, usize> {
+        let mut types = BTreeMap::new();
+        for (_, value) in self.0.iter() {
+            *types.entry(value.typetag_name()).or_default() += 1;
+        }
+        types
+    }
+
+    /// Keys and fields of all values of one type: each field an array with a row for each.
+    fn columns<'py>(
+        &self,
+        py: Python<'py>,
+        r#type: &Bound<'py, PyAny>,
+    ) -> PyResult<(Bound<'py, PyList>, Bound<'py, PyDict>)> {
+        let name: String = match r#type.extract() {
+            Ok(name) => name,
+            Err(_) => r#type.getattr("TYPE")?.extract()?,
+        };
+        known("variable", &name)?;
+        let values: Vec<_> = self.0.iter().filter(|(_, value)| value.typetag_name() == name).collect();
+        let mut fields: Vec<(String, Vec<usize>, Vec<f64>)> = vec![];
+        for (_, value) in &values {
+            let json = serde_json::to_value(value).map_err(errors::internal)?;
+            let mut place = 0;
+            gather("", &json, &mut place, &mut fields);
+        }
+        let dict = PyDict::new(py);
+        for (field, shape, numbers) in fields {
+            // a field that not all of them have is no column
+            if numbers.len() == values.len() * shape.iter().product::<usize>() {
+                let shape: Vec<_> = std::iter::once(values.len()).chain(shape).collect();
+                dict.set_item(field, to_array(py, &shape, numbers)?)?;
+            }
+        }
+        Ok((PyList::new(py, values.iter().map(|(key, _)| key.as_str()))?, dict))
+    }
+
+    fn __copy__(&self) -> Self {
+        Self(self.0.clone())
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        Self(self.0.clone())
+    }
+
+    fn __repr__(&self) -> String {
+        let types: Vec<_> = self.types().into_iter().map(|(name, n)| format!("{n} {name}")).collect();
+        format!("Values({})", types.join(", "))
+    }
+}
+
+/// Adds the numbers of a value to those of their fields: `translation`, `camera.fx`.
+fn gather(path: &str, json: &Json, place: &mut usize, fields: &mut Vec<(String, Vec<usize>, Vec<f64>)>) {
+    if let Json::Object(inner) = json {
+        for (name, value) in inner.iter().filter(|(name, _)| *name != "type") {
+            let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+            gather(&path, value, place, fields);
+        }
+        return;
+    }
+    let Some(shape) = shape(json) else { return };
+    // fields come in the same order in all values, as a rule
+    let found = match fields.get(*place) {
+        Some((name, ..)) if name == path => Some(*place),
+        _ => fields.iter().position(|(name, ..)| name == path),
+    };
+    let at = found.unwrap_or_else(|| {
+        fields.push((path.to_owned(), shape, vec![]));
+        fields.len() - 1
+    });
+    *place = at + 1;
+    if let Some((_, _, numbers)) = fields.get_mut(at) {
+        flatten(json, numbers);
+    }
+}
+
+/// The axes of numbers in arrays; `None` for anything else.
+fn shape(json: &Json) -> Option<Vec<usize>> {
+    match json {
+        Json::Number(_) => Some(vec![]),
+        Json::Array(items) => {
+            let inner = shape(items.first()?)?;
+            Some(std::iter::once(items.len()).chain(inner).collect())
+        }
+        _ => None,
+    }
+}
+
+fn flatten(json: &Json, numbers: &mut Vec<f64>) {
+    match json {
+        Json::Array(items) => items.iter().for_each(|item| flatten(item, numbers)),
+        json => numbers.extend(json.as_f64()),
+    }
+}

@@ -1,0 +1,10 @@
+//! What Python hands over: values as nodes of a document, arrays, keys.
+mod arrays;
+mod columns;
+mod keys;
+mod node;
+
+pub(crate) use arrays::{Numbers, array, numbers, numbers_or_nan, to_array};
+pub(crate) use columns::Columns;
+pub(crate) use keys::{key_rows, keys};
+pub(crate) use node::{json_to_python, node, to_python};

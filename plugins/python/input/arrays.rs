@@ -1,0 +1,139 @@
+//! Arrays of numbers, copied out of Python and into it.
+use crate::errors;
+use numpy::ndarray::{ArrayD, IxDyn};
+use numpy::{PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+
+/// Finite numbers by rows, as they lie in an array.
+pub(crate) struct Numbers {
+    pub shape: Vec<usize>,
+    pub values: Vec<f64>,
+    /// Whether all of them are whole by their type.
+    pub whole: bool,
+}
+
+impl Numbers {
+    /// Entries behind the first axis.
+    pub(crate) fn width(&self) -> usize {
+        self.shape.iter().skip(1).product()
+    }
+
+    pub(crate) fn row(&self, index: usize) -> &[f64] {
+        let width = self.width();
+        self.values.get(index * width..(index + 1) * width).unwrap_or_default()
+    }
+}
+
+/// In words: `(100, 3)`.
+fn in_words(shape: &[usize]) -> String {
+    let sizes: Vec<_> = shape.iter().map(ToString::to_string).collect();
+    if sizes.len() == 1 { format!("({},)", sizes.concat()) } else { format!("({})", sizes.join(", ")) }
+}
+
+/// An argument as an array of numpy; an array that is one already is not copied.
+pub(crate) fn array<'py>(
+    what: &str,
+    name: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    if let Ok(array) = value.cast::<PyUntypedArray>() {
+        return Ok(array.clone());
+    }
+    let made = value.py().import("numpy")?.call_method1("asarray", (value,));
+    let made =
+        made.map_err(|error| errors::argument(what, name, format!("expected an array of numbers: {error}")))?;
+    Ok(made.cast_into::<PyUntypedArray>()?)
+}
+
+/// An argument as finite numbers. `None` in a shape is any length; an array of other axes, of another type, or with what
+/// is not finite is refused.
+pub(crate) fn numbers(
+    what: &str,
+    name: &str,
+    value: &Bound<'_, PyAny>,
+    shape: &[Option<usize>],
+) -> PyResult<Numbers> {
+    let array = shaped(what, name, value, shape)?;
+    any_numbers(what, name, &array)
+}
+
+/// An argument as an array of this shape.
+fn shaped<'py>(
+    what: &str,
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    shape: &[Option<usize>],
+) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let array = array(what, name, value)?;
+    let fits = array.shape().len() == shape.len()
+        && array.shape().iter().zip(shape).all(|(found, expected)| expected.is_none_or(|n| n == *found));
+    if !fits {
+        let sizes: Vec<_> = shape.iter().map(|n| n.map_or("any".to_owned(), |n| n.to_string())).collect();
+        let comma = if sizes.len() == 1 { "," } else { "" };
+        let message = format!(
+            "expected an array of shape ({}{comma}), got {}",
+            sizes.join(", "),
+            in_words(array.shape())
+        );
+        return Err(errors::argument(what, name, message));
+    }
+    Ok(array)
+}
+
+/// The same, of which some may be not finite.
+pub(crate) fn numbers_or_nan(
+    what: &str,
+    name: &str,
+    value: &Bound<'_, PyAny>,
+    shape: &[Option<usize>],
+) -> PyResult<Numbers> {
+    let array = shaped(what, name, value, shape)?;
+    copied(what, name, &array)
+}
+
+/// The same for any shape.
+pub(crate) fn any_numbers(what: &str, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<Numbers> {
+    let numbers = copied(what, name, array)?;
+    let Some(at) = numbers.values.iter().position(|x| !x.is_finite()) else { return Ok(numbers) };
+    let found = numbers.values.get(at).copied().unwrap_or_default();
+    let message = format!("expected finite numbers, got {found} at {}", index(at, &numbers.shape));
+    Err(errors::argument(what, name, message))
+}
+
+/// Real numbers of an array, in its order.
+fn copied(what: &str, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<Numbers> {
+    let py = array.py();
+    let kind = array.dtype().kind();
+    if !matches!(kind, b'f' | b'i' | b'u') {
+        let dtype = array.dtype();
+        let message = format!("expected an array of real numbers, got one of the type {dtype}");
+        return Err(errors::argument(what, name, message));
+    }
+    let plain = py.import("numpy")?.call_method1("ascontiguousarray", (array, "float64"))?;
+    let plain: PyReadonlyArrayDyn<'_, f64> = plain.extract().map_err(errors::internal)?;
+    let values = plain.as_slice().map_err(errors::internal)?.to_vec();
+    // an array of no axes becomes one of one
+    let shape = array.shape().to_vec();
+    Ok(Numbers { shape, values, whole: kind != b'f' })
+}
+
+/// `[3, 1]`, by the place in an array of this shape.
+fn index(mut at: usize, shape: &[usize]) -> String {
+    let mut indices: Vec<usize> = vec![];
+    for n in shape.iter().rev() {
+        indices.push(at % n);
+        at /= n;
+    }
+    indices.reverse();
+    format!("{indices:?}")
+}
+
+/// Numbers by rows as an array.
+pub(crate) fn to_array<'py>(
+    py: Python<'py>,
+    shape: &[usize],
+    values: Vec<f64>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let array = ArrayD::from_shape_vec(IxDyn(shape), values).map_err(errors::internal)?;
+    Ok(PyArrayDyn::from_owned_array(py, array))
+}

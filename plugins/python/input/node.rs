@@ -1,0 +1,128 @@
+//! Values of Python as nodes of a document, and back.
+use super::arrays::any_numbers;
+use crate::errors;
+use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
+use numpy::PyUntypedArray;
+use pyo3::IntoPyObjectExt;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use serde_json::Value as Json;
+
+/// A place that is an argument, `camera.fx`, of which errors can show the text.
+fn place(path: &str, text: &str) -> Place {
+    SourceText::new(path, text).place(0..text.len())
+}
+
+/// A field within an argument.
+pub(crate) fn within(path: &str, name: &str) -> String {
+    if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }
+}
+
+/// A value as it would be read from a document; `path` is what errors call it.
+///
+/// # Errors
+/// Values that no document can hold.
+pub(crate) fn node(what: &str, path: &str, value: &Bound<'_, PyAny>) -> PyResult<Node> {
+    nested(what, path, value, 0)
+}
+
+fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Node> {
+    if depth > MAX_DEPTH {
+        return Err(errors::argument(what, path, format!("nested more than {MAX_DEPTH} levels deep")));
+    }
+    let plain = if value.is_none() {
+        Value::Null
+    } else if let Ok(value) = value.cast::<PyBool>() {
+        Value::Bool(value.is_true())
+    } else if let Ok(value) = value.cast::<PyInt>() {
+        match value.extract::<i64>() {
+            Ok(whole) => Value::Integer(whole),
+            Err(_) => match value.extract() {
+                Ok(large) => Value::Float(large),
+                Err(_) => return Err(errors::argument(what, path, "expected a number of at most 64 bits")),
+            },
+        }
+    } else if let Ok(value) = value.cast::<PyFloat>() {
+        Value::Float(value.value())
+    } else if let Ok(text) = value.cast::<PyString>() {
+        let text = text.to_cow()?.into_owned();
+        return Ok(Node::new(place(path, &text), Value::String(text)));
+    } else if let Ok(dict) = value.cast::<PyDict>() {
+        let mut table = manifactor::config::Table::default();
+        for (name, value) in dict {
+            let Ok(name) = name.extract::<String>() else {
+                return Err(errors::argument(what, path, format!("expected names as keys, got {name}")));
+            };
+            let inner = within(path, &name);
+            let node = nested(what, &inner, &value, depth + 1)?;
+            table.insert(name, Field { key: place(&inner, ""), node });
+        }
+        Value::Table(table)
+    } else if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        let items = value.try_iter()?.enumerate();
+        let item = |(i, item): (usize, PyResult<_>)| nested(what, &format!("{path}[{i}]"), &item?, depth + 1);
+        Value::Array(items.map(item).collect::<PyResult<_>>()?)
+    } else if value.cast::<PyUntypedArray>().is_ok() || value.hasattr("__array__")? {
+        let array = super::array(what, path, value)?;
+        let numbers = any_numbers(what, path, &array)?;
+        return Ok(array_node(&place(path, ""), &numbers.shape, &numbers.values, numbers.whole));
+    } else if let Ok(fields) = value.call_method0("to_dict") {
+        return nested(what, path, &fields, depth + 1);
+    } else if let Ok(path_like) = value.call_method0("__fspath__") {
+        return nested(what, path, &path_like, depth + 1);
+    } else {
+        let found = value.get_type().name()?;
+        let message = format!("expected numbers, texts, lists, dicts or arrays, got {found}");
+        return Err(errors::argument(what, path, message));
+    };
+    Ok(Node::new(place(path, ""), plain))
+}
+
+/// Numbers as arrays within arrays.
+pub(crate) fn array_node(place: &Place, shape: &[usize], values: &[f64], whole: bool) -> Node {
+    let value = match shape.split_first() {
+        None => number(values.first().copied().unwrap_or_default(), whole),
+        Some((_, inner)) => {
+            let width = inner.iter().product::<usize>().max(1);
+            let rows = values.chunks_exact(width);
+            Value::Array(rows.map(|row| array_node(place, inner, row, whole)).collect())
+        }
+    };
+    Node::new(place.clone(), value)
+}
+
+pub(crate) fn number(x: f64, whole: bool) -> Value {
+    if whole { Value::Integer(x as i64) } else { Value::Float(x) }
+}
+
+/// What serde writes, as dicts, lists and numbers.
+pub(crate) fn to_python<'py>(
+    py: Python<'py>,
+    value: &(impl serde::Serialize + ?Sized),
+) -> PyResult<Bound<'py, PyAny>> {
+    json_to_python(py, &serde_json::to_value(value).map_err(errors::internal)?)
+}
+
+/// The same of JSON.
+pub(crate) fn json_to_python<'py>(py: Python<'py>, json: &Json) -> PyResult<Bound<'py, PyAny>> {
+    match json {
+        Json::Null => Ok(py.None().into_bound(py)),
+        Json::Bool(value) => value.into_bound_py_any(py),
+        Json::Number(number) => match number.as_i64() {
+            Some(whole) => whole.into_bound_py_any(py),
+            None => number.as_f64().unwrap_or(f64::NAN).into_bound_py_any(py),
+        },
+        Json::String(text) => text.into_bound_py_any(py),
+        Json::Array(items) => {
+            let items = items.iter().map(|item| json_to_python(py, item)).collect::<PyResult<Vec<_>>>()?;
+            Ok(PyList::new(py, items)?.into_any())
+        }
+        Json::Object(fields) => {
+            let dict = PyDict::new(py);
+            for (name, value) in fields {
+                dict.set_item(name, json_to_python(py, value)?)?;
+            }
+            Ok(dict.into_any())
+        }
+    }
+}

@@ -1,0 +1,107 @@
+"""Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
+
+::
+
+    import manifactor as mf
+
+    graph, values = mf.Graph(), mf.Values()
+    values["x0"] = mf.Se2(translation=[0, 0], angle=0)
+    values["x1"] = mf.Se2(translation=[1, 0], angle=0)
+    graph.add("x0", mf.prior_se2(value=values["x0"]))
+    graph.add(["x0", "x1"], mf.between_se2(relative=mf.Se2(translation=[1, 0], angle=0.1)), noise=0.1)
+    solution = mf.solve(graph, values)
+"""
+
+from __future__ import annotations
+
+import os
+
+from . import errors, factors, functions, losses, solvers, starts, types, variables
+from ._native import FactorId, Graph, Noise, Session, Solution, Values, __version__, solve
+from ._native import read as _read
+from .batched import BatchFactor, batch
+from .chosen import Factor, Loss, Solver, Start, Variable
+from .errors import ArgumentError, DocumentError, GraphError, ManifactorError, SolveError, TraceError
+from .factors import *
+from .formula import require, where
+from .frames import poses, rotations, to_pandas
+from .logs import enable_logging
+from .losses import *
+from .report import Report, Summary, experiment, run
+from .solvers import auto, dogleg, gauss_newton, gnc, levenberg_marquardt
+from .traced import Check, TracedFactor, check_factor, factor
+from .variables import *
+
+__all__ = [
+    "ArgumentError",
+    "BatchFactor",
+    "Check",
+    "DocumentError",
+    "Factor",
+    "FactorId",
+    "Graph",
+    "GraphError",
+    "Loss",
+    "ManifactorError",
+    "Noise",
+    "Report",
+    "Session",
+    "Solution",
+    "SolveError",
+    "Solver",
+    "Start",
+    "Summary",
+    "TraceError",
+    "TracedFactor",
+    "Values",
+    "Variable",
+    "__version__",
+    "auto",
+    "batch",
+    "check_factor",
+    "dogleg",
+    "enable_logging",
+    "errors",
+    "experiment",
+    "factor",
+    "factors",
+    "functions",
+    "gauss_newton",
+    "gnc",
+    "levenberg_marquardt",
+    "load",
+    "losses",
+    "poses",
+    "require",
+    "rotations",
+    "run",
+    "save",
+    "solve",
+    "solvers",
+    "starts",
+    "to_pandas",
+    "types",
+    "variables",
+    "where",
+]
+__all__ += factors.__all__
+__all__ += losses.__all__
+__all__ += variables.__all__
+
+
+def load(path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True) -> tuple[Graph, Values]:
+    """Reads a graph and its values from a file: TOML, JSON, YAML, or g2o, TORO, BAL.
+
+    `repair` says what becomes of information matrices that are not positive definite: `"error"`, `"reject"` or `"clamp"`.
+    `anchor` holds the first pose where nothing in the file does.
+    """
+    graph, values, _ = _read(path, repair=repair, anchor=anchor)
+    return graph, values
+
+
+def save(path: str | os.PathLike[str], graph: Graph, values: Values) -> None:
+    """Writes a graph and its values as a document, by the extension of the file; `load` and `manifactor solve` read it."""
+    extension = os.path.splitext(os.fspath(path))[1].removeprefix(".")
+    text = graph.to_document(values, {"yml": "yaml"}.get(extension, extension))
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)

@@ -1,0 +1,16 @@
+"""The command line: `manifactor`, or `python -m manifactor`."""
+
+from __future__ import annotations
+
+import sys
+
+from . import _native
+
+
+def main() -> int:
+    """Does what the command line says, and returns the exit code."""
+    return _native.main(["manifactor", *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,157 @@
+"""Factors of which Python evaluates a whole batch in one call: `@batch`, for what cannot be written as a formula."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from inspect import Parameter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from .chosen import Factor
+from .errors import ArgumentError, Mistake
+from .traced import parameters
+
+Array = NDArray[np.float64]
+
+
+class BatchFactor:
+    """A factor as a function of arrays. Called with its constants, it is a `Factor`."""
+
+    def __init__(self, function: Callable[..., Any], rows: int, jacobian: Callable[..., Any] | str | None) -> None:
+        if isinstance(jacobian, str) and jacobian not in ("jax", "differences"):
+            message = f'expected a function, "jax" or "differences", got {jacobian!r}'
+            raise ArgumentError(function.__name__, [Mistake("jacobian", message)])
+        self.function = function
+        self.variables, self.constants = parameters(function)
+        self.rows = rows
+        self.__name__ = function.__name__
+        self.__doc__ = function.__doc__
+        self.__wrapped__ = function
+        if jacobian == "jax" or (jacobian is None and uses_jax(function)):
+            self.jacobian: Callable[..., Any] | None = by_jax(function, len(self.variables), len(self.constants))
+        else:
+            self.jacobian = jacobian if callable(jacobian) else None
+        #: By the shapes of the constants.
+        self._functions: dict[tuple[tuple[int, ...], ...], Any] = {}
+
+    def __repr__(self) -> str:
+        variables = [f"{name}: {of.__name__}" for name, of in self.variables.items()]
+        return f"<batch factor {self.__name__}({', '.join([*variables, *self.constants])}), {self.rows} rows>"
+
+    def __call__(self, **constants: Any) -> Factor:
+        """The factor with these constants: numbers or arrays."""
+        arrays = [np.asarray(value, dtype=float) for value in self._given(constants).values()]
+        row = np.concatenate([np.ravel(array) for array in arrays]) if arrays else np.empty(0)
+        made = self._function(tuple(array.shape for array in arrays)).factor(row)
+        assert isinstance(made, Factor)
+        return made
+
+    def __manifactor_rows__(self, rows: int, columns: Mapping[str, Any]) -> tuple[Any, Array]:
+        """The function for `Graph.add_many`, and the constants of each factor: arrays have a row for each."""
+        arrays = []
+        for name, value in self._given(dict(columns)).items():
+            array = np.asarray(value, dtype=float)
+            if not isinstance(value, np.ndarray):
+                array = np.broadcast_to(array, (rows, *array.shape))
+            elif array.ndim == 0 or len(array) != rows:
+                message = f"expected an array of {rows} rows, one for each, got shape {array.shape}"
+                raise ArgumentError(self.__name__, [Mistake(name, message)])
+            arrays.append(array)
+        function = self._function(tuple(array.shape[1:] for array in arrays))
+        flat = [array.reshape(rows, -1) for array in arrays]
+        return function, np.concatenate(flat, axis=1) if flat else np.empty((rows, 0))
+
+    def _given(self, constants: dict[str, Any]) -> dict[str, Any]:
+        unknown = [name for name in constants if name not in self.constants]
+        if unknown:
+            known = ", ".join(self.constants) or "none"
+            raise TypeError(f"{self.__name__} has no constant `{unknown[0]}`: there are {known}")
+        given = {name: constants.get(name, default) for name, default in self.constants.items()}
+        missing = [name for name, value in given.items() if value is Parameter.empty]
+        if missing:
+            raise TypeError(f"{self.__name__}: missing the constant `{missing[0]}`")
+        return given
+
+    def _function(self, shapes: tuple[tuple[int, ...], ...]) -> Any:
+        if shapes not in self._functions:
+            sizes = [int(np.prod(shape)) for shape in shapes]
+            types = [of.TYPE for of in self.variables.values()]
+            has_jacobian = self.jacobian is not None
+            evaluate = self._evaluate(shapes)
+            made = _native.BatchFunction(self.__name__, types, self.rows, sizes, evaluate, has_jacobian)
+            self._functions[shapes] = made
+        return self._functions[shapes]
+
+    def _evaluate(self, shapes: tuple[tuple[int, ...], ...]) -> Callable[[list[Array], list[Array], bool], Any]:
+        def evaluate(variables: list[Array], constants: list[Array], derivatives: bool) -> tuple[Any, Any]:
+            given = [c.reshape(len(c), *shape) for c, shape in zip(constants, shapes, strict=True)]
+            residual = self._as_rows(self.function(*variables, *given))
+            if not derivatives or self.jacobian is None:
+                return residual, None
+            jacobians = self.jacobian(*variables, *given)
+            if len(variables) == 1 and not isinstance(jacobians, list | tuple):
+                jacobians = [jacobians]
+            return residual, [np.asarray(jacobian, dtype=float) for jacobian in jacobians]
+
+        return evaluate
+
+    def _as_rows(self, returned: Any) -> Array:
+        residual = np.asarray(returned, dtype=float)
+        # a residual of one row may come without its axis
+        return residual[:, None] if residual.ndim == 1 and self.rows == 1 else residual
+
+
+def uses_jax(function: Callable[..., Any]) -> bool:
+    """Whether a function names a module of JAX's."""
+    if "jax" not in sys.modules:
+        return False
+    named = inspect.getclosurevars(function)
+    modules = [*named.globals.values(), *named.nonlocals.values()]
+    return any(getattr(module, "__name__", "").startswith("jax") for module in modules)
+
+
+def by_jax(function: Callable[..., Any], variables: int, constants: int) -> Callable[..., Any]:
+    """The Jacobians by JAX: by forward differentiation, point by point, compiled once for each shape."""
+    import jax
+    import jax.numpy as jnp
+
+    jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
+
+    def one(*arguments: Any) -> Any:
+        returned = jnp.asarray(function(*(argument[None] for argument in arguments)))
+        return jnp.atleast_1d(returned[0])
+
+    derivative = jax.vmap(jax.jacfwd(one, argnums=tuple(range(variables))))
+    compiled: Callable[..., Any] = jax.jit(derivative)
+    return compiled
+
+
+def batch(
+    *, rows: int, jacobian: Callable[..., Any] | str | None = None
+) -> Callable[[Callable[..., Any]], BatchFactor]:
+    """Makes a function of arrays the residual of many factors: it is called once for all of them.
+
+    Arguments that are annotated with a type of variables get the numbers of these, shape (n, size), where n is the number of
+    factors: `Se3` as rotation (x, y, z, w) and translation, `DualQuadric` as its pose and its semi-axes, points as they are. The
+    others are constants, with a row for each factor. It returns the residuals, shape (n, rows); a row that is not a number says
+    that the factor means nothing there::
+
+        @mf.batch(rows=1)
+        def ranges(x: mf.Se3, p: mf.Point3, measured):
+            return np.linalg.norm(x[:, 4:] - p, axis=1) - measured
+
+        graph.add_many(ranges, keys, {"measured": distances}, prefix=["x", "p"], noise=0.1)
+
+    `jacobian`, called with the same arguments, gives an array for each variable, shape (n, rows, size), by its numbers. Without,
+    derivatives are JAX's, where the function uses JAX or `jacobian="jax"`; else central differences in the tangent space.
+    Such a factor cannot be saved: `@mf.factor` can.
+    """
+    return lambda function: BatchFactor(function, rows, jacobian)
+
+
+__all__: Sequence[str] = ["BatchFactor", "batch"]

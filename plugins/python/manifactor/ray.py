@@ -1,0 +1,113 @@
+"""An experiment over Ray: `python -m manifactor.ray SWEEP`. Needs `manifactor[ray]`.
+
+The driver has the journal, and the workers run the trials, each on one processor. A worker that dies is a retry; where the driver
+dies, the same command goes on with what is left. The tables are those of `manifactor experiment`, byte for byte. Documents and data
+are read by each worker, from the same paths.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import _native
+from .report import Config, Summary, data_folder, opened, overrides
+
+#: How often a trial is begun again whose worker has died.
+RETRIES = 5
+
+#: What a worker opens the experiment by: its path, its text where it has no file, overrides, and the folder of data.
+Opened = tuple[str, str | None, tuple[str, ...], str | None]
+
+
+@functools.lru_cache(maxsize=4)
+def _sweep(of: Opened) -> Any:
+    """The experiment in a worker: read once, and not for each trial."""
+    path, text, set, data = of
+    return _native.Sweep(path, text, list(set), data, None, False, False)
+
+
+def run_trial(of: Opened, number: int) -> str:
+    """Runs a trial in a worker, and returns its line of the journal."""
+    line: str = _sweep(of).run(number)
+    return line
+
+
+def experiment(
+    config: Config,
+    *,
+    set: Mapping[str, Any] | Sequence[str] = (),
+    data: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    address: str | None = None,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Summary:
+    """Runs the trials of an experiment that are not done yet, on the workers of a cluster, and writes its tables.
+
+    `address` is that of a cluster; without it, one is started on this machine, with so many `workers`. Where Ray is connected
+    already, that is used. `progress` is called with the trials that are done in this call, and all that it has to do.
+    """
+    import ray
+
+    path, text = opened(config, "experiment")
+    if text is None:
+        path = os.path.abspath(path)
+    of = (path, text, tuple(overrides(set)), data_folder(data))
+    sweep = _native.Sweep(path, text, list(of[2]), of[3], None if out is None else os.fspath(out), force, True)
+    own = not ray.is_initialized()
+    if own and address is None:
+        # a cluster of this machine alone is not seen by others
+        ray.init(num_cpus=workers, include_dashboard=False, log_to_driver=False, _node_ip_address="127.0.0.1")
+    elif own:
+        ray.init(address=address, log_to_driver=False)
+    try:
+        waiting = sweep.open()
+        trial = ray.remote(num_cpus=1, max_retries=RETRIES)(run_trial)
+        running = {trial.remote(of, number): number for number in waiting}
+        total = len(waiting)
+        while running:
+            (done, *_), _ = ray.wait(list(running))
+            del running[done]
+            sweep.keep(ray.get(done))
+            if progress is not None:
+                progress(total - len(running), total)
+        summary, folder = sweep.write()
+    finally:
+        # a traceback would keep it, and with it the lock of the folder
+        del sweep
+        if own:
+            ray.shutdown()
+    return Summary(json.loads(summary), Path(folder))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line."""
+    parser = argparse.ArgumentParser("python -m manifactor.ray", description="Run an experiment on the workers of Ray.")
+    parser.add_argument("config", help="the document that describes the experiment")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="set a value of the document")
+    parser.add_argument("--data", metavar="DIR", help="the folder where public data sets lie; default: MANIFACTOR_DATA")
+    parser.add_argument("--out", metavar="DIR", help="the folder for the results")
+    parser.add_argument("--force", action="store_true", help="write into a folder that holds files of something else")
+    parser.add_argument("--address", help="of a cluster; default: one on this machine")
+    parser.add_argument("--workers", type=int, metavar="N", help="workers on this machine; default: one for each processor")
+    options = vars(parser.parse_args(arguments))
+
+    def progress(done: int, of: int) -> None:
+        print(f"{done} of {of} trials done", file=sys.stderr)
+
+    summary = experiment(options.pop("config"), progress=progress, **options)
+    print((summary.folder / "summary.md").read_text(encoding="utf-8"))
+    print(f"Written to {summary.folder}.")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

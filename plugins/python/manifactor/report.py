@@ -1,0 +1,214 @@
+"""Runs and experiments, and what they tell."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+
+#: A file, or what would stand in one.
+Config = str | os.PathLike[str] | Mapping[str, Any]
+Array = NDArray[np.float64]
+
+
+class Trajectory:
+    """Poses by time: from the camera's frame (z forward) to that of the truth, or of the map where there is no truth."""
+
+    def __init__(self, seconds: Array, translation: Array, rotation: Array) -> None:
+        #: Shape (n,), in seconds.
+        self.seconds = seconds
+        #: Shape (n, 3), in metres.
+        self.translation = translation
+        #: Unit quaternions (x, y, z, w), shape (n, 4).
+        self.rotation = rotation
+
+    def __len__(self) -> int:
+        return len(self.seconds)
+
+
+class Variant:
+    """One variant of a run: `report` has its figures, `record` all that there is to draw; both as their files have it."""
+
+    def __init__(self, report: dict[str, Any], row: dict[str, Any], record: dict[str, Any]) -> None:
+        self.report, self.record = report, record
+        #: Its line in the table of the run: costs, errors at the estimate where there is a truth, seconds.
+        self.row = row
+        self.name: str = report["name"]
+
+    def __repr__(self) -> str:
+        return f"Variant({self.name!r}, {self.report['counts']['objects']} objects)"
+
+    @property
+    def converged(self) -> bool:
+        """Whether its solve has ended at a minimum."""
+        return bool(self.report["solve"]["termination"]["status"] == "converged")
+
+    def trajectory(self, which: str = "estimate") -> Trajectory:
+        """The poses: of the `estimate`, of `odometry`, or of the `truth`."""
+        frames = [frame for frame in self.record["frames"] if frame.get(which) is not None]
+        poses = [frame[which].get("pose", frame[which]) for frame in frames]
+        return Trajectory(
+            np.array([frame["timestamp"] for frame in frames], dtype=float),
+            np.array([pose["translation"] for pose in poses], dtype=float).reshape(-1, 3),
+            np.array([pose["rotation"] for pose in poses], dtype=float).reshape(-1, 4),
+        )
+
+    @property
+    def objects(self) -> list[dict[str, Any]]:
+        """Each object that was detected, by number: its class, what became of it, its estimate and its error."""
+        return list(self.report["objects"])
+
+
+class Report:
+    """What a run has to tell."""
+
+    def __init__(
+        self, report: dict[str, Any], table: list[dict[str, Any]], record: dict[str, Any], page: str
+    ) -> None:
+        self.title: str = report["title"]
+        self.complete: bool = report["complete"]
+        self.seconds: float = report["seconds"]
+        self.variants = [Variant(*of) for of in zip(report["variants"], table, record["variants"], strict=True)]
+        #: The page with the map in 3D, as HTML that needs no network.
+        self.html = page
+
+    def __iter__(self) -> Iterator[Variant]:
+        return iter(self.variants)
+
+    def __len__(self) -> int:
+        return len(self.variants)
+
+    def __getitem__(self, name: str | int) -> Variant:
+        if isinstance(name, int):
+            return self.variants[name]
+        for variant in self.variants:
+            if variant.name == name:
+                return variant
+        raise KeyError(f"there is no variant {name!r}: there are {', '.join(v.name for v in self.variants)}")
+
+    def __repr__(self) -> str:
+        return f"Report({self.title!r}, {len(self)} variants, {self.seconds:.2f} s)"
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{html.escape(self.html)}" style="width: 100%; height: 720px; border: 0"></iframe>'
+
+    def save_html(self, path: str | os.PathLike[str]) -> None:
+        """Writes the page."""
+        Path(path).write_text(self.html, encoding="utf-8")
+
+    def to_pandas(self) -> Any:
+        """The table of the run as a `pandas.DataFrame`, a row for each variant."""
+        import pandas
+
+        return pandas.DataFrame([variant.row for variant in self]).set_index("variant")
+
+    def to_rerun(self, path: str | os.PathLike[str] | None = None, *, name: str = "manifactor") -> None:
+        """Shows the run in the viewer rerun, or writes it to a `.rrd` file; needs `manifactor[rerun]`."""
+        from .rerun import show
+
+        show(self, path, name)
+
+
+def overrides(values: Mapping[str, Any] | Sequence[str]) -> list[str]:
+    """`key=value` as the command line takes it."""
+    if isinstance(values, Mapping):
+        return [f"{key}={toml(value)}" for key, value in values.items()]
+    return list(values)
+
+
+def toml(value: Any) -> str:
+    """A value as TOML."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return repr(value)
+        case str() | os.PathLike():
+            return json.dumps(os.fspath(value), ensure_ascii=False)
+        case Mapping():
+            return "{ " + ", ".join(f"{json.dumps(key)} = {toml(item)}" for key, item in value.items()) + " }"
+        case np.ndarray():
+            return toml(value.tolist())
+        case _ if hasattr(value, "to_dict"):
+            return toml(value.to_dict())
+        case _:
+            return "[" + ", ".join(toml(item) for item in value) + "]"
+
+
+def opened(config: Config, name: str) -> tuple[str, str | None]:
+    """A path, and what stands there where there is no file."""
+    if isinstance(config, Mapping):
+        return name, json.dumps(config, default=lambda value: value.to_dict() if hasattr(value, "to_dict") else os.fspath(value))
+    return os.fspath(config), None
+
+
+def data_folder(data: str | os.PathLike[str] | None) -> str | None:
+    return os.fspath(data) if data is not None else os.environ.get("MANIFACTOR_DATA")
+
+
+def run(
+    config: Config,
+    *,
+    set: Mapping[str, Any] | Sequence[str] = (),
+    data: str | os.PathLike[str] | None = None,
+    observer: Callable[[dict[str, Any]], bool | None] | None = None,
+) -> Report:
+    """Builds, solves and evaluates what a document describes, in memory: nothing is written.
+
+    `config` is a file, or a dict with what would stand in it. `set` changes values of it by their path, as `--set` does:
+    `set={"source.seed": 2}`. `data` is the folder of public data sets; default: `MANIFACTOR_DATA`. `observer` is called with a
+    dict after each step of a solve, and ends it where it returns `False`. `manifactor run` writes a folder with pictures.
+    """
+    path, text = opened(config, "run")
+    report, table, record, page = _native.run(path, text, overrides(set), data_folder(data), observer)
+    return Report(json.loads(report), json.loads(table), json.loads(record), page)
+
+
+class Summary:
+    """What an experiment came to: `summary` as `summary.json` has it, empty for a part, and the folder of the tables."""
+
+    def __init__(self, summary: dict[str, Any], folder: Path) -> None:
+        self.summary, self.folder = summary, folder
+
+    def __repr__(self) -> str:
+        return f"Summary({self.folder}, {self.summary.get('open', 0)} trials open)"
+
+    def trials(self) -> Any:
+        """A row for each trial, as a `pandas.DataFrame`."""
+        import pandas
+
+        return pandas.read_csv(self.folder / "trials.csv")
+
+
+def experiment(
+    config: Config,
+    *,
+    set: Mapping[str, Any] | Sequence[str] = (),
+    data: str | os.PathLike[str] | None = None,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    retry_failed: bool = False,
+    threads: int | None = None,
+    shard: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Summary:
+    """Runs the trials of an experiment that are not done yet, and writes its tables.
+
+    Trials that are done are kept in `trials.jsonl` of its folder: after Ctrl-C, or a kill, the same call goes on. `progress`
+    is called with the trials that are done, and all. `shard="2/8"` runs the second of eight parts, which has a folder of its own
+    and no tables; the same call without it takes over what all parts have done. `manifactor.ray` spreads trials over a cluster.
+    """
+    path, text = opened(config, "experiment")
+    out = None if out is None else os.fspath(out)
+    summary, folder = _native.experiment(
+        path, text, overrides(set), data_folder(data), out, force, retry_failed, threads, shard, progress
+    )
+    return Summary(json.loads(summary or "{}"), Path(folder))

@@ -1,0 +1,722 @@
+"""Every type of variables that is linked, as a class of its values.
+
+Written by `python -m manifactor._generate` from the catalogue."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .chosen import Numbers, Variable, in_formulas
+
+__all__ = [
+    "BalCamera",
+    "DualQuadric",
+    "Plane",
+    "Point1",
+    "Point2",
+    "Point3",
+    "S2",
+    "Se2",
+    "Se3",
+    "So2",
+    "So3",
+]
+
+
+class BalCamera(Variable):
+    """A camera of unknown pose, focal length and radial distortion, as in bundle adjustment in the large (BAL).
+
+    It looks along its own -z; x is right and y up in the image, and the origin is the image's centre. A point P
+    of its frame is seen at f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p, p = -(Px, Py) / Pz, in pixels (Agarwal et al., Bundle
+    Adjustment in the Large, ECCV 2010). The pose takes points from the camera's frame to the world's, as all
+    poses here do; files have its inverse.
+
+    Tangent (rx, ry, rz, x, y, z, f, k1, k2): the pose steps by X·Exp(δ), in the camera's own frame, so that it turns
+    about its own centre; the others add.
+
+    ```toml
+    [values]
+    c0 = { type = "bal_camera", translation = [0.0, 0.5, 6.0], rotation = [0.0, 0.0, 0.6, 0.8], focal_length = 800.0, k1 = -0.1, k2 = 0.02 }
+    ```
+
+    Args:
+        translation: Its centre, in the world's frame; in the unit of the points.
+        rotation: Unit quaternion (x, y, z, w); turns directions of the camera's frame into those of the
+            world's.
+        focal_length: Focal length, in pixels.
+        k1: Radial distortion by the second power of the distance from the centre.
+        k2: Radial distortion by the fourth power of the distance from the centre.
+    """
+
+    TYPE: ClassVar[str] = "bal_camera"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z", "f", "k1", "k2")
+
+    def __new__(
+        cls,
+        *,
+        translation: Numbers,
+        rotation: Numbers,
+        focal_length: float,
+        k1: float,
+        k2: float,
+    ) -> Self:
+        return super().__new__(cls, "variable", "bal_camera", {"translation": translation, "rotation": rotation, "focal_length": focal_length, "k1": k1, "k2": k2})
+
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """Its centre, in the world's frame; in the unit of the points."""
+        return self.__getattr__("translation")  # type: ignore[no-any-return]
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Unit quaternion (x, y, z, w); turns directions of the camera's frame into those of the world's."""
+        return self.__getattr__("rotation")  # type: ignore[no-any-return]
+
+    @property
+    def focal_length(self) -> float:
+        """Focal length, in pixels."""
+        return self.__getattr__("focal_length")  # type: ignore[no-any-return]
+
+    @property
+    def k1(self) -> float:
+        """Radial distortion by the second power of the distance from the centre."""
+        return self.__getattr__("k1")  # type: ignore[no-any-return]
+
+    @property
+    def k2(self) -> float:
+        """Radial distortion by the fourth power of the distance from the centre."""
+        return self.__getattr__("k2")  # type: ignore[no-any-return]
+
+
+class DualQuadric(Variable):
+    """An object as an ellipsoid: Q* = Z diag(a², b², c², -1) Zᵀ with the pose Z.
+
+    Tangent (rx, ry, rz, x, y, z, log_a, log_b, log_c): the pose steps by Z·Exp(δ), in its own frame,
+    the semi-axes by s·exp(δ). So they stay positive, whatever step a solver takes; a step that would
+    leave 1e-9 to 1e9 metres stops there. Turning the ellipsoid about its own axis by half a turn, or
+    permuting its axes, describes the same body by another point of the manifold.
+
+    ```toml
+    [values]
+    q0 = { type = "dual_quadric", translation = [0.5, 0.2, 4.0], rotation = [0.0, 0.0, 0.6, 0.8], semi_axes = [0.1, 0.2, 0.3] }
+    ```
+
+    Args:
+        translation: Its centre, in metres.
+        rotation: Unit quaternion (x, y, z, w).
+        semi_axes: Half the extents along its own axes, in metres: three numbers from 1e-9 to 1e9.
+    """
+
+    TYPE: ClassVar[str] = "dual_quadric"
+    SHAPE: ClassVar[str] = "dual_quadric"
+    TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z", "log_a", "log_b", "log_c")
+
+    def __new__(cls, *, translation: Numbers, rotation: Numbers, semi_axes: Numbers) -> Self:
+        return super().__new__(cls, "variable", "dual_quadric", {"translation": translation, "rotation": rotation, "semi_axes": semi_axes})
+
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """Its centre, in metres."""
+        return self.__getattr__("translation")  # type: ignore[no-any-return]
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Unit quaternion (x, y, z, w)."""
+        return self.__getattr__("rotation")  # type: ignore[no-any-return]
+
+    @property
+    def semi_axes(self) -> NDArray[np.float64]:
+        """Half the extents along its own axes, in metres: three numbers from 1e-9 to 1e9."""
+        return self.__getattr__("semi_axes")  # type: ignore[no-any-return]
+
+    @property
+    def centroid(self) -> Any:
+        """In formulas: The centre of an object."""
+        return in_formulas(self, "centroid")
+
+    @property
+    def major_axis(self) -> Any:
+        """In formulas: The direction of the longest semi-axis, the first of equals; its sign means nothing."""
+        return in_formulas(self, "major_axis")
+
+    @property
+    def pose(self) -> Any:
+        """In formulas: The pose of an object, from its own frame to the outer one."""
+        return in_formulas(self, "pose")
+
+
+class Plane(Variable):
+    """A plane in Hessian normal form, S² × R: the points x with n · x = offset.
+
+    Tangent (a, b, offset): the normal n turns as an `s2` does, the offset adds. n points to the side where things stand;
+    (n, offset) and (-n, -offset) are the same points, seen from the two sides.
+
+    ```toml
+    [values]
+    table = { type = "plane", normal = [0.0, 0.0, 1.0], offset = 0.7 }
+    ```
+
+    Args:
+        normal: The side where things stand, of any length but zero.
+        offset: How far it is from the origin along its normal, in metres.
+    """
+
+    TYPE: ClassVar[str] = "plane"
+    SHAPE: ClassVar[str] = "plane"
+    TANGENT: ClassVar[tuple[str, ...]] = ("a", "b", "offset")
+
+    def __new__(cls, *, normal: Numbers, offset: float) -> Self:
+        return super().__new__(cls, "variable", "plane", {"normal": normal, "offset": offset})
+
+    @property
+    def normal(self) -> NDArray[np.float64]:
+        """The side where things stand, of any length but zero."""
+        return self.__getattr__("normal")  # type: ignore[no-any-return]
+
+    @property
+    def offset(self) -> float:
+        """How far it is from the origin along its normal, in metres."""
+        return self.__getattr__("offset")  # type: ignore[no-any-return]
+
+
+class Point1(Variable):
+    """A point in 1 dimension.
+
+    Tangent (x); x ⊞ δ = x + δ.
+
+    ```toml
+    [values]
+    l0 = { type = "point1", position = [1.0] }
+    ```
+
+    Args:
+        position: Its coordinates.
+    """
+
+    TYPE: ClassVar[str] = "point1"
+    SHAPE: ClassVar[str] = "number"
+    TANGENT: ClassVar[tuple[str, ...]] = ("x",)
+
+    def __new__(cls, *, position: Numbers) -> Self:
+        return super().__new__(cls, "variable", "point1", {"position": position})
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Its coordinates."""
+        return self.__getattr__("position")  # type: ignore[no-any-return]
+
+    @property
+    def abs(self) -> Any:
+        """In formulas: The absolute value. At zero it has a kink; the derivative taken there is that of a > 0."""
+        return in_formulas(self, "abs")
+
+    @property
+    def acos(self) -> Any:
+        """In formulas: The angle of a cosine, in radians. Its derivative at ±1 is infinite: `angle(a, b)` has no such place but 0 and π."""
+        return in_formulas(self, "acos")
+
+    @property
+    def asin(self) -> Any:
+        """In formulas: The angle of a sine, in radians. Its derivative at ±1 is infinite."""
+        return in_formulas(self, "asin")
+
+    @property
+    def atan(self) -> Any:
+        """In formulas: The angle of a tangent, in radians."""
+        return in_formulas(self, "atan")
+
+    @property
+    def cos(self) -> Any:
+        """In formulas: The cosine of an angle in radians."""
+        return in_formulas(self, "cos")
+
+    @property
+    def exp(self) -> Any:
+        """In formulas: The exponential."""
+        return in_formulas(self, "exp")
+
+    @property
+    def ln(self) -> Any:
+        """In formulas: The natural logarithm."""
+        return in_formulas(self, "ln")
+
+    @property
+    def rotation(self) -> Any:
+        """In formulas: The rotation by an angle in radians, counter-clockwise."""
+        return in_formulas(self, "rotation")
+
+    @property
+    def sin(self) -> Any:
+        """In formulas: The sine of an angle in radians."""
+        return in_formulas(self, "sin")
+
+    @property
+    def sqrt(self) -> Any:
+        """In formulas: The square root. Its derivative at zero is infinite."""
+        return in_formulas(self, "sqrt")
+
+    @property
+    def tan(self) -> Any:
+        """In formulas: The tangent of an angle in radians."""
+        return in_formulas(self, "tan")
+
+    @property
+    def wrap(self) -> Any:
+        """In formulas: The same angle within -π..π, in radians."""
+        return in_formulas(self, "wrap")
+
+
+class Point2(Variable):
+    """A point in 2 dimensions.
+
+    Tangent (x, y); x ⊞ δ = x + δ.
+
+    ```toml
+    [values]
+    l0 = { type = "point2", position = [1.0, 0.0] }
+    ```
+
+    Args:
+        position: Its coordinates.
+    """
+
+    TYPE: ClassVar[str] = "point2"
+    SHAPE: ClassVar[str] = "vector2"
+    TANGENT: ClassVar[tuple[str, ...]] = ("x", "y")
+
+    def __new__(cls, *, position: Numbers) -> Self:
+        return super().__new__(cls, "variable", "point2", {"position": position})
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Its coordinates."""
+        return self.__getattr__("position")  # type: ignore[no-any-return]
+
+    @property
+    def largest(self) -> Any:
+        """In formulas: The greatest component, the first of equals."""
+        return in_formulas(self, "largest")
+
+    @property
+    def norm(self) -> Any:
+        """In formulas: The length. At zero it has a kink; the derivative taken there is zero."""
+        return in_formulas(self, "norm")
+
+    @property
+    def norm_squared(self) -> Any:
+        """In formulas: The sum of the squares."""
+        return in_formulas(self, "norm_squared")
+
+    @property
+    def smallest(self) -> Any:
+        """In formulas: The least component, the first of equals."""
+        return in_formulas(self, "smallest")
+
+    @property
+    def unit(self) -> Any:
+        """In formulas: The vector, one long."""
+        return in_formulas(self, "unit")
+
+    @property
+    def x(self) -> Any:
+        """In formulas: The first component."""
+        return in_formulas(self, "x")
+
+    @property
+    def y(self) -> Any:
+        """In formulas: The second component."""
+        return in_formulas(self, "y")
+
+
+class Point3(Variable):
+    """A point in 3 dimensions.
+
+    Tangent (x, y, z); x ⊞ δ = x + δ.
+
+    ```toml
+    [values]
+    l0 = { type = "point3", position = [1.0, 0.0, 0.5] }
+    ```
+
+    Args:
+        position: Its coordinates.
+    """
+
+    TYPE: ClassVar[str] = "point3"
+    SHAPE: ClassVar[str] = "vector3"
+    TANGENT: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+
+    def __new__(cls, *, position: Numbers) -> Self:
+        return super().__new__(cls, "variable", "point3", {"position": position})
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Its coordinates."""
+        return self.__getattr__("position")  # type: ignore[no-any-return]
+
+    @property
+    def abs(self) -> Any:
+        """In formulas: The absolute value of each component."""
+        return in_formulas(self, "abs")
+
+    @property
+    def largest(self) -> Any:
+        """In formulas: The greatest component, the first of equals."""
+        return in_formulas(self, "largest")
+
+    @property
+    def ln(self) -> Any:
+        """In formulas: The logarithm of each component."""
+        return in_formulas(self, "ln")
+
+    @property
+    def norm(self) -> Any:
+        """In formulas: The length. At zero it has a kink; the derivative taken there is zero."""
+        return in_formulas(self, "norm")
+
+    @property
+    def norm_squared(self) -> Any:
+        """In formulas: The sum of the squares."""
+        return in_formulas(self, "norm_squared")
+
+    @property
+    def project(self) -> Any:
+        """In formulas: Where a point is seen, in the frame of a camera that looks along z: (x, y)/z."""
+        return in_formulas(self, "project")
+
+    @property
+    def rotation(self) -> Any:
+        """In formulas: The rotation about a vector by its length, in radians."""
+        return in_formulas(self, "rotation")
+
+    @property
+    def smallest(self) -> Any:
+        """In formulas: The least component, the first of equals."""
+        return in_formulas(self, "smallest")
+
+    @property
+    def unit(self) -> Any:
+        """In formulas: The vector, one long."""
+        return in_formulas(self, "unit")
+
+    @property
+    def x(self) -> Any:
+        """In formulas: The first component."""
+        return in_formulas(self, "x")
+
+    @property
+    def y(self) -> Any:
+        """In formulas: The second component."""
+        return in_formulas(self, "y")
+
+    @property
+    def z(self) -> Any:
+        """In formulas: The third component."""
+        return in_formulas(self, "z")
+
+
+class S2(Variable):
+    """A direction in space, such as gravity's: a point on the unit sphere.
+
+    Tangent (a, b): along two axes perpendicular to the direction n, B(n) = [b₁ b₂] of Duff et al., *Building an
+    Orthonormal Basis, Revisited* (2017). n ⊞ δ = cos|δ| n + sin|δ|/|δ| B δ, the great circle that leaves n towards B δ. The
+    opposite of n is half a turn away in every direction: `local` takes the first.
+
+    ```toml
+    [values]
+    g0 = { type = "s2", direction = [0.0, 0.0, 1.0] }
+    ```
+
+    Args:
+        direction: Where it points, of any length but zero.
+    """
+
+    TYPE: ClassVar[str] = "s2"
+    SHAPE: ClassVar[str] = "vector3"
+    TANGENT: ClassVar[tuple[str, ...]] = ("a", "b")
+
+    def __new__(cls, *, direction: Numbers) -> Self:
+        return super().__new__(cls, "variable", "s2", {"direction": direction})
+
+    @property
+    def direction(self) -> NDArray[np.float64]:
+        """Where it points, of any length but zero."""
+        return self.__getattr__("direction")  # type: ignore[no-any-return]
+
+    @property
+    def abs(self) -> Any:
+        """In formulas: The absolute value of each component."""
+        return in_formulas(self, "abs")
+
+    @property
+    def largest(self) -> Any:
+        """In formulas: The greatest component, the first of equals."""
+        return in_formulas(self, "largest")
+
+    @property
+    def ln(self) -> Any:
+        """In formulas: The logarithm of each component."""
+        return in_formulas(self, "ln")
+
+    @property
+    def norm(self) -> Any:
+        """In formulas: The length. At zero it has a kink; the derivative taken there is zero."""
+        return in_formulas(self, "norm")
+
+    @property
+    def norm_squared(self) -> Any:
+        """In formulas: The sum of the squares."""
+        return in_formulas(self, "norm_squared")
+
+    @property
+    def project(self) -> Any:
+        """In formulas: Where a point is seen, in the frame of a camera that looks along z: (x, y)/z."""
+        return in_formulas(self, "project")
+
+    @property
+    def rotation(self) -> Any:
+        """In formulas: The rotation about a vector by its length, in radians."""
+        return in_formulas(self, "rotation")
+
+    @property
+    def smallest(self) -> Any:
+        """In formulas: The least component, the first of equals."""
+        return in_formulas(self, "smallest")
+
+    @property
+    def unit(self) -> Any:
+        """In formulas: The vector, one long."""
+        return in_formulas(self, "unit")
+
+    @property
+    def x(self) -> Any:
+        """In formulas: The first component."""
+        return in_formulas(self, "x")
+
+    @property
+    def y(self) -> Any:
+        """In formulas: The second component."""
+        return in_formulas(self, "y")
+
+    @property
+    def z(self) -> Any:
+        """In formulas: The third component."""
+        return in_formulas(self, "z")
+
+
+class Se2(Variable):
+    """A pose in the plane, X·Exp(v, θ): tangent (x, y, theta), in metres and radians, in its own frame.
+
+    It takes points from its own (local) frame to the outer one: R p + t. The angle is in radians,
+    counter-clockwise.
+
+    ```toml
+    [values]
+    x0 = { type = "se2", translation = [1.0, 0.5], angle = 0.5 }
+    ```
+
+    Args:
+        translation: Its position, in metres.
+        angle: In radians, counter-clockwise.
+    """
+
+    TYPE: ClassVar[str] = "se2"
+    SHAPE: ClassVar[str] = "se2"
+    TANGENT: ClassVar[tuple[str, ...]] = ("x", "y", "theta")
+
+    def __new__(cls, *, translation: Numbers, angle: float) -> Self:
+        return super().__new__(cls, "variable", "se2", {"translation": translation, "angle": angle})
+
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """Its position, in metres."""
+        return self.__getattr__("translation")  # type: ignore[no-any-return]
+
+    @property
+    def angle(self) -> float:
+        """In radians, counter-clockwise."""
+        return self.__getattr__("angle")  # type: ignore[no-any-return]
+
+    @property
+    def inverse(self) -> Any:
+        """In formulas: The outer frame, seen from x: `inverse(x) * p` is a point, seen from x."""
+        return in_formulas(self, "inverse")
+
+    @property
+    def log(self) -> Any:
+        """In formulas: The tangent vector (v, θ) that leads from the outer frame to the pose."""
+        return in_formulas(self, "log")
+
+    @property
+    def position(self) -> Any:
+        """In formulas: Where a pose is."""
+        return in_formulas(self, "position")
+
+    @property
+    def rotation(self) -> Any:
+        """In formulas: Which way a pose is turned."""
+        return in_formulas(self, "rotation")
+
+
+class Se3(Variable):
+    """A pose in space, X·Exp(ω, v): tangent (rx, ry, rz, x, y, z), in radians and metres, in its own frame.
+
+    It takes points from its own (local) frame to the outer one: R p + t. The rotation is a unit
+    quaternion (x, y, z, w).
+
+    ```toml
+    [values]
+    x0 = { type = "se3", translation = [1.0, 0.0, 0.5], rotation = [0.0, 0.0, 0.6, 0.8] }
+    ```
+
+    Args:
+        translation: Its position, in metres.
+        rotation: Unit quaternion (x, y, z, w).
+    """
+
+    TYPE: ClassVar[str] = "se3"
+    SHAPE: ClassVar[str] = "se3"
+    TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz", "x", "y", "z")
+
+    def __new__(cls, *, translation: Numbers, rotation: Numbers) -> Self:
+        return super().__new__(cls, "variable", "se3", {"translation": translation, "rotation": rotation})
+
+    @property
+    def translation(self) -> NDArray[np.float64]:
+        """Its position, in metres."""
+        return self.__getattr__("translation")  # type: ignore[no-any-return]
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Unit quaternion (x, y, z, w)."""
+        return self.__getattr__("rotation")  # type: ignore[no-any-return]
+
+    @property
+    def inverse(self) -> Any:
+        """In formulas: The outer frame, seen from x: `inverse(x) * p` is a point, seen from x."""
+        return in_formulas(self, "inverse")
+
+    @property
+    def log(self) -> Any:
+        """In formulas: The tangent vector (ω, v) that leads from the outer frame to the pose."""
+        return in_formulas(self, "log")
+
+    @property
+    def position(self) -> Any:
+        """In formulas: Where a pose is."""
+        return in_formulas(self, "position")
+
+
+class So2(Variable):
+    """A rotation in the plane: tangent (theta), in radians, counter-clockwise.
+
+    The angle is kept within -π..π. The logarithm is that angle: it jumps from one end to the other.
+
+    ```toml
+    [values]
+    r0 = { type = "so2", angle = 0.5 }
+    ```
+
+    Args:
+        angle: In radians, counter-clockwise.
+    """
+
+    TYPE: ClassVar[str] = "so2"
+    SHAPE: ClassVar[str] = "so2"
+    TANGENT: ClassVar[tuple[str, ...]] = ("theta",)
+
+    def __new__(cls, *, angle: float) -> Self:
+        return super().__new__(cls, "variable", "so2", {"angle": angle})
+
+    @property
+    def angle(self) -> float:
+        """In radians, counter-clockwise."""
+        return self.__getattr__("angle")  # type: ignore[no-any-return]
+
+    @property
+    def inverse(self) -> Any:
+        """In formulas: The rotation back."""
+        return in_formulas(self, "inverse")
+
+    @property
+    def x_axis(self) -> Any:
+        """In formulas: The x axis, turned."""
+        return in_formulas(self, "x_axis")
+
+    @property
+    def y_axis(self) -> Any:
+        """In formulas: The y axis, turned."""
+        return in_formulas(self, "y_axis")
+
+
+class So3(Variable):
+    """A rotation in space, R·Exp(ω): tangent (rx, ry, rz), in radians, about its own axes.
+
+    Read from a quaternion (x, y, z, w) of length 1 to within 0.001, and normalised. The logarithm is
+    the shortest rotation vector; at an angle of exactly π it has two, and a jump between them.
+
+    ```toml
+    [values]
+    r0 = { type = "so3", rotation = [0.0, 0.0, 0.6, 0.8] }
+    ```
+
+    Args:
+        rotation: Unit quaternion (x, y, z, w).
+    """
+
+    TYPE: ClassVar[str] = "so3"
+    SHAPE: ClassVar[str] = "so3"
+    TANGENT: ClassVar[tuple[str, ...]] = ("rx", "ry", "rz")
+
+    def __new__(cls, *, rotation: Numbers) -> Self:
+        return super().__new__(cls, "variable", "so3", {"rotation": rotation})
+
+    @property
+    def rotation(self) -> NDArray[np.float64]:
+        """Unit quaternion (x, y, z, w)."""
+        return self.__getattr__("rotation")  # type: ignore[no-any-return]
+
+    @property
+    def inverse(self) -> Any:
+        """In formulas: The rotation back."""
+        return in_formulas(self, "inverse")
+
+    @property
+    def log(self) -> Any:
+        """In formulas: The rotation vector, shorter than half a turn, in radians."""
+        return in_formulas(self, "log")
+
+    @property
+    def x_axis(self) -> Any:
+        """In formulas: The x axis, turned."""
+        return in_formulas(self, "x_axis")
+
+    @property
+    def y_axis(self) -> Any:
+        """In formulas: The y axis, turned."""
+        return in_formulas(self, "y_axis")
+
+    @property
+    def z_axis(self) -> Any:
+        """In formulas: The z axis, turned."""
+        return in_formulas(self, "z_axis")
+
+
+#: The class of each type of variables, by its name in documents.
+BY_TYPE: dict[str, type[Variable]] = {
+    "bal_camera": BalCamera,
+    "dual_quadric": DualQuadric,
+    "plane": Plane,
+    "point1": Point1,
+    "point2": Point2,
+    "point3": Point3,
+    "s2": S2,
+    "se2": Se2,
+    "se3": Se3,
+    "so2": So2,
+    "so3": So3,
+}

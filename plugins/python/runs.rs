@@ -1,0 +1,206 @@
+//! Runs and experiments from their documents, and the command line.
+use crate::errors;
+use crate::solution::Watch;
+use manifactor::config::{Diagnostics, Document, Format};
+use manifactor::slam::experiment::{self, Experiment, Journal, Progress, Shard, Trial};
+use manifactor::slam::output::OutputFolder;
+use manifactor::slam::record::{RunRecord, VariantRecord};
+use manifactor::slam::run::Run;
+use manifactor::slam::run_document::RunDocument;
+use manifactor::slam::source::Folders;
+use manifactor::solve::Interrupt;
+use manifactor::viz::run_page;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// A document from a file, or from JSON in place of one, with overrides.
+fn open(config: &Path, json: Option<String>, set: &[String]) -> Result<Document, Diagnostics> {
+    let mut document = match json {
+        Some(text) => Document::parse(config.display().to_string(), text, Format::Json)?,
+        None => Document::open(config)?,
+    };
+    document.set(set)?;
+    Ok(document)
+}
+
+/// A run as JSON: its report, its table and its record; and its page.
+type Told = (String, String, String, String);
+
+/// Builds, solves and evaluates each variant of a run.
+#[pyfunction]
+#[pyo3(signature = (config, json, set, data, observer = None))]
+fn run(
+    py: Python<'_>,
+    config: PathBuf,
+    json: Option<String>,
+    set: Vec<String>,
+    data: Option<PathBuf>,
+    observer: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Told> {
+    let mut watch = Watch::new(observer);
+    let read = open(&config, json, &set).and_then(|document| RunDocument::read(&document));
+    let document = read.map_err(|error| errors::document(&error))?;
+    let done = py.detach(|| {
+        let mut run = Run::new(&document, data);
+        let (mut records, mut configs) = (vec![], vec![]);
+        for variant in &document.variants {
+            let (estimate, _) = run.variant(variant, &mut watch).map_err(|error| error.to_string())?;
+            records.push(VariantRecord::new(variant, &estimate));
+            configs.push(manifactor::config::to_toml(&variant.settings).map_err(|error| error.to_string())?);
+        }
+        let (report, record) = (run.finish(), RunRecord::new(&document.title, records));
+        let page = run_page(&report, &record, &configs);
+        let json = |value: Result<String, serde_json::Error>| value.map_err(|error| error.to_string());
+        let (told, table) = (serde_json::to_string(&report), serde_json::to_string(&report.table()));
+        Ok((json(told)?, json(table)?, json(serde_json::to_string(&record))?, page))
+    });
+    watch.finish()?;
+    done.map_err(|error: String| errors::solve(error))
+}
+
+/// Runs the trials of an experiment that are not done yet, writes its tables, and returns the summary as JSON and the folder.
+#[pyfunction]
+#[pyo3(name = "experiment", signature = (config, json, set, data, out, force, retry_failed, threads, shard = None, progress = None))]
+#[expect(clippy::too_many_arguments, reason = "the arguments of the command")]
+fn experiment_of(
+    py: Python<'_>,
+    config: PathBuf,
+    json: Option<String>,
+    set: Vec<String>,
+    data: Option<PathBuf>,
+    out: Option<PathBuf>,
+    force: bool,
+    retry_failed: bool,
+    threads: Option<usize>,
+    shard: Option<String>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(Option<String>, PathBuf)> {
+    let read = open(&config, json, &set).and_then(|document| Experiment::read(&document));
+    let mut sweep = read.map_err(|error| errors::document(&error))?;
+    if let Some(out) = out {
+        sweep.output = out;
+    }
+    let shard = shard.map(|shard| shard.parse::<Shard>()).transpose();
+    let shard = shard.map_err(|error| errors::argument("experiment", "shard", error))?;
+    if let Some(shard) = shard {
+        sweep.keep(shard);
+    }
+    let folders = Folders { data, document: sweep.folder.clone() };
+    let interrupt = Interrupt::default();
+    let mut raised = None;
+    let show = |now: Progress| {
+        let shown = Python::attach(|py| {
+            py.check_signals()?;
+            progress.as_ref().map_or(Ok(()), |progress| progress.call1(py, (now.done, now.trials)).map(drop))
+        });
+        if let Err(error) = shown {
+            interrupt.0.store(true, Ordering::Relaxed);
+            raised = Some(error);
+        }
+    };
+    let done = py.detach(|| {
+        let claimed =
+            OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(|e| e.to_string())?;
+        let mut journal = Journal::open(claimed).map_err(|error| error.to_string())?;
+        journal.take_over_shards().map_err(|error| error.to_string())?;
+        if retry_failed {
+            journal.retry_failed();
+        }
+        let threads = threads.unwrap_or_else(rayon::current_num_threads);
+        experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show)
+            .map_err(|e| e.to_string())?;
+        // a part has no tables
+        if shard.is_some() {
+            return Ok(None);
+        }
+        let summary = experiment::write(&sweep, &journal).map_err(|error| error.to_string())?;
+        serde_json::to_string(&summary).map(Some).map_err(|error| error.to_string())
+    });
+    raised.map_or(Ok(()), Err)?;
+    Ok((done.map_err(|error: String| errors::solve(error))?, sweep.output))
+}
+
+/// The trials of an experiment, for a driver that has them run elsewhere.
+#[pyclass(module = "manifactor._native")]
+struct Sweep {
+    sweep: Experiment,
+    folders: Folders,
+    journal: Option<Journal>,
+}
+
+#[pymethods]
+impl Sweep {
+    /// Opens an experiment; the driver has its journal, a worker has none.
+    #[new]
+    #[pyo3(signature = (config, json, set, data, out, force, is_driver))]
+    fn new(
+        config: PathBuf,
+        json: Option<String>,
+        set: Vec<String>,
+        data: Option<PathBuf>,
+        out: Option<PathBuf>,
+        force: bool,
+        is_driver: bool,
+    ) -> PyResult<Self> {
+        let read = open(&config, json, &set).and_then(|document| Experiment::read(&document));
+        let mut sweep = read.map_err(|error| errors::document(&error))?;
+        if let Some(out) = out {
+            sweep.output = out;
+        }
+        let folders = Folders { data, document: sweep.folder.clone() };
+        let journal = is_driver.then(|| {
+            let claimed =
+                OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(errors::solve)?;
+            Journal::open(claimed).map_err(errors::solve)
+        });
+        Ok(Self { journal: journal.transpose()?, sweep, folders })
+    }
+
+    /// Numbers of the trials that are not done yet.
+    fn open(&self) -> Vec<usize> {
+        let is_open =
+            |trial: &Trial| self.journal.as_ref().is_none_or(|journal| journal.find(trial).is_none());
+        self.sweep.trials.iter().enumerate().filter(|(_, trial)| is_open(trial)).map(|(i, _)| i).collect()
+    }
+
+    /// Runs a trial, and returns its line of the journal.
+    fn run(&self, py: Python<'_>, number: usize) -> PyResult<String> {
+        let Some(trial) = self.sweep.trials.get(number) else {
+            return Err(errors::argument("Sweep.run", "number", format!("there is no trial {number}")));
+        };
+        let mut watch = Watch::new(None);
+        let record = py.detach(|| experiment::alone(trial, &self.folders, &mut watch));
+        watch.finish()?;
+        let record = record.ok_or_else(|| errors::solve("the trial was interrupted"))?;
+        serde_json::to_string(&record).map_err(errors::internal)
+    }
+
+    /// Keeps a trial that is done: its line of the journal.
+    fn keep(&mut self, line: &str) -> PyResult<()> {
+        let record =
+            serde_json::from_str(line).map_err(|error| errors::argument("Sweep.keep", "line", error))?;
+        self.journal.as_mut().map_or(Ok(()), |journal| journal.append(record).map_err(errors::solve))
+    }
+
+    /// Writes the tables, and returns the summary as JSON and the folder.
+    fn write(&self) -> PyResult<(String, PathBuf)> {
+        let journal = self.journal.as_ref().ok_or_else(|| errors::solve("a worker has no journal"))?;
+        let summary = experiment::write(&self.sweep, journal).map_err(errors::solve)?;
+        let summary = serde_json::to_string(&summary).map_err(errors::internal)?;
+        Ok((summary, self.sweep.output.clone()))
+    }
+}
+
+/// The command line, the name of the program first; returns the exit code.
+#[pyfunction]
+fn main(py: Python<'_>, arguments: Vec<String>) -> u8 {
+    py.detach(|| manifactor_cli::main_with(arguments))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(run, module)?)?;
+    module.add_function(wrap_pyfunction!(experiment_of, module)?)?;
+    module.add_class::<Sweep>()?;
+    module.add_function(wrap_pyfunction!(main, module)?)
+}

@@ -1,0 +1,167 @@
+//! A graph that grows while it is solved.
+use crate::chosen::{What, solver};
+use crate::errors;
+use crate::graph::{Graph, Values};
+use crate::input::{keys, node, to_array, to_python};
+use crate::solution::Watch;
+use manifactor::config::Errors;
+use manifactor::graph::Key;
+use manifactor::online::{FactorId as InnerId, Session as Inner, Settings};
+use manifactor::solve::{Auto, Optimizer};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::Arc;
+
+/// A factor of a session.
+#[pyclass(module = "manifactor", frozen, eq, hash)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct FactorId(InnerId);
+
+#[pymethods]
+impl FactorId {
+    fn __repr__(&self) -> String {
+        format!("FactorId({})", self.0)
+    }
+}
+
+/// An incremental smoother: variables and factors come and go, and `update` keeps the estimate up to date.
+#[pyclass(module = "manifactor")]
+pub(crate) struct Session(Inner);
+
+#[pymethods]
+impl Session {
+    /// An empty session. `settings` are those of the table `online` of a document: `relinearize_every`, `bend`, `window`, …
+    #[new]
+    #[pyo3(signature = (**settings))]
+    fn new(settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let settings = match settings {
+            Some(settings) => {
+                let (node, errors) = (node("Session", "", settings.as_any())?, Errors::new());
+                let read = node.read::<Settings>(&errors);
+                errors.finish(read).map_err(|diagnostics| errors::read("Session", &diagnostics))?
+            }
+            None => Settings::default(),
+        };
+        Inner::new(settings).map(Self).map_err(|error| errors::argument("Session", error.setting, &error))
+    }
+
+    /// Adds variables with their first values, and factors between any variables, new or not; what the graph holds is held.
+    /// Takes effect at the next update. Returns the factors' ids, in order. Where something is wrong, nothing is added.
+    fn push(&mut self, graph: PyRef<'_, Graph>, values: PyRef<'_, Values>) -> PyResult<Vec<FactorId>> {
+        let ids = self.0.push(&graph.0, &values.0).map_err(errors::graph)?;
+        Ok(ids.into_iter().map(FactorId).collect())
+    }
+
+    /// Takes factors away, with the next update.
+    fn remove(&mut self, factors: Vec<Py<FactorId>>) -> PyResult<()> {
+        let ids: Vec<InnerId> = factors.iter().map(|id| id.get().0).collect();
+        self.0.remove(&ids).map_err(errors::graph)
+    }
+
+    /// Lets variables leave: what is known by them stays as a linear prior. With the next update.
+    fn marginalize(&mut self, keys: &Bound<'_, PyAny>) -> PyResult<()> {
+        let keys = self::keys("marginalize", keys)?;
+        self.0.marginalize(&keys).map_err(errors::graph)
+    }
+
+    /// Sets the time of what comes next, in seconds; for a window by time.
+    fn set_time(&mut self, seconds: f64) -> PyResult<()> {
+        self.0.set_time(seconds).map_err(errors::graph)
+    }
+
+    /// Makes the changes, and brings the estimate up to date. Returns the account of it: `redone`, `relinearized`, `parked`,
+    /// `undetermined` and so on. Where it fails, the session is as it was.
+    fn update<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let inner = &mut self.0;
+        let report = py.detach(|| inner.update().map_err(|error| error.to_string()));
+        crate::raised::raise()?;
+        to_python(py, &report.map_err(errors::solve)?)
+    }
+
+    /// The estimate of a variable, as of the last update.
+    fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+        match self.0.estimate(key) {
+            Some(value) => What::Variable(value.into()).into_python(py),
+            None => Err(pyo3::exceptions::PyKeyError::new_err(format!("there is no variable `{key}`"))),
+        }
+    }
+
+    fn __contains__(&self, key: &str) -> bool {
+        self.0.estimate(key).is_some()
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.variables()
+    }
+
+    /// All estimates, in the order in which the variables came.
+    #[getter]
+    fn values(&self, py: Python<'_>) -> Values {
+        Values(py.detach(|| self.0.estimates()))
+    }
+
+    /// ½ Σ ρ at the estimate. It looks at every factor.
+    fn cost(&mut self, py: Python<'_>) -> PyResult<f64> {
+        let inner = &mut self.0;
+        let cost = py.detach(|| inner.cost());
+        crate::raised::raise()?;
+        Ok(cost)
+    }
+
+    /// The joint covariance of a few variables, in the order of `keys` and of their tangent directions.
+    fn covariance<'py>(
+        &self,
+        py: Python<'py>,
+        keys: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let keys = self::keys("covariance", keys)?;
+        let names: Vec<&str> = keys.iter().map(Key::as_str).collect();
+        let joint = py.detach(|| self.0.covariance(&names).map_err(|error| error.to_string()));
+        let joint = joint.map_err(errors::solve)?;
+        to_array(py, &[joint.nrows(), joint.ncols()], joint.as_slice().to_vec())
+    }
+
+    /// Factors that are rejected as outliers, with the update that rejected them and what they cost.
+    fn rejections<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        to_python(py, &self.0.rejections())
+    }
+
+    /// The factors that count, as a graph with what is held.
+    fn graph(&self) -> Graph {
+        Graph(self.0.graph().0)
+    }
+
+    /// Solves all that is there as one batch, from the estimate, and returns the values and the account of the solver. The
+    /// session stays as it is.
+    #[pyo3(signature = (solver = None))]
+    fn finish<'py>(
+        &self,
+        py: Python<'py>,
+        solver: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(Values, Bound<'py, PyAny>)> {
+        let solver: Arc<dyn Optimizer> =
+            solver.map_or_else(|| Ok(Arc::new(Auto::default()) as _), |s| self::solver("solver", s))?;
+        let mut watch = Watch::new(None);
+        let finished = py.detach(|| self.0.finish(&*solver, &mut watch).map_err(|error| error.to_string()));
+        watch.finish()?;
+        let finished = finished.map_err(errors::graph)?;
+        Ok((Values(finished.values), to_python(py, &finished.outcome)?))
+    }
+
+    /// The session as a text, from which `Session.load` goes on, bit for bit.
+    fn save(&self, py: Python<'_>) -> PyResult<String> {
+        py.detach(|| self.0.save().map_err(|error| error.to_string())).map_err(errors::solve)
+    }
+
+    /// A session that was saved.
+    #[staticmethod]
+    fn load(py: Python<'_>, text: &str) -> PyResult<Self> {
+        let loaded = py.detach(|| Inner::load(text).map_err(|error| error.to_string()));
+        loaded.map(Self).map_err(|error| errors::argument("Session.load", "text", error))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("{:?}", self.0)
+    }
+}

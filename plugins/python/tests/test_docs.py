@@ -1,0 +1,39 @@
+"""The examples of the book run as they stand."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+BOOK = ROOT / "docs" / "python.md"
+BLOCKS = re.findall(r"^```python\n(.*?)^```", BOOK.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("number", range(len(BLOCKS)))
+def test_an_example_of_the_book_runs(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    block = BLOCKS[number]
+    if "import gtsam" in block:
+        pytest.importorskip("gtsam")
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, f"{BOOK.name}, block {number}", "exec"), {"__name__": "book"})  # noqa: S102
+
+
+def test_the_quickstart_is_short() -> None:
+    assert len(BLOCKS) >= 10 and len(BLOCKS[0].strip().splitlines()) <= 20
+
+
+def test_both_ways_of_each_example_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("gtsam")
+    loops = [block for block in BLOCKS if "solution = mf.solve(graph, values)" in block and "1.5708" in block]
+    theirs = [block for block in BLOCKS if "LevenbergMarquardtOptimizer" in block]
+    ours_space: dict[str, object] = {}
+    theirs_space: dict[str, object] = {}
+    exec(loops[0], ours_space)  # noqa: S102
+    exec(theirs[0], theirs_space)  # noqa: S102
+    solution, result, graph = ours_space["solution"], theirs_space["result"], theirs_space["graph"]
+    error = graph.error(result)  # type: ignore[attr-defined]
+    assert solution.cost == pytest.approx(error, rel=1e-4, abs=1e-6)  # type: ignore[attr-defined]
