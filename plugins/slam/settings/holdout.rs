@@ -10,13 +10,13 @@ use std::num::NonZeroUsize;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Holdout {
-    /// This share of all boxes, drawn at random: those of a frame that other boxes tell much of.
+    /// This share of all boxes, drawn at random; others of the same frames take part.
     Share(
         #[serde(deserialize_with = "within::<0, 1, _>")]
         #[schemars(range(min = 0, max = 1))]
         f64,
     ),
-    /// Those of the last frames, this share of all: what the camera sees where it has not been.
+    /// Those of the last frames, this share of all.
     Last(
         #[serde(deserialize_with = "within::<0, 1, _>")]
         #[schemars(range(min = 0, max = 1))]
