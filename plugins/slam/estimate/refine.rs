@@ -58,17 +58,7 @@ pub(crate) fn refined(
     others: &Values,
     up: Option<Direction>,
 ) -> DualQuadric {
-    let (mut graph, mut values) = (Graph::new(), Values::new());
-    for entry in entries {
-        for other in entry.keys.iter().filter(|other| *other != key) {
-            if let (false, Some(value)) = (values.contains(other.as_str()), others.variable(other.as_str())) {
-                values.insert_boxed(other.clone(), value.erased().clone_box());
-                graph.fix(other.clone());
-            }
-        }
-        graph.push((*entry).clone());
-    }
-    values.insert(key.clone(), start);
+    let (graph, mut values) = alone(key, start, entries.iter().copied(), others);
     // what cannot be compiled is reported by the joint solve
     let Ok(mut problem) = Problem::compile(&graph, &values) else { return start };
     let mut best = (rank(&problem), start);
@@ -86,6 +76,27 @@ pub(crate) fn refined(
         }
     }
     best.1
+}
+
+/// The graph of one object and its factors, where it starts, and the variables that these join it with, which are held.
+pub(super) fn alone<'a>(
+    key: &Key,
+    start: DualQuadric,
+    entries: impl Iterator<Item = &'a FactorEntry>,
+    others: &Values,
+) -> (Graph, Values) {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    for entry in entries {
+        for other in entry.keys.iter().filter(|other| *other != key) {
+            if let (false, Some(value)) = (values.contains(other.as_str()), others.variable(other.as_str())) {
+                values.insert_boxed(other.clone(), value.erased().clone_box());
+                graph.fix(other.clone());
+            }
+        }
+        graph.push(entry.clone());
+    }
+    values.insert(key.clone(), start);
+    (graph, values)
 }
 
 /// The start itself; a ball; and ellipsoids that are longest along each of these axes.

@@ -6,10 +6,11 @@
 //! need not be known how wrong boxes are.
 use super::MotionComponent;
 use super::components::{Measures, VarianceError, measures};
-use crate::estimate::refine::roughly;
+use crate::estimate::refine::{alone, roughly};
 use crate::mapping::Mapping;
 use manifactor_geometry::Se3;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
+use manifactor_quadric::DualQuadric;
 use manifactor_solve::{CompileError, Optimizer, Problem, Silent, solve};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -143,19 +144,8 @@ impl LeftOut {
 
     /// What its boxes cost where it fits best, from the shape that it has in the map of all objects.
     fn cost(&self, poses: &Values, shapes: &Values) -> Result<f64, CompileError> {
-        let (mut graph, mut values) = (Graph::new(), Values::new());
-        for entry in &self.entries {
-            for key in &entry.keys {
-                let held = if *key == self.key { shapes } else { poses };
-                if let (false, Some(value)) = (values.contains(key.as_str()), held.variable(key.as_str())) {
-                    values.insert_boxed(key.clone(), value.erased().clone_box());
-                    if *key != self.key {
-                        graph.fix(key.clone());
-                    }
-                }
-            }
-            graph.push(entry.clone());
-        }
+        let Ok(shape) = shapes.get::<DualQuadric>(&self.key) else { return Ok(0.0) };
+        let (graph, values) = alone(&self.key, *shape, self.entries.iter(), poses);
         let mut problem = Problem::compile(&graph, &values)?;
         roughly(ITERATIONS, SETTLED).descend(&mut problem, &mut Silent);
         let states = problem.inspect();
