@@ -14,5 +14,5 @@ pub use arrangement::{
     Beside, Collinear, OnObject, Plane, PlaneOf, PlanePrior, PointInside, SupportingPlane,
 };
 pub use detection::{ConicDistance, TangentPlanes};
-pub use directions::{Accelerometer, Axis, Parallel, S2, Upright, UprightAlong};
+pub use directions::{Accelerometer, Axis, Parallel, Resting, RestingAlong, S2, Upright, UprightAlong};
 pub use max_mixture::{Component, MaxMixture, MixtureError};
