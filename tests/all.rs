@@ -14,3 +14,4 @@ mod expression;
 mod fuzz;
 mod numbers;
 mod rooms;
+mod tables;

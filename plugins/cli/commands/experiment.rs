@@ -14,7 +14,7 @@ use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::slam::source::Folders;
 use manifactor::viz::{experiment_page, experiment_pictures};
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Run a base config once for each cell of a grid, and put what is measured into tables.
@@ -47,6 +47,10 @@ pub(crate) struct Experiment {
     /// done, runs what is left, and writes the tables.
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
+    /// Put the table of summary.md into a page, in place of the one before: between `<!-- experiment: PATH -->`, PATH that of the document
+    /// from the page, and `<!-- end of experiment -->`. What the table was made of is noted there.
+    #[arg(long, value_name = "PAGE")]
+    markdown: Option<PathBuf>,
     /// Print JSON: the summary that is also written.
     #[arg(long)]
     pub(crate) json: bool,
@@ -92,7 +96,32 @@ impl Experiment {
         let page = experiment_page(&sweep, &summary, &trials, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);
+        if let Some(page) = self.markdown.as_ref().filter(|_| summary.open == 0) {
+            self.put_into(page, &sweep, &summary)?;
+        }
         Ok(status)
+    }
+
+    fn put_into(&self, page: &Path, sweep: &Sweep, summary: &Summary) -> Result<(), Failure> {
+        let text = std::fs::read_to_string(page)
+            .map_err(|source| Failure::File { path: page.to_owned(), source })?;
+        let beside = page.parent().unwrap_or(Path::new(""));
+        let own = self.config.canonicalize().ok();
+        let is_meant = |experiment: &str| own.is_some() && beside.join(experiment).canonicalize().ok() == own;
+        match experiment::put_into(&text, is_meant, &sweep.digest(), &summary.markdown()) {
+            Some(text) => Ok(write_whole(page, text)?),
+            None => Err(Failure::Input {
+                message: format!(
+                    "{} has no place for the table of {}",
+                    page.display(),
+                    self.config.display()
+                ),
+                help: Some(
+                    "put a line `<!-- experiment: PATH -->` there, PATH from that page to the document"
+                        .to_owned(),
+                ),
+            }),
+        }
     }
 
     fn tell(&self, sweep: &Sweep, summary: &Summary) {

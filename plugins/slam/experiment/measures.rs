@@ -27,7 +27,7 @@ const BY_ALIGNMENT: [OfTrajectory; 9] = [
 ];
 
 /// What is measured once.
-const ONCE: [OfEstimate; 30] = [
+const ONCE: [OfEstimate; 32] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
     ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),
@@ -37,6 +37,8 @@ const ONCE: [OfEstimate; 30] = [
     ("initial_shape", |_, r| Some(r.landmarks?.initial.mean.shape)),
     ("initial_quality", |_, r| Some(r.landmarks?.initial.mean.quality)),
     ("scored", |_, r| Some(r.landmarks?.objects as f64)),
+    ("nees_poses", |_, r| r.consistency?.poses),
+    ("nees_objects", |_, r| r.consistency?.objects),
     ("c_vertical", |e, _| mean_alignment(e, "vertical_orientation")),
     ("c_horizontal", |e, _| mean_alignment(e, "horizontal_orientation")),
     ("sigma_rotation", |e, _| Some(e.components.last()?.odometry?.noise.rotation)),
@@ -67,7 +69,8 @@ const ONCE: [OfEstimate; 30] = [
 ///
 /// Lengths are in metres, angles in radians. `ate_*` and `rpe_*` are RMSEs by alignment, `odometry_*` the same of the
 /// odometry alone, `gain_*` by how much of it the ATE fell, `gain_low_*` and `gain_high_*` where that lies with 95 % confidence over blocks of ten seconds; `position` is an RMSE, `position_mean` a mean; `shape` and
-/// `quality` are mean Jaccard distances; `initial_*` are of the objects before the solve. `c_vertical` is the mean of
+/// `quality` are mean Jaccard distances; `initial_*` are of the objects before the solve; `nees_*`
+/// are normalized errors squared by degree of freedom, 1 where covariances are right. `c_vertical` is the mean of
 /// |m · up| over objects that the paper's Table I has as vertical, m their longest axis; `c_horizontal` likewise.
 pub fn measures(estimate: &Estimate, report: &VariantReport) -> IndexMap<String, f64> {
     let aligned = report.trajectory.iter().flat_map(|trajectory| {

@@ -24,18 +24,20 @@ impl Names<'_> {
         self.metrics();
         self.compared(axes);
         let SummarySettings { by, clusters, metrics, .. } = self.settings;
+        self.across();
         self.twice("by", "column", by);
         self.twice("clusters", "column", clusters);
         self.twice("metrics", "metric", metrics);
     }
 
     fn columns(&self, axes: &[Axis]) {
-        let SummarySettings { by, baseline, clusters, curve, .. } = self.settings;
+        let SummarySettings { by, baseline, clusters, across, curve, .. } = self.settings;
         let columns: Vec<String> =
             axes.iter().flat_map(|axis| &axis.columns).map(|column| column.name.clone()).collect();
         let named = |field: &'static str| move |name| (field, name);
         let all = by.iter().map(named("by")).chain(baseline.keys().map(named("baseline")));
         let all = all.chain(clusters.iter().map(named("clusters"))).chain(curve.iter().map(named("curve")));
+        let all = all.chain(across.iter().map(named("across")));
         for (field, name) in all.filter(|(_, name)| !columns.contains(name)) {
             self.unknown(field, "column", name, &columns);
         }
@@ -66,6 +68,16 @@ impl Names<'_> {
         if self.settings.baseline.len() > 1 {
             let problem = Fault::invalid("`baseline` is one column and one of its values");
             self.errors.report(self.place_of("baseline", ""), problem);
+        }
+    }
+
+    fn across(&self) {
+        let Some(across) = &self.settings.across else { return };
+        let compared = self.settings.compared().map(|(column, _)| column);
+        if !self.settings.by.contains(across) && compared != Some(across) {
+            let help = format!("add \"{across}\" to `by`");
+            let problem = Fault::with_help("what stands side by side has to be kept apart", help);
+            self.errors.report(self.place_of("across", across), problem);
         }
     }
 
@@ -167,6 +179,7 @@ mod tests {
             ("baseline = { modle = 'x' }", "sweep.toml:2:34: unknown column `modle`"),
             ("metrics = ['shape', 'shape']", "sweep.toml:2:33: metric `shape` is given twice"),
             ("by = ['seed', 'seed']", "sweep.toml:2:27: column `seed` is given twice"),
+            ("across = 'seed'", "sweep.toml:2:22: what stands side by side has to be kept apart"),
         ] {
             let told = wrong(summary);
             assert!(told.starts_with(expected), "{told}, not {expected}");

@@ -64,35 +64,6 @@ impl Summary {
         number("relative", rows.iter().map(|row| Some(row.3?.relative())).collect());
         table
     }
-
-    /// A table of means for people, with the difference from the baseline under each that is compared.
-    pub fn markdown(&self) -> String {
-        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-        let header = self.header();
-        let rules = self.columns.iter().map(|_| "---".to_owned());
-        let rules = rules.chain(std::iter::repeat_n("---:".to_owned(), header.len() - self.columns.len()));
-        line(&header)
-            + &line(&rules.collect::<Vec<_>>())
-            + &self.rows().map(|row| line(&row)).collect::<String>()
-    }
-
-    /// Names of the columns of [`rows`](Self::rows).
-    pub fn header(&self) -> Vec<String> {
-        let counts = ["trials", "failed", "not converged"].map(str::to_owned);
-        self.columns.iter().cloned().chain(counts).chain(self.metrics.clone()).collect()
-    }
-
-    /// A row for each group, for people: means, and behind each the difference from the baseline.
-    pub fn rows(&self) -> impl Iterator<Item = Vec<String>> {
-        self.groups.iter().map(|group| {
-            let metric = |metric: &String| {
-                let mean = group.means.get(metric).map_or("-".to_owned(), |mean| format!("{:.5}", mean.mean));
-                group.comparisons.get(metric).map_or(mean.clone(), |c| format!("{mean} ({c})"))
-            };
-            let counts = [group.trials, group.failed, group.not_converged].map(|n| n.to_string());
-            group.labels.iter().cloned().chain(counts).chain(self.metrics.iter().map(metric)).collect()
-        })
-    }
 }
 
 type Bound = (&'static str, fn(&Interval) -> Option<f64>);

@@ -13,6 +13,9 @@ pub struct Summary {
     pub columns: Vec<String>,
     /// What is averaged.
     pub metrics: Vec<String>,
+    /// The column whose values stand side by side in tables for people.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub across: Option<String>,
     /// In the order of the table.
     pub groups: Vec<Group>,
     /// Trials that are not done yet.
@@ -72,6 +75,7 @@ impl Summary {
             title: experiment.title.clone(),
             columns: by.iter().filter_map(|i| experiment.columns.get(*i).cloned()).collect(),
             metrics: settings.metrics.clone(),
+            across: settings.across.clone(),
             groups: keys.into_iter().map(|key| over.group(&key)).collect(),
             open: experiment.trials.len() - records.len(),
         }

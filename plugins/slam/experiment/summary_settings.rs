@@ -19,6 +19,9 @@ pub struct SummarySettings {
     /// What is averaged: columns of measures.
     #[schemars(extend("description" = described()))]
     pub metrics: Vec<String>,
+    /// A column in `by` whose values stand side by side in `summary.md`: a column of the table for each, metric by metric.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub across: Option<String>,
     /// A column of numbers in `by` that reports draw the metrics over.
     pub curve: Option<String>,
     /// How often trials are drawn anew. At most a million: with that many the ends of an interval are settled to a
@@ -37,6 +40,7 @@ impl Default for SummarySettings {
             baseline: IndexMap::new(),
             clusters: vec![],
             metrics: vec![],
+            across: None,
             curve: None,
             resamples: 10_000,
             seed: 1,

@@ -2,11 +2,12 @@
 //!
 //! A scene of solids, a camera that moves around them, odometry and boxes with noise: each from a seed
 //! of its own, so that one can be varied while the others stay. The same settings give the same bits.
-use crate::input::sequence::{Detection, Frame, GroundTruth, Sequence};
+use crate::input::sequence::{Acceleration, Detection, Frame, GroundTruth, Sequence};
 use crate::input::source::{Folders, Source, SourceError};
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::Camera;
+use occlusion::DepthImage;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
@@ -14,11 +15,12 @@ use serde::{Deserialize, Serialize};
 
 mod catalogue;
 mod noise;
+mod occlusion;
 mod scene;
 mod solid;
 mod trajectory;
 
-pub use noise::{Detector, MotionNoise, Spread};
+pub use noise::{AccelerometerNoise, Detector, MotionNoise, Spread};
 pub use scene::{SceneObject, SceneSettings};
 pub use solid::{Boxes, Solid};
 pub use trajectory::TrajectorySettings;
@@ -48,6 +50,9 @@ pub struct Simulated {
     pub odometry: MotionNoise,
     /// Noise of boxes and classes.
     pub detector: Detector,
+    /// An accelerometer in the camera's frame, with a reading for each image. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accelerometer: Option<AccelerometerNoise>,
 }
 
 impl Default for Simulated {
@@ -61,6 +66,7 @@ impl Default for Simulated {
             trajectory: TrajectorySettings::default(),
             odometry: MotionNoise::default(),
             detector: Detector::default(),
+            accelerometer: None,
         }
     }
 }
@@ -127,7 +133,12 @@ impl Simulated {
             frames.push(Frame { timestamp: time(i), world_from_camera });
         }
         let stamped = |(i, pose): (usize, &_)| StampedPose { timestamp: time(i), pose: *pose };
-        let detections = self.detect(&objects, &poses, [&mut detector, &mut Pcg64::from_rng(&mut noise)]);
+        let [mut imagination, mut mistakes, mut felt] = [(); 3].map(|()| Pcg64::from_rng(&mut noise));
+        let detections = self.detect(&objects, &poses, [&mut detector, &mut imagination, &mut mistakes]);
+        let readings = self.accelerometer.as_ref().map(|sensor| {
+            let readings = sensor.read(&poses, self.trajectory.interval, &mut felt).into_iter().enumerate();
+            readings.map(|(i, acceleration)| Acceleration { timestamp: time(i), acceleration }).collect()
+        });
         let truth = GroundTruth {
             trajectory: poses.iter().enumerate().map(stamped).collect(),
             objects: objects.into_iter().map(|object| object.truth).collect(),
@@ -137,7 +148,7 @@ impl Simulated {
             frames,
             detections,
             up: Some(Direction::Z),
-            accelerometer: vec![],
+            accelerometer: readings.unwrap_or_default(),
             ground_truth: Some(truth),
         })
     }
@@ -146,7 +157,7 @@ impl Simulated {
         &self,
         objects: &[SceneObject],
         poses: &[manifactor_geometry::Se3],
-        [rng, imagination]: [&mut Pcg64; 2],
+        [rng, imagination, mistakes]: [&mut Pcg64; 3],
     ) -> Vec<Detection> {
         let classes: Vec<&str> = catalogue::KINDS.iter().map(|kind| kind.class).collect();
         let mut usual = vec![];
@@ -161,17 +172,28 @@ impl Simulated {
         // of each object: the noise of its last box, and the seconds since
         let mut lasting = vec![([0.0; 4], f64::INFINITY); objects.len()];
         for (frame, pose) in poses.iter().enumerate() {
-            for ((object, usual), (noise, seconds)) in objects.iter().zip(&usual).zip(&mut lasting) {
+            let solids = objects.iter().map(|o| (&o.solid, pose.between(&o.truth.world_from_object)));
+            let depths = self.detector.occluded_by_objects.then(|| DepthImage::new(solids, &self.camera));
+            for (i, (usual, (noise, seconds))) in usual.iter().zip(&mut lasting).enumerate() {
+                let object = &objects[i];
                 *seconds += self.trajectory.interval;
                 let Some(boxes) = object.solid.boxes(&object.truth.world_from_object, &self.camera, pose)
                 else {
                     continue;
                 };
-                let bounding_box = self.detector.draw(&boxes, &self.camera, (noise, *seconds), rng);
+                let Boxes { whole, inside } = boxes;
+                let left = depths.as_ref().map_or(Some((inside, 1.0)), |depths| depths.left_of(i, inside));
+                // what is hidden draws its noise as well: one setting changes nothing but its own effect
+                let (seen, share) = left.unwrap_or((inside, 0.0));
+                let visible = share * inside.area() / whole.area();
+                let drawn = self.detector.draw(&seen, visible, &self.camera, (noise, *seconds), rng);
+                let bounding_box = drawn.filter(|_| left.is_some());
                 *seconds = 0.0;
                 let scores = self.detector.classify(usual, &classes, rng);
+                let taken_for = noise::mistaken(self.detector.wrong_object, i, objects.len(), mistakes);
                 if let Some(bounding_box) = bounding_box {
-                    detections.push(Detection { frame, object: Some(object.truth.id), scores, bounding_box });
+                    let object = Some(objects[taken_for].truth.id);
+                    detections.push(Detection { frame, object, scores, bounding_box });
                 }
             }
             for (bounding_box, scores) in self.detector.imagine(&self.camera, &classes, imagination) {
@@ -191,6 +213,7 @@ impl Simulated {
             ("detector.occluded", d.occluded),
             ("detector.occlusion", d.occlusion),
             ("detector.misclassified", d.misclassified),
+            ("detector.wrong_object", d.wrong_object),
             ("detector.confused", d.confused),
         ];
         let sizes = [
@@ -207,6 +230,8 @@ impl Simulated {
             ("detector.noise_lasts_s", d.noise_lasts_s),
             ("detector.false_boxes", d.false_boxes),
             ("detector.min_size_px", d.min_size_px),
+            ("accelerometer.sigma", self.accelerometer.as_ref().map_or(0.0, |a| a.sigma)),
+            ("accelerometer.bias", self.accelerometer.as_ref().map_or(0.0, |a| a.bias)),
         ];
         let positive = [("trajectory.interval", t.interval), ("trajectory.radius", t.radius)];
         let finite = [
@@ -244,6 +269,8 @@ register!(dyn Source, "simulated", Simulated);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
+    use std::collections::BTreeMap;
 
     #[test]
     fn the_same_settings_give_the_same_bits() {
@@ -343,6 +370,49 @@ mod tests {
     }
 
     #[test]
+    fn what_others_hide_is_seen_less_and_no_other_box_changes() {
+        let boxes = |hide| {
+            let mut settings = Simulated::default();
+            settings.detector.occluded_by_objects = hide;
+            let detections = settings.simulate().unwrap().detections.into_iter();
+            detections.map(|d| ((d.frame, d.object), d.bounding_box)).collect::<BTreeMap<_, _>>()
+        };
+        let (all, left) = (boxes(false), boxes(true));
+        assert!(left.len() < all.len() && left.keys().all(|key| all.contains_key(key)));
+        let same = left.iter().filter(|(key, found)| all[*key] == **found).count() as f64;
+        let share = same / left.len() as f64;
+        assert!((0.5..0.99).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn boxes_of_a_wrong_object_are_as_many_as_said() {
+        let mut settings = Simulated::default();
+        let right = settings.simulate().unwrap().detections;
+        settings.detector.wrong_object = 0.2;
+        let wrong = settings.simulate().unwrap().detections;
+        assert_eq!(right.len(), wrong.len());
+        let pairs = || right.iter().zip(&wrong);
+        assert!(pairs().all(|(a, b)| a.bounding_box == b.bounding_box));
+        let share = pairs().filter(|(a, b)| a.object != b.object).count() as f64 / right.len() as f64;
+        assert!((share - 0.2).abs() < 0.03, "{share}");
+    }
+
+    #[test]
+    fn an_accelerometer_feels_up_and_its_own_motion() {
+        let sensor = AccelerometerNoise { sigma: 0.0, bias: 0.0 };
+        let settings = Simulated { accelerometer: Some(sensor), ..Simulated::default() };
+        let sequence = settings.simulate().unwrap();
+        let truth = &sequence.ground_truth.as_ref().unwrap().trajectory;
+        assert_eq!(sequence.accelerometer.len(), truth.len());
+        for (reading, pose) in sequence.accelerometer.iter().zip(truth) {
+            let felt = pose.pose.rotation.act(&reading.acceleration);
+            assert!((felt - Vector3::z() * 9.81).norm() < 1.5, "{felt}");
+        }
+        let before = Simulated::default().simulate().unwrap();
+        assert_eq!(sequence.detections, before.detections);
+    }
+
+    #[test]
     fn settings_that_make_no_sense_are_refused() {
         let refused = |change: fn(&mut Simulated)| {
             let mut settings = Simulated::default();
@@ -351,6 +421,11 @@ mod tests {
         };
         assert!(refused(|s| s.scene.tilted = 1.5).contains("scene.tilted"));
         assert!(refused(|s| s.detector.sigma_px = f64::NAN).contains("detector.sigma_px"));
+        assert!(refused(|s| s.detector.wrong_object = 2.0).contains("detector.wrong_object"));
+        assert!(
+            refused(|s| s.accelerometer = Some(AccelerometerNoise { sigma: -1.0, bias: 0.0 }))
+                .contains("sigma")
+        );
         assert!(refused(|s| s.scene.objects = 5000).contains("no room"));
         assert!(refused(|s| s.scene.objects = usize::MAX).contains("at most ten thousand"));
         assert!(refused(|s| s.scene.classes = vec!["unicorn".into()]).contains("unicorn"));

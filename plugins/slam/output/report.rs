@@ -10,6 +10,7 @@ use manifactor_solve::{Diagnosis, Outcome, Rejected, Termination, Times};
 use serde::Serialize;
 
 mod association;
+mod consistency;
 mod held_out;
 mod landmarks;
 mod online;
@@ -19,6 +20,7 @@ mod trajectory;
 
 pub use association::AssociationReport;
 pub(crate) use association::Naming;
+pub use consistency::ConsistencyReport;
 pub use held_out::{HeldOutReport, Mean, Prediction};
 pub use landmarks::LandmarkReport;
 pub use online::OnlineReport;
@@ -74,6 +76,9 @@ pub struct VariantReport {
     pub trajectory: Vec<TrajectoryReport>,
     /// The objects against the truth, where there is one.
     pub landmarks: Option<LandmarkReport>,
+    /// Whether both are off by as much as the estimate says, where there is a truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub consistency: Option<ConsistencyReport>,
     /// How well boxes are predicted that the estimate did without.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutReport>,
@@ -182,6 +187,7 @@ impl VariantReport {
             solve,
             trajectory,
             landmarks,
+            consistency: ConsistencyReport::new(estimate, &settings.evaluation),
             held_out: None,
             objects,
             warnings,

@@ -1,5 +1,4 @@
 //! What is wrong with measurements.
-use super::solid::Boxes;
 use crate::input::sequence::ClassScores;
 use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
@@ -65,6 +64,42 @@ impl MotionNoise {
     }
 }
 
+/// An accelerometer, and what it does wrong: white noise, and an offset that stays.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct AccelerometerNoise {
+    /// Standard deviation of each axis, in m/s².
+    pub sigma: f64,
+    /// Standard deviation of the offset of each axis, in m/s².
+    pub bias: f64,
+}
+
+impl Default for AccelerometerNoise {
+    fn default() -> Self {
+        Self { sigma: 0.1, bias: 0.05 }
+    }
+}
+
+/// What an accelerometer at rest reads, in m/s².
+const GRAVITY: f64 = 9.81;
+
+impl AccelerometerNoise {
+    /// What it reads at each pose, in the camera's frame: up, and its own acceleration, by differences over `interval` seconds.
+    pub(super) fn read(&self, poses: &[Se3], interval: f64, rng: &mut Pcg64) -> Vec<Vector3<f64>> {
+        let bias = Vector3::from_fn(|_, _| self.bias * normal(rng));
+        let at = |i: usize| poses[i.min(poses.len() - 1)].translation;
+        let reading = |i: usize| {
+            // at both ends, that of the next to last
+            let middle = i.clamp(1, poses.len().saturating_sub(2).max(1));
+            let moved = at(middle + 1) - at(middle) * 2.0 + at(middle - 1);
+            let felt = Vector3::z() * GRAVITY + moved / interval.powi(2);
+            let noise = Vector3::from_fn(|_, _| self.sigma * normal(rng));
+            poses[i].rotation.inverse().act(&felt) + bias + noise
+        };
+        (0..poses.len()).map(reading).collect()
+    }
+}
+
 /// A detector and what it does wrong. Shares and rates are from 0 to 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -88,6 +123,10 @@ pub struct Detector {
     pub occluded: f64,
     /// By how much of its width or height such a box shrinks, at most.
     pub occlusion: f64,
+    /// Whether nearer objects hide what is behind them: a box is around what is left to see, to four pixels, and `min_visible` is about it.
+    pub occluded_by_objects: bool,
+    /// Rate at which a box is put to another object of the scene: a tracker's mistake.
+    pub wrong_object: f64,
     /// Share of the objects that are taken for another class in most of their images.
     pub misclassified: f64,
     /// Rate at which a box has another class than the object's usual.
@@ -106,6 +145,8 @@ impl Default for Detector {
             missed: 0.0,
             occluded: 0.0,
             occlusion: 0.4,
+            occluded_by_objects: false,
+            wrong_object: 0.0,
             misclassified: 0.0,
             confused: 0.0,
         }
@@ -114,10 +155,12 @@ impl Default for Detector {
 
 impl Detector {
     /// The box that it draws; `None` where it draws none.
-    /// `noise` is that of the object's box before, in standard deviations, and of this one after; `seconds` have passed.
+    /// `visible` is the share of the object that is to be seen; `noise` is that of its box before, in standard deviations, and of this
+    /// one after; `seconds` have passed.
     pub(super) fn draw(
         &self,
-        boxes: &Boxes,
+        bounding_box: &BoundingBox,
+        visible: f64,
         camera: &Camera,
         (noise, seconds): (&mut [f64; 4], f64),
         rng: &mut Pcg64,
@@ -127,9 +170,9 @@ impl Detector {
         let (side, share) = (rng.random_range(0..4), rng.random::<f64>() * self.occlusion);
         let left = if self.noise_lasts_s > 0.0 { (-seconds / self.noise_lasts_s).exp() } else { 0.0 };
         noise.iter_mut().for_each(|n| *n = left * *n + (1.0 - left * left).sqrt() * normal(rng));
-        let (width, height) = (boxes.inside.width(), boxes.inside.height());
+        let (width, height) = (bounding_box.width(), bounding_box.height());
         let sigma = [width, height].map(|size| self.sigma_px.hypot(self.sigma_of_size * size));
-        let mut b = boxes.inside.bounds();
+        let mut b = bounding_box.bounds();
         if hidden {
             let extent = b[side % 2 + 2] - b[side % 2];
             b[side] += if side < 2 { share * extent } else { -share * extent };
@@ -141,8 +184,7 @@ impl Detector {
             (b[axis], b[axis + 2]) = (low.clamp(0.0, size[axis]), high.clamp(0.0, size[axis]));
         }
         let large = b[2] - b[0] >= self.min_size_px && b[3] - b[1] >= self.min_size_px;
-        let visible = boxes.inside.area() >= self.min_visible * boxes.whole.area();
-        (!missed && large && visible).then(|| BoundingBox::new(b).ok()).flatten()
+        (!missed && large && visible >= self.min_visible).then(|| BoundingBox::new(b).ok()).flatten()
     }
 
     /// What it takes an object for whose usual class is this.
@@ -175,6 +217,12 @@ impl Detector {
         };
         (0..count).filter_map(|_| one()).collect()
     }
+}
+
+/// The object that a box is put to, of so many: with this rate another one.
+pub(super) fn mistaken(rate: f64, own: usize, objects: usize, rng: &mut Pcg64) -> usize {
+    let (wrong, step) = (rng.random_bool(rate), rng.random_range(1..objects.max(2)));
+    if wrong { (own + step) % objects.max(1) } else { own }
 }
 
 /// A class that is not this one, if there is any.

@@ -90,11 +90,8 @@ impl Solid {
     /// The box around what a camera sees of it, without and with the image's border; `None` where
     /// nothing is in front, or nothing in the image.
     pub fn boxes(&self, world_from_object: &Se3, camera: &Camera, world_from_camera: &Se3) -> Option<Boxes> {
-        let camera_from_object = world_from_camera.between(world_from_object);
         let (mut whole, mut inside) = (Extent::default(), Extent::default());
-        for face in &self.faces {
-            let seen: Vec<_> = face.iter().map(|corner| camera_from_object.act(corner)).collect();
-            let front = clip(&seen, |p| p.z - NEAR);
+        for front in self.in_front(&world_from_camera.between(world_from_object)) {
             let mut image: Vec<_> = front.iter().map(|p| project(camera, p)).collect();
             image.iter().for_each(|p| whole.add(p));
             let size = camera.size();
@@ -107,6 +104,14 @@ impl Solid {
         }
         Some(Boxes { whole: whole.bounding_box()?, inside: inside.bounding_box()? })
     }
+
+    /// What of its faces is in front of a camera, in the camera's frame.
+    pub(super) fn in_front(&self, camera_from_object: &Se3) -> impl Iterator<Item = Vec<Vector3<f64>>> {
+        self.faces.iter().map(|face| {
+            let seen: Vec<_> = face.iter().map(|corner| camera_from_object.act(corner)).collect();
+            clip(&seen, |p| p.z - NEAR)
+        })
+    }
 }
 
 /// The boxes around an object's image.
@@ -118,9 +123,18 @@ pub struct Boxes {
     pub inside: BoundingBox,
 }
 
-fn project(camera: &Camera, p: &Vector3<f64>) -> Vector2<f64> {
+/// Where a point is seen, in pixels.
+pub(super) fn project(camera: &Camera, p: &Vector3<f64>) -> Vector2<f64> {
     let (x, y) = (p.x / p.z, p.y / p.z);
     Vector2::new(camera.fx * x + camera.skew * y + camera.cx, camera.fy * y + camera.cy)
+}
+
+/// Whether a point is in a convex polygon, whichever way around that goes.
+pub(super) fn inside_convex(polygon: &[Vector2<f64>], p: &Vector2<f64>) -> bool {
+    let next = polygon.iter().cycle().skip(1);
+    let sides = polygon.iter().zip(next).map(|(a, b)| (b - a).perp(&(p - a)));
+    let (low, high) = sides.fold((0.0_f64, 0.0_f64), |(low, high), side| (low.min(side), high.max(side)));
+    low >= 0.0 || high <= 0.0
 }
 
 /// The part of a polygon where `distance` is not negative (Sutherland and Hodgman).

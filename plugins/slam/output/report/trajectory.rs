@@ -39,10 +39,7 @@ pub(super) fn compare(
     warnings: &mut Vec<Warning>,
 ) -> Vec<TrajectoryReport> {
     let Some(truth) = truth else { return vec![] };
-    let aligned = |trajectory: &[StampedPose], alignment| -> Result<Vec<PosePair>, MetricsError> {
-        let pairs = associate(&truth.trajectory, trajectory, settings.max_time_difference)?;
-        Ok(align(&pairs, alignment)?.1)
-    };
+    let aligned = |trajectory: &[StampedPose], alignment| aligned(truth, trajectory, alignment, settings);
     let error = |aligned: &[PosePair]| -> Result<TrajectoryError, MetricsError> {
         let rpe = relative_error(aligned, settings.relative_over.get(), Pairing::All).ok();
         Ok(TrajectoryError { ate: absolute_error(aligned)?, rpe })
@@ -61,6 +58,25 @@ pub(super) fn compare(
     }
     warnings.extend(reports.first().and_then(worse));
     reports
+}
+
+/// Poses of an estimate beside the true ones, in the frame of the truth by the first of them.
+pub(super) fn by_first_pose(
+    truth: &GroundTruth,
+    estimate: &[StampedPose],
+    settings: &EvaluationSettings,
+) -> Result<Vec<PosePair>, MetricsError> {
+    aligned(truth, estimate, Alignment::FirstPose, settings)
+}
+
+fn aligned(
+    truth: &GroundTruth,
+    estimate: &[StampedPose],
+    alignment: Alignment,
+    settings: &EvaluationSettings,
+) -> Result<Vec<PosePair>, MetricsError> {
+    let pairs = associate(&truth.trajectory, estimate, settings.max_time_difference)?;
+    Ok(align(&pairs, alignment)?.1)
 }
 
 fn worse(report: &TrajectoryReport) -> Option<Warning> {
