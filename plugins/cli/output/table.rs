@@ -116,8 +116,10 @@ fn noise(variant: &VariantReport) -> String {
         });
     }
     parts.extend(found.boxes.iter().map(|(name, boxes)| {
-        let BoxComponent { sigma_px, correlation_time, .. } = boxes;
-        format!("boxes ({name}) σ {sigma_px:.1} px, {correlation_time:.1} of them worth one")
+        let BoxComponent { sigma_px, of_size, correlation_time, .. } = boxes;
+        let grows =
+            if *of_size > 0.0 { format!(" and {:.1} % of the size", 100.0 * of_size) } else { String::new() };
+        format!("boxes ({name}) σ {sigma_px:.1} px{grows}, {correlation_time:.1} of them worth one")
     }));
     text::wrap(&format!("{}: {}", on_one_line(&variant.name), parts.join("; "))) + "\n"
 }

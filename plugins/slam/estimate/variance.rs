@@ -4,12 +4,14 @@
 //! The noise of *boxes* is that of their residuals: one of standard deviation σ has variance σ²(1 - h) at the estimate, h its leverage
 //! (Helmert; Förstner, *Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten*, 1979). The noise of *odometry* is the one
 //! that leads to the trajectory which suits objects best that had no part in it.
+mod boxes;
 mod components;
 mod correlation;
 mod cross_validation;
 mod motion;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
-pub use components::{BoxComponent, Components, VarianceError};
+pub use boxes::BoxComponent;
+pub use components::{Components, VarianceError};
 pub use cross_validation::Score;
 pub use motion::{MotionChoice, MotionComponent};

@@ -14,8 +14,10 @@ pub struct VarianceSettings {
     #[serde(deserialize_with = "not_negative")]
     #[schemars(extend("minimum" = 0))]
     pub tolerance: f64,
-    /// Which boxes have a noise in common.
+    /// Which boxes have a noise in common. Noises of several groups are drawn towards each other, as far as chance explains that they differ.
     pub boxes: BoxGroups,
+    /// Whether the noise of a box may grow with its width and height.
+    pub size: bool,
     /// Whether errors of consecutive boxes of an object are taken for correlated, as they are: a detector errs the same
     /// way in image after image, and no ellipsoid has the outline of a chair. τ such boxes say as much as one alone,
     /// τ their integrated autocorrelation time, so their standard deviation is √τ times as large.
@@ -33,6 +35,7 @@ impl Default for VarianceSettings {
             rounds,
             tolerance: 0.02,
             boxes: BoxGroups::All,
+            size: false,
             correlation: true,
             odometry: true,
             pivot: true,

@@ -51,8 +51,9 @@ pub(super) fn noise(page: &mut Page, report: &VariantReport) {
     let Some(noise) = report.variance_components.last() else { return };
     let rounds = report.variance_components.len();
     page.subheading("Noise").paragraph(&format!("As it was estimated, in {rounds} rounds."));
-    let alone =
-        |name: &str, sigma: f64| vec![name.to_owned(), format!("{sigma:.3e}"), String::new(), String::new()];
+    let alone = |name: &str, sigma: f64| {
+        [vec![name.to_owned(), format!("{sigma:.3e}")], vec![String::new(); 3]].concat()
+    };
     let mut rows = vec![];
     if let Some(choice) = noise.odometry {
         let MotionComponent { rotation, translation, pivot } = choice.noise;
@@ -65,10 +66,14 @@ pub(super) fn noise(page: &mut Page, report: &VariantReport) {
         rows.push(alone("its standard error", deviation));
     }
     rows.extend(noise.boxes.iter().map(|(name, c)| {
-        let numbers = [c.sigma_px, c.correlation_time, c.effective_px].map(|x| format!("{x:.2}"));
+        let numbers =
+            [c.sigma_px, 100.0 * c.of_size, c.correlation_time, c.effective_px].map(|x| format!("{x:.2}"));
         std::iter::once(format!("boxes: {name} (px)")).chain(numbers).collect()
     }));
-    page.table(&words(["noise", "σ", "correlation time", "σ in the graph"]), &rows);
+    page.table(
+        &words(["noise", "σ", "grows by (% of the size)", "correlation time", "σ in the graph"]),
+        &rows,
+    );
 }
 
 /// How well boxes are predicted that were held out, by class.

@@ -1,17 +1,16 @@
 //! The noise of each group of measurements.
-use super::correlation::autocorrelation_time;
+use super::boxes::{self, BoxComponent, Errors, Sizes, group};
 use super::cross_validation::CrossValidation;
 use super::motion::{self, MotionChoice};
 use super::{BoxGroups, VarianceSettings};
 use crate::estimate::Estimate;
-use crate::mapping::{MappedObject, Mapping, pose_key};
+use crate::mapping::Mapping;
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
-use manifactor_graph::batch::FactorState;
 use manifactor_graph::checked::{NotPositive, Positive};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::noise::NoiseError;
-use manifactor_graph::{FactorEntry, Key, Noise};
+use manifactor_graph::{FactorEntry, Key};
 use manifactor_quadric::DualQuadric;
 use manifactor_solve::{CompileError, CovarianceError, Observer};
 use serde::Serialize;
@@ -26,17 +25,6 @@ pub struct Components {
     pub odometry: Option<MotionChoice>,
     /// Of boxes, by group.
     pub boxes: IndexMap<String, BoxComponent>,
-}
-
-/// The noise of a group of boxes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BoxComponent {
-    /// Of each side of a box, in pixels.
-    pub sigma_px: f64,
-    /// How many consecutive boxes say as much as one alone.
-    pub correlation_time: f64,
-    /// What the graph is given: √(correlation_time) · sigma_px.
-    pub effective_px: f64,
 }
 
 /// Why the noise could not be estimated.
@@ -64,27 +52,15 @@ pub(super) enum Measures {
     Other,
 }
 
-/// Half of all normal deviates are below this.
-const MEDIAN: f64 = 0.674_489_750_196_081_7;
-/// Rows that are controlled less than this say nothing of their noise.
-const LEAST_REDUNDANCY: f64 = 1e-9;
-/// Fewer rows than this have no noise of their own.
-const LEAST_ROWS: usize = 40;
 /// Of boxes, in pixels, where the search begins.
 const BEGIN_PX: f64 = 10.0;
 /// As long as the noise of boxes changes by less than this share, that of odometry stays as it was chosen.
 const SAME_BOXES: f64 = 0.2;
 
-impl BoxComponent {
-    fn of(sigma_px: f64, correlation_time: f64) -> Self {
-        Self { sigma_px, correlation_time, effective_px: sigma_px * correlation_time.sqrt() }
-    }
-}
-
 impl Components {
     /// What the search begins with, whatever a document says.
     pub(in crate::estimate) fn begin(mapping: &Mapping, settings: &VarianceSettings) -> Self {
-        let component = BoxComponent::of(BEGIN_PX, 1.0);
+        let component = BoxComponent::of(BEGIN_PX, 0.0, 1.0, 0.0);
         let boxes = mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given);
         let boxes = boxes.map(|object| (group(object, settings.boxes), component)).collect();
         let is_chosen = settings.odometry && CrossValidation::is_possible(mapping);
@@ -103,15 +79,18 @@ impl Components {
     ) -> Result<Self, VarianceError> {
         let graph = &estimate.mapping.graph;
         let leverages = estimate.solution.leverages(graph)?;
-        let mut boxes: IndexMap<Key, Rows> = IndexMap::new();
+        let mut boxes: IndexMap<Key, Errors> = IndexMap::new();
+        let sizes = Sizes::of(&estimate.mapping);
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
             // factors are in the order of the graph: an object's boxes in the order of their frames
             if let Measures::Box { object } = measures(entry) {
-                boxes.entry(object).or_default().add(state, leverage, entry.noise.observed());
+                let size = sizes.of_box(entry).unwrap_or_default();
+                boxes.entry(object).or_default().add(state, leverage, entry.noise.observed(), size);
             }
         }
-        let mut found = Self { odometry: None, boxes: groups(&estimate.mapping, boxes, settings) };
+        let mut found =
+            Self { odometry: None, boxes: boxes::components(&estimate.mapping, &boxes, settings) };
         if !settings.odometry {
             return Ok(found);
         }
@@ -122,7 +101,7 @@ impl Components {
             let mut mapping = estimate.mapping.clone();
             found.apply(&mut mapping, settings, loss)?;
             if let Some(validation) = CrossValidation::new(&mapping, &estimate.solution.values) {
-                let pivot = if settings.pivot { distance(estimate) } else { 0.0 };
+                let pivot = if settings.pivot { motion::distance(estimate) } else { 0.0 };
                 found.odometry = motion::choose(&validation, pivot, chosen, observer)?;
             }
         }
@@ -147,13 +126,14 @@ impl Components {
                 groups.insert(object.key.clone(), (component, loss.map(|loss| loss.erased().tempered(tau))));
             }
         }
+        let sizes = Sizes::of(mapping);
         for entry in mapping.graph.factors_mut() {
             let noise = match (measures(entry), self.odometry) {
                 (Measures::Motion, Some(motion)) => motion.noise.noise()?,
                 (Measures::Box { object }, _) => match groups.get(&object) {
                     Some((component, loss)) => {
                         entry.loss.clone_from(loss);
-                        Noise::sigma(component.effective_px)?
+                        component.noise(sizes.of_box(entry))?
                     }
                     None => continue,
                 },
@@ -184,90 +164,4 @@ pub(super) fn measures(entry: &FactorEntry) -> Measures {
         ([_, seen], [a, b]) if *a == pose && *b == object => Measures::Box { object: seen.clone() },
         _ => Measures::Other,
     }
-}
-
-/// Errors of the boxes of an object, in pixels: by side, then in the order of the boxes.
-#[derive(Default)]
-struct Rows {
-    errors: [Vec<f64>; 4],
-}
-
-impl Rows {
-    fn add(&mut self, state: &FactorState, leverage: &[f64], observed: Option<&[bool]>) {
-        for (side, errors) in self.errors.iter_mut().enumerate() {
-            let seen = observed.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
-            let redundancy = 1.0 - leverage.get(side).copied().unwrap_or(1.0);
-            if let (true, Some(residual)) = (seen && redundancy > LEAST_REDUNDANCY, state.residual.get(side))
-            {
-                errors.push(residual / redundancy.sqrt());
-            }
-        }
-    }
-}
-
-/// How far away what the camera sees is, in metres: the median over all boxes.
-fn distance(estimate: &Estimate) -> f64 {
-    let (values, measurements) = (&estimate.solution.values, &estimate.mapping.measurements);
-    let of_object = |landmark: crate::estimate::Landmark<'_>| {
-        let views = measurements.object(landmark.object.id).map_or(&[][..], |measured| &measured.views);
-        let poses = views.iter().filter_map(|view| values.get::<Se3>(pose_key(view.frame)).ok());
-        poses.map(|pose| (pose.translation - landmark.quadric.centroid()).norm()).collect::<Vec<_>>()
-    };
-    let mut distances: Vec<f64> = estimate.landmarks().into_iter().flat_map(of_object).collect();
-    distances.sort_by(f64::total_cmp);
-    distances.get(distances.len() / 2).copied().unwrap_or_default()
-}
-
-/// The group of an object's boxes.
-fn group(object: &MappedObject, by: BoxGroups) -> String {
-    match by {
-        BoxGroups::All | BoxGroups::Given => "all".to_owned(),
-        BoxGroups::Class => {
-            object.class.as_ref().map_or_else(|| "unknown".to_owned(), |class| class.name.clone())
-        }
-        BoxGroups::Object => object.key.to_string(),
-    }
-}
-
-fn groups(
-    mapping: &Mapping,
-    mut boxes: IndexMap<Key, Rows>,
-    settings: &VarianceSettings,
-) -> IndexMap<String, BoxComponent> {
-    if settings.boxes == BoxGroups::Given {
-        return IndexMap::new();
-    }
-    let mut series: IndexMap<String, Vec<Vec<f64>>> = IndexMap::new();
-    let mut all = vec![];
-    for object in mapping.mapped() {
-        let Some(rows) = boxes.swap_remove(&object.key) else { continue };
-        all.extend(rows.errors.iter().cloned());
-        series.entry(group(object, settings.boxes)).or_default().extend(rows.errors);
-    }
-    let rows = |series: &[Vec<f64>]| series.iter().map(Vec::len).sum::<usize>();
-    let component = |own: &[Vec<f64>]| {
-        // too few to tell: as all are
-        box_component(if rows(own) < LEAST_ROWS { &all } else { own }, settings)
-    };
-    series.iter().filter_map(|(name, own)| Some((name.clone(), component(own)?))).collect()
-}
-
-fn box_component(series: &[Vec<f64>], settings: &VarianceSettings) -> Option<BoxComponent> {
-    let mut sizes: Vec<f64> = series.iter().flatten().map(|error| error.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    // robust: half of the boxes may be wrong
-    let sigma_px = sizes.get(sizes.len() / 2)? / MEDIAN;
-    if !(sigma_px.is_finite() && sigma_px > 0.0) {
-        return None;
-    }
-    let correlation_time = if settings.correlation {
-        // gross errors are detections of something else, and not what lasts
-        let within = |error: &&f64| error.abs() < 3.0 * sigma_px;
-        let within: Vec<Vec<f64>> =
-            series.iter().map(|errors| errors.iter().filter(within).copied().collect()).collect();
-        autocorrelation_time(&within)
-    } else {
-        1.0
-    };
-    Some(BoxComponent::of(sigma_px, correlation_time))
 }

@@ -1,6 +1,9 @@
 //! The noise of odometry, and how it is found.
 use super::components::VarianceError;
 use super::cross_validation::{CrossValidation, Score};
+use crate::estimate::{Estimate, Landmark};
+use crate::mapping::pose_key;
+use manifactor_geometry::Se3;
 use manifactor_graph::Noise;
 use manifactor_graph::noise::NoiseError;
 use manifactor_solve::Observer;
@@ -129,6 +132,19 @@ impl Search<'_> {
         }
         Ok(())
     }
+}
+
+/// How far away what the camera sees is, in metres: the median over all boxes.
+pub(super) fn distance(estimate: &Estimate) -> f64 {
+    let (values, measurements) = (&estimate.solution.values, &estimate.mapping.measurements);
+    let of_object = |landmark: Landmark<'_>| {
+        let views = measurements.object(landmark.object.id).map_or(&[][..], |measured| &measured.views);
+        let poses = views.iter().filter_map(|view| values.get::<Se3>(pose_key(view.frame)).ok());
+        poses.map(|pose| (pose.translation - landmark.quadric.centroid()).norm()).collect::<Vec<_>>()
+    };
+    let mut distances: Vec<f64> = estimate.landmarks().into_iter().flat_map(of_object).collect();
+    distances.sort_by(f64::total_cmp);
+    distances.get(distances.len() / 2).copied().unwrap_or_default()
 }
 
 /// Searches the grid, by decades and then by halves of them; by halves alone from what was chosen `before`, when boxes had another

@@ -1,0 +1,279 @@
+//! The noise of boxes: how large it is, how it grows with them, how it differs by object, and how long it lasts.
+use super::correlation::autocorrelation_time;
+use super::{BoxGroups, VarianceSettings};
+use crate::mapping::{MappedObject, Mapping, pose_key};
+use indexmap::IndexMap;
+use manifactor_graph::batch::FactorState;
+use manifactor_graph::noise::NoiseError;
+use manifactor_graph::{FactorEntry, Key, Noise};
+use serde::Serialize;
+use std::collections::HashMap;
+
+/// The noise of a group of boxes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BoxComponent {
+    /// Of each side of a box, in pixels: what does not grow with it.
+    pub sigma_px: f64,
+    /// What it has besides, as a part of the width for a left or right side, of the height for an upper or lower one; the two add up as
+    /// squares. 0 where that is not asked for.
+    pub of_size: f64,
+    /// How many consecutive boxes say as much as one alone.
+    pub correlation_time: f64,
+    /// What the graph is given: √(correlation_time) · σ, for a box of the size in the middle.
+    pub effective_px: f64,
+}
+
+/// Half of all normal deviates are below this.
+const MEDIAN: f64 = 0.674_489_750_196_081_7;
+/// The variance of the logarithm of a standard deviation by the median of n deviates is this, by n (Rousseeuw and Croux, *Alternatives to
+/// the Median Absolute Deviation*, 1993: its efficiency is 37 %).
+const MEDIAN_VARIANCE: f64 = 0.5 / 0.3678;
+/// Rows that are controlled less than this say nothing of their noise.
+const LEAST_REDUNDANCY: f64 = 1e-9;
+/// Parts that errors are sorted into, by size, and the least of each.
+const PARTS: usize = 8;
+const LEAST_OF_PART: usize = 20;
+
+impl BoxComponent {
+    /// `middle` is the size of the box in the middle, in pixels.
+    pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, middle: f64) -> Self {
+        let effective_px = sigma_px.hypot(of_size * middle) * correlation_time.sqrt();
+        Self { sigma_px, of_size, correlation_time, effective_px }
+    }
+
+    /// The same, larger by a factor.
+    fn scaled(self, by: f64) -> Self {
+        let Self { sigma_px, of_size, effective_px, .. } = self;
+        Self { sigma_px: by * sigma_px, of_size: by * of_size, effective_px: by * effective_px, ..self }
+    }
+
+    /// Of a box of these extents.
+    pub(super) fn noise(&self, size: Option<[f64; 2]>) -> Result<Noise, NoiseError> {
+        match size.filter(|_| self.of_size > 0.0) {
+            None => Noise::sigma(self.effective_px),
+            Some(size) => {
+                let [x, y] = size.map(|size| self.at(size) * self.correlation_time.sqrt());
+                Noise::sigmas(&[x, y, x, y])
+            }
+        }
+    }
+
+    fn at(&self, size: f64) -> f64 {
+        self.sigma_px.hypot(self.of_size * size)
+    }
+}
+
+/// Width and height of each box, by the keys of its factor.
+pub(super) struct Sizes(HashMap<[Key; 2], [f64; 2]>);
+
+impl Sizes {
+    pub(super) fn of(mapping: &Mapping) -> Self {
+        let of_object = |object: &MappedObject| {
+            let views = mapping.measurements.object(object.id).map_or(&[][..], |measured| &measured.views);
+            let size = |view: &crate::mapping::measurements::ObjectBox| {
+                let keys = [pose_key(view.frame), object.key.clone()];
+                (keys, [view.bounding_box.width(), view.bounding_box.height()])
+            };
+            views.iter().map(size).collect::<Vec<_>>()
+        };
+        Self(mapping.mapped().flat_map(of_object).collect())
+    }
+
+    pub(super) fn of_box(&self, entry: &FactorEntry) -> Option<[f64; 2]> {
+        let keys: [Key; 2] = entry.keys.clone().try_into().ok()?;
+        self.0.get(&keys).copied()
+    }
+}
+
+/// Errors of the boxes of an object: by side, then in the order of the boxes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Errors([Vec<SideError>; 4]);
+
+/// In pixels.
+#[derive(Debug, Clone, Copy)]
+struct SideError {
+    error: f64,
+    /// The box's width, for a left or right side, or its height.
+    size: f64,
+}
+
+impl Errors {
+    /// Residuals at the estimate are less than errors: σ²(1 - h), h the leverage of a row.
+    pub(super) fn add(
+        &mut self,
+        state: &FactorState,
+        leverage: &[f64],
+        observed: Option<&[bool]>,
+        size: [f64; 2],
+    ) {
+        for (side, errors) in self.0.iter_mut().enumerate() {
+            let seen = observed.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
+            let redundancy = 1.0 - leverage.get(side).copied().unwrap_or(1.0);
+            if let (true, Some(residual)) = (seen && redundancy > LEAST_REDUNDANCY, state.residual.get(side))
+            {
+                errors.push(SideError { error: residual / redundancy.sqrt(), size: size[side % 2] });
+            }
+        }
+    }
+}
+
+/// The group of an object's boxes.
+pub(super) fn group(object: &MappedObject, by: BoxGroups) -> String {
+    match by {
+        BoxGroups::All | BoxGroups::Given => "all".to_owned(),
+        BoxGroups::Class => {
+            object.class.as_ref().map_or_else(|| "unknown".to_owned(), |class| class.name.clone())
+        }
+        BoxGroups::Object => object.key.to_string(),
+    }
+}
+
+/// The noise of each group. Those of several groups are that of all boxes, larger or smaller by a factor that is drawn towards their mean
+/// the more, the less a group has to say (empirical Bayes: as if logarithms of σ were normal).
+pub(super) fn components(
+    mapping: &Mapping,
+    boxes: &IndexMap<Key, Errors>,
+    settings: &VarianceSettings,
+) -> IndexMap<String, BoxComponent> {
+    let mut groups: IndexMap<String, Vec<&[SideError]>> = IndexMap::new();
+    for object in mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given) {
+        let Some(Errors(errors)) = boxes.get(&object.key) else { continue };
+        let series = groups.entry(group(object, settings.boxes)).or_default();
+        series.extend(errors.iter().map(Vec::as_slice));
+    }
+    let all: Vec<&[SideError]> = groups.values().flatten().copied().collect();
+    let Some(of_all) = component(&all, settings) else { return IndexMap::new() };
+    if settings.boxes == BoxGroups::All {
+        return groups.into_keys().map(|name| (name, of_all)).collect();
+    }
+    let own = groups.iter().map(|(_, series)| {
+        let relative = median(series.iter().copied().flatten().map(|e| (e.error / of_all.at(e.size)).abs()));
+        let rows = series.iter().map(|errors| errors.len()).sum::<usize>() as f64;
+        (relative.filter(|x| *x > 0.0).map_or(0.0, f64::ln), rows / of_all.correlation_time)
+    });
+    let factors = shrunk(&own.collect::<Vec<_>>());
+    groups.into_keys().zip(factors).map(|(name, by)| (name, of_all.scaled(by.exp()))).collect()
+}
+
+/// Logarithms of standard deviations, each by so many deviates, drawn towards their mean: by as much as they differ from it by chance.
+fn shrunk(own: &[(f64, f64)]) -> Vec<f64> {
+    let n = own.len().max(1) as f64;
+    let variance = |deviates: f64| MEDIAN_VARIANCE / deviates.max(1.0);
+    let mean = own.iter().map(|(log, _)| log).sum::<f64>() / n;
+    let spread =
+        own.iter().map(|(log, deviates)| (log - mean).powi(2) - variance(*deviates)).sum::<f64>() / n;
+    let spread = spread.max(0.0);
+    own.iter().map(|(log, deviates)| mean + (log - mean) * spread / (spread + variance(*deviates))).collect()
+}
+
+/// The standard deviation that half of the deviates would be below of if they were normal: half of them may be wrong.
+fn median(deviates: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut sizes: Vec<f64> = deviates.collect();
+    sizes.sort_by(f64::total_cmp);
+    Some(sizes.get(sizes.len() / 2)? / MEDIAN)
+}
+
+fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<BoxComponent> {
+    let errors: Vec<SideError> = series.iter().copied().flatten().copied().collect();
+    let white = median(errors.iter().map(|e| e.error.abs()))?;
+    if !(white.is_finite() && white > 0.0) {
+        return None;
+    }
+    let (sigma_px, of_size) = settings.size.then(|| grown(&errors)).flatten().unwrap_or((white, 0.0));
+    let middle = errors.iter().map(|e| e.size).sum::<f64>() / errors.len() as f64;
+    let one = BoxComponent::of(sigma_px, of_size, 1.0, middle);
+    if !settings.correlation {
+        return Some(one);
+    }
+    // gross errors are detections of something else, and not what lasts
+    let within = |errors: &&[SideError]| -> Vec<f64> {
+        let within = errors.iter().filter(|e| e.error.abs() < 3.0 * one.at(e.size));
+        // what does not grow is in pixels as it was: the same bits
+        within.map(|e| if of_size > 0.0 { e.error / one.at(e.size) } else { e.error }).collect()
+    };
+    let within: Vec<Vec<f64>> = series.iter().map(within).collect();
+    Some(BoxComponent::of(sigma_px, of_size, autocorrelation_time(&within), middle))
+}
+
+/// What does not grow, and what grows with size: σ² = σ₀² + κ² size², by medians over parts of like size. `None` for too few.
+fn grown(errors: &[SideError]) -> Option<(f64, f64)> {
+    let mut sorted = errors.to_vec();
+    sorted.sort_by(|a, b| a.size.total_cmp(&b.size));
+    let parts = PARTS.min(sorted.len() / LEAST_OF_PART);
+    if parts < 2 {
+        return None;
+    }
+    let points = sorted.chunks(sorted.len().div_ceil(parts)).filter_map(|part| {
+        let variance = median(part.iter().map(|e| e.error.abs()))?.powi(2);
+        let square = part.iter().map(|e| e.size * e.size).sum::<f64>() / part.len() as f64;
+        // the error of a variance is in proportion to it
+        (variance > 0.0).then_some((square, variance, variance.powi(-2)))
+    });
+    let points: Vec<(f64, f64, f64)> = points.collect();
+    let sum = |of: fn(&(f64, f64, f64)) -> f64| points.iter().map(of).sum::<f64>();
+    let (w, x, y) = (sum(|p| p.2), sum(|p| p.2 * p.0), sum(|p| p.2 * p.1));
+    let (xx, xy) = (sum(|p| p.2 * p.0 * p.0), sum(|p| p.2 * p.0 * p.1));
+    let slope = (w * xy - x * y) / (w * xx - x * x);
+    let offset = (y - slope * x) / w;
+    // neither is negative
+    let (offset, slope) = match (offset > 0.0, slope > 0.0) {
+        (true, true) => (offset, slope),
+        (true, false) => (y / w, 0.0),
+        (false, _) => (0.0, xy / xx),
+    };
+    (offset.is_finite() && slope.is_finite()).then(|| (offset.sqrt(), slope.sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::Pcg64;
+
+    fn errors(count: usize, sigma: f64, of_size: f64, seed: u64) -> Vec<SideError> {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let one = |_| {
+            let size: f64 = rng.random_range(20.0..300.0);
+            let deviate: f64 = StandardNormal.sample(&mut rng);
+            SideError { error: deviate * sigma.hypot(of_size * size), size }
+        };
+        (0..count).map(one).collect()
+    }
+
+    fn settings(size: bool) -> VarianceSettings {
+        VarianceSettings { size, correlation: false, ..VarianceSettings::default() }
+    }
+
+    #[test]
+    fn what_grows_with_size_is_told_from_what_does_not() {
+        let (sigma, of_size) = grown(&errors(20_000, 2.0, 0.04, 1)).unwrap();
+        assert!((sigma - 2.0).abs() < 0.3 && (of_size - 0.04).abs() < 0.003, "{sigma} {of_size}");
+        let (sigma, of_size) = grown(&errors(20_000, 2.0, 0.0, 2)).unwrap();
+        assert!((sigma - 2.0).abs() < 0.1 && of_size < 0.003, "{sigma} {of_size}");
+        let (sigma, of_size) = grown(&errors(20_000, 0.0, 0.04, 3)).unwrap();
+        assert!(sigma < 0.5 && (of_size - 0.04).abs() < 0.003, "{sigma} {of_size}");
+        assert_eq!(grown(&errors(30, 2.0, 0.04, 4)), None);
+    }
+
+    #[test]
+    fn size_is_left_alone_where_it_is_not_asked_for() {
+        let errors = errors(5000, 2.0, 0.04, 1);
+        let plain = component(&[&errors], &settings(false)).unwrap();
+        assert_eq!((plain.of_size, plain.effective_px), (0.0, plain.sigma_px));
+        let grown = component(&[&errors], &settings(true)).unwrap();
+        let [x, y] = [100.0, 200.0].map(|size| grown.at(size));
+        assert_eq!(grown.noise(Some([100.0, 200.0])).unwrap(), Noise::sigmas(&[x, y, x, y]).unwrap());
+        assert!(y > 1.5 * x, "{x} {y}");
+    }
+
+    #[test]
+    fn groups_of_few_are_drawn_towards_all_and_those_of_many_are_not() {
+        let many = shrunk(&[(-0.5, 1e6), (0.5, 1e6), (0.0, 1e6)]);
+        assert!((many[0] + 0.5).abs() < 1e-3 && (many[1] - 0.5).abs() < 1e-3, "{many:?}");
+        let mixed = shrunk(&[(-0.5, 1e6), (0.5, 10.0), (0.0, 1e6)]);
+        assert!((mixed[0] + 0.5).abs() < 1e-3 && (0.05..0.3).contains(&mixed[1]), "{mixed:?}");
+        // differences that chance explains are none
+        assert_eq!(shrunk(&[(-0.1, 10.0), (0.1, 10.0)]), [0.0, 0.0]);
+    }
+}
