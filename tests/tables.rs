@@ -7,10 +7,12 @@ use std::path::Path;
 fn no_table_of_the_docs_is_stale() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     let mut tables = 0;
-    for path in std::fs::read_dir(&docs).unwrap().map(|entry| entry.unwrap().path()) {
+    let folders = [docs.clone(), docs.join("decisions")];
+    let pages = folders.iter().flat_map(|folder| std::fs::read_dir(folder).unwrap());
+    for path in pages.map(|entry| entry.unwrap().path()) {
         let Ok(page) = std::fs::read_to_string(&path) else { continue };
         for table in page_tables(&page) {
-            let document = Document::open(docs.join(&table.experiment)).unwrap();
+            let document = Document::open(path.with_file_name(&table.experiment)).unwrap();
             let digest = Experiment::read(&document).unwrap().digest();
             let (page, experiment) = (path.file_name().unwrap().to_string_lossy(), &table.experiment);
             assert_eq!(

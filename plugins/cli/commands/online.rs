@@ -132,6 +132,10 @@ impl Frames<'_> {
 }
 
 impl Watch for Frames<'_> {
+    fn quiet(&mut self) -> ControlFlow<()> {
+        self.goes_on()
+    }
+
     fn wait(&mut self, timestamp: f64) -> ControlFlow<()> {
         let Some(rate) = self.command.rate else { return ControlFlow::Continue(()) };
         let (begun, first) = *self.begun.get_or_insert((Instant::now(), timestamp));

@@ -71,10 +71,10 @@ impl Summary {
     /// A table of means for people, with the difference from the baseline behind each that is compared.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-        let (header, rows) = self
-            .across
-            .as_ref()
-            .map_or_else(|| (self.header(), self.rows().collect()), |column| self.side_by_side(column));
+        let (header, rows) = match &self.across {
+            Some(column) => self.side_by_side(column),
+            None => self.without_zeros(),
+        };
         let labels = self.columns.len() - usize::from(self.across.is_some());
         let rules = (0..header.len()).map(|i| if i < labels { "---" } else { "---:" }.to_owned());
         line(&header)
@@ -95,6 +95,20 @@ impl Summary {
             let metrics = self.metrics.iter().map(|metric| group.cell(metric));
             group.labels.iter().cloned().chain(counts).chain(metrics).collect()
         })
+    }
+
+    /// Header and rows, without the numbers of trials that failed or did not converge where there is none.
+    fn without_zeros(&self) -> (Vec<String>, Vec<Vec<String>>) {
+        let counts = self.columns.len() + 1;
+        let all_well = self.groups.iter().all(|group| group.failed + group.not_converged == 0);
+        let kept = |row: Vec<String>| -> Vec<String> {
+            let cells = row.into_iter().enumerate();
+            cells
+                .filter(|(i, _)| !(all_well && (counts..counts + 2).contains(i)))
+                .map(|(_, cell)| cell)
+                .collect()
+        };
+        (kept(self.header()), self.rows().map(kept).collect())
     }
 
     /// Header and rows with the values of one column beside each other, metric by metric. A group with trials that failed, or ended without

@@ -2,7 +2,12 @@
 use crate::input::sequence::{Detection, Observation, Opening, Sequence};
 use crate::input::source::SourceError;
 use std::fmt;
+use std::ops::ControlFlow;
+use std::panic::resume_unwind;
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// A sequence whose frames come one by one: from a file, from a simulator, from a sensor.
 pub struct Stream {
@@ -33,6 +38,46 @@ impl Stream {
             all.push(observation?);
         }
         Ok(all)
+    }
+}
+
+/// Frames that a thread of their own waits for, one ahead: who takes them can do something else while none comes.
+pub(crate) struct Awaited {
+    frames: Receiver<Result<Observation, SourceError>>,
+    reader: Option<JoinHandle<()>>,
+}
+
+/// While no frame comes, it is asked this often whether to go on.
+const NAP: Duration = Duration::from_millis(50);
+
+impl Awaited {
+    pub(crate) fn new(
+        observations: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send>,
+    ) -> Self {
+        let (sender, frames) = sync_channel(0);
+        // it ends with the frames, or with the first that nobody takes
+        let read =
+            move || observations.map(|frame| sender.send(frame)).take_while(Result::is_ok).for_each(drop);
+        Self { frames, reader: Some(std::thread::spawn(read)) }
+    }
+
+    /// The next frame, `None` after the last; `Break` where `goes_on` says so before one comes.
+    pub(crate) fn next(
+        &mut self,
+        mut goes_on: impl FnMut() -> ControlFlow<()>,
+    ) -> ControlFlow<(), Option<Result<Observation, SourceError>>> {
+        loop {
+            match self.frames.recv_timeout(NAP) {
+                Ok(frame) => return ControlFlow::Continue(Some(frame)),
+                Err(RecvTimeoutError::Timeout) => goes_on()?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    if let Some(Err(panic)) = self.reader.take().map(JoinHandle::join) {
+                        resume_unwind(panic);
+                    }
+                    return ControlFlow::Continue(None);
+                }
+            }
+        }
     }
 }
 

@@ -3,7 +3,7 @@ use super::RunError;
 use super::location::Search;
 use crate::estimate::Estimate;
 use crate::input::sequence::{Observation, Opening, Sequence};
-use crate::input::stream::Stream;
+use crate::input::stream::{Awaited, Stream};
 use crate::mapping::Warning;
 use crate::online::{FrameError, FrameReport, Mapper};
 use crate::output::report::{Found, Naming, OnlineReport, VariantReport};
@@ -28,7 +28,16 @@ pub fn online(
     let clock = Instant::now();
     let mut taken = Taken::new(stream.opening, settings)?;
     let (mut progress, mut search, mut found) = (OnlineReport::default(), Search::new(settings), None);
-    for observation in stream.observations {
+    let mut awaited = Awaited::new(stream.observations);
+    loop {
+        let observation = match awaited.next(|| watch.quiet()) {
+            ControlFlow::Continue(Some(observation)) => observation,
+            ControlFlow::Continue(None) => break,
+            ControlFlow::Break(()) => {
+                progress.interrupted = true;
+                break;
+            }
+        };
         if let Ok(observation) = &observation
             && observation.frame.timestamp > stream.past
             && watch.wait(observation.frame.timestamp).is_break()
@@ -122,6 +131,11 @@ impl Taken {
 
 /// Watches frames as they come in.
 pub trait Watch {
+    /// Now and then while no frame comes: to end the stream there.
+    fn quiet(&mut self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
     /// Before each frame, with its time stamp in seconds: returns when it is there, or to end the stream before it.
     fn wait(&mut self, _timestamp: f64) -> ControlFlow<()> {
         ControlFlow::Continue(())

@@ -2,7 +2,7 @@ use crate::endings::interrupt::AtWork;
 use crate::{fed, folder, manifactor, path, root};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use serde_json::Value;
-use std::io::Write;
+use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -191,4 +191,31 @@ fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
     // other settings make another map
     let ran = fed(&format!("{command} --set online.bend=0.2"), &frames);
     ran.ended(2).complains("is the journal of other settings");
+}
+
+#[test]
+fn a_signal_while_no_frame_comes_ends_the_stream_with_its_map() {
+    let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
+    let (live, out) = (path(&folder, "live.toml"), path(&folder, "out"));
+    let frames = manifactor(&format!("simulate {} --lines", path(&folder, "desk.toml"))).ended(0).stdout;
+    let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
+        .current_dir(root())
+        .args(["online", &live, "--out", &out, "--every", "1"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let known: Vec<&str> = frames.lines().take(20).collect();
+    writeln!(input, "{}", known.join("\n")).unwrap();
+    let mut said = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(said.any(|line| line.contains("20 frames")), "it ended before its frames");
+    // standard input stays open, and silent
+    Command::new("kill").args(["-INT", &child.id().to_string()]).output().unwrap();
+    let rest: Vec<String> = said.collect();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
+    drop(input);
+    let poses = std::fs::read_to_string(format!("{out}/estimate/trajectory.txt")).unwrap();
+    assert_eq!(count(&poses), 20, "{rest:?}");
 }
