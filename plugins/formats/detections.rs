@@ -3,7 +3,7 @@
 //! Columns `timestamp` (s), `class_name`, `score` (0 to 1), `xmin`, `ymin`, `xmax`, `ymax` (px), in any
 //! order; and, where they are known, `frame_idx`, `frame_idx_as_published`, `object_key` (0 where the
 //! box is associated with no object), `class_id`, and `scores`, all classes with a score as
-//! `cup:0.7;bowl:0.2`.
+//! `cup:0.7;bowl:0.2`. A box without a class has an empty name, and the score 0.
 use crate::error::{FormatError, Mistake, Problems, io_error};
 use crate::text::read_text;
 use crate::whole::write_whole;
@@ -29,7 +29,7 @@ pub struct Detection {
     /// Number of the class in the detector's list.
     #[serde(default)]
     pub class_id: Option<u32>,
-    /// The class with the highest score.
+    /// The class with the highest score; empty for a box without one.
     pub class_name: String,
     /// Its score, from 0 to 1.
     pub score: f64,
@@ -49,13 +49,14 @@ pub struct Detection {
 const REQUIRED: [&str; 7] = ["timestamp", "class_name", "score", "xmin", "ymin", "xmax", "ymax"];
 
 impl Detection {
-    /// The classes and their scores: those of `scores`, or the best alone.
+    /// The classes and their scores: those of `scores`, or the best alone; none for a box without a class.
     ///
     /// # Errors
     /// Where `scores` is not written as it should be.
     pub fn class_scores(&self) -> Result<Vec<(String, f64)>, Mistake> {
         let Some(scores) = self.scores.as_deref().filter(|s| !s.is_empty()) else {
-            return Ok(vec![(self.class_name.clone(), self.score)]);
+            let named = Some(&self.class_name).filter(|name| !name.is_empty());
+            return Ok(named.map(|name| (name.clone(), self.score)).into_iter().collect());
         };
         let one = |text: &str| {
             let (class, score) = text.rsplit_once(':')?;
@@ -74,8 +75,11 @@ impl Detection {
         if !self.timestamp.is_finite() {
             return row(format!("expected a finite time stamp, got {}", self.timestamp));
         }
-        if self.class_name.is_empty() {
-            return row("the class has no name".to_owned());
+        if self.class_name.is_empty() && self.score != 0.0 {
+            return row(format!(
+                "the class has no name, and the score {}: expected a name, or the score 0",
+                self.score
+            ));
         }
         if !(0.0..=1.0).contains(&self.score) {
             return row(format!("expected a score from 0 to 1, got {}", self.score));

@@ -44,7 +44,7 @@ pub fn write_detections(sequence: &Sequence, file: &Path) -> Result<(), FormatEr
 
 fn rows(sequence: &Sequence) -> Vec<Detection> {
     let row = |d: &crate::input::sequence::Detection| {
-        let (class, score) = d.scores.best()?;
+        let (class, score) = d.scores.best().unwrap_or_default();
         let all: Vec<_> = d.scores.iter().map(|(class, score)| format!("{class}:{score}")).collect();
         let [xmin, ymin, xmax, ymax] = d.bounding_box.bounds();
         Some(Detection {
@@ -68,6 +68,7 @@ fn rows(sequence: &Sequence) -> Vec<Detection> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::sequence::ClassScores;
     use crate::input::simulator::Simulated;
     use crate::input::source::{CameraChoice, Folders, Recorded, Source};
 
@@ -75,7 +76,9 @@ mod tests {
     fn what_is_written_is_read_back() {
         let mut settings = Simulated::default();
         settings.trajectory.frames = 30;
-        let sequence = settings.simulate().unwrap();
+        let mut sequence = settings.simulate().unwrap();
+        // a detector need not say what it sees
+        sequence.detections[3].scores = ClassScores::default();
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
         write(&sequence, folder).unwrap();
