@@ -35,7 +35,7 @@ impl ConsistencyReport {
         let poses = poses.iter().filter_map(|pair| {
             let covariance = covariances.get(keys.get(&pair.timestamp.to_bits())?)?;
             let error = pair.estimate.local(&pair.truth);
-            normalized(DVector::from_column_slice(error.as_slice()), covariance.clone())
+            normalized(&DVector::from_column_slice(error.as_slice()), covariance.clone())
         });
         let truth_from_map = estimate.mapping.frame.map_from_odometry.inverse();
         let landmarks = estimate.landmarks();
@@ -45,7 +45,7 @@ impl ConsistencyReport {
             // the tangent of a pose turns with it: its translation is in the frame of the object
             let off = pose.rotation.inverse().act(&off);
             let covariance = covariances.get(&landmark.object.key)?.view((3, 3), (3, 3)).into_owned();
-            normalized(DVector::from_column_slice(off.as_slice()), covariance)
+            normalized(&DVector::from_column_slice(off.as_slice()), covariance)
         });
         let report = Self { poses: mean(poses), objects: mean(objects) };
         (report.poses.is_some() || report.objects.is_some()).then_some(report)
@@ -53,9 +53,9 @@ impl ConsistencyReport {
 }
 
 /// eᵀ Σ⁻¹ e / n; `None` where Σ has no inverse.
-fn normalized(error: DVector<f64>, covariance: DMatrix<f64>) -> Option<f64> {
+fn normalized(error: &DVector<f64>, covariance: DMatrix<f64>) -> Option<f64> {
     let n = error.len() as f64;
-    Some(error.dot(&covariance.cholesky()?.solve(&error)) / n)
+    Some(error.dot(&covariance.cholesky()?.solve(error)) / n)
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
@@ -71,8 +71,8 @@ mod tests {
     fn an_error_of_one_sigma_in_each_direction_counts_one() {
         let covariance = DMatrix::from_row_slice(2, 2, &[4.0, 0.0, 0.0, 9.0]);
         let error = DVector::from_column_slice(&[2.0, -3.0]);
-        assert_eq!(normalized(error.clone(), covariance), Some(1.0));
-        assert_eq!(normalized(error, DMatrix::zeros(2, 2)), None);
+        assert_eq!(normalized(&error, covariance), Some(1.0));
+        assert_eq!(normalized(&error, DMatrix::zeros(2, 2)), None);
         assert_eq!(mean(std::iter::empty()), None);
     }
 }
