@@ -29,10 +29,11 @@ def frame(number: int) -> tuple[mf.Graph, mf.Values]:
     graph, values = mf.Graph(), mf.Values({f"x{number}": pose})
     if number == 0:
         graph.fix("x0")
-        values["q0"] = mf.DualQuadric(translation=[0, 0, 2], rotation=[0, 0, 0, 1], semi_axes=[0.2, 0.2, 0.2])
-        graph.add("q0", mf.prior_quadric(value=values["q0"]), noise=0.1)
-        values["p0"] = mf.Point3(position=[1, 1, 1])
-        graph.add("p0", mf.prior_point3(value=values["p0"]))
+        ball = mf.DualQuadric(translation=[0, 0, 2], rotation=[0, 0, 0, 1], semi_axes=[0.2, 0.2, 0.2])
+        graph.add("q0", mf.prior_quadric(value=ball), noise=0.1)
+        point = mf.Point3(position=[1, 1, 1])
+        graph.add("p0", mf.prior_point3(value=point))
+        values["q0"], values["p0"] = ball, point
     else:
         relative = mf.Se3(translation=[0.1, 0, 0], rotation=[0, 0, 0, 1])
         graph.add([f"x{number - 1}", f"x{number}"], mf.between_se3(relative=relative), noise=0.01)

@@ -48,9 +48,11 @@ def log(recording: Any, variant: Variant) -> None:
     for which in ("initial", "estimate"):
         solids = [(thing["class"], thing[which]) for thing in record["objects"] if thing.get(which) is not None]
         if solids:
-            names = [name for name, _ in solids]
-            fields = [[solid[field] for _, solid in solids] for field in ("translation", "rotation", "semi_axes")]
-            recording.log(f"{at}/objects/{which}", drawing.ellipsoids(*fields, names, which), static=True)
+            centres = [solid["translation"] for _, solid in solids]
+            turned = [solid["rotation"] for _, solid in solids]
+            semi_axes = [solid["semi_axes"] for _, solid in solids]
+            drawn = drawing.ellipsoids(centres, turned, semi_axes, [name for name, _ in solids], which)
+            recording.log(f"{at}/objects/{which}", drawn, static=True)
     truth = [thing["truth"] for thing in record["objects"] if thing.get("truth") is not None]
     if truth:
         boxes = rr.Boxes3D(
