@@ -174,6 +174,27 @@ impl Chosen {
     }
 }
 
+/// The fields of a value, for a field that takes values of one type and so no name of it.
+#[pyclass(module = "manifactor._native", frozen)]
+pub(crate) struct Untagged(Arc<dyn Variable>);
+
+impl Untagged {
+    pub(crate) fn fields(&self) -> PyResult<Json> {
+        let mut json = serde_json::to_value(&*self.0).map_err(errors::internal)?;
+        json.as_object_mut().map(|fields| fields.shift_remove("type"));
+        Ok(json)
+    }
+}
+
+/// A value without the name of its type; anything else as it is.
+#[pyfunction]
+fn untagged<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    match value.cast::<Chosen>().map(|chosen| &chosen.get().0) {
+        Ok(What::Variable(x)) => Ok(Bound::new(value.py(), Untagged(x.clone()))?.into_any()),
+        _ => Ok(value.clone()),
+    }
+}
+
 /// Checks that there is such a name.
 pub(crate) fn known(kind: &str, name: &str) -> PyResult<()> {
     if find(kind, name).is_some() {
@@ -309,6 +330,7 @@ fn check_factor<'py>(
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(untagged, module)?)?;
     module.add_function(wrap_pyfunction!(retract, module)?)?;
     module.add_function(wrap_pyfunction!(local, module)?)?;
     module.add_function(wrap_pyfunction!(tangent, module)?)?;

@@ -1,5 +1,6 @@
 //! Values of Python as nodes of a document, and back.
 use super::arrays::any_numbers;
+use crate::chosen::Untagged;
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
 use numpy::PyUntypedArray;
@@ -66,6 +67,8 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
         let array = super::array(what, path, value)?;
         let numbers = any_numbers(what, path, &array)?;
         return Ok(array_node(&place(path, ""), &numbers.shape, &numbers.values, numbers.whole));
+    } else if let Ok(value) = value.cast::<Untagged>() {
+        return Ok(json_node(&place(path, ""), value.get().fields()?));
     } else if let Ok(fields) = value.call_method0("to_dict") {
         return nested(what, path, &fields, depth + 1);
     } else if let Ok(path_like) = value.call_method0("__fspath__") {
@@ -76,6 +79,24 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
         return Err(errors::argument(what, path, message));
     };
     Ok(Node::new(place(path, ""), plain))
+}
+
+/// What serde writes as a node, all of it at one place.
+fn json_node(place: &Place, json: Json) -> Node {
+    let value = match json {
+        Json::Null => Value::Null,
+        Json::Bool(value) => Value::Bool(value),
+        Json::Number(number) => {
+            number.as_i64().map_or(Value::Float(number.as_f64().unwrap_or(f64::NAN)), Value::Integer)
+        }
+        Json::String(text) => Value::String(text),
+        Json::Array(items) => Value::Array(items.into_iter().map(|item| json_node(place, item)).collect()),
+        Json::Object(fields) => {
+            let field = |json| Field { key: place.clone(), node: json_node(place, json) };
+            Value::Table(Box::new(fields.into_iter().map(|(name, json)| (name, field(json))).collect()))
+        }
+    };
+    Node::new(place.clone(), value)
 }
 
 /// Numbers as arrays within arrays.
