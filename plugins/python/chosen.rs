@@ -216,7 +216,14 @@ macro_rules! argument {
                 Ok(What::$variant(x)) => Ok(x.clone()),
                 _ => {
                     let found = value.get_type().name()?;
-                    Err(PyTypeError::new_err(format!("{name}: expected {}, got {found}", $noun)))
+                    let mut message = format!("{name}: expected {}, got {found}", $noun);
+                    // a constructor, or a function under @mf.factor, in place of what it makes
+                    if value.is_callable()
+                        && let Ok(called) = value.getattr("__name__")
+                    {
+                        message += &format!("; call it: {called}(…)");
+                    }
+                    Err(PyTypeError::new_err(message))
                 }
             }
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,13 @@ def test_poses_that_have_left_stay_in_the_line_and_those_of_a_plane_lie_in_it(tm
     np.testing.assert_allclose(line, [[i, 1, 0] for i in (0, 1, 2, 3, 4)], atol=1e-6)
     with pytest.raises(ValueError, match="every: expected a number of updates from 1, got 0"):
         mf.Session().to_rerun(tmp_path / "none.rrd", every=0)
+
+
+def test_a_viewer_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    monkeypatch.delitem(sys.modules, "manifactor.rerun", raising=False)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'manifactor\[rerun\]'"):
+        mf.Session().to_rerun(tmp_path / "none.rrd")
 
 
 def logged(path: Path) -> list[tuple[str, dict[str, Any]]]:

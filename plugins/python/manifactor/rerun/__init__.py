@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+try:
+    import rerun
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError("the viewer is a package of its own: pip install 'manifactor[rerun]'", name="rerun") from error
+
 from .live import Live
 from .report import show
 
