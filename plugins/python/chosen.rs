@@ -1,6 +1,6 @@
 //! What is chosen by name: factors, losses, solvers, starts and values of variables.
 use crate::errors::{self, Mistake};
-use crate::input::{array, json_to_python, node, numbers, to_array, to_python};
+use crate::input::{Untagged, array, json_to_python, node, numbers, to_array, to_python};
 use manifactor::config::{Errors, Field, Node, Place, Value, nearest};
 use manifactor::graph::catalogue::{entries, find};
 use manifactor::graph::loss::Loss;
@@ -171,18 +171,6 @@ impl Chosen {
             What::Variable(x) => serde_json::to_value(&**x),
         };
         json.map_err(|error| errors::argument(self.0.names().1, "", error))
-    }
-}
-
-/// The fields of a value, for a field that takes values of one type and so no name of it.
-#[pyclass(module = "manifactor._native", frozen)]
-pub(crate) struct Untagged(Arc<dyn Variable>);
-
-impl Untagged {
-    pub(crate) fn fields(&self) -> PyResult<Json> {
-        let mut json = serde_json::to_value(&*self.0).map_err(errors::internal)?;
-        json.as_object_mut().map(|fields| fields.shift_remove("type"));
-        Ok(json)
     }
 }
 

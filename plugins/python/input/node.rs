@@ -1,13 +1,26 @@
 //! Values of Python as nodes of a document, and back.
 use super::arrays::any_numbers;
-use crate::chosen::Untagged;
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
+use manifactor::graph::Variable;
 use numpy::PyUntypedArray;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use serde_json::Value as Json;
+use std::sync::Arc;
+
+/// The fields of a value, for a field that takes values of one type and so no name of it.
+#[pyclass(module = "manifactor._native", frozen)]
+pub(crate) struct Untagged(pub Arc<dyn Variable>);
+
+impl Untagged {
+    fn fields(&self) -> PyResult<Json> {
+        let mut json = serde_json::to_value(&*self.0).map_err(errors::internal)?;
+        json.as_object_mut().map(|fields| fields.shift_remove("type"));
+        Ok(json)
+    }
+}
 
 /// A place that is an argument, `camera.fx`, of which errors can show the text.
 fn place(path: &str, text: &str) -> Place {
