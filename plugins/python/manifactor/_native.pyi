@@ -235,8 +235,8 @@ class Session:
         """The session as a text, from which `Session.load` goes on, bit for bit."""
     def to_rerun(self, path: str | os.PathLike[str] | None = None, *, name: str = "session", every: int = 1) -> Live:
         """Logs the session in the viewer rerun, or to a `.rrd` file, update by update: what is returned has the `push` and the
-        `update` to call from there on. `every` is the number of updates from one drawing of the map to the next, which takes
-        as long as the map is large. Needs `manifactor[rerun]`."""
+        `update` to call from there on. `every` is the number of updates from one drawing of the map and its cost to the
+        next, which take as long as the map is large. Needs `manifactor[rerun]`."""
     @staticmethod
     def load(text: str) -> Session:
         """A session that was saved."""

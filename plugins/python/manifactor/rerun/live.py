@@ -63,8 +63,8 @@ class Live:
         if seconds is not None:
             self.recording.set_time(TIME, duration=seconds)
         self._log("latency", rr.Scalars(latency))
-        self._log("cost", rr.Scalars(self.session.cost()))
         if self.updates % self.every == 0:
+            self._log("cost", rr.Scalars(self.session.cost()))
             self._show_map()
         self._seen.clear()
         self.updates += 1
