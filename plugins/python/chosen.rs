@@ -1,6 +1,6 @@
 //! What is chosen by name: factors, losses, solvers, starts and values of variables.
 use crate::errors::{self, Mistake};
-use crate::input::{array, json_to_python, node, numbers, to_array, to_python};
+use crate::input::{Untagged, array, json_to_python, node, numbers, to_array, to_python};
 use manifactor::config::{Errors, Field, Node, Place, Value, nearest};
 use manifactor::graph::catalogue::{entries, find};
 use manifactor::graph::loss::Loss;
@@ -174,6 +174,15 @@ impl Chosen {
     }
 }
 
+/// A value without the name of its type; anything else as it is.
+#[pyfunction]
+fn untagged<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    match value.cast::<Chosen>().map(|chosen| &chosen.get().0) {
+        Ok(What::Variable(x)) => Ok(Bound::new(value.py(), Untagged(x.clone()))?.into_any()),
+        _ => Ok(value.clone()),
+    }
+}
+
 /// Checks that there is such a name.
 pub(crate) fn known(kind: &str, name: &str) -> PyResult<()> {
     if find(kind, name).is_some() {
@@ -195,7 +204,14 @@ macro_rules! argument {
                 Ok(What::$variant(x)) => Ok(x.clone()),
                 _ => {
                     let found = value.get_type().name()?;
-                    Err(PyTypeError::new_err(format!("{name}: expected {}, got {found}", $noun)))
+                    let mut message = format!("{name}: expected {}, got {found}", $noun);
+                    // a constructor, or a function under @mf.factor, in place of what it makes
+                    if value.is_callable()
+                        && let Ok(called) = value.getattr("__name__")
+                    {
+                        message += &format!("; call it: {called}(…)");
+                    }
+                    Err(PyTypeError::new_err(message))
                 }
             }
         }
@@ -309,6 +325,7 @@ fn check_factor<'py>(
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(untagged, module)?)?;
     module.add_function(wrap_pyfunction!(retract, module)?)?;
     module.add_function(wrap_pyfunction!(local, module)?)?;
     module.add_function(wrap_pyfunction!(tangent, module)?)?;

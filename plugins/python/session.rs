@@ -161,6 +161,18 @@ impl Session {
         loaded.map(Self).map_err(|error| errors::argument("Session.load", "text", error))
     }
 
+    /// Logs the session in the viewer rerun, or to a `.rrd` file, update by update: what is returned has the `push` and the
+    /// `update` to call from there on.
+    #[pyo3(signature = (path = None, *, name = "session", every = 1))]
+    fn to_rerun<'py>(
+        slf: &Bound<'py, Self>,
+        path: Option<&Bound<'py, PyAny>>,
+        name: &str,
+        every: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("manifactor.rerun")?.call_method1("Live", (slf, path, name, every))
+    }
+
     fn __repr__(&self) -> String {
         format!("{:?}", self.0)
     }

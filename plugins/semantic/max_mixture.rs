@@ -124,6 +124,8 @@ impl From<MaxMixture> for Document {
 
 #[typetag::serialize(name = "max_mixture")]
 impl Factor for MaxMixture {
+    // inlined, the loops over its factors would be compiled again in each crate that makes one
+    #[inline(never)]
     fn erased(&self) -> &dyn ErasedResidual {
         &self.mixture
     }

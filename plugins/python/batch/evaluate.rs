@@ -61,8 +61,7 @@ impl Function {
     pub(super) fn residuals(&self, points: &[Point]) -> Vec<f64> {
         let mut all = Vec::with_capacity(points.len() * self.rows);
         for points in points.chunks(MOST) {
-            let inputs = Inputs::new(self, points.iter());
-            match self.call(&inputs, false) {
+            match self.call(Inputs::new(self, points), false) {
                 Ok((residuals, _)) => all.extend(residuals),
                 Err(error) => {
                     keep(error);
@@ -94,7 +93,7 @@ impl Function {
 
     /// Python's Jacobians are by the numbers of the variables: those by the tangent follow by the chain rule.
     fn by_python(&self, points: &[Point]) -> PyResult<Linearized> {
-        let (residuals, jacobians) = self.call(&Inputs::new(self, points.iter()), true)?;
+        let (residuals, jacobians) = self.call(Inputs::new(self, points), true)?;
         let mut blocks = vec![];
         for (v, (quantity, jacobian)) in self.quantities.iter().zip(&jacobians).enumerate() {
             let (size, n) = (quantity.shape.size, quantity.dimension);
@@ -121,17 +120,17 @@ impl Function {
 
     /// One call for the points and for all that are a small step away from them.
     fn by_differences(&self, points: &[Point]) -> PyResult<Linearized> {
-        let mut around = Inputs::new(self, points.iter());
+        let mut around = Inputs::new(self, points);
         for (v, n) in self.dimensions.iter().enumerate() {
             for direction in 0..*n {
                 for step in [STEP, -STEP] {
                     let mut delta = vec![0.0; *n];
                     delta.iter_mut().skip(direction).take(1).for_each(|x| *x = step);
-                    around.extend(self, points.iter(), Some((v, &delta)));
+                    around.extend_moved(self, points, v, &delta);
                 }
             }
         }
-        let (all, _) = self.call(&around, false)?;
+        let (all, _) = self.call(around, false)?;
         let mut parts = all.chunks_exact((self.rows * points.len()).max(1));
         let residuals = parts.next().unwrap_or_default().to_vec();
         let mut blocks = vec![];
@@ -153,22 +152,14 @@ impl Function {
     }
 
     /// One call: the residuals, and the Jacobians where they are asked for, as they lie in Python's arrays.
-    fn call(&self, inputs: &Inputs, derivatives: bool) -> PyResult<(Vec<f64>, Vec<Vec<f64>>)> {
+    fn call(&self, inputs: Inputs, derivatives: bool) -> PyResult<(Vec<f64>, Vec<Vec<f64>>)> {
         let n = inputs.count;
         Python::attach(|py| {
-            let array = |width: &usize, values: &Vec<f64>| to_array(py, &[n, *width], values.clone());
+            let array = |(width, values): (&usize, Vec<f64>)| to_array(py, &[n, *width], values);
             let sizes: Vec<usize> = self.quantities.iter().map(|quantity| quantity.shape.size).collect();
-            let variables = sizes
-                .iter()
-                .zip(&inputs.variables)
-                .map(|(w, v)| array(w, v))
-                .collect::<PyResult<Vec<_>>>()?;
-            let constants = self
-                .constants
-                .iter()
-                .zip(&inputs.constants)
-                .map(|(w, v)| array(w, v))
-                .collect::<PyResult<Vec<_>>>()?;
+            let variables = sizes.iter().zip(inputs.variables).map(array).collect::<PyResult<Vec<_>>>()?;
+            let constants = self.constants.iter().zip(inputs.constants).map(array);
+            let constants = constants.collect::<PyResult<Vec<_>>>()?;
             let returned = self.evaluate.bind(py).call1((
                 PyList::new(py, variables)?,
                 PyList::new(py, constants)?,
@@ -213,40 +204,50 @@ struct Inputs {
 }
 
 impl Inputs {
-    fn new<'p>(function: &Function, points: impl Iterator<Item = &'p Point>) -> Self {
+    fn new(function: &Function, points: &[Point]) -> Self {
         let (variables, constants) =
             (vec![vec![]; function.types.len()], vec![vec![]; function.constants.len()]);
-        let mut inputs = Self { count: 0, variables, constants };
-        inputs.extend(function, points, None);
-        inputs
-    }
-
-    /// Adds points, with one variable moved where that is said.
-    fn extend<'p>(
-        &mut self,
-        function: &Function,
-        points: impl Iterator<Item = &'p Point>,
-        moved: Option<(usize, &[f64])>,
-    ) {
+        let mut inputs = Self { count: points.len(), variables, constants };
+        for (v, to) in inputs.variables.iter_mut().enumerate() {
+            extend(function, points, v, None, to);
+        }
         for point in points {
-            self.count += 1;
-            for (v, (quantity, to)) in function.quantities.iter().zip(&mut self.variables).enumerate() {
-                let Some(x) = point.variables.get(v) else { continue };
-                let at = to.len();
-                to.resize(at + quantity.shape.size, 0.0);
-                let to = to.get_mut(at..).unwrap_or_default();
-                match moved.filter(|(which, _)| *which == v).and_then(|(_, delta)| x.erased().retract(delta))
-                {
-                    Some(x) => (quantity.values)(x.erased().as_any(), to),
-                    None => (quantity.values)(x.erased().as_any(), to),
-                }
-            }
             let mut rest = &*point.constants;
-            for (width, to) in function.constants.iter().zip(&mut self.constants) {
+            for (width, to) in function.constants.iter().zip(&mut inputs.constants) {
                 let (own, behind) = rest.split_at_checked(*width).unwrap_or_default();
                 to.extend(own);
                 rest = behind;
             }
+        }
+        inputs
+    }
+
+    /// Adds the points that these inputs began with once more, with one of their variables moved: the rest of them is copied.
+    fn extend_moved(&mut self, function: &Function, points: &[Point], moved: usize, delta: &[f64]) {
+        for (v, to) in self.variables.iter_mut().enumerate() {
+            if v == moved {
+                extend(function, points, v, Some(delta), to);
+            } else {
+                to.extend_from_within(..to.len() / self.count * points.len());
+            }
+        }
+        for to in &mut self.constants {
+            to.extend_from_within(..to.len() / self.count * points.len());
+        }
+        self.count += points.len();
+    }
+}
+
+/// Adds the numbers of one variable of all points, moved where that is said.
+fn extend(function: &Function, points: &[Point], v: usize, delta: Option<&[f64]>, to: &mut Vec<f64>) {
+    let Some(quantity) = function.quantities.get(v) else { return };
+    for x in points.iter().filter_map(|point| point.variables.get(v)) {
+        let at = to.len();
+        to.resize(at + quantity.shape.size, 0.0);
+        let to = to.get_mut(at..).unwrap_or_default();
+        match delta.and_then(|delta| x.erased().retract(delta)) {
+            Some(moved) => (quantity.values)(moved.erased().as_any(), to),
+            None => (quantity.values)(x.erased().as_any(), to),
         }
     }
 }

@@ -1,7 +1,10 @@
 //! Arrays of numbers, copied out of Python and into it.
 use crate::errors;
 use numpy::ndarray::{ArrayD, IxDyn};
-use numpy::{PyArrayDescrMethods, PyArrayDyn, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{
+    PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 /// Finite numbers by rows, as they lie in an array.
@@ -103,13 +106,21 @@ pub(crate) fn any_numbers(what: &str, name: &str, array: &Bound<'_, PyUntypedArr
 /// Real numbers of an array, in its order.
 fn copied(what: &str, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<Numbers> {
     let py = array.py();
+    // the usual case asks nothing of numpy
+    if let Ok(plain) = array.cast::<PyArrayDyn<f64>>()
+        && array.is_c_contiguous()
+        && let Ok(plain) = plain.try_readonly()
+        && let Ok(values) = plain.as_slice()
+    {
+        return Ok(Numbers { shape: array.shape().to_vec(), values: values.to_vec(), whole: false });
+    }
     let kind = array.dtype().kind();
     if !matches!(kind, b'f' | b'i' | b'u') {
         let dtype = array.dtype();
         let message = format!("expected an array of real numbers, got one of the type {dtype}");
         return Err(errors::argument(what, name, message));
     }
-    let plain = py.import("numpy")?.call_method1("ascontiguousarray", (array, "float64"))?;
+    let plain = py.import("numpy")?.call_method1("require", (array, "float64", ("C", "A")))?;
     let plain: PyReadonlyArrayDyn<'_, f64> = plain.extract().map_err(errors::internal)?;
     let values = plain.as_slice().map_err(errors::internal)?.to_vec();
     // an array of no axes becomes one of one

@@ -2,11 +2,25 @@
 use super::arrays::any_numbers;
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
+use manifactor::graph::Variable;
 use numpy::PyUntypedArray;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use serde_json::Value as Json;
+use std::sync::Arc;
+
+/// The fields of a value, for a field that takes values of one type and so no name of it.
+#[pyclass(module = "manifactor._native", frozen)]
+pub(crate) struct Untagged(pub Arc<dyn Variable>);
+
+impl Untagged {
+    fn fields(&self) -> PyResult<Json> {
+        let mut json = serde_json::to_value(&*self.0).map_err(errors::internal)?;
+        json.as_object_mut().map(|fields| fields.shift_remove("type"));
+        Ok(json)
+    }
+}
 
 /// A place that is an argument, `camera.fx`, of which errors can show the text.
 fn place(path: &str, text: &str) -> Place {
@@ -66,6 +80,8 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
         let array = super::array(what, path, value)?;
         let numbers = any_numbers(what, path, &array)?;
         return Ok(array_node(&place(path, ""), &numbers.shape, &numbers.values, numbers.whole));
+    } else if let Ok(value) = value.cast::<Untagged>() {
+        return Ok(json_node(&place(path, ""), value.get().fields()?));
     } else if let Ok(fields) = value.call_method0("to_dict") {
         return nested(what, path, &fields, depth + 1);
     } else if let Ok(path_like) = value.call_method0("__fspath__") {
@@ -76,6 +92,24 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
         return Err(errors::argument(what, path, message));
     };
     Ok(Node::new(place(path, ""), plain))
+}
+
+/// What serde writes as a node, all of it at one place.
+fn json_node(place: &Place, json: Json) -> Node {
+    let value = match json {
+        Json::Null => Value::Null,
+        Json::Bool(value) => Value::Bool(value),
+        Json::Number(number) => {
+            number.as_i64().map_or(Value::Float(number.as_f64().unwrap_or(f64::NAN)), Value::Integer)
+        }
+        Json::String(text) => Value::String(text),
+        Json::Array(items) => Value::Array(items.into_iter().map(|item| json_node(place, item)).collect()),
+        Json::Object(fields) => {
+            let field = |json| Field { key: place.clone(), node: json_node(place, json) };
+            Value::Table(Box::new(fields.into_iter().map(|(name, json)| (name, field(json))).collect()))
+        }
+    };
+    Node::new(place.clone(), value)
 }
 
 /// Numbers as arrays within arrays.

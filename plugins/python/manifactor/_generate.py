@@ -182,9 +182,10 @@ def imports(body: str, kind: str, used: set[str]) -> str:
         local.append(f"from . import {', '.join(modules)}")
     names = {CLASSES.get(kind, "")} | used
     names |= {name for name in ("Fields", "Numbers", "untagged") if name in body}
-    if "Noise" in names:
-        local.append("from ._native import Noise")
-    names -= {"", "Noise"}
+    native = sorted(names & {"Noise", "untagged"})
+    if native:
+        local.append(f"from ._native import {', '.join(native)}")
+    names -= {"", *native}
     if names:
         local.append(f"from .chosen import {', '.join(sorted(names))}")
     lines.append("\n".join(local))

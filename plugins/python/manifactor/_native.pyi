@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .chosen import Factor, Loss, Solver, Start, Variable
+from .rerun import Live
 
 __version__: str
 
@@ -232,6 +233,10 @@ class Session:
         session stays as it is."""
     def save(self) -> str:
         """The session as a text, from which `Session.load` goes on, bit for bit."""
+    def to_rerun(self, path: str | os.PathLike[str] | None = None, *, name: str = "session", every: int = 1) -> Live:
+        """Logs the session in the viewer rerun, or to a `.rrd` file, update by update: what is returned has the `push` and the
+        `update` to call from there on. `every` is the number of updates from one drawing of the map and its cost to the
+        next, which take as long as the map is large. Needs `manifactor[rerun]`."""
     @staticmethod
     def load(text: str) -> Session:
         """A session that was saved."""
@@ -263,6 +268,7 @@ def solve(
     tried, and ends the solve where it returns `False`. Other threads of Python run meanwhile, and Ctrl-C interrupts."""
 
 def read(path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True) -> tuple[Graph, Values, list[str]]: ...
+def untagged(value: Any) -> Any: ...
 def catalogue() -> str: ...
 def functions() -> str: ...
 def retract(x: _V, delta: ArrayLike) -> _V: ...

@@ -110,13 +110,6 @@ def class_of(kind: str, name: str) -> type[Chosen]:
     return variables.BY_TYPE.get(name, Variable)
 
 
-def untagged(value: Any) -> Any:
-    """A value without the name of its type, for a field that takes one type only."""
-    if isinstance(value, Variable):
-        return {name: field for name, field in value.to_dict().items() if name != "type"}
-    return value
-
-
 def in_formulas(value: Variable, name: str) -> Any:
     """For attributes that a value has in traced factors only."""
     help = "it is there in a factor that is written in Python"

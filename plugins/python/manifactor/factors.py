@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Literal
 
 from . import types, variables
-from ._native import Noise
-from .chosen import Factor, Fields, Numbers, untagged
+from ._native import Noise, untagged
+from .chosen import Factor, Fields, Numbers
 
 
 __all__ = [

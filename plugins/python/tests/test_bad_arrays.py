@@ -50,26 +50,33 @@ def test_fields(name: str) -> None:
         add({**GOOD, "translation": array})
 
 
+COUNTED = np.arange(3.0 * N).reshape(N, 3)
+
+
 @pytest.mark.parametrize(
     "array",
     [
-        np.asfortranarray(np.ones((N, 3))),
-        np.ones((3, N)).T,
-        np.ones((2 * N, 6))[::2, ::2],
-        np.ones((N, 3))[::-1, ::-1],
-        np.ones((N, 3), np.float32),
-        np.ones((N, 3), np.int8),
-        np.ones((N, 3), np.uint64),
-        np.ones((N, 3), ">f8"),
-        np.broadcast_to(np.ones(3), (N, 3)),
-        np.ma.masked_array(np.ones((N, 3)), False),
-        np.frombuffer(np.ones((N, 3)).tobytes()).reshape(N, 3),
+        COUNTED.copy(),
+        np.asfortranarray(COUNTED),
+        COUNTED.T.copy().T,
+        np.repeat(np.repeat(COUNTED, 2, axis=0), 2, axis=1)[::2, ::2],
+        COUNTED[::-1, ::-1].copy()[::-1, ::-1],
+        COUNTED.astype(np.float32),
+        COUNTED.astype(np.int8),
+        COUNTED.astype(np.uint64),
+        COUNTED.astype(">f8"),
+        np.ma.masked_array(COUNTED, False),
+        np.frombuffer(COUNTED.tobytes()).reshape(N, 3),
+        # behind one byte, so that no number lies where processors want it
+        np.frombuffer(b"0" + COUNTED.tobytes(), offset=1).reshape(N, 3),
     ],
-    ids=lambda array: f"{array.dtype} {array.strides}",
+    ids=lambda array: f"{array.dtype} {array.strides} {array.flags.aligned}",
 )
 def test_any_layout_will_do(array: np.ndarray[Any, Any]) -> None:
     array.flags.writeable = False
-    assert add({**GOOD, "translation": array})[2]["factor"]["relative"]["translation"] == [1, 1, 1]
+    graph = add({**GOOD, "translation": array})
+    assert [graph[row]["factor"]["relative"]["translation"] for row in range(N)] == COUNTED.tolist()
+    assert mf.Point3(position=array[1]).position.tolist() == COUNTED[1].tolist()
 
 
 def test_a_quaternion_that_is_none_is_named_with_its_row() -> None:

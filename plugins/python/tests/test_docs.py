@@ -15,8 +15,9 @@ BLOCKS = re.findall(r"^```python\n(.*?)^```", BOOK.read_text(encoding="utf-8"), 
 @pytest.mark.parametrize("number", range(len(BLOCKS)))
 def test_an_example_of_the_book_runs(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     block = BLOCKS[number]
-    if "import gtsam" in block:
-        pytest.importorskip("gtsam")
+    for module, sign in (("gtsam", "import gtsam"), ("rerun", "to_rerun(")):
+        if sign in block:
+            pytest.importorskip(module)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     exec(compile(block, f"{BOOK.name}, block {number}", "exec"), {"__name__": "book"})  # noqa: S102

@@ -312,3 +312,17 @@ def test_functions_of_formulas_are_documented() -> None:
             assert function.__doc__ and "->" in function.__doc__, name
     with pytest.raises(mf.TraceError, match="use numpy's"):
         fn.norm([1, 2, 3])
+
+
+def test_what_makes_a_factor_is_to_be_called() -> None:
+    @mf.factor
+    def stands(q: mf.DualQuadric, up: Any) -> Any:
+        return 1 - abs(q.major_axis @ up)
+
+    graph = mf.Graph()
+    with pytest.raises(TypeError, match=r"factor: expected a factor, got TracedFactor; call it: stands\(…\)"):
+        graph.add("q0", stands)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"loss: expected a loss, got function; call it: huber\(…\)"):
+        graph.add("q0", stands(), loss=mf.huber)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"loss: expected a loss, got str$"):
+        graph.add("q0", stands(), loss="huber")  # type: ignore[arg-type]

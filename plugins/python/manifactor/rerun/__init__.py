@@ -1,0 +1,13 @@
+"""Runs and sessions in the viewer rerun: `report.to_rerun()`, `session.to_rerun()`. Needs `manifactor[rerun]`."""
+
+from __future__ import annotations
+
+try:
+    import rerun
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError("the viewer is a package of its own: pip install 'manifactor[rerun]'", name="rerun") from error
+
+from .live import Live
+from .report import show
+
+__all__ = ["Live", "show"]
