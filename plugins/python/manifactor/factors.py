@@ -55,6 +55,8 @@ __all__ = [
     "range_se2_se2",
     "range_se3_point3",
     "range_se3_se3",
+    "resting",
+    "resting_along",
     "shape_prior",
     "size_prior",
     "supporting_plane",
@@ -1071,6 +1073,46 @@ def range_se3_se3(*, range: float) -> Factor:
         range: Their distance, in metres.
     """
     return Factor("range_se3_se3", {"range": range})
+
+
+def resting(*, up: Numbers | None = None) -> Factor:
+    """An object rests: one of its principal axes is vertical, whichever it is.
+
+    r = up × Q up / ‖Q‖, Q = R diag(s²) Rᵀ. Q up points from the centre to the point of the ellipsoid that touches the ground: what is
+    in balance has it right below the centre, lying or standing. So no class has to say which axis is up, and a
+    book that stands among books is as good as one that lies. For an axis of length a tilted by θ from the vertical, b the length across it,
+    r is (a² - b²)/√(Σ s⁴) · sin θ cos θ: an object that is as wide as high is free, and there is no jump where another axis gets
+    longer. σ is in these units: radians for a thin rod, less for all else. Moving and growing leave it
+    unchanged, turning about `up` turns r. An axis halfway between two directions in balance is a maximum, where the derivative of the cost vanishes. Defined
+    everywhere.
+
+    ```toml
+    [[factors]]
+    keys   = ["book"]
+    factor = { type = "resting" }
+    noise  = { sigma = 0.01 }
+    ```
+
+    Args:
+        up: The world's up, of any length but zero. Default: z.
+    """
+    return Factor("resting", {"up": up})
+
+
+def resting_along() -> Factor:
+    """An object rests on what is level along a direction that is estimated too: r = g × Q g / ‖Q‖.
+
+    Variables: the object, and the direction g, such as that of gravity. Objects tell where up is as well as the other way round: where
+    nothing else knows it. Otherwise as `resting`.
+
+    ```toml
+    [[factors]]
+    keys   = ["book", "g"]
+    factor = { type = "resting_along" }
+    noise  = { sigma = 0.01 }
+    ```
+    """
+    return Factor("resting_along", {})
 
 
 def shape_prior(*, semi_axes: Numbers, order: Literal['sorted', 'as_given'] | None = None) -> Factor:
