@@ -49,7 +49,7 @@ pub(crate) struct Experiment {
     shard: Option<Shard>,
     /// Put the table of summary.md into a page, in place of the one before: between `<!-- experiment: PATH -->`, PATH that of the document
     /// from the page, and `<!-- end of experiment -->`. What the table was made of is noted there.
-    #[arg(long, value_name = "PAGE")]
+    #[arg(long, value_name = "PAGE", conflicts_with = "shard")]
     markdown: Option<PathBuf>,
     /// Print JSON: the summary that is also written.
     #[arg(long)]
@@ -67,6 +67,7 @@ impl Experiment {
         if let Some(shard) = self.shard {
             sweep.keep(shard);
         }
+        let page = self.markdown.as_ref().map(|page| self.page(page)).transpose()?;
         let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
         let mut journal = Journal::open(claimed)?;
@@ -96,32 +97,32 @@ impl Experiment {
         let page = experiment_page(&sweep, &summary, &trials, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);
-        if let Some(page) = self.markdown.as_ref().filter(|_| summary.open == 0) {
-            self.put_into(page, &sweep, &summary)?;
+        if let Some((path, text)) = page.filter(|_| summary.open == 0) {
+            let text = self.put_into((&path, &text), &sweep.digest(), &summary.markdown())?;
+            write_whole(&path, text)?;
         }
         Ok(status)
     }
 
-    fn put_into(&self, page: &Path, sweep: &Sweep, summary: &Summary) -> Result<(), Failure> {
+    /// The page for the table, before hours are spent on what has no place.
+    fn page(&self, page: &Path) -> Result<(PathBuf, String), Failure> {
         let text = std::fs::read_to_string(page)
             .map_err(|source| Failure::File { path: page.to_owned(), source })?;
+        self.put_into((page, &text), "", "")?;
+        Ok((page.to_owned(), text))
+    }
+
+    fn put_into(&self, (page, text): (&Path, &str), digest: &str, table: &str) -> Result<String, Failure> {
         let beside = page.parent().unwrap_or(Path::new(""));
         let own = self.config.canonicalize().ok();
         let is_meant = |experiment: &str| own.is_some() && beside.join(experiment).canonicalize().ok() == own;
-        match experiment::put_into(&text, is_meant, &sweep.digest(), &summary.markdown()) {
-            Some(text) => Ok(write_whole(page, text)?),
-            None => Err(Failure::Input {
-                message: format!(
-                    "{} has no place for the table of {}",
-                    page.display(),
-                    self.config.display()
-                ),
-                help: Some(
-                    "put a line `<!-- experiment: PATH -->` there, PATH from that page to the document"
-                        .to_owned(),
-                ),
-            }),
-        }
+        experiment::put_into(text, is_meant, digest, table).ok_or_else(|| Failure::Input {
+            message: format!("{} has no place for the table of {}", page.display(), self.config.display()),
+            help: Some(
+                "put a line `<!-- experiment: PATH -->` there, PATH from that page to the document"
+                    .to_owned(),
+            ),
+        })
     }
 
     fn tell(&self, sweep: &Sweep, summary: &Summary) {

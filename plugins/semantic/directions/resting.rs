@@ -5,7 +5,7 @@ use manifactor_quadric::DualQuadric;
 
 /// An object rests: one of its principal axes is vertical, whichever it is.
 ///
-/// r = up × Q up / ‖Q‖, Q = R diag(s²) Rᵀ. Q up points from the centre to the point of the ellipsoid that touches the ground: what is
+/// r = up × Q up / ‖Q‖, Q = R diag(s²) Rᵀ. -Q up points from the centre to the point of the ellipsoid that touches the ground: what is
 /// in balance has it right below the centre, lying or standing. So no class has to say which axis is up, and a
 /// book that stands among books is as good as one that lies. For an axis of length a tilted by θ from the vertical, b the length across it,
 /// r is (a² - b²)/√(Σ s⁴) · sin θ cos θ: an object that is as wide as high is free, and there is no jump where another axis gets

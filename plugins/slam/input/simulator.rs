@@ -410,6 +410,11 @@ mod tests {
         }
         let before = Simulated::default().simulate().unwrap();
         assert_eq!(sequence.detections, before.detections);
+        let mut two = settings;
+        two.trajectory.frames = 2;
+        for reading in two.simulate().unwrap().accelerometer {
+            assert!((reading.acceleration.norm() - 9.81).abs() < 1e-9, "{reading:?}");
+        }
     }
 
     #[test]

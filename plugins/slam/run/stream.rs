@@ -14,7 +14,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Maps a stream frame by frame, solves all of it at the end, and evaluates. `watch` is told of each frame, with the map and
-/// the seconds that it took; it can end the stream there.
+/// the seconds that it took; it can end the stream there. Frames are waited for in a thread of their own, one ahead; where the stream is ended
+/// before its source is, that thread ends with the next frame.
 ///
 /// # Errors
 /// Where the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
@@ -65,6 +66,8 @@ pub fn online(
             break;
         }
     }
+    // what waits for a frame may wait for good, but holds what it reads no longer than it has to
+    drop(awaited);
     progress.end(&mut taken.mapper);
     watch.end(&mut taken.mapper);
     let Taken { mapper, mut sequence, naming } = taken;

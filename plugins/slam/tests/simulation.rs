@@ -1,8 +1,11 @@
 //! The scenes of the simulated experiment, as they were settled before anything was tuned.
-use manifactor_config::Document;
+use manifactor_config::{Document, Format};
 use manifactor_slam::experiment::{Experiment, Trial};
+use manifactor_slam::run::Run;
+use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::Sequence;
 use manifactor_slam::source::Folders;
+use manifactor_solve::Silent;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -62,4 +65,32 @@ fn nothing_is_tuned_on_the_scenes_that_are_reported() {
     };
     let reported = seeds("simulation.toml");
     assert!(seeds("tuning.toml").iter().all(|scene| !reported.contains(scene)));
+}
+
+#[test]
+fn errors_are_as_large_as_covariances_say_where_the_noise_is_known() {
+    // an even circle: all motions are alike, and their noise is a share of them
+    let (frames, share) = (60, 0.05);
+    let turn = 300f64.to_radians() / f64::from(frames - 1);
+    let step = 2.0 * 2.2 * (turn / 2.0).sin();
+    let [turn, step] = [turn, step].map(|motion| share * motion / 3f64.sqrt());
+    let consistency = |seed: u64| {
+        let text = format!(
+            "
+            source = {{ type = 'simulated', seed = {seed}, scene = {{ seed = {seed}, objects = 8, classes = ['sports ball'] }},
+                       trajectory = {{ frames = {frames}, waves = [0.0, 0.0], wander = 0.0 }},
+                       odometry = {{ translation = {share}, rotation = {share} }} }}
+            prior = {{ noise = {{ sigma = 0.0001 }} }}
+            odometry = {{ noise = {{ sigmas = [{turn}, {turn}, {turn}, {step}, {step}, {step}] }} }}
+            detections = {{ noise = {{ sigma = 2.0 }} }}"
+        );
+        let document = Document::parse("run.toml", text, Format::Toml).unwrap();
+        let run = RunDocument::read(&document).unwrap();
+        let (_, report) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+        report.consistency.unwrap()
+    };
+    let all: Vec<_> = (1..=8).map(consistency).collect();
+    let mean = |of: &dyn Fn(usize) -> f64| (0..all.len()).map(of).sum::<f64>() / all.len() as f64;
+    let (poses, objects) = (mean(&|i| all[i].poses.unwrap()), mean(&|i| all[i].objects.unwrap()));
+    assert!((0.7..1.4).contains(&poses) && (0.7..1.4).contains(&objects), "{poses} {objects} {all:?}");
 }

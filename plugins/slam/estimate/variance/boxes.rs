@@ -19,7 +19,7 @@ pub struct BoxComponent {
     pub of_size: f64,
     /// How many consecutive boxes say as much as one alone.
     pub correlation_time: f64,
-    /// What the graph is given: √(correlation_time) · σ, for a box of the size in the middle.
+    /// What the graph is given: √(correlation_time) · σ, for a box of the mean size.
     pub effective_px: f64,
 }
 
@@ -33,11 +33,13 @@ const LEAST_REDUNDANCY: f64 = 1e-9;
 /// Parts that errors are sorted into, by size, and the least of each.
 const PARTS: usize = 8;
 const LEAST_OF_PART: usize = 20;
+/// A share of the squares of sizes: with less variance than this they are alike.
+const ALIKE: f64 = 1e-6;
 
 impl BoxComponent {
-    /// `middle` is the size of the box in the middle, in pixels.
-    pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, middle: f64) -> Self {
-        let effective_px = sigma_px.hypot(of_size * middle) * correlation_time.sqrt();
+    /// `size` is the mean size of boxes, in pixels.
+    pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, size: f64) -> Self {
+        let effective_px = sigma_px.hypot(of_size * size) * correlation_time.sqrt();
         Self { sigma_px, of_size, correlation_time, effective_px }
     }
 
@@ -79,7 +81,9 @@ impl Sizes {
         Self(mapping.mapped().flat_map(of_object).collect())
     }
 
+    /// `None` for what is not a box of four sides.
     pub(super) fn of_box(&self, entry: &FactorEntry) -> Option<[f64; 2]> {
+        entry.factor.erased().signature().rows.filter(|rows| *rows == 4)?;
         let keys: [Key; 2] = entry.keys.clone().try_into().ok()?;
         self.0.get(&keys).copied()
     }
@@ -93,7 +97,7 @@ pub(super) struct Errors([Vec<SideError>; 4]);
 #[derive(Debug, Clone, Copy)]
 struct SideError {
     error: f64,
-    /// The box's width, for a left or right side, or its height.
+    /// The box's width, for a left or right side, or its height; 0 where that is not known.
     size: f64,
 }
 
@@ -149,21 +153,37 @@ pub(super) fn components(
     let own = groups.iter().map(|(_, series)| {
         let relative = median(series.iter().copied().flatten().map(|e| (e.error / of_all.at(e.size)).abs()));
         let rows = series.iter().map(|errors| errors.len()).sum::<usize>() as f64;
-        (relative.filter(|x| *x > 0.0).map_or(0.0, f64::ln), rows / of_all.correlation_time)
+        // one without errors says nothing
+        let relative = relative.map(f64::ln).filter(|log| log.is_finite());
+        relative.map_or((0.0, 0.0), |log| (log, rows / of_all.correlation_time))
     });
     let factors = shrunk(&own.collect::<Vec<_>>());
     groups.into_keys().zip(factors).map(|(name, by)| (name, of_all.scaled(by.exp()))).collect()
 }
 
-/// Logarithms of standard deviations, each by so many deviates, drawn towards their mean: by as much as they differ from it by chance.
+/// Logarithms of standard deviations, each by so many deviates, drawn towards their mean: by as much as they differ from it by chance. Those of
+/// no deviates are the mean. The spread is DerSimonian and Laird's (*Meta-analysis in Clinical Trials*, 1986).
 fn shrunk(own: &[(f64, f64)]) -> Vec<f64> {
-    let n = own.len().max(1) as f64;
     let variance = |deviates: f64| MEDIAN_VARIANCE / deviates.max(1.0);
-    let mean = own.iter().map(|(log, _)| log).sum::<f64>() / n;
-    let spread =
-        own.iter().map(|(log, deviates)| (log - mean).powi(2) - variance(*deviates)).sum::<f64>() / n;
-    let spread = spread.max(0.0);
-    own.iter().map(|(log, deviates)| mean + (log - mean) * spread / (spread + variance(*deviates))).collect()
+    let known = || own.iter().filter(|(_, deviates)| *deviates > 0.0);
+    let mean = |spread: f64| {
+        let weight = |deviates: f64| (spread + variance(deviates)).recip();
+        let sum = known().map(|(log, deviates)| weight(*deviates) * log).sum::<f64>();
+        let weights = known().map(|(_, deviates)| weight(*deviates)).sum::<f64>();
+        if weights > 0.0 { sum / weights } else { 0.0 }
+    };
+    let inverse = |power: i32| known().map(|(_, deviates)| variance(*deviates).powi(-power)).sum::<f64>();
+    let fixed = mean(0.0);
+    let squares = known().map(|(log, deviates)| (log - fixed).powi(2) / variance(*deviates)).sum::<f64>();
+    let degrees = known().count() as f64 - 1.0;
+    let spread = (squares - degrees) / (inverse(1) - inverse(2) / inverse(1));
+    let spread = if spread.is_finite() { spread.max(0.0) } else { 0.0 };
+    let mean = mean(spread);
+    let one = |(log, deviates): &(f64, f64)| {
+        let share = if *deviates > 0.0 { spread / (spread + variance(*deviates)) } else { 0.0 };
+        mean + (log - mean) * share
+    };
+    own.iter().map(one).collect()
 }
 
 /// The standard deviation that half of the deviates would be below of if they were normal: half of them may be wrong.
@@ -180,8 +200,8 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
         return None;
     }
     let (sigma_px, of_size) = settings.size.then(|| grown(&errors)).flatten().unwrap_or((white, 0.0));
-    let middle = errors.iter().map(|e| e.size).sum::<f64>() / errors.len() as f64;
-    let one = BoxComponent::of(sigma_px, of_size, 1.0, middle);
+    let size = errors.iter().map(|e| e.size).sum::<f64>() / errors.len() as f64;
+    let one = BoxComponent::of(sigma_px, of_size, 1.0, size);
     if !settings.correlation {
         return Some(one);
     }
@@ -192,12 +212,12 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
         within.map(|e| if of_size > 0.0 { e.error / one.at(e.size) } else { e.error }).collect()
     };
     let within: Vec<Vec<f64>> = series.iter().map(within).collect();
-    Some(BoxComponent::of(sigma_px, of_size, autocorrelation_time(&within), middle))
+    Some(BoxComponent::of(sigma_px, of_size, autocorrelation_time(&within), size))
 }
 
 /// What does not grow, and what grows with size: σ² = σ₀² + κ² size², by medians over parts of like size. `None` for too few.
 fn grown(errors: &[SideError]) -> Option<(f64, f64)> {
-    let mut sorted = errors.to_vec();
+    let mut sorted: Vec<SideError> = errors.iter().filter(|e| e.size > 0.0).copied().collect();
     sorted.sort_by(|a, b| a.size.total_cmp(&b.size));
     let parts = PARTS.min(sorted.len() / LEAST_OF_PART);
     if parts < 2 {
@@ -213,6 +233,10 @@ fn grown(errors: &[SideError]) -> Option<(f64, f64)> {
     let sum = |of: fn(&(f64, f64, f64)) -> f64| points.iter().map(of).sum::<f64>();
     let (w, x, y) = (sum(|p| p.2), sum(|p| p.2 * p.0), sum(|p| p.2 * p.1));
     let (xx, xy) = (sum(|p| p.2 * p.0 * p.0), sum(|p| p.2 * p.0 * p.1));
+    // sizes that are all alike tell nothing
+    if points.len() < 2 || w * xx - x * x <= ALIKE * w * xx {
+        return None;
+    }
     let slope = (w * xy - x * y) / (w * xx - x * x);
     let offset = (y - slope * x) / w;
     // neither is negative
@@ -254,6 +278,9 @@ mod tests {
         let (sigma, of_size) = grown(&errors(20_000, 0.0, 0.04, 3)).unwrap();
         assert!(sigma < 0.5 && (of_size - 0.04).abs() < 0.003, "{sigma} {of_size}");
         assert_eq!(grown(&errors(30, 2.0, 0.04, 4)), None);
+        let alike: Vec<_> =
+            errors(1000, 2.0, 0.04, 5).into_iter().map(|e| SideError { size: 80.0, ..e }).collect();
+        assert_eq!(grown(&alike), None);
     }
 
     #[test]
@@ -275,5 +302,9 @@ mod tests {
         assert!((mixed[0] + 0.5).abs() < 1e-3 && (0.05..0.3).contains(&mixed[1]), "{mixed:?}");
         // differences that chance explains are none
         assert_eq!(shrunk(&[(-0.1, 10.0), (0.1, 10.0)]), [0.0, 0.0]);
+        // a few of little to say do not move one that is known, and one of nothing to say is as all are
+        let found = shrunk(&[(0.0, 400.0), (-0.7, 2.0), (-0.6, 2.0), (0.0, 0.0)]);
+        assert!(found.iter().all(|log| log.abs() < 0.02), "{found:?}");
+        assert_eq!(shrunk(&[]), Vec::<f64>::new());
     }
 }

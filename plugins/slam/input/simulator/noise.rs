@@ -89,9 +89,10 @@ impl AccelerometerNoise {
         let bias = Vector3::from_fn(|_, _| self.bias * normal(rng));
         let at = |i: usize| poses[i.min(poses.len() - 1)].translation;
         let reading = |i: usize| {
-            // at both ends, that of the next to last
+            // at both ends, that of the pose beside; of two poses nobody can tell
             let middle = i.clamp(1, poses.len().saturating_sub(2).max(1));
             let moved = at(middle + 1) - at(middle) * 2.0 + at(middle - 1);
+            let moved = if poses.len() < 3 { Vector3::zeros() } else { moved };
             let felt = Vector3::z() * GRAVITY + moved / interval.powi(2);
             let noise = Vector3::from_fn(|_, _| self.sigma * normal(rng));
             poses[i].rotation.inverse().act(&felt) + bias + noise

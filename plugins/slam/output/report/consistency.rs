@@ -14,10 +14,11 @@ use std::collections::HashMap;
 /// estimate thinks better of itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ConsistencyReport {
-    /// Mean over poses, brought into the frame of the truth by the first; six degrees of freedom.
+    /// Mean over poses, six degrees of freedom, each against the true pose nearest in time. The first of them brings all into the frame of the
+    /// truth, and so counts as 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poses: Option<f64>,
-    /// Mean over the centres of objects, where the truth has objects; three degrees of freedom.
+    /// Mean over the centres of objects, where the truth has objects, in the frame of the odometry; three degrees of freedom.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub objects: Option<f64>,
 }
