@@ -67,7 +67,7 @@ impl Experiment {
         if let Some(shard) = self.shard {
             sweep.keep(shard);
         }
-        let page = self.markdown.as_ref().map(|page| self.page(page)).transpose()?;
+        let target = self.markdown.as_ref().map(|page| self.page(page)).transpose()?;
         let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
         let mut journal = Journal::open(claimed)?;
@@ -97,7 +97,7 @@ impl Experiment {
         let page = experiment_page(&sweep, &summary, &trials, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);
-        if let Some((path, text)) = page.filter(|_| summary.open == 0) {
+        if let Some((path, text)) = target.filter(|_| summary.open == 0) {
             let text = self.put_into((&path, &text), &sweep.digest(), &summary.markdown())?;
             write_whole(&path, text)?;
         }
