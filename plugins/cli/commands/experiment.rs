@@ -67,7 +67,10 @@ impl Experiment {
         if let Some(shard) = self.shard {
             sweep.keep(shard);
         }
-        let target = self.markdown.as_ref().map(|page| self.page(page)).transpose()?;
+        // before hours are spent on what has no place
+        if let Some(page) = &self.markdown {
+            self.put_into(page, "", "")?;
+        }
         let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
         let mut journal = Journal::open(claimed)?;
@@ -97,26 +100,20 @@ impl Experiment {
         let page = experiment_page(&sweep, &summary, &trials, document.source().text());
         write_whole(&sweep.output.join("report.html"), page)?;
         self.tell(&sweep, &summary);
-        if let Some((path, text)) = target.filter(|_| summary.open == 0) {
-            let text = self.put_into((&path, &text), &sweep.digest(), &summary.markdown())?;
-            write_whole(&path, text)?;
+        if let Some(page) = self.markdown.as_ref().filter(|_| summary.open == 0) {
+            write_whole(page, self.put_into(page, &sweep.digest(), &summary.markdown())?)?;
         }
         Ok(status)
     }
 
-    /// The page for the table, before hours are spent on what has no place.
-    fn page(&self, page: &Path) -> Result<(PathBuf, String), Failure> {
+    /// The page as it is now, with this table in its place.
+    fn put_into(&self, page: &Path, digest: &str, table: &str) -> Result<String, Failure> {
         let text = std::fs::read_to_string(page)
             .map_err(|source| Failure::File { path: page.to_owned(), source })?;
-        self.put_into((page, &text), "", "")?;
-        Ok((page.to_owned(), text))
-    }
-
-    fn put_into(&self, (page, text): (&Path, &str), digest: &str, table: &str) -> Result<String, Failure> {
         let beside = page.parent().unwrap_or(Path::new(""));
         let own = self.config.canonicalize().ok();
         let is_meant = |experiment: &str| own.is_some() && beside.join(experiment).canonicalize().ok() == own;
-        experiment::put_into(text, is_meant, digest, table).ok_or_else(|| Failure::Input {
+        experiment::put_into(&text, is_meant, digest, table).ok_or_else(|| Failure::Input {
             message: format!("{} has no place for the table of {}", page.display(), self.config.display()),
             help: Some(
                 "put a line `<!-- experiment: PATH -->` there, PATH from that page to the document"

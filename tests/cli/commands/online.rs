@@ -3,7 +3,7 @@ use crate::{fed, folder, manifactor, path, root};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Command, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
 use std::time::Duration;
 
 pub(crate) const DESK: &str = r#"
@@ -151,6 +151,22 @@ fn lines_of(file: &str) -> usize {
     std::fs::read(file).unwrap_or_default().iter().filter(|byte| **byte == b'\n').count()
 }
 
+/// The binary at work on the first so many lines: no more come, and none is the last.
+fn waiting(command: &str, stderr: Stdio, lines: &str, count: usize) -> (Child, ChildStdin) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
+        .current_dir(root())
+        .args(command.split_whitespace())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(stderr)
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    let known: Vec<&str> = lines.lines().take(count).collect();
+    writeln!(input, "{}", known.join("\n")).unwrap();
+    (child, input)
+}
+
 #[test]
 fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
     let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
@@ -163,18 +179,7 @@ fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
     let mut kept = 0;
     while kept < 50 {
         kept += rng.random_range(1..9);
-        let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
-            .current_dir(root())
-            .args(command.split_whitespace())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        // no more frames come, and none is the last: it waits until it is killed
-        let mut frames_of_child = child.stdin.take().unwrap();
-        let known: Vec<&str> = frames.lines().take(kept).collect();
-        writeln!(frames_of_child, "{}", known.join("\n")).unwrap();
+        let (mut child, _input) = waiting(&command, Stdio::null(), &frames, kept);
         // the first line is not a frame
         while lines_of(&journal) < kept + 1 {
             assert!(child.try_wait().unwrap().is_none(), "it ended before its frames");
@@ -198,17 +203,8 @@ fn a_signal_while_no_frame_comes_ends_the_stream_with_its_map() {
     let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
     let (live, out) = (path(&folder, "live.toml"), path(&folder, "out"));
     let frames = manifactor(&format!("simulate {} --lines", path(&folder, "desk.toml"))).ended(0).stdout;
-    let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
-        .current_dir(root())
-        .args(["online", &live, "--out", &out, "--every", "1"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut input = child.stdin.take().unwrap();
-    let known: Vec<&str> = frames.lines().take(20).collect();
-    writeln!(input, "{}", known.join("\n")).unwrap();
+    let command = format!("online {live} --out {out} --every 1");
+    let (mut child, input) = waiting(&command, Stdio::piped(), &frames, 20);
     let mut said = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     assert!(said.any(|line| line.contains("20 frames")), "it ended before its frames");
     // standard input stays open, and silent

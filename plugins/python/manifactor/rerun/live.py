@@ -38,7 +38,7 @@ class Live:
         self._at = rr.escape_entity_path_part(name)
         #: Each pose where it was last seen, shape (3,), by key.
         self._path: dict[str, Array] = {}
-        #: Objects and their boxes, by the pose that saw them, since the last update.
+        #: Objects and their boxes, by the pose that saw them, since the map was last shown.
         self._seen: dict[str, list[tuple[str, list[float]]]] = {}
         self._camera: dict[str, Any] | None = None
 
@@ -62,11 +62,13 @@ class Live:
         self.recording.set_time(ITERATION, sequence=self.updates)
         if seconds is not None:
             self.recording.set_time(TIME, duration=seconds)
+        else:
+            self.recording.disable_timeline(TIME)
         self._log("latency", rr.Scalars(latency))
         if self.updates % self.every == 0:
             self._log("cost", rr.Scalars(self.session.cost()))
             self._show_map()
-        self._seen.clear()
+            self._seen.clear()
         self.updates += 1
         return account
 

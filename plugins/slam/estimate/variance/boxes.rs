@@ -1,13 +1,13 @@
 //! The noise of boxes: how large it is, how it grows with them, how it differs by object, and how long it lasts.
 use super::correlation::autocorrelation_time;
 use super::{BoxGroups, VarianceSettings};
-use crate::mapping::{MappedObject, Mapping, pose_key};
+use crate::mapping::{MappedObject, Mapping};
 use indexmap::IndexMap;
 use manifactor_graph::batch::FactorState;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{FactorEntry, Key, Noise};
+use manifactor_quadric::BoundingBoxFactor;
 use serde::Serialize;
-use std::collections::HashMap;
 
 /// The noise of a group of boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -65,28 +65,10 @@ impl BoxComponent {
     }
 }
 
-/// Width and height of each box, by the keys of its factor.
-pub(super) struct Sizes(HashMap<[Key; 2], [f64; 2]>);
-
-impl Sizes {
-    pub(super) fn of(mapping: &Mapping) -> Self {
-        let of_object = |object: &MappedObject| {
-            let views = mapping.measurements.object(object.id).map_or(&[][..], |measured| &measured.views);
-            let size = |view: &crate::mapping::measurements::ObjectBox| {
-                let keys = [pose_key(view.frame), object.key.clone()];
-                (keys, [view.bounding_box.width(), view.bounding_box.height()])
-            };
-            views.iter().map(size).collect::<Vec<_>>()
-        };
-        Self(mapping.mapped().flat_map(of_object).collect())
-    }
-
-    /// `None` for what is not a box of four sides.
-    pub(super) fn of_box(&self, entry: &FactorEntry) -> Option<[f64; 2]> {
-        entry.factor.erased().signature().rows.filter(|rows| *rows == 4)?;
-        let keys: [Key; 2] = entry.keys.clone().try_into().ok()?;
-        self.0.get(&keys).copied()
-    }
+/// Width and height of the box that a factor measures; `None` for what has no box.
+pub(super) fn size(entry: &FactorEntry) -> Option<[f64; 2]> {
+    let factor = entry.factor.erased().as_any().downcast_ref::<BoundingBoxFactor>()?;
+    Some([factor.bounding_box.width(), factor.bounding_box.height()])
 }
 
 /// Errors of the boxes of an object: by side, then in the order of the boxes.
@@ -150,7 +132,7 @@ pub(super) fn components(
     if settings.boxes == BoxGroups::All {
         return groups.into_keys().map(|name| (name, of_all)).collect();
     }
-    let own = groups.iter().map(|(_, series)| {
+    let own = groups.values().map(|series| {
         let relative = median(series.iter().copied().flatten().map(|e| (e.error / of_all.at(e.size)).abs()));
         let rows = series.iter().map(|errors| errors.len()).sum::<usize>() as f64;
         // one without errors says nothing

@@ -1,5 +1,5 @@
 //! The noise of each group of measurements.
-use super::boxes::{self, BoxComponent, Errors, Sizes, group};
+use super::boxes::{self, BoxComponent, Errors, group};
 use super::cross_validation::CrossValidation;
 use super::motion::{self, MotionChoice};
 use super::{BoxGroups, VarianceSettings};
@@ -80,12 +80,11 @@ impl Components {
         let graph = &estimate.mapping.graph;
         let leverages = estimate.solution.leverages(graph)?;
         let mut boxes: IndexMap<Key, Errors> = IndexMap::new();
-        let sizes = Sizes::of(&estimate.mapping);
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
             // factors are in the order of the graph: an object's boxes in the order of their frames
             if let Measures::Box { object } = measures(entry) {
-                let size = sizes.of_box(entry).unwrap_or_default();
+                let size = boxes::size(entry).unwrap_or_default();
                 boxes.entry(object).or_default().add(state, leverage, entry.noise.observed(), size);
             }
         }
@@ -126,14 +125,13 @@ impl Components {
                 groups.insert(object.key.clone(), (component, loss.map(|loss| loss.erased().tempered(tau))));
             }
         }
-        let sizes = Sizes::of(mapping);
         for entry in mapping.graph.factors_mut() {
             let noise = match (measures(entry), self.odometry) {
                 (Measures::Motion, Some(motion)) => motion.noise.noise()?,
                 (Measures::Box { object }, _) => match groups.get(&object) {
                     Some((component, loss)) => {
                         entry.loss.clone_from(loss);
-                        component.noise(sizes.of_box(entry))?
+                        component.noise(boxes::size(entry))?
                     }
                     None => continue,
                 },

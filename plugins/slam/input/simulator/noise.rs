@@ -124,7 +124,7 @@ pub struct Detector {
     pub occluded: f64,
     /// By how much of its width or height such a box shrinks, at most.
     pub occlusion: f64,
-    /// Whether nearer objects hide what is behind them: a box is around what is left to see, to four pixels, and `min_visible` is about it.
+    /// Whether nearer objects hide what is behind them: a box is around what is left to see, to four pixels or a thousandth of the image, and `min_visible` is about it.
     pub occluded_by_objects: bool,
     /// Rate at which a box is put to another object of the scene: a tracker's mistake.
     pub wrong_object: f64,

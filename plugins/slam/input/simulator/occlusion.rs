@@ -4,11 +4,14 @@ use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::{Vector2, Vector3};
 
-/// Side of a cell of the image, in pixels.
+/// Side of a cell of the image, in pixels, where that makes no more cells than these along either side of the image.
 const CELL: f64 = 4.0;
+const MOST_CELLS: f64 = 1000.0;
 
 /// An image of which object is the nearest in each cell.
 pub(super) struct DepthImage {
+    /// Side of a cell, in pixels.
+    cell: f64,
     columns: usize,
     rows: usize,
     /// By cell: how far away the nearest surface is, and whose it is.
@@ -21,8 +24,10 @@ impl DepthImage {
     /// Draws all solids, each with its pose in the frame of the camera.
     pub(super) fn new<'a>(solids: impl Iterator<Item = (&'a Solid, Se3)>, camera: &Camera) -> Self {
         let size = camera.size();
-        let [columns, rows] = [size.x, size.y].map(|length| (length / CELL).ceil() as usize);
+        let cell = CELL.max(size.max() / MOST_CELLS);
+        let [columns, rows] = [size.x, size.y].map(|length| (length / cell).ceil() as usize);
         let mut image = Self {
+            cell,
             columns,
             rows,
             nearest: vec![(f64::INFINITY, usize::MAX); columns * rows],
@@ -57,13 +62,14 @@ impl DepthImage {
         let outline: Vec<Vector2<f64>> = face.iter().map(|p| project(camera, p)).collect();
         let first = outline.first().copied().unwrap_or_default();
         let (low, high) = outline.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
+        let side = self.cell;
         let cells = |low: f64, high: f64, most: usize| {
-            let from = (low / CELL - 0.5).ceil().max(0.0) as usize;
-            from..((high / CELL + 0.5).floor().max(0.0) as usize).min(most)
+            let from = (low / side - 0.5).ceil().max(0.0) as usize;
+            from..((high / side + 0.5).floor().max(0.0) as usize).min(most)
         };
         for row in cells(low.y, high.y, self.rows) {
             for column in cells(low.x, high.x, self.columns) {
-                let p = Vector2::new((column as f64 + 0.5) * CELL, (row as f64 + 0.5) * CELL);
+                let p = Vector2::new((column as f64 + 0.5) * side, (row as f64 + 0.5) * side);
                 if !inside_convex(&outline, &p) {
                     continue;
                 }
@@ -105,7 +111,7 @@ impl DepthImage {
         }
         let mut bounds = bounding_box.bounds();
         for side in (0..4).filter(|side| left[*side] != all[*side]) {
-            bounds[side] = (left[side] + usize::from(side > 1)) as f64 * CELL;
+            bounds[side] = (left[side] + usize::from(side > 1)) as f64 * self.cell;
         }
         Some((BoundingBox::new(bounds).ok()?, f64::from(sees) / f64::from(covers)))
     }
@@ -135,6 +141,13 @@ mod tests {
     fn alone_it_is_seen_as_it_is() {
         let sheet = ([0.4, 0.4, 0.1], [0.0, 0.0, 2.0]);
         assert_eq!(seen(&[sheet])[0], Some((whole(&sheet), 1.0)));
+    }
+
+    #[test]
+    fn an_image_however_large_has_cells_in_bounds() {
+        let camera = Camera { width: u32::MAX, height: u32::MAX, ..CAMERA };
+        let image = DepthImage::new(std::iter::empty(), &camera);
+        assert_eq!(image.nearest.len(), 1_000_000);
     }
 
     #[test]
