@@ -22,6 +22,7 @@ mod error;
 mod factor_id;
 mod fronts;
 mod gone;
+mod landmarks;
 mod model;
 mod report;
 mod saved;
@@ -31,7 +32,8 @@ mod tree;
 
 pub use error::{ChangeError, UpdateError};
 pub use factor_id::FactorId;
+pub use landmarks::{LandmarkSettings, Landmarks, Named, Sighting, SightingError};
 pub use report::{Rejection, Report, Shared};
 pub use saved::{LoadError, SaveError};
-pub use session::{CovarianceError, Finished, Session};
+pub use session::{CovarianceError, Finished, Given, Innovation, InnovationError, Misfit, Session};
 pub use settings::{ManifoldType, NotOneSpan, Outliers, Settings, Span, UnknownManifold, Window};

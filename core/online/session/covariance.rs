@@ -41,22 +41,25 @@ impl Session {
         let mut variables = vec![];
         for key in keys {
             let missing = || CovarianceError::NoVariable { key: Key::from(*key) };
-            let v = self.model.variable(key).ok_or_else(missing)?;
-            let place = self.model.place(v);
-            if place.parked {
-                return Err(CovarianceError::Parked { key: self.key(v) });
-            }
-            variables.push(v);
+            variables.push(self.model.variable(key).ok_or_else(missing)?);
+        }
+        self.covariance_of(&variables)
+    }
+
+    /// The same of variables by their numbers.
+    pub(crate) fn covariance_of(&self, variables: &[u32]) -> Result<DMatrix<f64>, CovarianceError> {
+        if let Some(v) = variables.iter().find(|v| self.model.place(**v).parked) {
+            return Err(CovarianceError::Parked { key: self.key(*v) });
         }
         // Σᵢⱼ = (L⁻¹eᵢ)ᵀ(L⁻¹eⱼ), and such a column is zero but on the path from its front to the root
-        let path = self.path(&variables);
+        let path = self.path(variables);
         for step in &path.steps {
             if let Some((v, direction)) = self.fronts.open(step.front).first() {
                 let direction = self.model.place(*v).tangent[*direction as usize];
                 return Err(CovarianceError::Undetermined { key: self.key(*v), direction });
             }
         }
-        Ok(self.along(&path, &variables))
+        Ok(self.along(&path, variables))
     }
 
     /// The same of variables by their numbers, where directions that nothing constrains are held: a gauge, as a rule.

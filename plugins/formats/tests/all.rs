@@ -9,7 +9,6 @@
 )]
 mod auto;
 mod bal;
-mod barcodes;
 mod gnc;
 mod online;
 mod pose_graphs;

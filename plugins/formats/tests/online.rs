@@ -10,7 +10,7 @@ use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{DMatrix, Vector2, Vector3};
 use std::path::PathBuf;
 
-pub(crate) fn data(path: &str) -> Option<PathBuf> {
+fn data(path: &str) -> Option<PathBuf> {
     let file = std::env::var_os("MANIFACTOR_DATA").map(|root| PathBuf::from(root).join(path));
     let file = file.filter(|file| file.exists());
     if file.is_none() {
@@ -170,46 +170,8 @@ fn a_window_that_holds_all_closures_is_as_good_as_all() {
     println!("{apart} {bytes:?} {}", all.bytes());
 }
 
-/// Victoria Park as a graph: poses by their numbers, trees by their ids.
-fn victoria_park(path: PathBuf) -> Graph {
-    let mut graph = Graph::new();
-    for line in std::fs::read_to_string(path).unwrap().lines() {
-        let fields: Vec<&str> = line.split_whitespace().collect();
-        let numbers: Vec<f64> = fields[1..].iter().map(|field| field.parse().unwrap()).collect();
-        let pose = Key::indexed("x", numbers[0]);
-        let n = &numbers[2..];
-        if fields[0] == "ODOMETRY" {
-            let relative = Se2::new(So2::exp(n[2]), Vector2::new(n[0], n[1]));
-            let covariance =
-                DMatrix::from_row_slice(3, 3, &[n[3], n[4], n[5], n[4], n[6], n[7], n[5], n[7], n[8]]);
-            let noise = Noise::covariance(covariance).unwrap();
-            graph.add([pose, Key::indexed("x", numbers[1])], Between { relative }).noise(noise);
-        } else {
-            let covariance = DMatrix::from_row_slice(2, 2, &[n[2], n[3], n[3], n[4]]);
-            let noise = Noise::covariance(covariance).unwrap();
-            let seen = Landmark::<2> { position: Coordinates::new(Vector2::new(n[0], n[1])).unwrap() };
-            graph.add([pose, Key::indexed("l", numbers[1])], seen).noise(noise);
-        }
-    }
-    graph.fix("x0");
-    graph
-}
-
-#[test]
-fn victoria_park_is_mapped_by_the_ids_of_its_trees() {
-    let Some(path) = data("online/landmarks_2d/victoria_park.txt") else { return };
-    let graph = victoria_park(path);
-    let (mut session, report) = replay(&graph, 3000);
-    assert!(report.parked.is_empty() && report.undetermined.is_empty());
-    let trees = session.estimates().iter().filter(|(key, _)| key.as_str().starts_with('l')).count();
-    assert_eq!(session.variables(), trees + 3000);
-    let best = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap().outcome.final_cost;
-    let cost = session.cost();
-    assert!(cost <= 1.01 * best, "{cost}, the optimum is {best}");
-}
-
 /// The rows of a table of numbers, without comments.
-pub(crate) fn rows(path: PathBuf) -> Vec<Vec<f64>> {
+fn rows(path: PathBuf) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(path).unwrap();
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     lines.map(|line| line.split_whitespace().map(|field| field.parse().unwrap()).collect()).collect()

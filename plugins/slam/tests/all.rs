@@ -9,6 +9,7 @@
 )]
 mod association;
 mod evo;
+mod ground_robots;
 mod online;
 mod prior_map;
 mod simulation;

@@ -1,0 +1,239 @@
+//! Robots in the plane that see landmarks, with their names and without.
+mod mr_clam;
+mod victoria_park;
+
+use manifactor_formats::replay::Latencies;
+use manifactor_geometry::{Between, Point2, Prior, Se2, So2};
+use manifactor_graph::loss::Loss;
+use manifactor_graph::{
+    Factor, FactorEntry, Graph, Key, Lifted, Manifold, Noise, Residual, Scalar, Values, register_factor,
+};
+use manifactor_online::{LandmarkSettings, Landmarks, Named, Session, Settings, Sighting};
+use manifactor_slam::metrics::{IdentityScores, identity};
+use manifactor_solve::{LevenbergMarquardt, Silent};
+use nalgebra::{U3, Vector2, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// The variable that says how the steering errs.
+const STEERING: &str = "steering";
+
+/// Odometry of a car whose steering errs for good: it turns by another angle than it says, by so many radians a metre, and by a share
+/// of the angle.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
+struct Steered {
+    relative: Se2,
+}
+
+impl Steered {
+    fn corrected<T: Scalar>(&self, by: &Vector2<T>) -> Se2<T> {
+        let relative = self.relative.lift::<T>();
+        let turn = by.x * relative.translation.x + by.y * relative.rotation.log().x;
+        Se2::new(So2::exp(relative.rotation.log().x + turn), relative.translation)
+    }
+}
+
+impl Residual for Steered {
+    type Variables = (Se2, Se2, Point2);
+    type Dim = U3;
+
+    fn residual<T: Scalar>(&self, (a, b, by): Lifted<Self::Variables, T>) -> Vector3<T> {
+        self.corrected(&by).between(&a.between(&b)).log()
+    }
+}
+register_factor!("steered", Steered);
+
+fn data(path: &str) -> Option<PathBuf> {
+    let file = crate::tum::data()?.join("online").join(path);
+    file.exists().then_some(file)
+}
+
+/// The rows of a table of numbers, without comments.
+fn rows(path: PathBuf) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    lines.map(|line| line.split_whitespace().map(|field| field.parse().unwrap()).collect()).collect()
+}
+
+/// A pose of the robot.
+struct Step {
+    /// How it has moved since the last.
+    odometry: Option<(Se2, Noise)>,
+    seen: Vec<Seen>,
+}
+
+/// What it sees of a landmark.
+struct Seen {
+    /// The landmark's true name.
+    id: usize,
+    /// Where it is from the robot, in metres.
+    place: Vector2<f64>,
+    factor: Arc<dyn Factor>,
+    noise: Noise,
+    loss: Option<Arc<dyn Loss>>,
+}
+
+/// What a session came to, pose by pose.
+struct Driven {
+    session: Session,
+    /// Where the newest pose was after its update, and where odometry alone leads.
+    newest: Vec<Vector2<f64>>,
+    odometry: Vec<Vector2<f64>>,
+    /// The true name and the key of each landmark that was seen.
+    names: Vec<(usize, Option<Key>)>,
+    /// CPU time of the steps, in milliseconds.
+    times: Vec<f64>,
+    /// By what share the estimate costs more than a batch solve from it, now and then.
+    gaps: Vec<f64>,
+}
+
+fn cpu_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+/// Maps landmarks: by their true names, or without.
+fn drive(steps: &[Step], nameless: Option<LandmarkSettings>, steering: Option<&Noise>) -> Driven {
+    let mut landmarks = nameless.map(|settings| Landmarks::new("l", settings).unwrap());
+    let session = Session::new(Settings::default()).unwrap();
+    let (newest, odometry, names, times, gaps) = (vec![], vec![], vec![], vec![], vec![]);
+    let mut driven = Driven { session, newest, odometry, names, times, gaps };
+    let (mut pose, mut alone) = (Se2::identity(), Se2::identity());
+    for (i, Step { odometry, seen }) in steps.iter().enumerate() {
+        let session = &mut driven.session;
+        let (mut graph, mut values, here) = (Graph::new(), Values::new(), Key::indexed("x", i));
+        if let Some((relative, noise)) = odometry {
+            alone = Se2::compose(&alone, relative);
+            let last = Key::indexed("x", i - 1);
+            let known = session.get::<Point2>(STEERING).ok();
+            let relative = match known {
+                Some(steering) => {
+                    let factor = Steered { relative: *relative };
+                    graph.add([last, here.clone(), STEERING.into()], factor).noise(noise.clone());
+                    factor.corrected(&steering.0)
+                }
+                None => {
+                    graph.add([last, here.clone()], Between { relative: *relative }).noise(noise.clone());
+                    *relative
+                }
+            };
+            pose = Se2::compose(&pose, &relative);
+        } else {
+            graph.fix(here.clone());
+            if let Some(prior) = steering {
+                values.insert(STEERING, Point2::new(Vector2::zeros()));
+                let prior = prior.clone();
+                graph.add([STEERING], Prior { value: Point2::new(Vector2::zeros()) }).noise(prior);
+            }
+        }
+        values.insert(here.clone(), pose);
+        let begin = cpu_seconds();
+        let seen_ids = seen.iter().map(|seen| seen.id);
+        match &mut landmarks {
+            Some(landmarks) => {
+                session.push(&graph, &values).unwrap();
+                session.update().unwrap();
+                let pose: Se2 = session.get(here.as_str()).unwrap();
+                let seen: Vec<Sighting> = seen.iter().map(|seen| seen.sighting(&pose)).collect();
+                let Named { names, merged } = landmarks.see(session, &here, &seen).unwrap();
+                driven.names.extend(seen_ids.zip(names));
+                for (from, into) in merged {
+                    let of_it = driven.names.iter_mut().filter(|(_, name)| name.as_ref() == Some(&from));
+                    of_it.for_each(|(_, name)| *name = Some(into.clone()));
+                }
+            }
+            None => {
+                let names: Vec<Key> = seen.iter().map(|seen| Key::indexed("l", seen.id)).collect();
+                for (seen, key) in seen.iter().zip(&names) {
+                    let Sighting { factor, noise, loss, landmark } = seen.sighting(&pose);
+                    if session.estimate(key.as_str()).is_none() && !values.contains(key.as_str()) {
+                        values.insert_boxed(key.clone(), landmark);
+                    }
+                    let keys = vec![here.clone(), key.clone()];
+                    graph.push(FactorEntry { keys, name: None, factor, noise, loss });
+                }
+                session.push(&graph, &values).unwrap();
+                driven.names.extend(seen_ids.zip(names.into_iter().map(Some)));
+            }
+        }
+        let report = driven.session.update().unwrap();
+        driven.times.push(1e3 * (cpu_seconds() - begin));
+        assert!(report.parked.is_empty() && report.undetermined.is_empty(), "{report:?}");
+        pose = driven.session.get(here.as_str()).unwrap();
+        driven.newest.push(pose.translation);
+        driven.odometry.push(alone.translation);
+        if i % 500 == 499 || i + 1 == steps.len() {
+            let finished = driven.session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap();
+            let best = finished.outcome.final_cost;
+            driven.gaps.push((driven.session.cost() - best) / best);
+        }
+    }
+    driven
+}
+
+impl Seen {
+    fn sighting(&self, pose: &Se2) -> Sighting {
+        Sighting {
+            factor: self.factor.clone(),
+            noise: self.noise.clone(),
+            loss: self.loss.clone(),
+            landmark: Box::new(Point2::new(pose.act(&self.place))),
+        }
+    }
+}
+
+impl Driven {
+    fn path(&self) -> Vec<Vector2<f64>> {
+        let place = |i: usize| self.session.get::<Se2>(Key::indexed("x", i).as_str()).unwrap().translation;
+        (0..self.newest.len()).map(place).collect()
+    }
+
+    /// The root of the mean square of the path's errors and the largest, and the motion that leads to the truth.
+    fn path_errors(&self, truth: &[Vector2<f64>]) -> ((f64, f64), Se2) {
+        let path = self.path();
+        (aligned_errors(&path, truth), align(&path, truth))
+    }
+
+    fn latencies(&self) -> Latencies {
+        Latencies::of(&self.times)
+    }
+
+    /// Of sightings whose true name counts, by what is the same of it.
+    fn scores(&self, counts: impl Fn(usize) -> bool, same: impl Fn(usize) -> usize) -> IdentityScores {
+        let counting = self.names.iter().filter(|(id, _)| counts(*id));
+        identity(counting.map(|(id, key)| (same(*id), key.as_ref())))
+    }
+
+    fn unclear(&self) -> usize {
+        self.names.iter().filter(|(_, key)| key.is_none()).count()
+    }
+}
+
+/// The same after alignment.
+fn aligned_errors(path: &[Vector2<f64>], truth: &[Vector2<f64>]) -> (f64, f64) {
+    let motion = align(path, truth);
+    errors(&path.iter().map(|place| motion.act(place)).collect::<Vec<_>>(), truth)
+}
+
+/// The motion that takes the first points to the second with the least sum of squares.
+fn align(from: &[Vector2<f64>], to: &[Vector2<f64>]) -> Se2 {
+    let centre = |points: &[Vector2<f64>]| points.iter().sum::<Vector2<f64>>() / points.len() as f64;
+    let (a, b) = (centre(from), centre(to));
+    let (mut dot, mut cross) = (0.0, 0.0);
+    for (p, q) in from.iter().zip(to) {
+        let (p, q) = (p - a, q - b);
+        (dot, cross) = (dot + p.dot(&q), cross + p.x * q.y - p.y * q.x);
+    }
+    let rotation = So2::exp(f64::atan2(cross, dot));
+    let turned = rotation.act(&a);
+    Se2::new(rotation, b - turned)
+}
+
+/// The root of the mean square, and the largest.
+fn errors(found: &[Vector2<f64>], truth: &[Vector2<f64>]) -> (f64, f64) {
+    let apart: Vec<f64> = found.iter().zip(truth).map(|(a, b)| (a - b).norm()).collect();
+    let square = apart.iter().map(|x| x * x).sum::<f64>() / apart.len() as f64;
+    (square.sqrt(), apart.iter().fold(0.0, |most, x| x.max(most)))
+}
