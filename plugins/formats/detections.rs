@@ -2,8 +2,8 @@
 //!
 //! Columns `timestamp` (s), `class_name`, `score` (0 to 1), `xmin`, `ymin`, `xmax`, `ymax` (px), in any
 //! order; and, where they are known, `frame_idx`, `frame_idx_as_published`, `object_key` (0 where the
-//! box is associated with no object), `class_id`, and `scores`, all classes with a score as
-//! `cup:0.7;bowl:0.2`. A box without a class has an empty name, and the score 0.
+//! box is associated with no object), `class_id`, `scores`, all classes with a score as
+//! `cup:0.7;bowl:0.2`, and `depth`, that of the object's centre along the optical axis (m). A box without a class has an empty name, and the score 0.
 use crate::error::{FormatError, Mistake, Problems, io_error};
 use crate::text::read_text;
 use crate::whole::write_whole;
@@ -44,6 +44,9 @@ pub struct Detection {
     /// Scores by class, where more than the best are known: `cup:0.7;bowl:0.2`.
     #[serde(default)]
     pub scores: Option<String>,
+    /// How far away the object's centre is along the optical axis, in metres, where that was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<f64>,
 }
 
 const REQUIRED: [&str; 7] = ["timestamp", "class_name", "score", "xmin", "ymin", "xmax", "ymax"];
@@ -88,6 +91,9 @@ impl Detection {
         let ordered = self.xmin < self.xmax && self.ymin < self.ymax;
         if !(ordered && sides.iter().all(|s| s.is_finite())) {
             return row(format!("expected a box with xmin < xmax and ymin < ymax, got {sides:?}"));
+        }
+        if let Some(depth) = self.depth.filter(|depth| !(*depth > 0.0 && depth.is_finite())) {
+            return row(format!("expected a depth above 0 m, or none, got {depth}"));
         }
         self.class_scores().map(|_| self)
     }

@@ -12,8 +12,9 @@ use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, Verdict, u
 use crate::settings::{DetectionSettings, OdometrySettings, Settings};
 use manifactor_formats::plausible;
 use manifactor_geometry::{Between, Prior, Se3};
-use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_quadric::{BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values};
+use manifactor_quadric::{BoundingBoxFactor, Camera, CentroidDepth, DualQuadric, QuadricPrior};
 use serde::Serialize;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -183,7 +184,7 @@ impl Mapping {
                 let known = measured.prior.as_ref().map(|known| known_entry(known, settings));
                 self.graph.factors_mut().extend(known);
                 let boxes = measured.views.iter();
-                let boxes = boxes.map(|view| box_entry(view, key.clone(), camera, &settings.detections));
+                let boxes = boxes.flat_map(|view| view_entries(view, &key, camera, &settings.detections));
                 self.graph.factors_mut().extend(boxes);
                 self.graph.factors_mut().extend(verdict.entries);
                 self.values.insert(key.clone(), *start);
@@ -277,8 +278,27 @@ pub(crate) fn odometry_entry(frames: [usize; 2], relative: Se3, settings: &Odome
     }
 }
 
+/// The factors of a box: its own, and that of its depth, where it has one.
+pub(crate) fn view_entries(
+    view: &ObjectBox,
+    object: &Key,
+    camera: Camera,
+    settings: &DetectionSettings,
+) -> impl Iterator<Item = FactorEntry> {
+    let of_depth = view.depth.and_then(|depth| {
+        Some(FactorEntry {
+            keys: vec![pose_key(view.frame), object.clone()],
+            name: None,
+            factor: Arc::new(CentroidDepth { depth: Positive::new(depth).ok()? }),
+            noise: Noise::sigma(settings.depth_error * depth).ok()?,
+            loss: settings.loss.clone(),
+        })
+    });
+    std::iter::once(box_entry(view, object.clone(), camera, settings)).chain(of_depth)
+}
+
 /// The factor of a box.
-pub(crate) fn box_entry(
+fn box_entry(
     view: &ObjectBox,
     object: Key,
     camera: Camera,

@@ -1,13 +1,13 @@
 //! Published pose graphs through a session, pose by pose, beside batch solves.
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_formats::replay::Replay;
-use manifactor_geometry::{Between, Coordinates, Landmark, Point2, Range, Se2, Se3, So2};
+use manifactor_geometry::{Between, Point2, Range, Se2, Se3};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
 use manifactor_online::{Report, Session, Settings, Span, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
-use nalgebra::{DMatrix, Vector2, Vector3};
+use nalgebra::{Vector2, Vector3};
 use std::path::PathBuf;
 
 fn data(path: &str) -> Option<PathBuf> {

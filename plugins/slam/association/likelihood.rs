@@ -14,6 +14,7 @@ use manifactor_graph::register;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 use std::sync::Arc;
 use tracker::Tracker;
 
@@ -64,6 +65,10 @@ pub struct Likelihood {
     #[serde(deserialize_with = "positive")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub drift_m: f64,
+    /// Standard deviation of measured depths, where the source has any, as a part of the depth.
+    #[serde(deserialize_with = "positive")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub depth_error: f64,
     /// The share of boxes that have a class which is not their object's.
     #[serde(deserialize_with = "within::<0, 1, _>")]
     #[schemars(range(min = 0, max = 1))]
@@ -91,6 +96,7 @@ impl Default for Likelihood {
             lasting: 2.5,
             depth: 1.5,
             depth_spread: 0.6,
+            depth_error: 0.03,
             drift_rad: 0.016,
             drift_m: 0.016,
             class_error: 0.1,
@@ -112,7 +118,7 @@ register!(dyn Association, "likelihood", Likelihood);
 
 impl Likelihood {
     fn noise(&self) -> BoxNoise {
-        BoxNoise { px: self.box_sigma, of_size: self.box_sigma_of_size }
+        BoxNoise { px: self.box_sigma, of_size: self.box_sigma_of_size, of_depth: self.depth_error }
     }
 
     /// The likelihood of a class for an object that has this share of it.
@@ -120,10 +126,15 @@ impl Likelihood {
         (1.0 - self.class_error) * share + self.class_error / CLASSES
     }
 
-    /// What a box costs that shows a new object: it is anywhere in the image, of any size and class.
-    fn cost_of_new(&self, camera: &Camera) -> f64 {
+    /// What a box costs that shows a new object: it is anywhere in the image, of any size and class, and as far away as objects usually are,
+    /// give or take the spread.
+    fn cost_of_new(&self, camera: &Camera, depth: Option<f64>, usual: f64) -> f64 {
         let area = camera.size().product();
-        -2.0 * (self.new_objects / (area * area / 4.0) / CLASSES).ln()
+        let of_depth = depth.map_or(0.0, |depth| {
+            let spread = self.depth_spread;
+            ((depth / usual).ln() / spread).powi(2) + TAU.ln() + 2.0 * (spread * depth).ln()
+        });
+        of_depth - 2.0 * (self.new_objects / (area * area / 4.0) / CLASSES).ln()
     }
 }
 

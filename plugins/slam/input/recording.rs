@@ -60,6 +60,7 @@ fn rows(sequence: &Sequence) -> Vec<Detection> {
             xmax,
             ymax,
             scores: (all.len() > 1).then(|| all.join(";")),
+            depth: d.depth,
         })
     };
     sequence.detections.iter().filter_map(row).collect()

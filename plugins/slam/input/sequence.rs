@@ -104,6 +104,8 @@ pub struct Detection {
     pub scores: ClassScores,
     /// Where it is in the image, in pixels.
     pub bounding_box: BoundingBox,
+    /// How far away the object's centre is along the optical axis, in metres, where that was measured.
+    pub depth: Option<f64>,
 }
 
 /// A number for an object, the same in detections and in the truth.

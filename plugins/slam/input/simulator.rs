@@ -133,8 +133,8 @@ impl Simulated {
             frames.push(Frame { timestamp: time(i), world_from_camera });
         }
         let stamped = |(i, pose): (usize, &_)| StampedPose { timestamp: time(i), pose: *pose };
-        let [mut imagination, mut mistakes, mut felt] = [(); 3].map(|()| Pcg64::from_rng(&mut noise));
-        let detections = self.detect(&objects, &poses, [&mut detector, &mut imagination, &mut mistakes]);
+        let [mut imagination, mut mistakes, mut felt, mut ranges] = [(); 4].map(|()| Pcg64::from_rng(&mut noise));
+        let detections = self.detect(&objects, &poses, [&mut detector, &mut imagination, &mut mistakes, &mut ranges]);
         let readings = self.accelerometer.as_ref().map(|sensor| {
             let readings = sensor.read(&poses, self.trajectory.interval, &mut felt).into_iter().enumerate();
             readings.map(|(i, acceleration)| Acceleration { timestamp: time(i), acceleration }).collect()
@@ -157,7 +157,7 @@ impl Simulated {
         &self,
         objects: &[SceneObject],
         poses: &[manifactor_geometry::Se3],
-        [rng, imagination, mistakes]: [&mut Pcg64; 3],
+        [rng, imagination, mistakes, ranges]: [&mut Pcg64; 4],
     ) -> Vec<Detection> {
         let classes: Vec<&str> = catalogue::KINDS.iter().map(|kind| kind.class).collect();
         let mut usual = vec![];
@@ -191,13 +191,15 @@ impl Simulated {
                 *seconds = 0.0;
                 let scores = self.detector.classify(usual, &classes, rng);
                 let taken_for = noise::mistaken(self.detector.wrong_object, i, objects.len(), mistakes);
+                let away = pose.inverse().act(&object.truth.world_from_object.translation).z;
+                let depth = self.detector.measure(away, ranges);
                 if let Some(bounding_box) = bounding_box {
                     let object = Some(objects[taken_for].truth.id);
-                    detections.push(Detection { frame, object, scores, bounding_box });
+                    detections.push(Detection { frame, object, scores, bounding_box, depth });
                 }
             }
             for (bounding_box, scores) in self.detector.imagine(&self.camera, &classes, imagination) {
-                detections.push(Detection { frame, object: None, scores, bounding_box });
+                detections.push(Detection { frame, object: None, scores, bounding_box, depth: None });
             }
         }
         detections

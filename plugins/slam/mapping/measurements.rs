@@ -19,6 +19,8 @@ pub struct ObjectBox {
     pub bounding_box: BoundingBox,
     /// Which of its sides are the object's own, and not the border's: xmin, ymin, xmax, ymax.
     pub inside: [bool; 4],
+    /// How far away the object's centre is along the optical axis, in metres, where that was measured.
+    pub depth: Option<f64>,
 }
 
 /// One object.
@@ -159,7 +161,7 @@ pub(crate) fn sift(detection: &Detection, camera: &Camera, settings: &DetectionS
     if !settings.cut_sides.accepts(inside) {
         return Sifted::Cut;
     }
-    Sifted::View(ObjectBox { frame: detection.frame, bounding_box, inside })
+    Sifted::View(ObjectBox { frame: detection.frame, bounding_box, inside, depth: detection.depth })
 }
 
 impl Measured {
@@ -228,6 +230,7 @@ mod tests {
             object: Some(ObjectId(object)).filter(|_| object > 0),
             scores: ClassScores::single(class, score),
             bounding_box: BoundingBox::new(bounds).unwrap(),
+            depth: None,
         }
     }
 

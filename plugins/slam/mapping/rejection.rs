@@ -4,6 +4,7 @@ use crate::settings::ObjectSettings;
 use manifactor_geometry::Se3;
 use manifactor_quadric::initialise::{View, parallax};
 use manifactor_quadric::{Camera, DualQuadric};
+use nalgebra::Vector3;
 use serde::Serialize;
 use std::fmt;
 
@@ -33,6 +34,13 @@ pub enum Rejection {
         /// How large it should be.
         least_deg: f64,
     },
+    /// It does not stand still: by the depths of its boxes.
+    Moves {
+        /// How far it moves while it is seen, in metres.
+        way_m: f64,
+        /// Its own length, which it should stay below, in metres.
+        limit_m: f64,
+    },
     /// No ellipsoid could be made of its boxes.
     Initialisation {
         /// What the initialiser says.
@@ -53,6 +61,9 @@ impl fmt::Display for Rejection {
             Self::Parallax { parallax_deg, least_deg } => {
                 write!(f, "seen under {parallax_deg:.1}°, at least {least_deg}° are needed")
             }
+            Self::Moves { way_m, limit_m } => {
+                write!(f, "it moves by {way_m:.1} m while it is seen, more than its own length, {limit_m:.1} m")
+            }
             Self::Initialisation { message } => f.write_str(message),
         }
     }
@@ -71,7 +82,7 @@ pub(crate) fn start(
     sound(measured, settings)?;
     let seen = |view: &ObjectBox| {
         let pose = pose(view.frame)?;
-        Some(View { observed: view.inside, ..View::new(pose, camera, view.bounding_box) })
+        Some(View { observed: view.inside, depth: view.depth, ..View::new(pose, camera, view.bounding_box) })
     };
     let views: Vec<View> = measured.views.iter().filter_map(seen).collect();
     // over all pairs of views, so it is left out where any will do
@@ -80,7 +91,34 @@ pub(crate) fn start(
         return Err(Rejection::Parallax { parallax_deg, least_deg: settings.min_parallax_deg });
     }
     let started = settings.initialiser.initialise(&views);
-    started.map_err(|error| Rejection::Initialisation { message: error.to_string() })
+    let start = started.map_err(|error| Rejection::Initialisation { message: error.to_string() })?;
+    still(measured, pose, &camera, &start).map(|()| start)
+}
+
+/// Whether an object that began so stands still, as far as the depths of its boxes tell.
+pub(crate) fn still(
+    measured: &Measured,
+    pose: impl Fn(usize) -> Option<Se3>,
+    camera: &Camera,
+    start: &DualQuadric,
+) -> Result<(), Rejection> {
+    let place = |view: &ObjectBox| {
+        let centre = camera.ray(view.bounding_box.centre()) * view.depth?;
+        Some((view.frame as f64, pose(view.frame)?.act(&centre)))
+    };
+    let places: Vec<(f64, Vector3<f64>)> = measured.views.iter().filter_map(place).collect();
+    let (way_m, limit_m) = (way(&places), 2.0 * start.semi_axes.max());
+    if way_m > limit_m { Err(Rejection::Moves { way_m, limit_m }) } else { Ok(()) }
+}
+
+/// How far something moves that was in these places at these times: along a line, by least squares.
+fn way(places: &[(f64, Vector3<f64>)]) -> f64 {
+    let (Some((first, _)), Some((last, _))) = (places.first(), places.last()) else { return 0.0 };
+    let n = places.len() as f64;
+    let mean = places.iter().map(|(time, _)| time).sum::<f64>() / n;
+    let square: f64 = places.iter().map(|(time, _)| (time - mean).powi(2)).sum();
+    let sum: Vector3<f64> = places.iter().map(|(time, place)| place * (time - mean)).sum();
+    if square > 0.0 { sum.norm() / square * (last - first) } else { 0.0 }
 }
 
 /// Whether an object has boxes enough, and such as one object has; what an earlier map has needs none.
@@ -97,4 +135,16 @@ pub(crate) fn sound(measured: &Measured, settings: &ObjectSettings) -> Result<()
         return Err(Rejection::BoxDeviation { deviation_px, limit_px: settings.max_box_deviation_px });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_is_that_of_the_line_through_the_places() {
+        let at = |time: f64, x: f64| (time, Vector3::new(x, 0.0, 7.0));
+        assert!((way(&[at(3.0, 1.0), at(4.0, 2.1), at(5.0, 2.9), at(6.0, 4.0)]) - 2.94).abs() < 1e-12);
+        assert_eq!((way(&[]), way(&[at(3.0, 1.0)]), way(&[at(3.0, 1.0), at(3.0, 2.0)])), (0.0, 0.0, 0.0));
+    }
 }

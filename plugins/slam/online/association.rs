@@ -5,7 +5,7 @@ use super::object::Tracked;
 use crate::association::{Map, Merge, Names};
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measurements, ObjectBox};
-use crate::mapping::{box_entry, object_key, pose_key};
+use crate::mapping::{object_key, pose_key, view_entries};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};
@@ -98,7 +98,9 @@ impl Mapper {
     fn push_boxes(&mut self, id: ObjectId, views: &[ObjectBox], report: &mut FrameReport) {
         let mut graph = Graph::new();
         for view in views.iter().filter(|view| self.pose(view.frame).is_some()) {
-            graph.push(box_entry(view, object_key(id), self.camera, &self.settings.detections));
+            let key = object_key(id);
+            let entries = view_entries(view, &key, self.camera, &self.settings.detections);
+            graph.factors_mut().extend(entries);
         }
         match (self.session.push(&graph, &Values::new()), self.objects.get_mut(&id)) {
             (Ok(ids), Some(Tracked::Mapped(mapped))) => mapped.boxes.extend(ids),

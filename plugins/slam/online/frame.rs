@@ -6,7 +6,7 @@ use crate::association::{Image, Learned, Merge};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, ObjectId, Observation};
 use crate::mapping::measurements::{ObjectBox, Sifted, sift};
-use crate::mapping::{box_entry, known_entry, object_key, odometry_entry, pose_key, prior_entry};
+use crate::mapping::{view_entries, known_entry, object_key, odometry_entry, pose_key, prior_entry};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
 use manifactor_geometry::Se3;
@@ -154,8 +154,10 @@ impl Mapper {
         for (id, view) in
             seen.boxes.iter().filter(|(id, _)| self.objects.get(id).is_some_and(Tracked::is_mapped))
         {
-            graph.push(box_entry(view, object_key(*id), self.camera, &self.settings.detections));
-            owners.push(*id);
+            for entry in view_entries(view, &object_key(*id), self.camera, &self.settings.detections) {
+                graph.push(entry);
+                owners.push(*id);
+            }
         }
         let pushed = self.push_frame(&graph, &values, owners, &alone, report);
         pushed?;

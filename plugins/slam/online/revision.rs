@@ -7,7 +7,7 @@ use crate::association::Merge;
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measurements, ObjectBox};
-use crate::mapping::{Rejection, as_candidate, box_entry, object_key, rejection};
+use crate::mapping::{Rejection, as_candidate, object_key, rejection, view_entries};
 use crate::semantics::Candidate;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_online::FactorId;
@@ -107,7 +107,9 @@ impl Mapper {
                     sights.are_enough(measured, degrees) && rejection::sound(measured, settings).is_ok();
                 is_due.then_some(Due::Birth)
             }
-            Tracked::Mapped(mapped) => match rejection::sound(measured, settings) {
+            Tracked::Mapped(mapped) => match rejection::sound(measured, settings).and_then(|()| {
+                rejection::still(measured, |frame| self.pose(frame), &self.camera, &mapped.start)
+            }) {
                 Err(rejection) => Some(Due::Withdrawal(rejection)),
                 Ok(()) if measured.class_name() != mapped.class.as_deref() => {
                     Some(Due::Revision(measured.class_name().map(str::to_owned)))
@@ -198,8 +200,8 @@ impl Mapper {
         let key = object_key(id);
         let settings = Arc::clone(&self.settings);
         let there = views.iter().filter(|view| self.pose(view.frame).is_some());
-        let boxes: Vec<FactorEntry> =
-            there.map(|view| box_entry(view, key.clone(), self.camera, &settings.detections)).collect();
+        let entries = |view| view_entries(view, &key, self.camera, &settings.detections);
+        let boxes: Vec<FactorEntry> = there.flat_map(entries).collect();
         let before = self.ledger.clone();
         let mut all = self.candidates();
         if let Some(measured) = self.measured(id) {

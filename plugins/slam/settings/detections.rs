@@ -1,6 +1,6 @@
 use super::poses::{every_row, noise_of};
 use manifactor_graph::Noise;
-use manifactor_graph::checked::{not_negative, within};
+use manifactor_graph::checked::{not_negative, positive, within};
 use manifactor_graph::loss::Loss;
 use manifactor_quadric::BoxModel;
 use schemars::JsonSchema;
@@ -29,6 +29,10 @@ pub struct DetectionSettings {
     #[serde(deserialize_with = "within::<0, 1, _>")]
     #[schemars(range(min = 0, max = 1))]
     pub min_score: f64,
+    /// Standard deviation of depths, where the source has any, as a part of the depth.
+    #[serde(deserialize_with = "positive")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub depth_error: f64,
 }
 
 /// What becomes of a box that the border of the image cuts.
@@ -77,6 +81,7 @@ impl Default for DetectionSettings {
             cut_sides: CutSides::Drop,
             border_px: 20.0,
             min_score: 0.0,
+            depth_error: 0.03,
         }
     }
 }

@@ -249,6 +249,7 @@ fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
         object: Some(ObjectId(id)),
         scores: ClassScores::single("cup", 0.5),
         // a square of it is infinite
+        depth: None,
         bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
     };
     let measured = mapper.measurements().clone();

@@ -4,8 +4,9 @@
 //! axes of about the same length, a rotation not far from that of the first camera.
 use super::sightings::Sighting;
 use manifactor_geometry::Se3;
+use manifactor_graph::checked::Positive;
 use manifactor_graph::{Manifold, Residual};
-use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric, QuadricPrior};
+use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, CentroidDepth, DualQuadric, QuadricPrior};
 use nalgebra::{Cholesky, SMatrix, SVector, Vector3, Vector4};
 
 type Matrix9 = SMatrix<f64, 9, 9>;
@@ -18,6 +19,8 @@ pub(super) struct BoxNoise {
     pub px: f64,
     /// As a part of width and height.
     pub of_size: f64,
+    /// Of a depth, as a part of it.
+    pub of_depth: f64,
 }
 
 /// What is believed of an object beside its boxes.
@@ -69,10 +72,10 @@ const WIDTH: f64 = 9.0;
 const LOST: f64 = 40.0;
 
 impl BoxNoise {
-    /// Standard deviations of the sides.
-    pub(super) fn deviations(&self, b: &BoundingBox) -> [f64; 4] {
+    /// Standard deviations of the sides and of the depth, which is infinite where that was not measured.
+    pub(super) fn deviations(&self, b: &BoundingBox, depth: Option<f64>) -> SVector<f64, ROWS> {
         let (x, y) = (self.px.hypot(self.of_size * b.width()), self.px.hypot(self.of_size * b.height()));
-        [x, y, x, y]
+        [x, y, x, y, depth.map_or(f64::INFINITY, |depth| self.of_depth * depth)].into()
     }
 }
 
@@ -143,12 +146,19 @@ impl FirstSight {
     }
 }
 
-/// What a camera sees of an ellipsoid, with the derivative by its tangent and by that of the pose.
+/// What a camera sees of an ellipsoid: the sides of its box, and the depth of its centre; with the derivatives by its tangent and by that
+/// of the pose.
 pub(super) struct Predicted {
     pub bounding_box: BoundingBox,
-    pub by_pose: SMatrix<f64, 4, 6>,
-    pub by_quadric: SMatrix<f64, 4, 9>,
+    pub depth: f64,
+    pub by_pose: SMatrix<f64, ROWS, 6>,
+    pub by_quadric: SMatrix<f64, ROWS, 9>,
 }
+
+/// Four sides and a depth.
+pub(super) const ROWS: usize = 5;
+/// The row of the depth.
+pub(super) const DEPTH: usize = 4;
 
 /// Predicts a box; `None` where nothing of the object is in the image.
 pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Option<Predicted> {
@@ -160,7 +170,15 @@ pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Opt
     let mut jacobians = (SMatrix::zeros(), SMatrix::zeros());
     let b = factor.linearize((pose, quadric), &[true; 15], &mut jacobians);
     let bounding_box = BoundingBox::new(b.into()).ok()?;
-    Some(Predicted { bounding_box, by_pose: jacobians.0, by_quadric: jacobians.1 })
+    let mut by_depth = (SMatrix::zeros(), SMatrix::zeros());
+    let away = CentroidDepth { depth: Positive::literal(1.0) };
+    let depth = away.linearize((pose, quadric), &[true; 15], &mut by_depth).x + 1.0;
+    let (mut by_pose, mut by_quadric) = (SMatrix::<f64, ROWS, 6>::zeros(), SMatrix::<f64, ROWS, 9>::zeros());
+    by_pose.fixed_rows_mut::<DEPTH>(0).copy_from(&jacobians.0);
+    by_pose.set_row(DEPTH, &by_depth.0);
+    by_quadric.fixed_rows_mut::<DEPTH>(0).copy_from(&jacobians.1);
+    by_quadric.set_row(DEPTH, &by_depth.1);
+    Some(Predicted { bounding_box, depth, by_pose, by_quadric })
 }
 
 /// The ellipsoid that fits best, reached from `start`; `None` where it is not determined.
@@ -226,16 +244,24 @@ impl System {
     }
 }
 
-/// The errors of a box's sides and their derivatives, in standard deviations; `None` where the ellipsoid has no box there.
+impl Predicted {
+    /// How far off the sides and the depth are from what was seen.
+    pub(super) fn error(&self, b: &BoundingBox, depth: Option<f64>) -> SVector<f64, ROWS> {
+        let sides = Vector4::from(self.bounding_box.bounds()) - Vector4::from(b.bounds());
+        sides.push(depth.map_or(0.0, |depth| self.depth - depth))
+    }
+}
+
+/// The errors of a box's sides and of its depth, and their derivatives, in standard deviations; `None` where the ellipsoid has no box there.
 fn whiten(
     quadric: &DualQuadric,
     seen: &Sighting,
     camera: &Camera,
     noise: &BoxNoise,
-) -> Option<(Vector4<f64>, SMatrix<f64, 4, 9>)> {
+) -> Option<(SVector<f64, ROWS>, SMatrix<f64, ROWS, 9>)> {
     let predicted = predict(&seen.world_from_camera, quadric, camera)?;
-    let weights = Vector4::from(noise.deviations(&seen.bounding_box)).map(|sigma| 1.0 / sigma);
-    let error = Vector4::from(predicted.bounding_box.bounds()) - Vector4::from(seen.bounding_box.bounds());
+    let error = predicted.error(&seen.bounding_box, seen.depth);
+    let weights = noise.deviations(&seen.bounding_box, seen.depth).map(|sigma| 1.0 / sigma);
     Some((error.component_mul(&weights), SMatrix::from_diagonal(&weights) * predicted.by_quadric))
 }
 
@@ -257,13 +283,13 @@ mod tests {
 
     const CAMERA: Camera =
         Camera { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
-    const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02 };
+    const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02, of_depth: 0.03 };
 
     /// A camera at x metres to the right that looks ahead.
     fn seen(x: f64, frame: usize, quadric: &DualQuadric) -> Sighting {
         let world_from_camera = Se3 { translation: Vector3::x() * x, ..Se3::identity() };
         let bounding_box = predict(&world_from_camera, quadric, &CAMERA).unwrap().bounding_box;
-        Sighting { frame, world_from_camera, bounding_box }
+        Sighting { frame, world_from_camera, bounding_box, depth: None }
     }
 
     fn ball(z: f64) -> DualQuadric {

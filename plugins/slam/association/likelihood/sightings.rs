@@ -10,6 +10,15 @@ pub(super) struct Sighting {
     pub frame: usize,
     pub world_from_camera: Se3,
     pub bounding_box: BoundingBox,
+    /// How far away its centre is along the optical axis, in metres, where that was measured.
+    pub depth: Option<f64>,
+}
+
+impl Sighting {
+    /// How many numbers it measures.
+    pub(super) fn rows(&self) -> usize {
+        4 + usize::from(self.depth.is_some())
+    }
 }
 
 /// A few sightings from all sides, the last among them.

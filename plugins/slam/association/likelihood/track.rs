@@ -1,7 +1,7 @@
 //! One object, as far as it is known.
 use super::super::Map;
 use super::Likelihood;
-use super::fit::{Belief, BoxNoise, Fitted, fit, predict};
+use super::fit::{Belief, BoxNoise, DEPTH, Fitted, Predicted, ROWS, fit, predict};
 use super::sightings::{Sighting, Sightings};
 use crate::input::class::Aliases;
 use crate::input::prior_map::PriorObject;
@@ -9,7 +9,7 @@ use crate::input::sequence::{ClassScores, ObjectId};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
-use nalgebra::{Cholesky, Matrix3, Matrix4, Matrix6, Vector4, Vector6};
+use nalgebra::{Cholesky, Matrix3, Matrix6, SMatrix, SVector, Vector6};
 use std::f64::consts::TAU;
 
 /// An object.
@@ -29,11 +29,11 @@ pub(super) struct Track {
     pub next_look: usize,
 }
 
-/// The box that is expected of an object, and how far it may be off.
+/// The box that is expected of an object and its depth, and how far these may be off.
 pub(super) struct Expected {
-    pub bounding_box: BoundingBox,
-    /// Of the sides, in square pixels.
-    covariance: Matrix4<f64>,
+    predicted: Predicted,
+    /// Of the sides, in pixels, and the depth, in metres.
+    covariance: SMatrix<f64, ROWS, ROWS>,
 }
 
 /// Boxes that an object has when it is first compared with others.
@@ -129,12 +129,10 @@ impl Track {
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
         let by_drift = predicted.by_pose * Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
         let by_quadric = predicted.by_quadric * self.fitted.covariance * predicted.by_quadric.transpose();
-        let sigma = Vector4::from(settings.noise().deviations(&predicted.bounding_box)) * settings.lasting;
-        let by_detector = Matrix4::from_diagonal(&sigma.component_mul(&sigma));
-        Some(Expected {
-            bounding_box: predicted.bounding_box,
-            covariance: by_quadric + by_drift + by_detector,
-        })
+        let noise = settings.noise();
+        let sigma = noise.deviations(&predicted.bounding_box, Some(predicted.depth)) * settings.lasting;
+        let by_detector = SMatrix::from_diagonal(&sigma.component_mul(&sigma));
+        Some(Expected { predicted, covariance: by_quadric + by_drift + by_detector })
     }
 
     /// Intersection over union of a box with that of its ellipsoid.
@@ -171,10 +169,24 @@ impl Track {
 }
 
 impl Expected {
-    /// What a box costs: d² + ln det 2πS.
-    pub(super) fn cost(&self, b: &BoundingBox) -> f64 {
-        let error = Vector4::from(b.bounds()) - Vector4::from(self.bounding_box.bounds());
-        let Some(factor) = Cholesky::new(self.covariance) else { return f64::INFINITY };
-        error.dot(&factor.solve(&error)) + factor.ln_determinant() + 4.0 * TAU.ln()
+    /// The box alone.
+    pub(super) fn bounding_box(&self) -> &BoundingBox {
+        &self.predicted.bounding_box
     }
+
+    /// What a box costs, with its depth, where it has one: d² + ln det 2πS.
+    pub(super) fn cost(&self, b: &BoundingBox, depth: Option<f64>) -> f64 {
+        let error = self.predicted.error(b, depth);
+        let sides = (error.fixed_rows::<DEPTH>(0), self.covariance.fixed_view::<DEPTH, DEPTH>(0, 0));
+        match depth {
+            Some(_) => cost(error, self.covariance),
+            None => cost(sides.0.into_owned(), sides.1.into_owned()),
+        }
+    }
+}
+
+/// d² + ln det 2πS.
+fn cost<const N: usize>(error: SVector<f64, N>, covariance: SMatrix<f64, N, N>) -> f64 {
+    let Some(factor) = Cholesky::new(covariance) else { return f64::INFINITY };
+    error.dot(&factor.solve(&error)) + factor.ln_determinant() + N as f64 * TAU.ln()
 }

@@ -73,6 +73,7 @@ impl Associator for Tracker {
                 frame: image.frame,
                 world_from_camera: pose,
                 bounding_box: detection.bounding_box,
+                depth: detection.depth,
             };
             let Some(t) = self.track(id, &sighting, usual) else { continue };
             self.tracks[t].vote(&detection.scores, &self.aliases);
@@ -132,7 +133,7 @@ impl Tracker {
         boxes: &[usize],
         pose: &Se3,
     ) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
-        let new = self.settings.cost_of_new(&self.camera);
+        let usual = self.usual_depth(pose);
         let class =
             |i: &usize| image.detections[*i].scores.best().map(|(class, _)| self.aliases.canonical(class));
         let classes: Vec<Option<String>> = boxes.iter().map(class).collect();
@@ -146,12 +147,13 @@ impl Tracker {
             };
             let before = gains.len();
             for (row, i) in boxes.iter().enumerate() {
-                let b = &image.detections[*i].bounding_box;
-                if !b.intersects(&expected.bounding_box) {
+                let detection = &image.detections[*i];
+                if !detection.bounding_box.intersects(expected.bounding_box()) {
                     continue;
                 }
+                let new = self.settings.cost_of_new(&self.camera, detection.depth, usual);
                 let share = classes[row].as_deref().map_or(1.0, |class| track.share(class));
-                let cost = expected.cost(b) - 2.0 * self.settings.likelihood(share).ln();
+                let cost = expected.cost(&detection.bounding_box, detection.depth) - 2.0 * self.settings.likelihood(share).ln();
                 if cost < new {
                     gains.push((row, tracks.len(), new - cost));
                 }
@@ -178,7 +180,10 @@ impl Tracker {
     fn track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
         let known = self.tracks.iter().position(|track| track.id == id);
         known.or_else(|| {
-            let belief = Belief::new(first, &self.camera, depth, self.settings.depth_spread);
+            let belief = match first.depth {
+                Some(depth) => Belief::new(first, &self.camera, depth, self.settings.depth_error),
+                None => Belief::new(first, &self.camera, depth, self.settings.depth_spread),
+            };
             self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);
             Some(self.tracks.len() - 1)
         })

@@ -104,7 +104,8 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
     let error_of = |sightings: &Sightings| {
         let error = |seen: &Sighting| squared_error(&fitted.quadric, seen, camera, &noise);
         let all = sightings.all();
-        all.iter().map(error).sum::<f64>() / (4 * all.len().max(1)) as f64
+        let rows: usize = all.iter().map(Sighting::rows).sum();
+        all.iter().map(error).sum::<f64>() / rows.max(1) as f64
     };
     let error = error_of(&more.sightings).max(error_of(&fewer.sightings));
     let limit = match alike(more, fewer) {

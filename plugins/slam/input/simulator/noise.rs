@@ -2,6 +2,7 @@
 use crate::input::sequence::ClassScores;
 use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
+use manifactor_graph::checked::Positive;
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::{Vector3, Vector6};
 use rand::RngExt;
@@ -132,6 +133,9 @@ pub struct Detector {
     pub misclassified: f64,
     /// Rate at which a box has another class than the object's usual.
     pub confused: f64,
+    /// Standard deviation of the depths of objects' centres that come with their boxes, as a part of the depth. Default: none come.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth_error: Option<Positive>,
 }
 
 impl Default for Detector {
@@ -150,6 +154,7 @@ impl Default for Detector {
             wrong_object: 0.0,
             misclassified: 0.0,
             confused: 0.0,
+            depth_error: None,
         }
     }
 }
@@ -197,6 +202,12 @@ impl Detector {
 }
 
 impl Detector {
+    /// What is measured of a depth, in metres, if it is at all; of what is behind the camera nothing is.
+    pub(super) fn measure(&self, depth: f64, rng: &mut Pcg64) -> Option<f64> {
+        let error = self.depth_error?.get() * normal(rng);
+        Some(depth * (1.0 + error)).filter(|measured| *measured > 0.0)
+    }
+
     /// Boxes of nothing in an image.
     pub(super) fn imagine(
         &self,

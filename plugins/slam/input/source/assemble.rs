@@ -64,6 +64,7 @@ fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, Sou
         object: row.object_key.filter(|key| *key != 0).map(ObjectId),
         scores,
         bounding_box: BoundingBox { xmin: row.xmin, ymin: row.ymin, xmax: row.xmax, ymax: row.ymax },
+        depth: row.depth,
     })
 }
 

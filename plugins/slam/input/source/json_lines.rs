@@ -7,7 +7,7 @@ use crate::input::stream::Stream;
 use indexmap::IndexMap;
 use manifactor_formats::FormatError;
 use manifactor_geometry::Se3;
-use manifactor_graph::checked::within;
+use manifactor_graph::checked::{Positive, within};
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::BoundingBox;
 use nalgebra::Vector3;
@@ -22,7 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 ///
 /// A line has the time, the pose by odometry (from the camera's frame, z forward, to a world of its own choice), and the boxes,
 /// each with a class and its score, or with the scores of several. What else it may have: `object`, where somebody knows which
-/// one it is, and readings of an accelerometer since the line before.
+/// one it is, `depth`, where somebody has measured how far away its centre is, in metres along the optical axis, and readings of an accelerometer since the line before.
 ///
 /// ```json
 /// {"timestamp": 0.1, "pose": {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}, "boxes": [{"box": [10.0, 20.0, 90.0, 80.0], "class": "cup", "score": 0.8}]}
@@ -75,6 +75,8 @@ struct LineBox {
     scores: IndexMap<String, f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     object: Option<ObjectId>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    depth: Option<Positive>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -104,6 +106,7 @@ pub fn line(observation: &Observation) -> String {
             score: single.as_ref().map_or(1.0, |(_, score)| *score),
             class: single.map(|(class, _)| class),
             object: detection.object,
+            depth: detection.depth.and_then(|depth| Positive::new(depth).ok()),
         }
     };
     let of_reading = |r: &Acceleration| Reading { timestamp: r.timestamp, acceleration: r.acceleration };
@@ -136,7 +139,8 @@ impl From<Line> for Observation {
         let of_box = |b: LineBox| {
             let single = b.class.map(|class| (class, b.score));
             let scores: ClassScores = b.scores.into_iter().chain(single).collect();
-            Detection { frame: 0, object: b.object, scores, bounding_box: b.bounding_box }
+            let (bounding_box, depth) = (b.bounding_box, b.depth.map(Positive::get));
+            Detection { frame: 0, object: b.object, scores, bounding_box, depth }
         };
         let of_reading = |r: Reading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
         Self {
