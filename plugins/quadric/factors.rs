@@ -1,11 +1,13 @@
 //! What is known of an ellipsoid: its box in an image, its orientation, its size.
 mod bounding_box;
+mod bounding_box_offset;
 mod orientation;
 mod quadric_prior;
 mod shape_prior;
 mod size_prior;
 
 pub use bounding_box::{BoundingBoxFactor, BoxModel};
+pub use bounding_box_offset::BoundingBoxOffset;
 pub use orientation::{
     HorizontalOrientation, HorizontalOrientationSmooth, VerticalOrientation, VerticalOrientationSmooth,
 };

@@ -6,7 +6,7 @@ mod shapes;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
-pub use factors::{BoundingBoxFactor, BoxModel, QuadricPrior, ShapePrior, SizePrior};
+pub use factors::{BoundingBoxFactor, BoundingBoxOffset, BoxModel, QuadricPrior, ShapePrior, SizePrior};
 pub use factors::{
     HorizontalOrientation, HorizontalOrientationSmooth, VerticalOrientation, VerticalOrientationSmooth,
 };

@@ -163,11 +163,14 @@ impl Estimate {
             settled = components.len() + 1 >= variance.rounds.get()
                 || components.last().is_some_and(|before| found.change(before) < variance.tolerance);
             found.apply(&mut estimate.mapping, variance, loss)?;
-            components.push(found);
-            let Self { sequence, mapping, mut solution, .. } = estimate;
-            let values = std::mem::take(&mut solution.values);
+            let Self { sequence, mut mapping, mut solution, .. } = estimate;
+            let mut values = std::mem::take(&mut solution.values);
             // what was compiled for it gives its memory back before the next solve
             drop(solution);
+            if settled && variance.lasting {
+                found.add_offsets(&mut mapping, &mut values, &sequence, variance, loss)?;
+            }
+            components.push(found);
             // near enough to go on from, until the last
             let refinements = if settled { most } else { 0 };
             estimate = Self::solve(sequence, mapping, values, refinements, settings, observer)?;

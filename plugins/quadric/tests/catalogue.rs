@@ -14,6 +14,7 @@ fn every_entry_is_documented() {
         names,
         [
             "bounding_box",
+            "bounding_box_offset",
             "horizontal_orientation",
             "horizontal_orientation_smooth",
             "prior_quadric",

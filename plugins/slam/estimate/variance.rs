@@ -8,10 +8,12 @@ mod boxes;
 mod components;
 mod correlation;
 mod cross_validation;
+mod lasting;
 mod motion;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
 pub use boxes::BoxComponent;
 pub use components::{Components, VarianceError};
 pub use cross_validation::Score;
+pub use lasting::LastingComponent;
 pub use motion::{MotionChoice, MotionComponent};

@@ -43,7 +43,8 @@ impl OwnGraph {
 
 fn is_of_the_map(key: &str) -> bool {
     let number = key.strip_prefix('x').or_else(|| key.strip_prefix('q')).unwrap_or_default();
-    !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())
+    // an object's offsets have a number of their own
+    number.split("_offset").all(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// As documents write it; nothing at all, where there is nothing.

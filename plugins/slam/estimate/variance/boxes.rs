@@ -1,5 +1,6 @@
 //! The noise of boxes: how large it is, how it grows with them, how it differs by object, and how long it lasts.
 use super::correlation::autocorrelation_time;
+use super::lasting::{LastingComponent, lasting};
 use super::{BoxGroups, VarianceSettings};
 use crate::mapping::{MappedObject, Mapping};
 use indexmap::IndexMap;
@@ -21,6 +22,9 @@ pub struct BoxComponent {
     pub correlation_time: f64,
     /// What the graph is given: √(correlation_time) · σ, for a box of the mean size.
     pub effective_px: f64,
+    /// What has offsets of its own in the last solve, in place of the correlation time; `None` where that is not asked for, or nothing lasts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lasting: Option<LastingComponent>,
 }
 
 /// Half of all normal deviates are below this.
@@ -40,7 +44,7 @@ impl BoxComponent {
     /// `size` is the mean size of boxes, in pixels.
     pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, size: f64) -> Self {
         let effective_px = sigma_px.hypot(of_size * size) * correlation_time.sqrt();
-        Self { sigma_px, of_size, correlation_time, effective_px }
+        Self { sigma_px, of_size, correlation_time, effective_px, lasting: None }
     }
 
     /// The same, larger by a factor.
@@ -60,7 +64,8 @@ impl BoxComponent {
         }
     }
 
-    fn at(&self, size: f64) -> f64 {
+    /// Of a side of a box of this extent: what does not last and what does.
+    pub(super) fn at(&self, size: f64) -> f64 {
         self.sigma_px.hypot(self.of_size * size)
     }
 }
@@ -81,6 +86,8 @@ struct SideError {
     error: f64,
     /// The box's width, for a left or right side, or its height; 0 where that is not known.
     size: f64,
+    /// In seconds.
+    time: f64,
 }
 
 impl Errors {
@@ -91,13 +98,14 @@ impl Errors {
         leverage: &[f64],
         observed: Option<&[bool]>,
         size: [f64; 2],
+        time: f64,
     ) {
         for (side, errors) in self.0.iter_mut().enumerate() {
             let seen = observed.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
             let redundancy = 1.0 - leverage.get(side).copied().unwrap_or(1.0);
             if let (true, Some(residual)) = (seen && redundancy > LEAST_REDUNDANCY, state.residual.get(side))
             {
-                errors.push(SideError { error: residual / redundancy.sqrt(), size: size[side % 2] });
+                errors.push(SideError { error: residual / redundancy.sqrt(), size: size[side % 2], time });
             }
         }
     }
@@ -188,13 +196,16 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
         return Some(one);
     }
     // gross errors are detections of something else, and not what lasts
-    let within = |errors: &&[SideError]| -> Vec<f64> {
+    let within = |errors: &&[SideError]| -> Vec<(f64, f64)> {
         let within = errors.iter().filter(|e| e.error.abs() < 3.0 * one.at(e.size));
         // what does not grow is in pixels as it was: the same bits
-        within.map(|e| if of_size > 0.0 { e.error / one.at(e.size) } else { e.error }).collect()
+        within.map(|e| (e.time, if of_size > 0.0 { e.error / one.at(e.size) } else { e.error })).collect()
     };
-    let within: Vec<Vec<f64>> = series.iter().map(within).collect();
-    Some(BoxComponent::of(sigma_px, of_size, autocorrelation_time(&within), size))
+    let within: Vec<Vec<(f64, f64)>> = series.iter().map(within).collect();
+    let errors: Vec<Vec<f64>> =
+        within.iter().map(|series| series.iter().map(|(_, error)| *error).collect()).collect();
+    let component = BoxComponent::of(sigma_px, of_size, autocorrelation_time(&errors), size);
+    Some(BoxComponent { lasting: settings.lasting.then(|| lasting(&within)).flatten(), ..component })
 }
 
 /// What does not grow, and what grows with size: σ² = σ₀² + κ² size², by medians over parts of like size. `None` for too few.
@@ -242,7 +253,7 @@ mod tests {
         let one = |_| {
             let size: f64 = rng.random_range(20.0..300.0);
             let deviate: f64 = StandardNormal.sample(&mut rng);
-            SideError { error: deviate * sigma.hypot(of_size * size), size }
+            SideError { error: deviate * sigma.hypot(of_size * size), size, time: 0.0 }
         };
         (0..count).map(one).collect()
     }

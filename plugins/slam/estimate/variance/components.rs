@@ -4,7 +4,8 @@ use super::cross_validation::CrossValidation;
 use super::motion::{self, MotionChoice};
 use super::{BoxGroups, VarianceSettings};
 use crate::estimate::Estimate;
-use crate::mapping::Mapping;
+use crate::input::sequence::Sequence;
+use crate::mapping::{Mapping, pose_key};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotPositive, Positive};
@@ -79,13 +80,15 @@ impl Components {
     ) -> Result<Self, VarianceError> {
         let graph = &estimate.mapping.graph;
         let leverages = estimate.solution.leverages(graph)?;
+        let times = times(&estimate.sequence);
         let mut boxes: IndexMap<Key, Errors> = IndexMap::new();
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
             // factors are in the order of the graph: an object's boxes in the order of their frames
             if let Measures::Box { object } = measures(entry) {
                 let size = boxes::size(entry).unwrap_or_default();
-                boxes.entry(object).or_default().add(state, leverage, entry.noise.observed(), size);
+                let time = entry.keys.first().and_then(|pose| times.get(pose)).copied().unwrap_or_default();
+                boxes.entry(object).or_default().add(state, leverage, entry.noise.observed(), size, time);
             }
         }
         let mut found =
@@ -152,6 +155,11 @@ impl Components {
         });
         boxes.map(|(now, before)| (now / before).ln().abs()).fold(0.0, f64::max)
     }
+}
+
+/// When each pose was, in seconds.
+pub(super) fn times(sequence: &Sequence) -> HashMap<Key, f64> {
+    sequence.frames.iter().enumerate().map(|(i, frame)| (pose_key(i), frame.timestamp)).collect()
 }
 
 pub(super) fn measures(entry: &FactorEntry) -> Measures {
