@@ -146,7 +146,7 @@ impl Estimate {
     pub(crate) fn from_start(
         sequence: Arc<Sequence>,
         mut mapping: Mapping,
-        start: Values,
+        mut start: Values,
         settings: &Settings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
@@ -154,7 +154,8 @@ impl Estimate {
         let Some(variance) = &settings.variance_components else {
             return Ok(Self::solve(sequence, mapping, start, most, settings, observer)?);
         };
-        Components::begin(&mapping, variance).apply(&mut mapping, variance, loss)?;
+        let begin = Components::begin(&mapping, variance);
+        begin.apply(&mut mapping, &mut start, &sequence, variance, loss)?;
         let mut estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
         let (mut components, mut settled): (Vec<Components>, bool) = (vec![], false);
         let interrupted = |of: &Self| of.solution.outcome.termination == Termination::Interrupted;
@@ -162,14 +163,11 @@ impl Estimate {
             let found = Components::of(&estimate, variance, loss, observer)?;
             settled = components.len() + 1 >= variance.rounds.get()
                 || components.last().is_some_and(|before| found.change(before) < variance.tolerance);
-            found.apply(&mut estimate.mapping, variance, loss)?;
             let Self { sequence, mut mapping, mut solution, .. } = estimate;
             let mut values = std::mem::take(&mut solution.values);
             // what was compiled for it gives its memory back before the next solve
             drop(solution);
-            if settled && variance.lasting {
-                found.add_offsets(&mut mapping, &mut values, &sequence, variance, loss)?;
-            }
+            found.apply(&mut mapping, &mut values, &sequence, variance, loss)?;
             components.push(found);
             // near enough to go on from, until the last
             let refinements = if settled { most } else { 0 };

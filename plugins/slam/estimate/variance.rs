@@ -10,6 +10,7 @@ mod correlation;
 mod cross_validation;
 mod lasting;
 mod motion;
+mod offsets;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
 pub use boxes::BoxComponent;

@@ -22,7 +22,7 @@ pub struct VarianceSettings {
     /// way in image after image, and no ellipsoid has the outline of a chair. τ such boxes say as much as one alone,
     /// τ their integrated autocorrelation time, so their standard deviation is √τ times as large.
     pub correlation: bool,
-    /// Whether what lasts of the errors becomes variables, in place of a larger standard deviation: in the last solve an object's boxes share
+    /// Whether what lasts of the errors becomes variables, in place of a larger standard deviation: an object's boxes share
     /// offsets of their four sides, which change slowly. How large these are, and for how long they last, is estimated as well.
     pub lasting: bool,
     /// Whether the noise of odometry is estimated; it stays as it is given, otherwise, and with fewer than four objects.

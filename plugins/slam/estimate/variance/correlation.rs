@@ -1,7 +1,7 @@
 //! How long errors last.
 
 /// The longest lag that is looked at.
-pub(super) const LONGEST: usize = 300;
+const LONGEST: usize = 300;
 /// A window of this many times τ (Sokal, Monte Carlo Methods in Statistical Mechanics, 1996).
 const WINDOW: f64 = 5.0;
 
