@@ -2,7 +2,7 @@
 //!
 //! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
 //! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
-//! semantic rules say of it; last, variables and factors of the document's own.
+//! semantic rules say of it; last, variables and factors of the document's own. Offsets of boxes, where they are asked for, come with their noise.
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::fusion::FusedClass;
 use crate::input::prior_map::PriorObject;

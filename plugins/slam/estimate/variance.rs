@@ -4,6 +4,8 @@
 //! The noise of *boxes* is that of their residuals: one of standard deviation σ has variance σ²(1 - h) at the estimate, h its leverage
 //! (Helmert; Förstner, *Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten*, 1979). The noise of *odometry* is the one
 //! that leads to the trajectory which suits objects best that had no part in it.
+//!
+//! The errors of boxes last. They have a standard deviation that is larger for it, or variables of their own for what lasts, where that is asked for.
 mod boxes;
 mod components;
 mod correlation;

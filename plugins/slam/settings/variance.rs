@@ -24,6 +24,9 @@ pub struct VarianceSettings {
     pub correlation: bool,
     /// Whether what lasts of the errors becomes variables, in place of a larger standard deviation: an object's boxes share
     /// offsets of their four sides, which change slowly. How large these are, and for how long they last, is estimated as well.
+    // not written where it is off: what experiments made before is not stale
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("default" = false))]
     pub lasting: bool,
     /// Whether the noise of odometry is estimated; it stays as it is given, otherwise, and with fewer than four objects.
     pub odometry: bool,
