@@ -93,12 +93,13 @@ fn boxes_that_last_get_their_loss_in_units_of_one_box() {
     }
 }
 
-/// An estimate with offsets where the noise of the detector lasts so long, in seconds.
+/// An estimate with offsets where the noise of the detector lasts so long, in seconds. Odometry is right: what it gets wrong lasts as well.
 fn with_offsets(seconds: f64) -> Estimate {
     let text = format!(
         "
         source = {{ type = 'simulated', scene = {{ objects = 5, classes = ['sports ball'] }}, trajectory = {{ frames = 60 }},
-                   detector = {{ sigma_px = 4.0, noise_lasts_s = {seconds} }} }}
+                   detector = {{ sigma_px = 4.0, noise_lasts_s = {seconds} }},
+                   odometry = {{ translation = 1e-5, rotation = 1e-5 }} }}
         objects = {{ refinements = 0 }}
         variance_components = {{ lasting = true, odometry = false }}
         odometry = {{ noise = {{ sigma = 0.001 }} }}"
