@@ -4,7 +4,7 @@ pub mod refine;
 pub mod variance;
 
 use crate::estimate::refine::Refiner;
-use crate::estimate::variance::{Components, VarianceError};
+use crate::estimate::variance::{Components, VarianceError, VarianceSettings};
 use crate::input::sequence::{Sequence, TrueObject};
 use crate::mapping::{MappedObject, Mapping, pose_key};
 use crate::settings::Settings;
@@ -146,7 +146,7 @@ impl Estimate {
     pub(crate) fn from_start(
         sequence: Arc<Sequence>,
         mut mapping: Mapping,
-        start: Values,
+        mut start: Values,
         settings: &Settings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
@@ -154,26 +154,44 @@ impl Estimate {
         let Some(variance) = &settings.variance_components else {
             return Ok(Self::solve(sequence, mapping, start, most, settings, observer)?);
         };
-        Components::begin(&mapping, variance).apply(&mut mapping, variance, loss)?;
+        let begin = Components::begin(&mapping, variance);
+        begin.apply(&mut mapping, &mut start, &sequence, variance, loss)?;
         let mut estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-        let (mut components, mut settled): (Vec<Components>, bool) = (vec![], false);
-        let interrupted = |of: &Self| of.solution.outcome.termination == Termination::Interrupted;
-        while !(settled || interrupted(&estimate) || estimate.mapping.mapped().next().is_none()) {
-            let found = Components::of(&estimate, variance, loss, observer)?;
-            settled = components.len() + 1 >= variance.rounds.get()
-                || components.last().is_some_and(|before| found.change(before) < variance.tolerance);
-            found.apply(&mut estimate.mapping, variance, loss)?;
-            components.push(found);
-            let Self { sequence, mapping, mut solution, .. } = estimate;
-            let values = std::mem::take(&mut solution.values);
-            // what was compiled for it gives its memory back before the next solve
-            drop(solution);
-            // near enough to go on from, until the last
-            let refinements = if settled { most } else { 0 };
-            estimate = Self::solve(sequence, mapping, values, refinements, settings, observer)?;
-            estimate.components.clone_from(&components);
+        // offsets would take up what a trajectory gets wrong whose noise is not known yet
+        for lasting in [false, true].into_iter().filter(|lasting| variance.lasting || !lasting) {
+            let variance = VarianceSettings { lasting, ..variance.clone() };
+            estimate = estimate.with_noise(&variance, settings, observer)?;
         }
         Ok(estimate)
+    }
+
+    /// Estimates the noise and solves, by turns.
+    fn with_noise(
+        mut self,
+        variance: &VarianceSettings,
+        settings: &Settings,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, EstimateError> {
+        let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
+        let (mut rounds, mut settled) = (0, false);
+        let interrupted = |of: &Self| of.solution.outcome.termination == Termination::Interrupted;
+        while !(settled || interrupted(&self) || self.mapping.mapped().next().is_none()) {
+            let found = Components::of(&self, variance, loss, observer)?;
+            rounds += 1;
+            settled = rounds >= variance.rounds.get()
+                || self.components.last().is_some_and(|before| found.change(before) < variance.tolerance);
+            let Self { sequence, mut mapping, mut solution, mut components, .. } = self;
+            let mut values = std::mem::take(&mut solution.values);
+            // what was compiled for it gives its memory back before the next solve
+            drop(solution);
+            found.apply(&mut mapping, &mut values, &sequence, variance, loss)?;
+            components.push(found);
+            // near enough to go on from, until the last
+            let refinements = if settled { most } else { 0 };
+            let solved = Self::solve(sequence, mapping, values, refinements, settings, observer)?;
+            self = Self { components, ..solved };
+        }
+        Ok(self)
     }
 
     /// Solves once, from `values`, with at most this number of refinements.

@@ -2,7 +2,7 @@
 //!
 //! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
 //! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
-//! semantic rules say of it; last, variables and factors of the document's own.
+//! semantic rules say of it; last, variables and factors of the document's own. Offsets of boxes, where they are asked for, come with their noise.
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::fusion::FusedClass;
 use crate::input::prior_map::PriorObject;
@@ -89,6 +89,21 @@ pub(crate) fn pose_key(frame: usize) -> Key {
 /// The key of an object.
 pub fn object_key(id: ObjectId) -> Key {
     Key::indexed("q", id)
+}
+
+/// What is between the key of an object and the number of an interval.
+const OFFSET: &str = "_offset";
+
+/// The key of the offset that boxes of an object share in an interval; see [`variance`](crate::estimate::variance).
+pub(crate) fn offset_key(object: &Key, interval: usize) -> Key {
+    Key::indexed(&format!("{object}{OFFSET}"), interval)
+}
+
+/// The object whose boxes share an offset; `None` for the key of anything else.
+pub(crate) fn offset_owner(key: &Key) -> Option<&str> {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let (object, interval) = key.as_str().split_once(OFFSET)?;
+    (is_number(object.strip_prefix('q')?) && is_number(interval)).then_some(object)
 }
 
 impl Mapping {
@@ -298,12 +313,7 @@ pub(crate) fn view_entries(
 }
 
 /// The factor of a box.
-fn box_entry(
-    view: &ObjectBox,
-    object: Key,
-    camera: Camera,
-    settings: &DetectionSettings,
-) -> FactorEntry {
+fn box_entry(view: &ObjectBox, object: Key, camera: Camera, settings: &DetectionSettings) -> FactorEntry {
     let (bounding_box, model) = (view.bounding_box, settings.model);
     FactorEntry {
         keys: vec![pose_key(view.frame), object],

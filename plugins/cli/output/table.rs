@@ -2,7 +2,7 @@
 use crate::output::text::{self, Table, on_one_line, seconds};
 use manifactor::slam::mapping::object_key;
 use manifactor::slam::report::{Mean, Prediction, RunReport, VariantReport};
-use manifactor::slam::variance::{BoxComponent, MotionComponent, Score};
+use manifactor::slam::variance::{BoxComponent, LastingComponent, MotionComponent, Score};
 
 /// What a run came to, in a table and a few lines.
 pub(crate) fn of_run(report: &RunReport) -> String {
@@ -116,10 +116,16 @@ fn noise(variant: &VariantReport) -> String {
         });
     }
     parts.extend(found.boxes.iter().map(|(name, boxes)| {
-        let BoxComponent { sigma_px, of_size, correlation_time, .. } = boxes;
+        let BoxComponent { sigma_px, of_size, correlation_time, lasting, .. } = boxes;
         let grows =
             if *of_size > 0.0 { format!(" and {:.1} % of the size", 100.0 * of_size) } else { String::new() };
-        format!("boxes ({name}) σ {sigma_px:.1} px{grows}, {correlation_time:.1} of them worth one")
+        let lasts = match lasting {
+            None => format!("{correlation_time:.1} of them worth one"),
+            Some(LastingComponent { white, lasting, seconds }) => {
+                format!("{white:.2} of it new in each, {lasting:.2} for {seconds:.2} s")
+            }
+        };
+        format!("boxes ({name}) σ {sigma_px:.1} px{grows}, {lasts}")
     }));
     text::wrap(&format!("{}: {}", on_one_line(&variant.name), parts.join("; "))) + "\n"
 }

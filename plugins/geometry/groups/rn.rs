@@ -24,6 +24,8 @@ pub type Point1 = Rn<1>;
 pub type Point2 = Rn<2>;
 /// A point in space.
 pub type Point3 = Rn<3>;
+/// Four numbers, such as the offsets of the sides of a box.
+pub type Point4 = Rn<4>;
 
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -33,13 +35,18 @@ struct Document<const N: usize> {
 }
 
 fn description(n: usize) -> String {
-    let position = ["1.0", "0.0", "0.5"].get(..n).unwrap_or_default().join(", ");
-    let axes = ["x", "y", "z"].get(..n).unwrap_or_default().join(", ");
+    let position = ["1.0", "0.0", "0.5", "0.0"].get(..n).unwrap_or_default().join(", ");
+    let axes = tangent(n).join(", ");
     format!(
         "A point in {n} dimension{}.\n\nTangent ({axes}); x ⊞ δ = x + δ.\n\n```toml\n[values]\n\
          l0 = {{ type = \"point{n}\", position = [{position}] }}\n```",
         if n == 1 { "" } else { "s" }
     )
+}
+
+/// The names of n directions.
+const fn tangent(n: usize) -> &'static [&'static str] {
+    if n <= AXES.len() { AXES.split_at(n).0 } else { NUMBERED.split_at(n).0 }
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
@@ -78,8 +85,7 @@ impl<const N: usize> From<Rn<N>> for Document<N> {
 impl<const N: usize> Manifold for Rn<N> {
     type Dim = Const<N>;
     type Of<T: Scalar> = SVector<T, N>;
-    const TANGENT: &'static [&'static str] =
-        if N <= AXES.len() { AXES.split_at(N).0 } else { NUMBERED.split_at(N).0 };
+    const TANGENT: &'static [&'static str] = tangent(N);
 
     fn lift<T: Scalar>(&self) -> SVector<T, N> {
         self.0.lift()
@@ -135,6 +141,7 @@ macro_rules! point {
 point!(1, "point1", "{ position = [1.0] }");
 point!(2, "point2", "{ position = [1.0, 0.5] }");
 point!(3, "point3", "{ position = [1.0, 0.5, 0.0] }");
+point!(4, "point4", "{ position = [1.0, 0.5, 0.0, 0.5] }");
 
 #[cfg(test)]
 mod tests {
@@ -147,6 +154,7 @@ mod tests {
         numbers_are_a_manifold: (any_point::<1>(), any_point::<1>(), vector::<1>(10.0));
         the_plane_is_a_manifold: (any_point::<2>(), any_point::<2>(), vector::<2>(10.0));
         space_is_a_manifold: (any_point::<3>(), any_point::<3>(), vector::<3>(10.0));
+        four_numbers_are_a_manifold: (any_point::<4>(), any_point::<4>(), vector::<4>(10.0));
     }
 
     #[test]

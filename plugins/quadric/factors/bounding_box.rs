@@ -65,7 +65,7 @@ pub enum BoxModel {
 impl BoundingBoxFactor {
     /// The sides of β; `None` where the factor is not defined.
     #[inline(always)]
-    fn sides<T: Scalar>(&self, ellipsoid: &Ellipsoid<T>) -> Option<[Side<T>; 4]> {
+    pub(super) fn sides<T: Scalar>(&self, ellipsoid: &Ellipsoid<T>) -> Option<[Side<T>; 4]> {
         if !ellipsoid.is_in_front() {
             return None;
         }
@@ -91,9 +91,32 @@ impl BoundingBoxFactor {
         Some(BoundingBox::from_bounds(sides.map(|s| s.bound())))
     }
 
-    fn error<T: Scalar>(&self, sides: &[Side<T>; 4]) -> Vector4<T> {
+    pub(super) fn error<T: Scalar>(&self, sides: &[Side<T>; 4]) -> Vector4<T> {
         let measured = self.bounding_box.bounds();
         Vector4::from_fn(|i, _| sides[i].bound() - T::from(measured[i]))
+    }
+}
+
+impl BoundingBoxFactor {
+    /// The residual and its derivatives; zeros and `None` where the factor is not defined.
+    pub(super) fn derive(
+        &self,
+        (camera, quadric): (&Se3, &DualQuadric),
+        by_pose: &mut Matrix4x6<f64>,
+        by_quadric: &mut SMatrix<f64, 4, 9>,
+    ) -> Option<Vector4<f64>> {
+        by_pose.fill(0.0);
+        by_quadric.fill(0.0);
+        let seen = Ellipsoid::seen(camera, quadric);
+        let sides = self.sides(&seen)?;
+        for (i, side) in sides.iter().enumerate() {
+            if let Some(line) = TangentLine::of(&self.camera, side, i % 2) {
+                let (pose, object) = line.derivatives(&seen, &quadric.semi_axes);
+                by_pose.row_mut(i).copy_from(&pose);
+                by_quadric.row_mut(i).copy_from(&object);
+            }
+        }
+        Some(self.error(&sides))
     }
 }
 
@@ -118,32 +141,11 @@ impl Residual for BoundingBoxFactor {
 
     fn linearize(
         &self,
-        (camera, quadric): Refs<'_, Self::Variables>,
+        variables: Refs<'_, Self::Variables>,
         _free: &[bool],
-        jacobians: &mut Jacobians<Self>,
+        (by_pose, by_quadric): &mut Jacobians<Self>,
     ) -> Vector4<f64> {
-        let (by_pose, by_quadric): (&mut Matrix4x6<f64>, &mut SMatrix<f64, 4, 9>) =
-            (&mut jacobians.0, &mut jacobians.1);
-        let seen = Ellipsoid::seen(camera, quadric);
-        let Some(sides) = self.sides(&seen) else {
-            by_pose.fill(0.0);
-            by_quadric.fill(0.0);
-            return Vector4::zeros();
-        };
-        for (i, side) in sides.iter().enumerate() {
-            match TangentLine::of(&self.camera, side, i % 2) {
-                None => {
-                    by_pose.row_mut(i).fill(0.0);
-                    by_quadric.row_mut(i).fill(0.0);
-                }
-                Some(line) => {
-                    let (pose, object) = line.derivatives(&seen, &quadric.semi_axes);
-                    by_pose.row_mut(i).copy_from(&pose);
-                    by_quadric.row_mut(i).copy_from(&object);
-                }
-            }
-        }
-        self.error(&sides)
+        self.derive(variables, by_pose, by_quadric).unwrap_or_default()
     }
 }
 

@@ -4,14 +4,19 @@
 //! The noise of *boxes* is that of their residuals: one of standard deviation σ has variance σ²(1 - h) at the estimate, h its leverage
 //! (Helmert; Förstner, *Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten*, 1979). The noise of *odometry* is the one
 //! that leads to the trajectory which suits objects best that had no part in it.
+//!
+//! The errors of boxes last. They have a standard deviation that is larger for it, or variables of their own for what lasts, where that is asked for.
 mod boxes;
 mod components;
 mod correlation;
 mod cross_validation;
+mod lasting;
 mod motion;
+mod offsets;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
 pub use boxes::BoxComponent;
 pub use components::{Components, VarianceError};
 pub use cross_validation::Score;
+pub use lasting::LastingComponent;
 pub use motion::{MotionChoice, MotionComponent};

@@ -95,7 +95,13 @@ fn main() {
         let best = near.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(iou, _)| *iou >= 0.5);
         let object = best.filter(|(_, track)| still.contains(track)).map(|(_, track)| ObjectId(track + 1));
         named += usize::from(object.is_some());
-        recorded.detections.push(Detection { frame, object, scores, bounding_box, depth: Some(n[12]).filter(|z| *z > 0.0) });
+        recorded.detections.push(Detection {
+            frame,
+            object,
+            scores,
+            bounding_box,
+            depth: Some(n[12]).filter(|z| *z > 0.0),
+        });
     }
     recorded.detections.sort_by_key(|detection| detection.frame);
     recording::write(&recorded, Path::new(out)).unwrap();

@@ -133,8 +133,10 @@ impl Simulated {
             frames.push(Frame { timestamp: time(i), world_from_camera });
         }
         let stamped = |(i, pose): (usize, &_)| StampedPose { timestamp: time(i), pose: *pose };
-        let [mut imagination, mut mistakes, mut felt, mut ranges] = [(); 4].map(|()| Pcg64::from_rng(&mut noise));
-        let detections = self.detect(&objects, &poses, [&mut detector, &mut imagination, &mut mistakes, &mut ranges]);
+        let [mut imagination, mut mistakes, mut felt, mut ranges] =
+            [(); 4].map(|()| Pcg64::from_rng(&mut noise));
+        let detections =
+            self.detect(&objects, &poses, [&mut detector, &mut imagination, &mut mistakes, &mut ranges]);
         let readings = self.accelerometer.as_ref().map(|sensor| {
             let readings = sensor.read(&poses, self.trajectory.interval, &mut felt).into_iter().enumerate();
             readings.map(|(i, acceleration)| Acceleration { timestamp: time(i), acceleration }).collect()

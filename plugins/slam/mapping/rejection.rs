@@ -38,7 +38,7 @@ pub enum Rejection {
     Moves {
         /// How far it moves while it is seen, in metres.
         way_m: f64,
-        /// Its own length, which it should stay below, in metres.
+        /// Half its length, which it should stay below, in metres.
         limit_m: f64,
     },
     /// No ellipsoid could be made of its boxes.
@@ -62,7 +62,10 @@ impl fmt::Display for Rejection {
                 write!(f, "seen under {parallax_deg:.1}°, at least {least_deg}° are needed")
             }
             Self::Moves { way_m, limit_m } => {
-                write!(f, "it moves by {way_m:.1} m while it is seen, more than its own length, {limit_m:.1} m")
+                write!(
+                    f,
+                    "it moves by {way_m:.1} m while it is seen, more than half its length, {limit_m:.1} m"
+                )
             }
             Self::Initialisation { message } => f.write_str(message),
         }
@@ -107,7 +110,7 @@ pub(crate) fn still(
         Some((view.frame as f64, pose(view.frame)?.act(&centre)))
     };
     let places: Vec<(f64, Vector3<f64>)> = measured.views.iter().filter_map(place).collect();
-    let (way_m, limit_m) = (way(&places), 2.0 * start.semi_axes.max());
+    let (way_m, limit_m) = (way(&places), start.semi_axes.max());
     if way_m > limit_m { Err(Rejection::Moves { way_m, limit_m }) } else { Ok(()) }
 }
 

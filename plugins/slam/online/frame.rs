@@ -6,7 +6,7 @@ use crate::association::{Image, Learned, Merge};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, ObjectId, Observation};
 use crate::mapping::measurements::{ObjectBox, Sifted, sift};
-use crate::mapping::{view_entries, known_entry, object_key, odometry_entry, pose_key, prior_entry};
+use crate::mapping::{known_entry, object_key, odometry_entry, pose_key, prior_entry, view_entries};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
 use manifactor_geometry::Se3;

@@ -1,5 +1,6 @@
+use crate::mapping::offset_owner;
 use manifactor_config::{Fault, Section, read_graph_section};
-use manifactor_graph::{FactorEntry, Fixed, Graph, Values, Variable};
+use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, Variable};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
@@ -21,7 +22,7 @@ impl OwnGraph {
             return Self::default();
         }
         let (graph, values) = read_graph_section(section);
-        for (key, _) in values.iter().filter(|(key, _)| is_of_the_map(key.as_str())) {
+        for (key, _) in values.iter().filter(|(key, _)| is_of_the_map(key)) {
             let message = format!("`{key}` is the key of a pose or an object");
             let help = "x0, x1, … are the poses and q0, q1, … the objects of a run: choose another name";
             section.report("variables", Fault::with_help(message, help));
@@ -41,9 +42,11 @@ impl OwnGraph {
     }
 }
 
-fn is_of_the_map(key: &str) -> bool {
-    let number = key.strip_prefix('x').or_else(|| key.strip_prefix('q')).unwrap_or_default();
-    !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())
+fn is_of_the_map(key: &Key) -> bool {
+    let name = key.as_str();
+    let number = name.strip_prefix('x').or_else(|| name.strip_prefix('q')).unwrap_or_default();
+    let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+    is_number || offset_owner(key).is_some()
 }
 
 /// As documents write it; nothing at all, where there is nothing.

@@ -6,7 +6,9 @@ use super::sightings::Sighting;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Manifold, Residual};
-use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, CentroidDepth, DualQuadric, QuadricPrior};
+use manifactor_quadric::{
+    BoundingBox, BoundingBoxFactor, BoxModel, Camera, CentroidDepth, DualQuadric, QuadricPrior,
+};
 use nalgebra::{Cholesky, SMatrix, SVector, Vector3, Vector4};
 
 type Matrix9 = SMatrix<f64, 9, 9>;

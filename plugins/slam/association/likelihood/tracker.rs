@@ -153,7 +153,8 @@ impl Tracker {
                 }
                 let new = self.settings.cost_of_new(&self.camera, detection.depth, usual);
                 let share = classes[row].as_deref().map_or(1.0, |class| track.share(class));
-                let cost = expected.cost(&detection.bounding_box, detection.depth) - 2.0 * self.settings.likelihood(share).ln();
+                let cost = expected.cost(&detection.bounding_box, detection.depth)
+                    - 2.0 * self.settings.likelihood(share).ln();
                 if cost < new {
                     gains.push((row, tracks.len(), new - cost));
                 }

@@ -1,12 +1,13 @@
 //! The noise of boxes: how large it is, how it grows with them, how it differs by object, and how long it lasts.
 use super::correlation::autocorrelation_time;
+use super::lasting::{self, LastingComponent, Sides, TimedError};
+use super::offsets::box_of;
 use super::{BoxGroups, VarianceSettings};
 use crate::mapping::{MappedObject, Mapping};
 use indexmap::IndexMap;
 use manifactor_graph::batch::FactorState;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{FactorEntry, Key, Noise};
-use manifactor_quadric::BoundingBoxFactor;
 use serde::Serialize;
 
 /// The noise of a group of boxes.
@@ -19,8 +20,11 @@ pub struct BoxComponent {
     pub of_size: f64,
     /// How many consecutive boxes say as much as one alone.
     pub correlation_time: f64,
-    /// What the graph is given: √(correlation_time) · σ, for a box of the mean size.
+    /// What the graph is given, for a box of the mean size: √(correlation_time) · σ, or what is left to boxes that have offsets.
     pub effective_px: f64,
+    /// What has offsets of its own, in place of the correlation time; `None` where that is not asked for, or nothing lasts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lasting: Option<LastingComponent>,
 }
 
 /// Half of all normal deviates are below this.
@@ -38,9 +42,15 @@ const ALIKE: f64 = 1e-6;
 
 impl BoxComponent {
     /// `size` is the mean size of boxes, in pixels.
-    pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, size: f64) -> Self {
-        let effective_px = sigma_px.hypot(of_size * size) * correlation_time.sqrt();
-        Self { sigma_px, of_size, correlation_time, effective_px }
+    pub(super) fn of(
+        sigma_px: f64,
+        of_size: f64,
+        correlation_time: f64,
+        lasting: Option<LastingComponent>,
+        size: f64,
+    ) -> Self {
+        let new = Self { sigma_px, of_size, correlation_time, effective_px: 0.0, lasting };
+        Self { effective_px: new.at(size) * new.inflation(), ..new }
     }
 
     /// The same, larger by a factor.
@@ -54,20 +64,31 @@ impl BoxComponent {
         match size.filter(|_| self.of_size > 0.0) {
             None => Noise::sigma(self.effective_px),
             Some(size) => {
-                let [x, y] = size.map(|size| self.at(size) * self.correlation_time.sqrt());
+                let [x, y] = size.map(|size| self.at(size) * self.inflation());
                 Noise::sigmas(&[x, y, x, y])
             }
         }
     }
 
-    fn at(&self, size: f64) -> f64 {
+    /// How many times as large as that of residuals the standard deviation in the graph is.
+    fn inflation(&self) -> f64 {
+        self.lasting.map_or_else(|| self.correlation_time.sqrt(), |lasting| lasting.in_boxes())
+    }
+
+    /// How many boxes the loss takes for one.
+    pub(super) fn alike(&self) -> f64 {
+        if self.lasting.is_some() { 1.0 } else { self.correlation_time }
+    }
+
+    /// Of a side of a box of this extent.
+    pub(super) fn at(&self, size: f64) -> f64 {
         self.sigma_px.hypot(self.of_size * size)
     }
 }
 
 /// Width and height of the box that a factor measures; `None` for what has no box.
 pub(super) fn size(entry: &FactorEntry) -> Option<[f64; 2]> {
-    let factor = entry.factor.erased().as_any().downcast_ref::<BoundingBoxFactor>()?;
+    let factor = box_of(entry)?;
     Some([factor.bounding_box.width(), factor.bounding_box.height()])
 }
 
@@ -81,23 +102,35 @@ struct SideError {
     error: f64,
     /// The box's width, for a left or right side, or its height; 0 where that is not known.
     size: f64,
+    /// As it is, of known time; `None` where it is not asked what lasts.
+    timed: Option<TimedError>,
+}
+
+/// A box at the estimate, and what is known of its factor.
+pub(super) struct Observed<'a> {
+    pub(super) entry: &'a FactorEntry,
+    pub(super) state: &'a FactorState,
+    pub(super) leverage: &'a [f64],
+    /// The errors of its sides without its offset; `None` where it is not asked what lasts.
+    pub(super) timed: Option<[TimedError; 4]>,
 }
 
 impl Errors {
-    /// Residuals at the estimate are less than errors: σ²(1 - h), h the leverage of a row.
-    pub(super) fn add(
-        &mut self,
-        state: &FactorState,
-        leverage: &[f64],
-        observed: Option<&[bool]>,
-        size: [f64; 2],
-    ) {
+    /// Residuals at the estimate are less than errors: σ²(1 - h), h the leverage of a row. Those of a box that has an offset are taken without
+    /// it, and as they are.
+    pub(super) fn add(&mut self, observed: &Observed<'_>) {
+        let Observed { entry, state, leverage, timed } = observed;
+        let (size, rows) = (size(entry).unwrap_or_default(), entry.noise.observed());
+        let has_offset = entry.keys.len() > 2;
         for (side, errors) in self.0.iter_mut().enumerate() {
-            let seen = observed.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
+            let seen = rows.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
             let redundancy = 1.0 - leverage.get(side).copied().unwrap_or(1.0);
             if let (true, Some(residual)) = (seen && redundancy > LEAST_REDUNDANCY, state.residual.get(side))
             {
-                errors.push(SideError { error: residual / redundancy.sqrt(), size: size[side % 2] });
+                let (size, timed) = (size[side % 2], timed.map(|sides| sides[side]));
+                let alone = timed.filter(|_| has_offset).map(|timed| timed.error);
+                let error = alone.unwrap_or_else(|| residual / redundancy.sqrt());
+                errors.push(SideError { error, size, timed });
             }
         }
     }
@@ -183,18 +216,29 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
     }
     let (sigma_px, of_size) = settings.size.then(|| grown(&errors)).flatten().unwrap_or((white, 0.0));
     let size = errors.iter().map(|e| e.size).sum::<f64>() / errors.len() as f64;
-    let one = BoxComponent::of(sigma_px, of_size, 1.0, size);
+    let one = BoxComponent::of(sigma_px, of_size, 1.0, None, size);
     if !settings.correlation {
         return Some(one);
     }
     // gross errors are detections of something else, and not what lasts
-    let within = |errors: &&[SideError]| -> Vec<f64> {
-        let within = errors.iter().filter(|e| e.error.abs() < 3.0 * one.at(e.size));
-        // what does not grow is in pixels as it was: the same bits
-        within.map(|e| if of_size > 0.0 { e.error / one.at(e.size) } else { e.error }).collect()
+    let within = |errors: &&[SideError]| -> Vec<SideError> {
+        errors.iter().filter(|e| e.error.abs() < 3.0 * one.at(e.size)).copied().collect()
     };
-    let within: Vec<Vec<f64>> = series.iter().map(within).collect();
-    Some(BoxComponent::of(sigma_px, of_size, autocorrelation_time(&within), size))
+    let within: Vec<Vec<SideError>> = series.iter().map(within).collect();
+    // what does not grow is in pixels as it was: the same bits
+    let in_units = |e: &SideError| if of_size > 0.0 { e.error / one.at(e.size) } else { e.error };
+    let errors: Vec<Vec<f64>> = within.iter().map(|series| series.iter().map(in_units).collect()).collect();
+    let time = autocorrelation_time(&errors);
+    // four sides an object
+    let lasting = settings.lasting.then(|| within.chunks_exact(4).map(|sides| timed(sides, &one)).collect());
+    let lasting = lasting.and_then(|objects: Vec<Sides>| lasting::lasting(&objects));
+    Some(BoxComponent::of(sigma_px, of_size, time, lasting, size))
+}
+
+/// The errors of the sides of an object, in standard deviations.
+fn timed(sides: &[Vec<SideError>], one: &BoxComponent) -> Sides {
+    let of = |e: &SideError| Some(e.timed?.divided_by(one.at(e.size)));
+    std::array::from_fn(|i| sides.get(i).into_iter().flatten().filter_map(of).collect())
 }
 
 /// What does not grow, and what grows with size: σ² = σ₀² + κ² size², by medians over parts of like size. `None` for too few.
@@ -242,7 +286,7 @@ mod tests {
         let one = |_| {
             let size: f64 = rng.random_range(20.0..300.0);
             let deviate: f64 = StandardNormal.sample(&mut rng);
-            SideError { error: deviate * sigma.hypot(of_size * size), size }
+            SideError { error: deviate * sigma.hypot(of_size * size), size, timed: None }
         };
         (0..count).map(one).collect()
     }

@@ -1,16 +1,19 @@
 //! The noise of each group of measurements.
-use super::boxes::{self, BoxComponent, Errors, group};
+use super::boxes::{self, BoxComponent, Errors, Observed, group};
 use super::cross_validation::CrossValidation;
+use super::lasting::TimedError;
 use super::motion::{self, MotionChoice};
+use super::offsets::{self, box_of};
 use super::{BoxGroups, VarianceSettings};
 use crate::estimate::Estimate;
-use crate::mapping::Mapping;
+use crate::input::sequence::Sequence;
+use crate::mapping::{Mapping, pose_key};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotPositive, Positive};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::noise::NoiseError;
-use manifactor_graph::{FactorEntry, Key};
+use manifactor_graph::{FactorEntry, Key, Residual, Values};
 use manifactor_quadric::DualQuadric;
 use manifactor_solve::{CompileError, CovarianceError, Observer};
 use serde::Serialize;
@@ -60,7 +63,7 @@ const SAME_BOXES: f64 = 0.2;
 impl Components {
     /// What the search begins with, whatever a document says.
     pub(in crate::estimate) fn begin(mapping: &Mapping, settings: &VarianceSettings) -> Self {
-        let component = BoxComponent::of(BEGIN_PX, 0.0, 1.0, 0.0);
+        let component = BoxComponent::of(BEGIN_PX, 0.0, 1.0, None, 0.0);
         let boxes = mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given);
         let boxes = boxes.map(|object| (group(object, settings.boxes), component)).collect();
         let is_chosen = settings.odometry && CrossValidation::is_possible(mapping);
@@ -79,13 +82,15 @@ impl Components {
     ) -> Result<Self, VarianceError> {
         let graph = &estimate.mapping.graph;
         let leverages = estimate.solution.leverages(graph)?;
+        let times = times(&estimate.sequence);
         let mut boxes: IndexMap<Key, Errors> = IndexMap::new();
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
             // factors are in the order of the graph: an object's boxes in the order of their frames
             if let Measures::Box { object } = measures(entry) {
-                let size = boxes::size(entry).unwrap_or_default();
-                boxes.entry(object).or_default().add(state, leverage, entry.noise.observed(), size);
+                let timed =
+                    settings.lasting.then(|| timed(entry, &estimate.solution.values, &times)).flatten();
+                boxes.entry(object).or_default().add(&Observed { entry, state, leverage, timed });
             }
         }
         let mut found =
@@ -97,9 +102,9 @@ impl Components {
         let chosen = before.and_then(|before| before.odometry);
         found.odometry = chosen;
         if before.is_none_or(|before| found.change(before) > SAME_BOXES) {
-            let mut mapping = estimate.mapping.clone();
-            found.apply(&mut mapping, settings, loss)?;
-            if let Some(validation) = CrossValidation::new(&mapping, &estimate.solution.values) {
+            let (mut mapping, mut values) = (estimate.mapping.clone(), estimate.solution.values.clone());
+            found.apply(&mut mapping, &mut values, &estimate.sequence, settings, loss)?;
+            if let Some(validation) = CrossValidation::new(&mapping, &values) {
                 let pivot = if settings.pivot { motion::distance(estimate) } else { 0.0 };
                 found.odometry = motion::choose(&validation, pivot, chosen, observer)?;
             }
@@ -107,7 +112,7 @@ impl Components {
         Ok(found)
     }
 
-    /// Gives the graph this noise, and boxes a loss whose scale is in units of their own σ: ρ(τs)/τ, so that an outlier
+    /// Gives the graph this noise, boxes whose errors last offsets, which begin at zero, and boxes a loss whose scale is in units of their own σ: ρ(τs)/τ, so that an outlier
     /// is one among boxes, and not among averages of τ of them.
     ///
     /// # Errors
@@ -115,13 +120,16 @@ impl Components {
     pub fn apply(
         &self,
         mapping: &mut Mapping,
+        values: &mut Values,
+        sequence: &Sequence,
         settings: &VarianceSettings,
         loss: Option<&Arc<dyn Loss>>,
     ) -> Result<(), VarianceError> {
+        offsets::remove(mapping, values);
         let mut groups = HashMap::new();
         for object in mapping.mapped() {
             if let Some(component) = self.boxes.get(&group(object, settings.boxes)) {
-                let tau = Positive::new(component.correlation_time)?;
+                let tau = Positive::new(component.alike())?;
                 groups.insert(object.key.clone(), (component, loss.map(|loss| loss.erased().tempered(tau))));
             }
         }
@@ -142,7 +150,7 @@ impl Components {
                 None => noise,
             };
         }
-        Ok(())
+        offsets::add(self, mapping, values, sequence, settings)
     }
 
     /// The largest change of any standard deviation of boxes, as a share of it.
@@ -154,12 +162,29 @@ impl Components {
     }
 }
 
+/// The errors of the sides of a box without its offset, in pixels.
+fn timed(entry: &FactorEntry, values: &Values, times: &HashMap<Key, f64>) -> Option<[TimedError; 4]> {
+    let ([pose, object, ..], factor) = (&entry.keys[..], box_of(entry)?) else { return None };
+    let time = *times.get(pose)?;
+    let variables = (values.get::<Se3>(pose).ok()?, values.get::<DualQuadric>(object).ok()?);
+    let mut jacobians = Default::default();
+    let errors = factor.linearize(variables, &[true, true], &mut jacobians);
+    let side = |i: usize| TimedError { time, error: errors[i], by_object: jacobians.1.row(i).transpose() };
+    Some([0, 1, 2, 3].map(side))
+}
+
+/// When each pose was, in seconds.
+pub(super) fn times(sequence: &Sequence) -> HashMap<Key, f64> {
+    sequence.frames.iter().enumerate().map(|(i, frame)| (pose_key(i), frame.timestamp)).collect()
+}
+
 pub(super) fn measures(entry: &FactorEntry) -> Measures {
     let (pose, object) = (TypeId::of::<Se3>(), TypeId::of::<DualQuadric>());
     let variables = entry.factor.erased().signature().variables;
     match (&entry.keys[..], &variables[..]) {
         ([_, _], [a, b]) if *a == pose && *b == pose => Measures::Motion,
         ([_, seen], [a, b]) if *a == pose && *b == object => Measures::Box { object: seen.clone() },
+        ([_, seen, _], _) if box_of(entry).is_some() => Measures::Box { object: seen.clone() },
         _ => Measures::Other,
     }
 }

@@ -83,7 +83,7 @@ impl<'a> FactorStates<'a> {
     /// The root mean square of an object's box residuals.
     pub(super) fn box_rms(&self, object: &Key) -> Option<f64> {
         let factors = self.by_key.get(object)?.iter();
-        let boxes = factors.filter(|(name, _, state)| *name == "bounding_box" && state.defined);
+        let boxes = factors.filter(|(name, _, state)| name.starts_with("bounding_box") && state.defined);
         let rows: Vec<f64> = boxes.flat_map(|(_, _, state)| state.whitened.iter().copied()).collect();
         let squares = rows.iter().map(|x| x * x).sum::<f64>();
         (!rows.is_empty()).then(|| (squares / rows.len() as f64).sqrt())
