@@ -30,7 +30,7 @@ pub struct DetectionSettings {
     #[schemars(range(min = 0, max = 1))]
     pub min_score: f64,
     /// Standard deviation of depths, where the source has any, as a part of the depth.
-    #[serde(deserialize_with = "positive")]
+    #[serde(deserialize_with = "positive", skip_serializing_if = "is_usual")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub depth_error: f64,
 }
@@ -59,6 +59,15 @@ impl CutSides {
     }
 }
 
+/// Of a depth, as a part of it, where a document does not say.
+const DEPTH_ERROR: f64 = 0.03;
+
+/// What is as usual is not written: sources without depths have it as well.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_usual(depth_error: &f64) -> bool {
+    *depth_error == DEPTH_ERROR
+}
+
 /// Rows of a box's residual.
 const SIDES: usize = 4;
 
@@ -81,7 +90,7 @@ impl Default for DetectionSettings {
             cut_sides: CutSides::Drop,
             border_px: 20.0,
             min_score: 0.0,
-            depth_error: 0.03,
+            depth_error: DEPTH_ERROR,
         }
     }
 }

@@ -1,4 +1,3 @@
-use crate::mapping::offset_owner;
 use manifactor_config::{Fault, Section, read_graph_section};
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, Variable};
 use serde::ser::SerializeMap;
@@ -40,6 +39,21 @@ impl OwnGraph {
         }
         graph.factors_mut().extend(self.graph.factors().iter().cloned());
     }
+}
+
+/// What is between the key of an object and the number of an interval.
+const OFFSET: &str = "_offset";
+
+/// The key of the offset that boxes of an object share in an interval; see [`variance`](crate::estimate::variance).
+pub(crate) fn offset_key(object: &Key, interval: usize) -> Key {
+    Key::indexed(&format!("{object}{OFFSET}"), interval)
+}
+
+/// The object whose boxes share an offset; `None` for the key of anything else.
+pub(crate) fn offset_owner(key: &Key) -> Option<&str> {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let (object, interval) = key.as_str().split_once(OFFSET)?;
+    (is_number(object.strip_prefix('q')?) && is_number(interval)).then_some(object)
 }
 
 fn is_of_the_map(key: &Key) -> bool {
