@@ -104,7 +104,7 @@ impl Mapping {
         let all = &measurements.objects;
         let pose =
             |i: usize| Some(frame.map_from_odometry.compose(&sequence.frames.get(i)?.world_from_camera));
-        let start = |measured| rejection::start(measured, pose, sequence.camera, &settings.objects);
+        let start = |measured| rejection::start(measured, pose, sequence.camera, settings);
         let starts: Vec<_> = all.iter().map(start).collect();
         let candidates = all.iter().zip(&starts).filter_map(|(object, start)| candidate(object, start));
         let mut judge = Judge::new(

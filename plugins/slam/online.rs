@@ -209,7 +209,7 @@ impl Mapper {
             Some(start) => Ok(start),
             None => {
                 let pose = |i: usize| poses.get(i).copied();
-                rejection::start(measured, pose, self.camera, &self.settings.objects)
+                rejection::start(measured, pose, self.camera, &self.settings)
             }
         };
         let starts = self.measurements.objects.iter().map(start).collect();

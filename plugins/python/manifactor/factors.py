@@ -20,11 +20,14 @@ __all__ = [
     "between_point1",
     "between_point2",
     "between_point3",
+    "between_point4",
     "between_se2",
     "between_se3",
     "between_so2",
     "between_so3",
     "bounding_box",
+    "bounding_box_offset",
+    "centroid_depth",
     "chordal_between_se2",
     "chordal_between_se3",
     "collinear",
@@ -44,6 +47,7 @@ __all__ = [
     "prior_point1",
     "prior_point2",
     "prior_point3",
+    "prior_point4",
     "prior_quadric",
     "prior_se2",
     "prior_se3",
@@ -210,6 +214,24 @@ def between_point3(*, relative: variables.Point3 | Fields) -> Factor:
     return Factor("between_point3", {"relative": untagged(relative)})
 
 
+def between_point4(*, relative: variables.Point4 | Fields) -> Factor:
+    """The second variable is at `relative`, seen from the first: r = Log(Z⁻¹ Xᵢ⁻¹ Xⱼ).
+
+    One row for each tangent direction (x0, x1, x2, x3). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "x1"]
+    factor = { type = "between_point4", relative = { position = [1.0, 0.5, 0.0, 0.5] } }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        relative: The second variable in the frame of the first.
+    """
+    return Factor("between_point4", {"relative": untagged(relative)})
+
+
 def between_se2(*, relative: variables.Se2 | Fields) -> Factor:
     """The second variable is at `relative`, seen from the first: r = Log(Z⁻¹ Xᵢ⁻¹ Xⱼ).
 
@@ -322,6 +344,46 @@ def bounding_box(
         model: What of the object the box goes around. Default: "standard".
     """
     return Factor("bounding_box", {"box": box, "camera": camera, "model": model})
+
+
+def bounding_box_offset() -> Factor:
+    """The box around an object's outline, shifted by an offset, is the one that was drawn: r = β(x, q) + o - b, in pixels.
+
+    Variables: the pose of the camera, the object, and the offset of each side. Rows and β are those of `bounding_box`, and so is where it
+    is defined. Several boxes share an offset: it stands for what their errors have in common. A side that the border cuts has an offset as
+    well. The boxes alone cannot tell an offset from a larger object: a prior on the offset has to.
+
+    ```toml
+    [[factors]]
+    keys   = ["x0", "q0", "o0"]
+    factor = { type = "bounding_box_offset", box = [120.0, 80.0, 260.0, 310.0], camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
+    noise  = { sigma = 2.0 }
+
+    [[factors]]
+    keys   = ["o0"]
+    factor = { type = "prior_point4", value = { position = [0.0, 0.0, 0.0, 0.0] } }
+    noise  = { sigma = 5.0 }
+    ```
+    """
+    return Factor("bounding_box_offset", {})
+
+
+def centroid_depth(*, depth: float) -> Factor:
+    """An object's centre is at this depth: r = (Rᵀ(c - t))ᶻ - depth, c the centroid, R and t the camera's pose.
+
+    The depth is along the optical axis, as depth images have it, in metres. It says nothing of the object's size. Defined everywhere.
+
+    ```toml
+    [[factors]]
+    keys   = ["x0", "q0"]
+    factor = { type = "centroid_depth", depth = 1.8 }
+    noise  = { sigma = 0.05 }
+    ```
+
+    Args:
+        depth: In metres.
+    """
+    return Factor("centroid_depth", {"depth": depth})
 
 
 def chordal_between_se2(*, relative: variables.Se2 | Fields) -> Factor:
@@ -867,6 +929,24 @@ def prior_point3(*, value: variables.Point3 | Fields) -> Factor:
         value: Where the variable is expected.
     """
     return Factor("prior_point3", {"value": untagged(value)})
+
+
+def prior_point4(*, value: variables.Point4 | Fields) -> Factor:
+    """The variable is close to `value`: r = Log(Z⁻¹X).
+
+    One row for each tangent direction (x0, x1, x2, x3). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
+
+    ```toml
+    [[factors]]
+    keys = ["x0"]
+    factor = { type = "prior_point4", value = { position = [1.0, 0.5, 0.0, 0.5] } }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        value: Where the variable is expected.
+    """
+    return Factor("prior_point4", {"value": untagged(value)})
 
 
 def prior_quadric(*, value: variables.DualQuadric | Fields) -> Factor:

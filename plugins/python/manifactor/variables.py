@@ -18,6 +18,7 @@ __all__ = [
     "Point1",
     "Point2",
     "Point3",
+    "Point4",
     "S2",
     "Se2",
     "Se3",
@@ -419,6 +420,33 @@ class Point3(Variable):
         return in_formulas(self, "z")
 
 
+class Point4(Variable):
+    """A point in 4 dimensions.
+
+    Tangent (x0, x1, x2, x3); x ⊞ δ = x + δ.
+
+    ```toml
+    [values]
+    l0 = { type = "point4", position = [1.0, 0.0, 0.5, 0.0] }
+    ```
+
+    Args:
+        position: Its coordinates.
+    """
+
+    TYPE: ClassVar[str] = "point4"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("x0", "x1", "x2", "x3")
+
+    def __new__(cls, *, position: Numbers) -> Self:
+        return super().__new__(cls, "variable", "point4", {"position": position})
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """Its coordinates."""
+        return self.__getattr__("position")  # type: ignore[no-any-return]
+
+
 class S2(Variable):
     """A direction in space, such as gravity's: a point on the unit sphere.
 
@@ -714,6 +742,7 @@ BY_TYPE: dict[str, type[Variable]] = {
     "point1": Point1,
     "point2": Point2,
     "point3": Point3,
+    "point4": Point4,
     "s2": S2,
     "se2": Se2,
     "se3": Se3,

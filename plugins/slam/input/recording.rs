@@ -72,11 +72,13 @@ mod tests {
     use crate::input::sequence::ClassScores;
     use crate::input::simulator::Simulated;
     use crate::input::source::{CameraChoice, Folders, Recorded, Source};
+    use manifactor_graph::checked::Positive;
 
     #[test]
     fn what_is_written_is_read_back() {
         let mut settings = Simulated::default();
         settings.trajectory.frames = 30;
+        settings.detector.depth_error = Some(Positive::literal(0.02));
         let mut sequence = settings.simulate().unwrap();
         // a detector need not say what it sees
         sequence.detections[3].scores = ClassScores::default();
@@ -91,7 +93,7 @@ mod tests {
         assert_eq!((read.frames.len(), read.detections.len()), (30, sequence.detections.len()));
         for (a, b) in read.detections.iter().zip(&sequence.detections) {
             assert_eq!((a.frame, a.object, &a.scores), (b.frame, b.object, &b.scores));
-            assert_eq!(a.bounding_box, b.bounding_box);
+            assert_eq!((a.bounding_box, a.depth), (b.bounding_box, b.depth));
         }
         let (found, truth) = (read.ground_truth.unwrap(), sequence.ground_truth.unwrap());
         assert_eq!(found.objects, truth.objects);

@@ -1,6 +1,6 @@
 //! Which objects are mapped, and where they begin.
 use crate::mapping::measurements::{Measured, ObjectBox};
-use crate::settings::ObjectSettings;
+use crate::settings::{ObjectSettings, Settings};
 use manifactor_geometry::Se3;
 use manifactor_quadric::initialise::{View, parallax};
 use manifactor_quadric::{Camera, DualQuadric};
@@ -38,7 +38,7 @@ pub enum Rejection {
     Moves {
         /// How far it moves while it is seen, in metres.
         way_m: f64,
-        /// Half its length, which it should stay below, in metres.
+        /// Half its length, or three standard deviations of its depths, if that is more, in metres.
         limit_m: f64,
     },
     /// No ellipsoid could be made of its boxes.
@@ -62,10 +62,7 @@ impl fmt::Display for Rejection {
                 write!(f, "seen under {parallax_deg:.1}°, at least {least_deg}° are needed")
             }
             Self::Moves { way_m, limit_m } => {
-                write!(
-                    f,
-                    "it moves by {way_m:.1} m while it is seen, more than half its length, {limit_m:.1} m"
-                )
+                write!(f, "it moves by {way_m:.2} m while it is seen, allowed are {limit_m:.2} m")
             }
             Self::Initialisation { message } => f.write_str(message),
         }
@@ -77,7 +74,7 @@ pub(crate) fn start(
     measured: &Measured,
     pose: impl Fn(usize) -> Option<Se3>,
     camera: Camera,
-    settings: &ObjectSettings,
+    Settings { objects: settings, detections, .. }: &Settings,
 ) -> Result<DualQuadric, Rejection> {
     if let Some(prior) = &measured.prior {
         return Ok(prior.quadric);
@@ -95,7 +92,7 @@ pub(crate) fn start(
     }
     let started = settings.initialiser.initialise(&views);
     let start = started.map_err(|error| Rejection::Initialisation { message: error.to_string() })?;
-    still(measured, pose, &camera, &start).map(|()| start)
+    still(measured, pose, &camera, &start, detections.depth_error).map(|()| start)
 }
 
 /// Whether an object that began so stands still, as far as the depths of its boxes tell.
@@ -104,13 +101,17 @@ pub(crate) fn still(
     pose: impl Fn(usize) -> Option<Se3>,
     camera: &Camera,
     start: &DualQuadric,
+    depth_error: f64,
 ) -> Result<(), Rejection> {
-    let place = |view: &ObjectBox| {
-        let centre = camera.ray(view.bounding_box.centre()) * view.depth?;
-        Some((view.frame as f64, pose(view.frame)?.act(&centre)))
+    let mut depths = 0.0;
+    let mut place = |view: &ObjectBox| {
+        let (depth, pose) = (view.depth?, pose(view.frame)?);
+        depths += depth;
+        Some((view.frame as f64, pose.act(&(camera.ray(view.bounding_box.centre()) * depth))))
     };
-    let places: Vec<(f64, Vector3<f64>)> = measured.views.iter().filter_map(place).collect();
-    let (way_m, limit_m) = (way(&places), start.semi_axes.max());
+    let places: Vec<(f64, Vector3<f64>)> = measured.views.iter().filter_map(&mut place).collect();
+    let doubt_m = 3.0 * depth_error * depths / places.len().max(1) as f64;
+    let (way_m, limit_m) = (way(&places), start.semi_axes.max().max(doubt_m));
     if way_m > limit_m { Err(Rejection::Moves { way_m, limit_m }) } else { Ok(()) }
 }
 

@@ -108,7 +108,8 @@ impl Mapper {
                 is_due.then_some(Due::Birth)
             }
             Tracked::Mapped(mapped) => match rejection::sound(measured, settings).and_then(|()| {
-                rejection::still(measured, |frame| self.pose(frame), &self.camera, &mapped.start)
+                let depth_error = self.settings.detections.depth_error;
+                rejection::still(measured, |frame| self.pose(frame), &self.camera, &mapped.start, depth_error)
             }) {
                 Err(rejection) => Some(Due::Withdrawal(rejection)),
                 Ok(()) if measured.class_name() != mapped.class.as_deref() => {
@@ -165,7 +166,7 @@ impl Mapper {
     /// Puts an object into the map that can be placed now.
     fn bear(&mut self, id: ObjectId, report: &mut FrameReport) {
         let Some(measured) = self.measured(id) else { return };
-        let started = rejection::start(measured, |i| self.pose(i), self.camera, &self.settings.objects);
+        let started = rejection::start(measured, |i| self.pose(i), self.camera, &self.settings);
         let (views, class) = (measured.views.clone(), measured.class_name().map(str::to_owned));
         let born = started.map_err(|rejection| rejection.to_string());
         let born = born.and_then(|start| self.push_object(id, start, &views));

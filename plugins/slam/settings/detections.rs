@@ -29,7 +29,7 @@ pub struct DetectionSettings {
     #[serde(deserialize_with = "within::<0, 1, _>")]
     #[schemars(range(min = 0, max = 1))]
     pub min_score: f64,
-    /// Standard deviation of depths, where the source has any, as a part of the depth.
+    /// Standard deviation of depths, where the source has any, as a part of the depth. Default: 0.03.
     #[serde(deserialize_with = "positive", skip_serializing_if = "is_usual")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub depth_error: f64,

@@ -194,3 +194,33 @@ fn real_boxes_without_names_are_put_to_their_objects() {
         assert!(found.f1 > 0.5 && found.f1 < 0.8, "{other}: {found:?}");
     }
 }
+
+#[test]
+fn depths_place_objects_at_once_and_tell_what_moves() {
+    let with = ["source.detector.depth_error=0.02", "objects.birth_parallax_deg=0"];
+    let initialiser = ["objects.initialiser={type=\"depth\",thickness=0.0}"];
+    let (without, sequence) = scene(&[]);
+    let (settings, measured) = scene(&[&with[..], &initialiser].concat());
+    // the same boxes
+    assert!(
+        sequence.detections.iter().zip(&measured.detections).all(|(a, b)| a.bounding_box == b.bounding_box)
+    );
+    let (f1, f1_without) =
+        (scores(&estimate(&settings, &measured)).f1, scores(&estimate(&without, &sequence)).f1);
+    assert!(f1 > f1_without - 0.01, "{f1} {f1_without}");
+    let born = |settings: &Settings, sequence: &Sequence| {
+        let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
+        sequence.observations().take(20).map(|frame| mapper.take(&frame).unwrap().born.len()).sum::<usize>()
+    };
+    let (early, late) = (born(&settings, &measured), born(&without, &sequence));
+    assert!(early > late + 5, "{early} {late}");
+    let mut moved = Sequence::clone(&measured);
+    let id = moved.detections[0].object.unwrap();
+    for detection in moved.detections.iter_mut().filter(|detection| detection.object == Some(id)) {
+        detection.depth = detection.depth.map(|depth| depth + 0.01 * detection.frame as f64);
+    }
+    let report = estimate(&by(&settings, Given {}), &Arc::new(moved));
+    let rejected: Vec<_> = report.objects.iter().filter(|object| object.rejected_because.is_some()).collect();
+    assert_eq!(rejected.iter().map(|object| object.object.id).collect::<Vec<_>>(), [id]);
+    assert!(rejected[0].rejected_because.as_ref().unwrap().starts_with("it moves by"), "{rejected:?}");
+}

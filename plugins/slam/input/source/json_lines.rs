@@ -261,6 +261,7 @@ mod tests {
     fn what_is_written_as_lines_is_read_back() {
         let mut settings = Simulated::default();
         settings.trajectory.frames = 20;
+        settings.detector.depth_error = Some(Positive::literal(0.02));
         let sequence = settings.simulate().unwrap();
         let lines: Vec<String> = sequence.observations().map(|o| line(&o)).collect();
         let folder = tempfile::tempdir().unwrap();
