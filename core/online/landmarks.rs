@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// What a sensor sees of a landmark, whichever that is.
+/// What a sensor sees of a landmark, whichever that is. One sighting has to determine where the landmark is: a bearing alone does not.
 #[derive(Debug, Clone)]
 pub struct Sighting {
     /// The measurement, between a pose and a landmark.
@@ -121,9 +121,8 @@ pub struct Landmarks {
     prefix: String,
     settings: LandmarkSettings,
     known: Vec<Known>,
-    /// Landmarks that there ever were, and poses.
+    /// Landmarks that there ever were.
     born: usize,
-    poses: usize,
 }
 
 /// A landmark.
@@ -132,9 +131,9 @@ struct Known {
     key: Key,
     /// Its covariance when it was last looked at: what came later says more.
     covariance: Option<DMatrix<f64>>,
-    /// Its sightings, and the poses that they are from, by number.
+    /// Its sightings, and the poses that they are from.
     sightings: Vec<FactorId>,
-    poses: Vec<usize>,
+    poses: Vec<Key>,
 }
 
 impl Landmarks {
@@ -144,7 +143,7 @@ impl Landmarks {
     /// Where a setting is outside its domain.
     pub fn new(prefix: &str, settings: LandmarkSettings) -> Result<Self, SettingError> {
         settings.check()?;
-        Ok(Self { prefix: prefix.to_owned(), settings, known: vec![], born: 0, poses: 0 })
+        Ok(Self { prefix: prefix.to_owned(), settings, known: vec![], born: 0 })
     }
 
     /// The keys of all landmarks, the oldest first.
@@ -152,8 +151,8 @@ impl Landmarks {
         self.known.iter().map(|known| &known.key)
     }
 
-    /// Puts what is seen from a pose to landmarks, and pushes it. Pose and landmarks are as of the last update, and the next one
-    /// takes the sightings in; where that fails, go back to a clone of the landmarks.
+    /// Puts what is seen from a pose to landmarks, and pushes it. Pose and landmarks are as of the last update, so
+    /// that there has to be one between two calls, and the next takes the sightings in; where that fails, go back to a clone of the landmarks.
     ///
     /// # Errors
     /// Where a sighting does not fit, or the pose has no covariance. Nothing is pushed then.
@@ -190,9 +189,8 @@ impl Landmarks {
         self.known.extend(new);
         for (owner, id) in owners.iter().flatten().zip(ids) {
             self.known[*owner].sightings.push(id);
-            self.known[*owner].poses.push(self.poses);
+            self.known[*owner].poses.push(pose.clone());
         }
-        self.poses += 1;
         let name = |owner: Option<usize>| owner.map(|owner| self.known[owner].key.clone());
         let names = owners.into_iter().map(name).collect();
         Ok(Named { names, merged: self.merge(session, same)? })
@@ -208,7 +206,9 @@ impl Landmarks {
         for (into, from) in same {
             let (a, b) = (&self.known[into], &self.known[from]);
             let are_two = a.poses.iter().any(|pose| b.poses.contains(pose));
-            if are_two || gone.contains(&into) || gone.contains(&from) {
+            // what has left with its pose cannot be given to another
+            let is_whole = b.sightings.iter().all(|id| session.entry(*id).is_some());
+            if are_two || !is_whole || gone.contains(&into) || gone.contains(&from) {
                 continue;
             }
             let mut graph = Graph::new();

@@ -45,7 +45,7 @@ pub struct Detection {
     #[serde(default)]
     pub scores: Option<String>,
     /// How far away the object's centre is along the optical axis, in metres, where that was measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub depth: Option<f64>,
 }
 

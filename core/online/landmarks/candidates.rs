@@ -1,6 +1,6 @@
 //! Which landmarks a sighting may be of.
 use super::hypotheses::{self, Hypothesis};
-use super::{Landmarks, Sighting, SightingError};
+use super::{Known, Landmarks, Sighting, SightingError};
 use crate::session::{Innovation, InnovationError, Linearized, Session};
 use manifactor_graph::Key;
 use nalgebra::DMatrix;
@@ -27,12 +27,15 @@ impl Landmarks {
         if seen.is_empty() {
             return Ok(Candidates::default());
         }
+        // those that have left with a window
+        self.known.retain(|known| session.find(known.key.as_str()).is_some());
         let new = -2.0 * self.settings.density.ln();
         let of_pose = session.covariance(&[pose.as_str()])?;
         let (mut options, mut factors) = (vec![], vec![]);
         for (sighting, one) in seen.iter().enumerate() {
             let mut of_one = vec![];
-            for (landmark, known) in self.known.iter().enumerate() {
+            let is_there = |known: &Known| session.estimate(known.key.as_str()).is_some();
+            for (landmark, known) in self.known.iter().enumerate().filter(|(_, known)| is_there(known)) {
                 let factor = match session.linearized(0, &one.of(pose, &known.key)) {
                     Ok(factor) => factor,
                     // it cannot be seen from here
@@ -73,8 +76,8 @@ fn same(innovation: &Innovation, options: &[Vec<Hypothesis>], most: f64) -> Vec<
     same
 }
 
-/// What it costs at least that a sighting is of a landmark, whatever the correlation with the pose is: J Σ Jᵀ is at most twice the sum of
-/// what pose and landmark alone would make it.
+/// What it costs at least that a sighting alone is of a landmark, whatever the correlation with the pose is: J Σ Jᵀ is at most twice the sum of
+/// what pose and landmark alone would make it. Several sightings that are off by one drift may cost less together: this gate does not know.
 fn least_cost(factor: &Linearized, of_pose: &DMatrix<f64>, of_landmark: Option<&DMatrix<f64>>) -> f64 {
     let ([by_pose, by_landmark], Some(of_landmark)) = (factor.jacobians.as_slice(), of_landmark) else {
         return f64::NEG_INFINITY;

@@ -20,7 +20,7 @@ pub(super) enum Choice {
     Unclear,
 }
 
-/// Hypotheses that are looked at beyond the cheapest, at most: with more in doubt, only what is cheaper is.
+/// Steps of the search, at most. Beyond them the cheapest hypothesis that was found counts, and sightings that have a choice are unclear.
 const NODES: usize = 20_000;
 
 /// Finds the cheapest hypothesis: each sighting is of one of its `options` or new, at a cost of `new`, and no two are of one landmark.
@@ -83,8 +83,8 @@ struct Search<'a> {
 impl Search<'_> {
     fn descend(&mut self, cost: f64) {
         let depth = self.chosen.len();
-        let slack = if self.nodes < NODES { self.slack } else { 0.0 };
-        if cost + self.left[depth] > self.best + slack {
+        let is_over = self.nodes >= NODES && self.best.is_finite();
+        if is_over || cost + self.left[depth] > self.best + self.slack {
             return;
         }
         let Some(&sighting) = self.order.get(depth) else { return self.note(cost) };
@@ -129,7 +129,8 @@ impl Search<'_> {
             let (options, costs) = (&self.options[sighting], &self.costs[sighting]);
             let chosen = option.unwrap_or(options.len());
             let others = costs.iter().enumerate().filter(|(o, _)| *o != chosen).map(|(_, cost)| *cost);
-            if others.fold(f64::INFINITY, f64::min) >= self.best + self.slack {
+            let has_choice = self.nodes >= NODES && !options.is_empty() && self.slack > 0.0;
+            if !has_choice && others.fold(f64::INFINITY, f64::min) >= self.best + self.slack {
                 choices[sighting] = option.map_or(Choice::New, |o| Choice::Landmark(options[o].landmark));
             }
         }

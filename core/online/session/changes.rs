@@ -207,7 +207,7 @@ impl Session {
     }
 
     /// The number and the type of a variable, of a pending one too.
-    pub(super) fn find(&self, key: &str) -> Option<(usize, TypeId)> {
+    pub(crate) fn find(&self, key: &str) -> Option<(usize, TypeId)> {
         if let Some(variable) = self.model.variable(key) {
             return Some((variable as usize, self.model.type_of(variable)?));
         }

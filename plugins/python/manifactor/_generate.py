@@ -304,9 +304,17 @@ def module_of_functions(functions: list[Schema]) -> str:
     return head + "\nfrom typing import Any\n\nfrom .formula import call\n\n\n" + "\n\n\n".join(parts) + "\n"
 
 
+def whole(schema: Schema) -> Schema:
+    """The same, with the fields of the type that it stands for, where it is but another name of that."""
+    name = schema.get("$ref", "").removeprefix("#/$defs/")
+    return {**schema["$defs"][name], **{key: value for key, value in schema.items() if key != "$ref"}} if name else schema
+
+
 def modules() -> dict[str, str]:
     """The text of each module, by its name."""
     entries: list[Schema] = json.loads(_native.catalogue())
+    for entry in entries:
+        entry["schema"] = whole(entry["schema"])
     functions: list[Schema] = json.loads(_native.functions())
     types = Types()
     variables = {entry["name"]: entry for entry in entries if entry["kind"] == "variable"}

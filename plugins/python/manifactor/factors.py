@@ -346,7 +346,12 @@ def bounding_box(
     return Factor("bounding_box", {"box": box, "camera": camera, "model": model})
 
 
-def bounding_box_offset() -> Factor:
+def bounding_box_offset(
+    *,
+    box: Numbers,
+    camera: types.Camera,
+    model: Literal['standard', 'truncated'] | None = None,
+) -> Factor:
     """The box around an object's outline, shifted by an offset, is the one that was drawn: r = β(x, q) + o - b, in pixels.
 
     Variables: the pose of the camera, the object, and the offset of each side. Rows and β are those of `bounding_box`, and so is where it
@@ -364,8 +369,13 @@ def bounding_box_offset() -> Factor:
     factor = { type = "prior_point4", value = { position = [0.0, 0.0, 0.0, 0.0] } }
     noise  = { sigma = 5.0 }
     ```
+
+    Args:
+        box: The box that was measured: xmin, ymin, xmax, ymax, in pixels.
+        camera: The camera that saw it.
+        model: What of the object the box goes around. Default: "standard".
     """
-    return Factor("bounding_box_offset", {})
+    return Factor("bounding_box_offset", {"box": box, "camera": camera, "model": model})
 
 
 def centroid_depth(*, depth: float) -> Factor:

@@ -78,6 +78,7 @@ mod tests {
     fn what_is_written_is_read_back() {
         let mut settings = Simulated::default();
         settings.trajectory.frames = 30;
+        settings.detector.false_boxes = 0.2;
         settings.detector.depth_error = Some(Positive::literal(0.02));
         let mut sequence = settings.simulate().unwrap();
         // a detector need not say what it sees

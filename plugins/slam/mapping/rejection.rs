@@ -103,9 +103,13 @@ pub(crate) fn still(
     start: &DualQuadric,
     depth_error: f64,
 ) -> Result<(), Rejection> {
+    if measured.prior.is_some() {
+        return Ok(());
+    }
     let mut depths = 0.0;
     let mut place = |view: &ObjectBox| {
-        let (depth, pose) = (view.depth?, pose(view.frame)?);
+        // the centre of a box that the border cuts is not that of the object
+        let (depth, pose) = (view.depth.filter(|_| view.inside == [true; 4])?, pose(view.frame)?);
         depths += depth;
         Some((view.frame as f64, pose.act(&(camera.ray(view.bounding_box.centre()) * depth))))
     };

@@ -181,10 +181,9 @@ impl Tracker {
     fn track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
         let known = self.tracks.iter().position(|track| track.id == id);
         known.or_else(|| {
-            let belief = match first.depth {
-                Some(depth) => Belief::new(first, &self.camera, depth, self.settings.depth_error),
-                None => Belief::new(first, &self.camera, depth, self.settings.depth_spread),
-            };
+            // how well a measured depth is known is said by the sighting
+            let depth = first.depth.unwrap_or(depth);
+            let belief = Belief::new(first, &self.camera, depth, self.settings.depth_spread);
             self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);
             Some(self.tracks.len() - 1)
         })
