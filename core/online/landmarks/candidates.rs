@@ -31,11 +31,13 @@ impl Landmarks {
         self.known.retain(|known| session.find(known.key.as_str()).is_some());
         let new = -2.0 * self.settings.density.ln();
         let of_pose = session.covariance(&[pose.as_str()])?;
+        let is_there = |known: &Known| session.estimate(known.key.as_str()).is_some();
+        let there: Vec<(usize, &Known)> =
+            self.known.iter().enumerate().filter(|(_, known)| is_there(known)).collect();
         let (mut options, mut factors) = (vec![], vec![]);
         for (sighting, one) in seen.iter().enumerate() {
             let mut of_one = vec![];
-            let is_there = |known: &Known| session.estimate(known.key.as_str()).is_some();
-            for (landmark, known) in self.known.iter().enumerate().filter(|(_, known)| is_there(known)) {
+            for (landmark, known) in &there {
                 let factor = match session.linearized(0, &one.of(pose, &known.key)) {
                     Ok(factor) => factor,
                     // it cannot be seen from here
@@ -44,7 +46,7 @@ impl Landmarks {
                 };
                 let is_parked = factor.variables.iter().any(|v| session.is_parked(*v));
                 if !is_parked && least_cost(&factor, &of_pose, known.covariance.as_ref()) < new {
-                    of_one.push(Hypothesis { landmark, factor: factors.len() });
+                    of_one.push(Hypothesis { landmark: *landmark, factor: factors.len() });
                     factors.push(factor);
                 }
             }

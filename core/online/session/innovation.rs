@@ -175,21 +175,6 @@ impl Innovation {
         let volume = self.volumes[a] + 2.0 * s.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
         Some(Misfit { squared, volume })
     }
-
-    /// Number of factors.
-    pub fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// Whether there is no factor.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
-    /// The rows of a factor's residual that are observed.
-    pub fn rows(&self, factor: usize) -> usize {
-        self.rows[factor].len()
-    }
 }
 
 impl Joint {

@@ -50,6 +50,11 @@ fn data(path: &str) -> Option<PathBuf> {
     file.exists().then_some(file)
 }
 
+/// Whether all rows of the tables in `docs/decisions/association.md` are asked for: that takes minutes.
+fn is_for_tables() -> bool {
+    std::env::var_os("MANIFACTOR_TABLES").is_some()
+}
+
 /// The rows of a table of numbers, without comments.
 fn rows(path: PathBuf) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(path).unwrap();

@@ -3,7 +3,7 @@
 //! Noises are what the sensors are, not what fits the truth. Odometry is the commanded speed: its error is a random walk, so that
 //! its variance grows with the way, the turn and the time, however often the robot looks. A camera tells ranges by a barcode's
 //! size, so their error grows with the range. Some barcodes are read as others: hence a robust loss.
-use super::{Seen, Step, aligned_errors, data, drive, errors};
+use super::{Seen, Step, aligned_errors, data, drive, errors, is_for_tables};
 use manifactor_geometry::{BearingRange2, Point2, Se2, So2};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Cauchy;
@@ -161,12 +161,7 @@ fn barcodes_that_nobody_reads_are_told_apart_by_groups() {
     let Some((of_groups, ate)) = compare(false, settings) else { return };
     // odometry alone is off by 1.88 m; which of a group it is stays in doubt
     assert!(ate.0 < 0.5 && of_groups.precision > 0.95, "{ate:?} {of_groups:?}");
-}
-
-#[test]
-#[ignore = "the table of docs/decisions/association.md"]
-fn barcodes_by_settings() {
-    for with_robots in [false, true] {
+    for with_robots in [false, true].into_iter().filter(|_| is_for_tables()) {
         for density in [0.02, 0.002, 0.0002] {
             for odds in [1.0, 3.0, 10.0] {
                 println!("robots {with_robots}, density {density}, odds {odds}");

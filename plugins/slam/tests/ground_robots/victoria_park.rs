@@ -1,5 +1,5 @@
 //! Victoria Park: a car among trees, which a laser sees (Nebot, ACFR; prepared by Kaess).
-use super::{Seen, Step, aligned_errors, data, drive};
+use super::{Seen, Step, aligned_errors, data, drive, is_for_tables};
 use manifactor_geometry::{Coordinates, Landmark, Se2, So2};
 use manifactor_graph::Noise;
 use manifactor_online::LandmarkSettings;
@@ -79,11 +79,9 @@ fn compare(sensors: &Sensors) -> Option<(IdentityScores, (f64, f64))> {
 fn trees_without_names_are_told_apart() {
     let Some((scores, apart)) = compare(&SENSORS) else { return };
     assert!(scores.f1 > 0.95 && apart.0 < 3.0);
-}
-
-#[test]
-#[ignore = "minutes: the table of docs/decisions/association.md"]
-fn trees_by_what_the_sensors_are_taken_for() {
+    if !is_for_tables() {
+        return;
+    }
     for trees in [None, Some(0.3), Some(0.2)] {
         for odometry in [1.0, 2.0, 3.0] {
             for steering in [false, true] {
