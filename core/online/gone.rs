@@ -31,6 +31,9 @@ pub(crate) struct GoneKeys {
     /// Those that end with a number, by what stands before it.
     numbered: BTreeMap<String, Runs>,
     others: BTreeSet<String>,
+    /// Those of variables that have left nothing behind: another may have that name. They are few.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    free: BTreeSet<String>,
 }
 
 /// A name, and the number that it ends with; `None` where another name would have the same number.
@@ -49,7 +52,18 @@ impl GoneKeys {
         }
     }
 
-    pub(crate) fn insert(&mut self, key: &str) {
+    /// Whether a new variable may not have this name.
+    pub(crate) fn is_taken(&self, key: &str) -> bool {
+        self.contains(key) && !self.free.contains(key)
+    }
+
+    /// Takes note of a variable that is gone, and whether something of it is left.
+    pub(crate) fn insert(&mut self, key: &str, is_left: bool) {
+        if is_left {
+            self.free.remove(key);
+        } else {
+            self.free.insert(key.to_owned());
+        }
         match split(key) {
             Some((name, number)) => self.numbered.entry(name.to_owned()).or_default().insert(number),
             None => drop(self.others.insert(key.to_owned())),
@@ -79,7 +93,7 @@ mod tests {
     #[test]
     fn names_are_told_apart() {
         let mut gone = GoneKeys::default();
-        ["x7", "x07", "lamp", "12", "y99999999999999999999999"].iter().for_each(|key| gone.insert(key));
+        ["x7", "x07", "lamp", "12", "y99999999999999999999999"].iter().for_each(|key| gone.insert(key, true));
         assert!(["x7", "x07", "lamp", "12", "y99999999999999999999999"].iter().all(|key| gone.contains(key)));
         assert!(["x8", "x007", "lam", "1", "y9", "x"].iter().all(|key| !gone.contains(key)));
     }

@@ -60,8 +60,11 @@ impl Session {
             return Err(ChangeError::Known { key: key.clone() });
         }
         let of_factors = factors.factors().iter().flat_map(|entry| &entry.keys).chain(factors.fixed().keys());
-        let named = values.iter().map(|(key, _)| key).chain(of_factors);
-        if let Some(key) = named.into_iter().find(|key| self.gone.contains(key.as_str())) {
+        let is_gone = |key: &&Key| {
+            self.gone.contains(key.as_str()) && values.find(key.as_str()).is_none() && !is_known(key)
+        };
+        let mut taken = values.iter().map(|(key, _)| key).filter(|key| self.gone.is_taken(key.as_str()));
+        if let Some(key) = taken.next().or_else(|| of_factors.into_iter().find(is_gone)) {
             return Err(ChangeError::Gone { key: key.clone() });
         }
         let is_sealed =

@@ -18,7 +18,8 @@ impl Session {
     /// Has variables leave, at the end of the next [`update`](Self::update): what their factors say of others stays, as a linear
     /// prior, and those others keep their linearization points until they leave as well. Estimates and covariances of what
     /// stays are what they were. Factors that do not count where they are left, as they are not defined there or hang
-    /// on something that is parked, are dropped, and the report names them.
+    /// on something that is parked, are dropped, and the report names them. One that has no factors then leaves nothing behind: another may have
+    /// its key.
     ///
     /// # Errors
     /// Where a variable is not there, or gone already. None leaves then.
@@ -59,6 +60,8 @@ impl Session {
             let _ = self.pass(&Touched::default(), &Moves::default(), true, report);
         }
         let mut touched = Touched::default();
+        let is_bare = |v: &u32| self.model.factors_of(&[*v]).is_empty();
+        let bare: Vec<u32> = leaving.iter().copied().filter(is_bare).collect();
         for v in leaving {
             self.seal_one(*v, &mut touched, report);
         }
@@ -68,8 +71,10 @@ impl Session {
         let moves = self.park(&mut touched);
         let passed = self.pass(&touched, &moves, false, report);
         for v in leaving {
+            let key = self.key(*v);
+            self.gone.insert(key.as_str(), !bare.contains(v));
+            report.sealed.push(key);
             self.forget(*v);
-            report.sealed.push(self.key(*v));
         }
         self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
         passed
@@ -136,7 +141,6 @@ impl Session {
         self.shaken.remove(&variable);
         self.damped.remove(&variable);
         self.model.blocks.damp(variable, 0.0);
-        self.gone.insert(self.model.place(variable).key.as_str());
         self.model.forget(variable);
     }
 }

@@ -112,6 +112,28 @@ fn what_is_gone_is_named_and_nothing_can_be_added_to_it() {
     assert!(session.entry(ids[0]).is_none() && session.estimate("x0").is_none());
     let held = session.fix(&"x3".into(), &Fixed::Whole(true)).unwrap_err();
     assert_eq!(held, ChangeError::Sealed { key: "x3".into() });
+    // what has left nothing behind is gone as well, but another may have its name
+    let bare = |at: f64| {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        graph.add(["b7"], At { at: [at, 0.0] });
+        values.insert("b7", Plane { x: 0.0, y: 0.0 });
+        (graph, values)
+    };
+    let (graph, values) = bare(3.0);
+    let of_bare = session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    session.remove(&of_bare).unwrap();
+    session.marginalize(&["b7"]).unwrap();
+    session.update().unwrap();
+    let (graph, values) = bare(5.0);
+    assert_eq!(session.push(&graph, &Values::new()).unwrap_err(), gone("b7"));
+    session = Session::load(&session.save().unwrap()).unwrap();
+    session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    assert!((session.get::<Plane>("b7").unwrap().x - 5.0).abs() < 1e-9);
+    session.marginalize(&["b7"]).unwrap();
+    session.update().unwrap();
+    assert_eq!(session.push(&graph, &values).unwrap_err(), gone("b7"));
     session.update().unwrap();
 }
 
