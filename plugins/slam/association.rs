@@ -1,7 +1,8 @@
 //! Which object a box shows, where the source does not say: chosen by name in a run's `association`.
 //!
 //! An [`Associator`] names the boxes of a frame, and learns from it once the frame is in the map. What it names wrongly at first
-//! it may mend later: two objects that turn out to be one are [merged](Merge), and [`Names`] has the name that counts.
+//! it may mend later: two objects that turn out to be one are [merged](Merge), boxes that turn out to show another object [move](Move)
+//! to it, and [`Names`] has the name that counts.
 pub(crate) mod assignment;
 mod given;
 mod likelihood;
@@ -18,7 +19,7 @@ use std::sync::Arc;
 
 pub use given::Given;
 pub use likelihood::Likelihood;
-pub use names::{Merge, Names};
+pub use names::{Merge, Move, Names};
 pub use overlap::{Iou, Projection};
 
 /// A way to associate boxes with objects.
@@ -51,12 +52,21 @@ pub trait Associator: Debug + Send {
 }
 
 /// What a frame has taught of earlier ones.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Learned {
     /// Objects that turn out to be one.
     pub merged: Vec<Merge>,
+    /// Boxes that turn out to show another object, before any are merged.
+    pub moved: Vec<Move>,
     /// Objects that were seen too rarely to be any, and are not looked for any more.
     pub forgotten: Vec<ObjectId>,
+}
+
+impl Learned {
+    /// Whether no box has another object for it.
+    pub(crate) fn is_nothing(&self) -> bool {
+        self.moved.is_empty() && self.merged.is_empty()
+    }
 }
 
 /// What an associator sees of a frame.

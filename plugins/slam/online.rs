@@ -12,7 +12,7 @@ mod present;
 mod revision;
 mod rules;
 
-use crate::association::{Associator, Image, Map, Merge, Names};
+use crate::association::{Associator, Image, Learned, Map, Names};
 use crate::estimate::{Estimate, EstimateError};
 use crate::gravity::GravityError;
 use crate::input::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
@@ -47,10 +47,10 @@ pub struct Mapper {
     session: Session,
     up: Up,
     associator: Box<dyn Associator>,
-    /// Of objects that turned out to be others.
+    /// What boxes are called now that were called otherwise when they came.
     names: Names,
-    /// Those that the map has not taken in yet.
-    pending: Vec<Merge>,
+    /// What was learned of earlier frames, and the map has not taken in yet.
+    pending: Vec<Learned>,
     measurements: Measurements,
     objects: BTreeMap<ObjectId, Tracked>,
     ledger: Ledger,
@@ -173,7 +173,7 @@ impl Mapper {
         self.associator.reconsider(&Image { frame, timestamp, detections }, names, &self.known((frame, pose)))
     }
 
-    /// Names of objects that turned out to be others.
+    /// What boxes are called now.
     pub fn names(&self) -> &Names {
         &self.names
     }

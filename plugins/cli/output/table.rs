@@ -83,9 +83,10 @@ fn association(variant: &VariantReport) -> String {
     let Some(association) = &variant.association else { return String::new() };
     let merged = text::count(association.merged, "object");
     let mut line = format!(
-        "{}: boxes put to objects by {}, {merged} merged",
+        "{}: boxes put to objects by {}, {merged} merged, {} moved",
         on_one_line(&variant.name),
-        association.by
+        association.by,
+        text::count(association.moved, "box")
     );
     if let (Some(then), Some(end)) = (&association.at_the_time, &association.in_the_end) {
         line += &format!(

@@ -1,5 +1,7 @@
 //! By the joint likelihood of box and class.
+mod division;
 mod fit;
+mod second_look;
 mod sightings;
 mod track;
 mod tracker;
@@ -27,7 +29,8 @@ use tracker::Tracker;
 /// is nearly another's twin shows the same object: detectors draw a box for each class.
 ///
 /// An object that was lost begins again under another name. Where one ellipsoid explains the boxes of two objects that
-/// are not seen side by side, they become one.
+/// are not seen side by side, they become one; where only two explain those of one, it becomes two. All boxes of a frame are put to objects once
+/// more a while later, by what is known then: those that turn out to show another object are moved to it.
 ///
 /// Chosen on fr1/desk, fr1/desk2 and simulated desks: see the page on association in `docs/decisions`.
 ///
@@ -86,6 +89,10 @@ pub struct Likelihood {
     #[serde(deserialize_with = "positive")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub merge_error: f64,
+    /// The boxes of a frame are put to objects once more after so many seconds, by what is known then.
+    #[serde(deserialize_with = "positive")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub second_look_s: f64,
 }
 
 impl Default for Likelihood {
@@ -103,6 +110,7 @@ impl Default for Likelihood {
             new_objects: 0.05,
             twin_iou: 0.7,
             merge_error: 1.2,
+            second_look_s: 10.0,
         }
     }
 }

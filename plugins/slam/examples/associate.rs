@@ -63,11 +63,14 @@ fn scores(settings: &Likelihood, sequence: &Sequence) -> [IdentityScores; 3] {
     for frame in 0..frames.len() {
         let put = associator.associate(&image(frame), &map);
         let learned = associator.learn(&image(frame), &put, &map);
+        learned.moved.iter().for_each(|moved| names.put(moved));
         learned.merged.into_iter().for_each(|merge| names.merge(merge));
         then.push(put);
     }
-    let now: Vec<Vec<_>> =
-        then.iter().map(|put| put.iter().map(|id| id.map(|id| names.now(id))).collect()).collect();
+    let now_of = |frame: usize, put: &Vec<Option<ObjectId>>| -> Vec<Option<ObjectId>> {
+        put.iter().enumerate().map(|(place, id)| id.map(|id| names.of(id, frame, place))).collect()
+    };
+    let now: Vec<Vec<_>> = then.iter().enumerate().map(|(frame, put)| now_of(frame, put)).collect();
     let again = now.iter().enumerate().map(|(i, put)| associator.reconsider(&image(i), put, &map)).collect();
     [then, now, again].map(|names: Vec<Vec<Option<ObjectId>>>| {
         let truth = sequence.detections.iter().map(|detection| detection.object);

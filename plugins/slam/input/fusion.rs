@@ -63,6 +63,16 @@ impl Fusion {
         }
     }
 
+    /// Takes back a detection that was counted in.
+    pub(crate) fn take_back(&mut self, scores: &ClassScores, aliases: &Aliases) {
+        self.detections = self.detections.saturating_sub(1);
+        for (class, score) in scores.iter() {
+            if let Some(sum) = self.sums.get_mut(&*aliases.canonical(class)) {
+                *sum = (*sum - score).max(0.0);
+            }
+        }
+    }
+
     /// Counts another's detections in.
     pub(crate) fn add_all(&mut self, other: Self) {
         self.detections += other.detections;

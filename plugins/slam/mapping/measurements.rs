@@ -95,6 +95,30 @@ impl Measurements {
         }
     }
 
+    /// Takes a detection back that was taken for one of an object.
+    pub(crate) fn take_back(
+        &mut self,
+        detection: &Detection,
+        from: ObjectId,
+        camera: &Camera,
+        settings: &DetectionSettings,
+        aliases: &Aliases,
+    ) {
+        let sifted = sift(detection, camera, settings);
+        let Ok(place) = self.objects.binary_search_by_key(&from, |object| object.id) else { return };
+        let (false, object) = (matches!(sifted, Sifted::LowScore), &mut self.objects[place]) else { return };
+        object.detections = object.detections.saturating_sub(1);
+        object.fusion.take_back(&detection.scores, aliases);
+        match sifted {
+            Sifted::View(view) => match object.views.iter().position(|own| *own == view) {
+                Some(own) => drop(object.views.remove(own)),
+                // another box of its frame has taken its place
+                None => self.duplicates = self.duplicates.saturating_sub(1),
+            },
+            _ => self.cut = self.cut.saturating_sub(1),
+        }
+    }
+
     /// Forgets an object: its boxes are of none.
     pub(crate) fn disown(&mut self, id: ObjectId) {
         if let Ok(place) = self.objects.binary_search_by_key(&id, |object| object.id) {
@@ -172,6 +196,12 @@ impl Measured {
     /// One that an earlier map has.
     fn known(object: &Arc<PriorObject>) -> Self {
         Self { fusion: object.classes.clone(), prior: Some(object.clone()), ..Self::new(object.id) }
+    }
+
+    /// Its box in a frame, if there is one.
+    pub(crate) fn view(&self, frame: usize) -> Option<&ObjectBox> {
+        let place = self.views.binary_search_by_key(&frame, |view| view.frame).ok()?;
+        self.views.get(place)
     }
 
     /// Adds a box; whether it takes the place of another of its frame.

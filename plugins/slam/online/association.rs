@@ -1,17 +1,21 @@
-//! Objects that are named as they come, and that turn out to be one.
+//! Objects that are named as they come, and what turns out to be otherwise.
 use super::Mapper;
 use super::frame::FrameReport;
-use super::object::Tracked;
-use crate::association::{Map, Merge, Names};
+use super::object::{Sights, Tracked};
+use crate::association::{Learned, Map, Merge, Move, Names};
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measurements, ObjectBox};
-use crate::mapping::{object_key, pose_key, view_entries};
+use crate::mapping::{object_key, pose_key};
+use crate::settings::Settings;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Values};
-use manifactor_online::Session;
+use manifactor_online::{FactorId, Session};
 use manifactor_quadric::DualQuadric;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// An object begins again when more of its boxes than this part are others at once.
+const OTHERS: f64 = 0.25;
 
 /// What has been estimated so far; of frames that have left the window, as it was when they came.
 pub(super) struct Known<'a> {
@@ -45,16 +49,92 @@ impl Mapper {
         Known { newest, live: &self.live, session: &self.session, measurements: &self.measurements }
     }
 
-    /// Makes one of objects that turn out to be one. Returns the names as they are then.
-    pub(super) fn unite_all(&mut self, merges: &[Merge], report: &mut FrameReport) -> Names {
+    /// Corrects what earlier frames were thought to show. Returns the names as they are then.
+    pub(super) fn correct(&mut self, all: &[Learned], report: &mut FrameReport) -> Names {
         let (mut names, mut owners) = (self.names.clone(), vec![]);
-        for merge in merges {
-            owners.extend(self.unite(*merge, report));
-            names.merge(*merge);
+        for learned in all {
+            for moved in &learned.moved {
+                self.put(moved, report);
+                names.put(moved);
+            }
+            owners.extend(self.begin_again(&learned.moved, report));
+            for merge in &learned.merged {
+                owners.extend(self.unite(*merge, report));
+                names.merge(*merge);
+            }
         }
         let owners: BTreeSet<ObjectId> = owners.into_iter().map(|id| names.now(id)).collect();
         self.ask(&owners.into_iter().collect::<Vec<_>>(), report);
         names
+    }
+
+    /// Gives a box to the object that it shows.
+    fn put(&mut self, moved: &Move, report: &mut FrameReport) {
+        let Move { frame, from, into, ref detection, .. } = *moved;
+        let Settings { detections, aliases, .. } = &*self.settings;
+        self.measurements.take_back(detection, from, &self.camera, detections, aliases);
+        self.measurements.add(detection, &self.camera, detections, aliases);
+        if let Some(object @ Tracked::Withdrawn) = self.objects.get_mut(&from) {
+            // it may be one thing without it
+            *object = Tracked::default();
+        }
+        for id in [from, into] {
+            self.put_right(id, frame, report);
+        }
+        tracing::debug!(frame, "a box of object {from} is one of {into}");
+        report.moved.push(moved.clone());
+    }
+
+    /// Takes objects out of the map that have so many other boxes now that they are better begun again, when they are seen the next time: where
+    /// they are is where other things are. Returns objects that rules had connected with them.
+    fn begin_again(&mut self, all: &[Move], report: &mut FrameReport) -> Vec<ObjectId> {
+        let mut changed: BTreeMap<ObjectId, usize> = BTreeMap::new();
+        for id in all.iter().flat_map(|moved| [moved.from, moved.into]) {
+            *changed.entry(id).or_default() += 1;
+        }
+        let mut owners = vec![];
+        for (id, boxes) in changed {
+            let Some(measured) = self.measured(id).filter(|measured| measured.prior.is_none()) else {
+                continue;
+            };
+            let is_mapped = self.objects.get(&id).is_some_and(Tracked::is_mapped);
+            if is_mapped && boxes as f64 > OTHERS * measured.views.len() as f64 {
+                owners.extend(self.take_out(id, report));
+                let sights = self.sights(id);
+                self.objects.insert(id, Tracked::Waiting(sights));
+                report.withdrawn.push(object_key(id));
+            }
+        }
+        owners
+    }
+
+    /// Brings the factors of an object's box in a frame into line with what is measured.
+    fn put_right(&mut self, id: ObjectId, frame: usize, report: &mut FrameReport) {
+        let view = self.measured(id).and_then(|measured| measured.view(frame)).copied();
+        match self.objects.entry(id).or_default() {
+            Tracked::Mapped(mapped) => {
+                let gone = mapped.boxes.extract_if(.., |(of, _)| *of == frame).map(|(_, factor)| factor);
+                let gone: Vec<FactorId> = gone.collect();
+                self.remove(&gone, report);
+                self.push_boxes(id, view.as_slice(), report);
+            }
+            Tracked::Waiting(_) => {
+                let sights = self.sights(id);
+                self.objects.insert(id, Tracked::Waiting(sights));
+            }
+            Tracked::Withdrawn => {}
+        }
+    }
+
+    /// From where an object is seen that is not in the map.
+    pub(super) fn sights(&self, id: ObjectId) -> Sights {
+        let mut sights = Sights::new();
+        for view in self.measured(id).map_or(&[][..], |measured| &measured.views) {
+            if let Some(pose) = self.pose(view.frame) {
+                sights.add(view, &pose, &self.camera);
+            }
+        }
+        sights
     }
 
     /// Forgets an object that is not in the map: its boxes are nobody's.
@@ -96,14 +176,11 @@ impl Mapper {
 
     /// Pushes boxes of an object that is in the map, as far as their poses are still there.
     fn push_boxes(&mut self, id: ObjectId, views: &[ObjectBox], report: &mut FrameReport) {
+        let (frames, entries) = self.entries_of(&object_key(id), views);
         let mut graph = Graph::new();
-        for view in views.iter().filter(|view| self.pose(view.frame).is_some()) {
-            let key = object_key(id);
-            let entries = view_entries(view, &key, self.camera, &self.settings.detections);
-            graph.factors_mut().extend(entries);
-        }
+        graph.factors_mut().extend(entries);
         match (self.session.push(&graph, &Values::new()), self.objects.get_mut(&id)) {
-            (Ok(ids), Some(Tracked::Mapped(mapped))) => mapped.boxes.extend(ids),
+            (Ok(ids), Some(Tracked::Mapped(mapped))) => mapped.boxes.extend(frames.into_iter().zip(ids)),
             (Ok(_), _) => {}
             (Err(error), _) => report.refused.push(error.to_string()),
         }

@@ -2,7 +2,7 @@
 use super::association::Known;
 use super::object::Tracked;
 use super::{FrameError, Located, Mapper};
-use crate::association::{Image, Learned, Merge};
+use crate::association::{Image, Learned, Merge, Move};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, ObjectId, Observation};
 use crate::mapping::measurements::{ObjectBox, Sifted, sift};
@@ -36,7 +36,10 @@ pub struct FrameReport {
     /// Objects that were seen too rarely to be any: their boxes are of none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forgotten: Vec<ObjectId>,
-    /// Objects that turned out to be others.
+    /// Boxes of earlier frames that turned out to show other objects.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub moved: Vec<Move>,
+    /// Objects that turned out to be others, after that.
     pub merged: Vec<Merge>,
     /// Objects that came into the map.
     pub born: Vec<Key>,
@@ -71,6 +74,7 @@ impl FrameReport {
             boxes: 0,
             names: vec![],
             forgotten: vec![],
+            moved: vec![],
             merged: vec![],
             born: vec![],
             withdrawn: vec![],
@@ -87,6 +91,7 @@ impl FrameReport {
             *last = first;
         }
         put(before.forgotten, &mut self.forgotten);
+        put(before.moved, &mut self.moved);
         put(before.merged, &mut self.merged);
         put(before.born, &mut self.born);
         put(before.withdrawn, &mut self.withdrawn);
@@ -195,7 +200,7 @@ impl Mapper {
                 let first = ids.len() - owners.len();
                 for (owner, id) in owners.into_iter().zip(ids.into_iter().skip(first)) {
                     if let Some(Tracked::Mapped(mapped)) = self.objects.get_mut(&owner) {
-                        mapped.boxes.push(id);
+                        mapped.boxes.push((report.frame, id));
                     }
                 }
                 Ok(())

@@ -32,8 +32,8 @@ pub(super) struct Sights {
 pub(super) struct Mapped {
     /// Where it began.
     pub start: DualQuadric,
-    /// The factors of its boxes.
-    pub boxes: Vec<FactorId>,
+    /// The factors of its boxes, each with its frame.
+    pub boxes: Vec<(usize, FactorId)>,
     /// Its class when rules were last asked.
     pub class: Option<String>,
 }
@@ -43,7 +43,7 @@ const MORE: f64 = 1.2;
 
 impl Default for Tracked {
     fn default() -> Self {
-        Self::Waiting(Sights { lines: vec![], cosine: 1.0, tried: 0 })
+        Self::Waiting(Sights::new())
     }
 }
 
@@ -68,6 +68,11 @@ impl Tracked {
 }
 
 impl Sights {
+    /// None yet.
+    pub(super) fn new() -> Self {
+        Self { lines: vec![], cosine: 1.0, tried: 0 }
+    }
+
     /// Adds the line of sight of a box.
     pub(super) fn add(&mut self, view: &ObjectBox, pose: &Se3, camera: &Camera) {
         let ray = camera.ray(view.bounding_box.centre()).normalize();

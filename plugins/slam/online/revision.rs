@@ -3,7 +3,6 @@ use super::Mapper;
 use super::frame::{FrameReport, Seen};
 use super::object::{Mapped, Tracked};
 use super::rules::Ledger;
-use crate::association::Merge;
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measurements, ObjectBox};
@@ -29,7 +28,7 @@ enum Due {
 struct Before {
     objects: BTreeMap<ObjectId, Tracked>,
     ledger: Ledger,
-    /// Where objects are united.
+    /// Where boxes get other objects.
     measurements: Option<Measurements>,
 }
 
@@ -42,18 +41,23 @@ impl Mapper {
                 sights.add(view, &pose, &self.camera);
             }
         }
-        let mut merged = std::mem::take(&mut self.pending);
-        merged.extend(&seen.learned.merged);
         report.forgotten.clone_from(&seen.learned.forgotten);
         report.forgotten.iter().for_each(|id| self.forget(*id));
+        let mut learned = std::mem::take(&mut self.pending);
+        if !seen.learned.is_nothing() {
+            learned.push(seen.learned.clone());
+        }
         let is_due = |id: &ObjectId| self.due(*id).is_some();
-        if merged.is_empty() && !seen.up_moved && !seen.boxes.keys().any(is_due) {
+        if learned.is_empty() && !seen.up_moved && !seen.boxes.keys().any(is_due) {
             return;
         }
-        let before = self.before(&merged);
-        let names = self.unite_all(&merged, report);
-        let changed = seen.boxes.keys().copied().chain(merged.iter().map(|merge| merge.into));
-        let ids: BTreeSet<ObjectId> = changed.map(|id| names.now(id)).collect();
+        let before = self.before(!learned.is_empty());
+        let names = self.correct(&learned, report);
+        let moved = report.moved.iter().flat_map(|moved| [moved.from, moved.into]);
+        let changed =
+            seen.boxes.keys().copied().chain(moved).chain(report.merged.iter().map(|merge| merge.into));
+        let mut ids: BTreeSet<ObjectId> = changed.map(|id| names.now(id)).collect();
+        ids.retain(|id| !report.withdrawn.contains(&object_key(*id)));
         let due: Vec<(ObjectId, Due)> = ids.iter().filter_map(|id| Some((*id, self.due(*id)?))).collect();
         if seen.up_moved {
             self.ask_all_again(report);
@@ -65,8 +69,14 @@ impl Mapper {
                 Due::Birth => self.bear(id, report),
             }
         }
+        for id in report.moved.iter().map(|moved| moved.from) {
+            if self.measured(id).is_some_and(|measured| measured.detections == 0 && measured.prior.is_none())
+            {
+                self.forget(id);
+            }
+        }
         let is_same = report.born.is_empty() && report.withdrawn.is_empty() && report.revised.is_empty();
-        if is_same && report.merged.is_empty() {
+        if is_same && report.merged.is_empty() && report.moved.is_empty() {
             return;
         }
         match self.session.update() {
@@ -75,10 +85,12 @@ impl Mapper {
                 report.updates.push(update);
             }
             Err(error) => {
-                let united: Vec<Key> = report.merged.drain(..).map(|merge| object_key(merge.from)).collect();
-                // they are true all the same
-                self.pending = merged;
-                let keys = [&united, &report.born, &report.withdrawn, &report.revised];
+                let moved = report.moved.drain(..).map(|moved| moved.from);
+                let corrected = moved.chain(report.merged.drain(..).map(|merge| merge.from));
+                let corrected: Vec<Key> = corrected.map(object_key).collect();
+                // it is true all the same
+                self.pending = learned;
+                let keys = [&corrected, &report.born, &report.withdrawn, &report.revised];
                 let keys: Vec<&str> = keys.into_iter().flatten().map(Key::as_str).collect();
                 report.refused.push(format!("changes of {}: {error}", keys.join(", ")));
                 (self.objects, self.ledger) = (before.objects, before.ledger);
@@ -92,8 +104,8 @@ impl Mapper {
         }
     }
 
-    fn before(&self, merges: &[Merge]) -> Before {
-        let measurements = (!merges.is_empty()).then(|| self.measurements.clone());
+    fn before(&self, is_corrected: bool) -> Before {
+        let measurements = is_corrected.then(|| self.measurements.clone());
         Before { objects: self.objects.clone(), ledger: self.ledger.clone(), measurements }
     }
 
@@ -124,6 +136,11 @@ impl Mapper {
     /// Takes an object out of the map.
     fn withdraw(&mut self, id: ObjectId, rejection: &Rejection, report: &mut FrameReport) {
         let owners = self.take_out(id, report);
+        if let Rejection::Views { .. } = rejection {
+            // its boxes were those of others; there may be more to come
+            let sights = self.sights(id);
+            self.objects.insert(id, Tracked::Waiting(sights));
+        }
         self.ask(&owners, report);
         tracing::info!(object = %id, "taken out of the map: {rejection}");
         report.withdrawn.push(object_key(id));
@@ -134,7 +151,7 @@ impl Mapper {
         let key = object_key(id);
         let (mut factors, owners) = self.ledger.revoke(|other| *other == key);
         if let Some(Tracked::Mapped(mapped)) = self.objects.insert(id, Tracked::Withdrawn) {
-            factors.extend(mapped.boxes);
+            factors.extend(mapped.boxes.into_iter().map(|(_, factor)| factor));
         }
         self.remove(&factors, report);
         let left = self.session.marginalize(&[&key]);
@@ -197,12 +214,10 @@ impl Mapper {
         id: ObjectId,
         start: DualQuadric,
         views: &[ObjectBox],
-    ) -> Result<(DualQuadric, Vec<FactorId>), String> {
+    ) -> Result<(DualQuadric, Vec<(usize, FactorId)>), String> {
         let key = object_key(id);
         let settings = Arc::clone(&self.settings);
-        let there = views.iter().filter(|view| self.pose(view.frame).is_some());
-        let entries = |view| view_entries(view, &key, self.camera, &settings.detections);
-        let boxes: Vec<FactorEntry> = there.flat_map(entries).collect();
+        let (frames, boxes) = self.entries_of(&key, views);
         let before = self.ledger.clone();
         let mut all = self.candidates();
         if let Some(measured) = self.measured(id) {
@@ -225,13 +240,23 @@ impl Mapper {
             Ok(mut ids) => {
                 let of_rules = ids.split_off(boxes.len());
                 self.ledger.name(of_rules);
-                Ok((start, ids))
+                Ok((start, frames.into_iter().zip(ids).collect()))
             }
             Err(error) => {
                 self.ledger = before;
                 Err(error.to_string())
             }
         }
+    }
+
+    /// The factors of an object's boxes whose poses are still there, and the frame of each.
+    pub(super) fn entries_of(&self, key: &Key, views: &[ObjectBox]) -> (Vec<usize>, Vec<FactorEntry>) {
+        let there = views.iter().filter(|view| self.pose(view.frame).is_some());
+        let entries = there.flat_map(|view| {
+            let entries = view_entries(view, key, self.camera, &self.settings.detections);
+            entries.map(|entry| (view.frame, entry))
+        });
+        entries.unzip()
     }
 
     /// The estimates of all variables of some factors, but one.
@@ -282,7 +307,7 @@ impl Mapper {
     }
 
     /// Removes those factors that are still there.
-    fn remove(&mut self, factors: &[FactorId], report: &mut FrameReport) {
+    pub(super) fn remove(&mut self, factors: &[FactorId], report: &mut FrameReport) {
         let there = factors.iter().copied().filter(|id| self.session.entry(*id).is_some());
         let removed = self.session.remove(&there.collect::<Vec<_>>());
         report.refused.extend(removed.err().map(|error| error.to_string()));

@@ -28,20 +28,19 @@ pub(super) fn associated(
     for observation in sequence.observations() {
         interrupted |= observer.poll().is_break();
         if interrupted {
-            naming.note(&observation.detections, &[]);
+            naming.note(&observation.detections, None);
             taken.push(None);
             continue;
         }
         match mapper.take(&observation) {
             Ok(report) => {
-                naming.note(&observation.detections, &report.names);
-                naming.forget(&report.forgotten);
+                naming.note(&observation.detections, Some(&report));
                 report.refused.iter().for_each(|refused| tracing::warn!("{refused}"));
                 taken.push(Some(report.frame));
             }
             Err(error) => {
                 tracing::warn!("{error}");
-                naming.note(&observation.detections, &[]);
+                naming.note(&observation.detections, None);
                 taken.push(None);
             }
         }

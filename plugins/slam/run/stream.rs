@@ -103,8 +103,7 @@ impl Taken {
 
     fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
         let report = self.mapper.take(observation)?;
-        self.naming.note(&observation.detections, &report.names);
-        self.naming.forget(&report.forgotten);
+        self.naming.note(&observation.detections, Some(&report));
         self.sequence.push(observation.clone());
         Ok(report)
     }

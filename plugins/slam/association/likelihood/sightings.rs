@@ -35,6 +35,11 @@ const DISTANCE: f64 = 0.1;
 const FRAMES: usize = 30;
 
 impl Sightings {
+    /// These, in order of frames.
+    pub(super) fn of(all: Vec<Sighting>) -> Self {
+        Self(all)
+    }
+
     pub(super) fn all(&self) -> &[Sighting] {
         &self.0
     }
@@ -55,6 +60,11 @@ impl Sightings {
         }
         self.0.push(sighting);
         self.thin(centre);
+    }
+
+    /// Leaves out that of a frame.
+    pub(super) fn remove(&mut self, frame: usize) {
+        self.0.retain(|sighting| sighting.frame != frame);
     }
 
     /// Those of both.

@@ -5,7 +5,7 @@ use super::fit::{Belief, BoxNoise, DEPTH, Fitted, Predicted, ROWS, fit, predict}
 use super::sightings::{Sighting, Sightings};
 use crate::input::class::Aliases;
 use crate::input::prior_map::PriorObject;
-use crate::input::sequence::{ClassScores, ObjectId};
+use crate::input::sequence::{ClassScores, Detection, ObjectId};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
@@ -21,12 +21,25 @@ pub(super) struct Track {
     pub belief: Belief,
     pub fitted: Fitted,
     pub sightings: Sightings,
-    /// All frames that it was seen in.
-    pub frames: Vec<usize>,
+    /// All its boxes, one a frame, in order.
+    pub boxes: Vec<Seen>,
     /// When it was seen last, in seconds.
     pub seen_at: Option<f64>,
-    /// It is compared with others when it has so many boxes.
+    /// It is compared with others when it has so many boxes,
     pub next_look: usize,
+    /// and looked at for being two when it has so many.
+    pub next_doubt: usize,
+}
+
+/// One of an object's boxes.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    /// In seconds.
+    pub timestamp: f64,
+    /// Its place among the boxes of its frame.
+    pub place: usize,
+    /// With the frame as the map counts it.
+    pub detection: Detection,
 }
 
 /// The box that is expected of an object and its depth, and how far these may be off.
@@ -38,6 +51,8 @@ pub(super) struct Expected {
 
 /// Boxes that an object has when it is first compared with others.
 const FIRST_LOOK: usize = 3;
+/// Boxes that it has when it is first asked whether it is two.
+const FIRST_DOUBT: usize = 8;
 /// How many times as many it has the next time.
 const MORE: f64 = 1.3;
 
@@ -51,8 +66,17 @@ impl Track {
         noise: &BoxNoise,
     ) -> Option<Self> {
         let fitted = fit(&belief, belief.first(), &[*first], camera, noise)?;
-        let (votes, sightings, frames) = (IndexMap::new(), Sightings::default(), vec![]);
-        Some(Self { id, votes, belief, fitted, sightings, frames, seen_at: None, next_look: FIRST_LOOK })
+        Some(Self {
+            id,
+            votes: IndexMap::new(),
+            belief,
+            fitted,
+            sightings: Sightings::default(),
+            boxes: vec![],
+            seen_at: None,
+            next_look: FIRST_LOOK,
+            next_doubt: FIRST_DOUBT,
+        })
     }
 
     /// An object of an earlier map.
@@ -64,20 +88,16 @@ impl Track {
             belief: Belief::known(&fitted),
             fitted,
             sightings: Sightings::default(),
-            frames: vec![],
+            boxes: vec![],
             seen_at: None,
             next_look: FIRST_LOOK,
+            next_doubt: FIRST_DOUBT,
         }
     }
 
     /// Whether an earlier map has it.
     pub(super) fn is_known(&self) -> bool {
         matches!(self.belief, Belief::Known { .. })
-    }
-
-    /// How many boxes it has.
-    pub(super) fn boxes(&self) -> usize {
-        self.frames.len()
     }
 
     /// Whether each of two has its centre in the other.
@@ -103,10 +123,11 @@ impl Track {
         self.fitted.covariance.fixed_view::<3, 3>(3, 3).into_owned()
     }
 
-    /// Counts a box's class.
-    pub(super) fn vote(&mut self, scores: &ClassScores, aliases: &Aliases) {
+    /// Counts a box's class so many times: once, or takes it back.
+    pub(super) fn vote(&mut self, scores: &ClassScores, aliases: &Aliases, times: f64) {
         if let Some((class, score)) = scores.best() {
-            *self.votes.entry(aliases.canonical(class)).or_default() += score;
+            let votes = self.votes.entry(aliases.canonical(class)).or_default();
+            *votes = (*votes + times * score).max(0.0);
         }
     }
 
@@ -142,29 +163,56 @@ impl Track {
     }
 
     /// Takes a box in. Where the fit fails, the ellipsoid stays as it was.
-    pub(super) fn see(
-        &mut self,
-        sighting: Sighting,
-        timestamp: f64,
-        map: &dyn Map,
-        camera: &Camera,
-        noise: &BoxNoise,
-    ) {
-        self.frames.push(sighting.frame);
-        self.seen_at = Some(timestamp);
+    pub(super) fn see(&mut self, seen: Seen, pose: Se3, map: &dyn Map, camera: &Camera, noise: &BoxNoise) {
+        self.seen_at = Some(seen.timestamp);
         self.sightings.renew(map);
-        self.sightings.add(sighting, &self.fitted.quadric.centroid());
+        self.sightings.add(seen.from(pose), &self.fitted.quadric.centroid());
+        self.boxes.push(seen);
+        self.fit_again(camera, noise);
+    }
+
+    /// Fits the ellipsoid to the sightings, from where it is.
+    pub(super) fn fit_again(&mut self, camera: &Camera, noise: &BoxNoise) {
         let fitted = fit(&self.belief, self.fitted.quadric, self.sightings.all(), camera, noise);
         self.fitted = fitted.unwrap_or(self.fitted);
     }
 
     /// Whether it is time to compare it with others: its name, and the time is put off.
     pub(super) fn is_due(&mut self, frame: usize) -> Option<ObjectId> {
-        let is_due = self.frames.last() == Some(&frame) && self.boxes() >= self.next_look;
+        let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_look;
         is_due.then(|| {
-            self.next_look = (self.boxes() as f64 * MORE).ceil() as usize + 1;
+            self.next_look = self.next();
             self.id
         })
+    }
+
+    /// Whether it is time to ask if it is two, and the time is put off.
+    pub(super) fn is_doubtful(&mut self, frame: usize) -> bool {
+        let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_doubt;
+        if is_due {
+            self.next_doubt = self.next();
+        }
+        is_due
+    }
+
+    fn is_seen_in(&self, frame: usize) -> bool {
+        self.boxes.last().is_some_and(|last| last.frame() == frame)
+    }
+
+    fn next(&self) -> usize {
+        (self.boxes.len() as f64 * MORE).ceil() as usize + 1
+    }
+}
+
+impl Seen {
+    pub(super) fn frame(&self) -> usize {
+        self.detection.frame
+    }
+
+    /// The same, seen from there.
+    pub(super) fn from(&self, world_from_camera: Se3) -> Sighting {
+        let Detection { frame, bounding_box, depth, .. } = self.detection;
+        Sighting { frame, world_from_camera, bounding_box, depth }
     }
 }
 

@@ -2,19 +2,21 @@
 use super::super::{Associator, Image, Learned, Map, assignment};
 use super::Likelihood;
 use super::fit::Belief;
+use super::second_look::Past;
 use super::sightings::Sighting;
-use super::track::Track;
+use super::track::{Seen, Track};
 use crate::input::class::Aliases;
 use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{Detection, ObjectId};
 use manifactor_geometry::Se3;
 use manifactor_quadric::Camera;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Boxes of a frame that are looked at, those of the highest scores: a detector that draws more has gone mad.
 const BOXES: usize = 200;
 /// An object of fewer boxes is forgotten when it was not seen for a while.
-const FIRM: usize = 3;
+pub(super) const FIRM: usize = 3;
 /// That while, in seconds.
 const PATIENCE: f64 = 10.0;
 /// So many such objects are kept at most.
@@ -29,11 +31,13 @@ const KNOWN: f64 = 0.15;
 pub(super) struct Tracker {
     pub settings: Likelihood,
     pub camera: Camera,
-    aliases: Aliases,
+    pub aliases: Aliases,
     pub tracks: Vec<Track>,
-    next: u32,
+    pub next: u32,
     /// When objects of an earlier map were seen last, as it were, in seconds.
     began: Option<f64>,
+    /// Frames that are looked at once more.
+    pub past: VecDeque<Past>,
 }
 
 impl Associator for Tracker {
@@ -66,31 +70,30 @@ impl Associator for Tracker {
         self.began.get_or_insert(image.timestamp - AT_LARGE);
         let usual = self.usual_depth(&pose);
         let mut seen = vec![];
-        for (detection, id) in image.detections.iter().zip(names) {
+        for (place, (detection, id)) in image.detections.iter().zip(names).enumerate() {
             let Some(id) = *id else { continue };
             self.next = self.next.max(id.0.saturating_add(1));
-            let sighting = Sighting {
-                frame: image.frame,
-                world_from_camera: pose,
-                bounding_box: detection.bounding_box,
-                depth: detection.depth,
-            };
-            let Some(t) = self.track(id, &sighting, usual) else { continue };
-            self.tracks[t].vote(&detection.scores, &self.aliases);
-            seen.push((t, sighting));
+            let detection = Detection { frame: image.frame, object: Some(id), ..detection.clone() };
+            let one = Seen { timestamp: image.timestamp, place, detection };
+            let Some(t) = self.track(id, &one.from(pose), usual) else { continue };
+            self.tracks[t].vote(&one.detection.scores, &self.aliases, 1.0);
+            seen.push((t, one));
         }
         // of twins the one that fits best
         seen.sort_by(|(a, x), (b, y)| {
-            let fits = |t: usize, sighting: &Sighting| self.tracks[t].overlap(sighting, &self.camera);
+            let fits = |t: usize, seen: &Seen| self.tracks[t].overlap(&seen.from(pose), &self.camera);
             a.cmp(b).then_with(|| fits(*b, y).total_cmp(&fits(*a, x)))
         });
         seen.dedup_by_key(|(t, _)| *t);
         let noise = self.settings.noise();
-        for (t, sighting) in &seen {
-            self.tracks[*t].see(*sighting, image.timestamp, map, &self.camera, &noise);
+        for (t, one) in seen {
+            self.tracks[t].see(one, pose, map, &self.camera, &noise);
         }
         let forgotten = self.forget(image.timestamp);
-        Learned { merged: self.merge(image.frame), forgotten }
+        self.past.push_back(Past::new(image, names));
+        let mut moved = self.look_again(image.timestamp, map);
+        moved.extend(self.divide(image.frame, map));
+        Learned { moved, merged: self.merge(image.frame), forgotten }
     }
 }
 
@@ -104,7 +107,7 @@ impl Tracker {
     ) -> Self {
         let tracks: Vec<Track> = known.iter().map(|object| Track::known(object)).collect();
         let next = tracks.iter().map(|track| track.id.0.saturating_add(1)).max().unwrap_or(1);
-        Self { settings, camera, aliases, tracks, next, began: None }
+        Self { settings, camera, aliases, tracks, next, began: None, past: VecDeque::new() }
     }
 
     /// The known objects of boxes.
@@ -199,7 +202,7 @@ impl Tracker {
 
     /// Forgets objects that are seen too rarely, and those that are seen least lately where there are too many such.
     fn forget(&mut self, now: f64) -> Vec<ObjectId> {
-        let is_firm = |track: &Track| track.boxes() >= FIRM || track.is_known();
+        let is_firm = |track: &Track| track.boxes.len() >= FIRM || track.is_known();
         let doubtful = self.tracks.iter().filter(|track| !is_firm(track));
         let mut seen: Vec<f64> = doubtful.filter_map(|track| track.seen_at).collect();
         seen.sort_by(|a, b| b.total_cmp(a));

@@ -3,7 +3,7 @@ use super::super::Merge;
 use super::Likelihood;
 use super::fit::{Fitted, fit, squared_error};
 use super::sightings::{Sighting, Sightings};
-use super::track::Track;
+use super::track::{Seen, Track};
 use super::tracker::Tracker;
 use crate::input::sequence::ObjectId;
 use manifactor_quadric::Camera;
@@ -51,7 +51,9 @@ impl Tracker {
             if let Some((other, union)) = best {
                 let gone = if union.track.id == id { other } else { own };
                 let stays = own + other - gone;
-                merges.push(Merge { from: self.tracks[gone].id, into: union.track.id });
+                let merge = Merge { from: self.tracks[gone].id, into: union.track.id };
+                self.past.iter_mut().for_each(|past| past.rename(merge));
+                merges.push(merge);
                 self.tracks[stays] = union.track;
                 self.tracks.remove(gone);
             }
@@ -79,13 +81,13 @@ fn gap(one: &Track, two: &Track) -> Option<f64> {
     if one.is_known() && two.is_known() {
         return None;
     }
-    let together = || common(&one.frames, &two.frames) as f64;
-    (gap <= 1.0 && together() <= TOGETHER * one.boxes().min(two.boxes()) as f64).then_some(gap)
+    let together = || common(&one.boxes, &two.boxes) as f64;
+    (gap <= 1.0 && together() <= TOGETHER * one.boxes.len().min(two.boxes.len()) as f64).then_some(gap)
 }
 
 /// The object that two are, with the name of the one that an earlier map has, or that has more boxes, if one ellipsoid explains all boxes.
 fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Option<Union> {
-    let rank = |track: &Track| (track.is_known(), track.boxes());
+    let rank = |track: &Track| (track.is_known(), track.boxes.len());
     let (more, fewer) = if rank(one) >= rank(two) { (one, two) } else { (two, one) };
     let (noise, mut sightings) = (settings.noise(), more.sightings.and(&fewer.sightings));
     // the boxes of one may look like outliers from the other
@@ -120,11 +122,12 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
     for (class, votes) in &fewer.votes {
         *track.votes.entry(class.clone()).or_default() += votes;
     }
-    track.frames.extend(&fewer.frames);
-    track.frames.sort_unstable();
-    track.frames.dedup();
+    track.boxes.extend_from_slice(&fewer.boxes);
+    track.boxes.sort_by_key(Seen::frame);
+    track.boxes.dedup_by_key(|seen| seen.frame());
     track.seen_at = more.seen_at.into_iter().chain(fewer.seen_at).reduce(f64::max);
     track.next_look = track.next_look.max(fewer.next_look);
+    track.next_doubt = track.next_doubt.max(fewer.next_doubt);
     sightings.thin(&fitted.quadric.centroid());
     track.fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
     track.sightings = sightings;
@@ -136,18 +139,8 @@ fn alike(one: &Track, two: &Track) -> f64 {
     one.votes.keys().map(|class| (one.share(class) * two.share(class)).sqrt()).sum()
 }
 
-/// How many numbers two ascending lists have in common.
-fn common(one: &[usize], two: &[usize]) -> usize {
-    one.iter().filter(|frame| two.binary_search(frame).is_ok()).count()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn common_frames_are_counted() {
-        assert_eq!(common(&[1, 3, 5, 9], &[2, 3, 4, 9, 12]), 2);
-        assert_eq!(common(&[], &[1]), 0);
-    }
+/// How many frames two have in common.
+fn common(one: &[Seen], two: &[Seen]) -> usize {
+    let has = |seen: &&Seen| two.binary_search_by_key(&seen.frame(), Seen::frame).is_ok();
+    one.iter().filter(has).count()
 }

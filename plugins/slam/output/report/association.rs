@@ -2,6 +2,7 @@
 use crate::association::{Association, Names};
 use crate::input::sequence::{Detection, ObjectId};
 use crate::metrics::{IdentityScores, identity};
+use crate::online::FrameReport;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -13,6 +14,8 @@ pub struct AssociationReport {
     pub by: &'static str,
     /// Objects that turned out to be others.
     pub merged: usize,
+    /// Boxes that were given to another object later, while frames came.
+    pub moved: usize,
     /// With the names that boxes had when they came.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_the_time: Option<IdentityScores>,
@@ -35,22 +38,34 @@ struct Named {
     truth: Option<ObjectId>,
     /// When it came.
     then: Option<ObjectId>,
+    /// Its frame, as the map counts them, and its place in that.
+    place: (usize, usize),
+    /// When all was looked at once more in the end, if it was.
+    again: Option<Option<ObjectId>>,
+}
+
+impl Named {
     /// In the end.
-    now: Option<ObjectId>,
+    fn now(&self, names: &Names) -> Option<ObjectId> {
+        let (frame, place) = self.place;
+        self.again.unwrap_or_else(|| self.then.map(|name| names.of(name, frame, place)))
+    }
 }
 
 impl Naming {
-    /// Takes note of objects that are none: their boxes have no name in the end.
-    pub(crate) fn forget(&mut self, objects: &[ObjectId]) {
-        self.forgotten.extend(objects);
-    }
-
-    /// Takes note of a frame's boxes, and of the names that they were given; none, where the frame was left out.
-    pub(crate) fn note(&mut self, detections: &[Detection], given: &[Option<ObjectId>]) {
-        let given = given.iter().copied().chain(std::iter::repeat(None));
-        let named =
-            |(detection, given): (&Detection, _)| Named { truth: detection.object, then: given, now: given };
-        self.boxes.extend(detections.iter().zip(given).map(named));
+    /// Takes note of a frame's boxes, and of what was made of them; nothing, where the frame was left out.
+    pub(crate) fn note(&mut self, detections: &[Detection], taken: Option<&FrameReport>) {
+        let given = |place: usize| taken.and_then(|report| report.names.get(place).copied().flatten());
+        let frame = taken.map_or(0, |report| report.frame);
+        let named = |(place, detection): (usize, &Detection)| Named {
+            truth: detection.object,
+            then: given(place),
+            place: (frame, place),
+            again: None,
+        };
+        self.boxes.extend(detections.iter().enumerate().map(named));
+        // objects that are none: their boxes have no name in the end
+        self.forgotten.extend(taken.map_or(&[][..], |report| &report.forgotten));
     }
 
     /// Gives some boxes other names for those that they have.
@@ -61,16 +76,15 @@ impl Naming {
         by: impl FnOnce(&[Option<ObjectId>]) -> Vec<Option<ObjectId>>,
     ) {
         let boxes = self.boxes.get_mut(boxes).unwrap_or_default();
-        let now: Vec<_> = boxes.iter().map(|named| named.now.map(|name| names.now(name))).collect();
+        let now: Vec<_> = boxes.iter().map(|named| named.now(names)).collect();
         for (named, name) in boxes.iter_mut().zip(by(&now)) {
-            named.now = name;
+            named.again = Some(name);
         }
     }
 
     /// The names of all boxes as they are now.
     pub(crate) fn now<'a>(&'a self, names: &'a Names) -> impl Iterator<Item = Option<ObjectId>> + 'a {
-        let is_known = |name: &ObjectId| !self.forgotten.contains(name);
-        self.boxes.iter().map(move |named| named.now.filter(is_known).map(|name| names.now(name)))
+        self.boxes.iter().map(|named| named.now(names).filter(|name| !self.forgotten.contains(name)))
     }
 
     /// The report; none, where the names are those of the source.
@@ -83,6 +97,7 @@ impl Naming {
         (!by.uses_names()).then(|| AssociationReport {
             by: by.typetag_name(),
             merged: names.given_up(),
+            moved: names.moved(),
             at_the_time: score(&mut self.boxes.iter().map(|named| named.then)),
             in_the_end: score(&mut self.now(names)),
         })

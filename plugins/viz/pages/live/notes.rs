@@ -1,4 +1,5 @@
 //! What has happened to the map, in words, and how often.
+use manifactor_slam::association::Move;
 use manifactor_slam::online::FrameReport;
 use manifactor_slam::sequence::ObjectId;
 use serde_json::{Value, json};
@@ -14,6 +15,7 @@ const LONGEST: usize = 300;
 pub(super) struct Notes {
     born: usize,
     withdrawn: usize,
+    moved: usize,
     merged: usize,
     forgotten: usize,
     refused: usize,
@@ -37,6 +39,7 @@ impl Notes {
         }
         self.born += report.born.len();
         self.withdrawn += report.withdrawn.len();
+        self.moved += report.moved.len();
         self.merged += report.merged.len();
         self.forgotten += report.forgotten.len();
         for key in &report.born {
@@ -44,6 +47,9 @@ impl Notes {
         }
         for key in &report.withdrawn {
             self.note(frame, &format!("{key} was withdrawn: its boxes are those of several things"));
+        }
+        for Move { frame: of, from, into, .. } in &report.moved {
+            self.note(frame, &format!("a box of frame {of} shows object {into}, not {from}"));
         }
         for merge in &report.merged {
             self.note(frame, &format!("object {} merged into {}", merge.from, now(merge.into)));
@@ -93,6 +99,7 @@ impl Notes {
             "counts": {
                 "born": self.born,
                 "withdrawn": self.withdrawn,
+                "moved": self.moved,
                 "merged": self.merged,
                 "forgotten": self.forgotten,
                 "refused": self.refused,
