@@ -5,6 +5,7 @@ use super::fit::{Belief, Fitted, fit, squared_error};
 use super::sightings::{Sighting, Sightings};
 use super::track::{Seen, Track};
 use super::tracker::{FIRM, Tracker};
+use super::union::{LOOSER, SAME, alike};
 use crate::input::class::Aliases;
 use crate::input::sequence::ObjectId;
 use indexmap::IndexMap;
@@ -63,7 +64,7 @@ impl Fitter<'_> {
     /// The two that an object is: one ellipsoid does not explain its boxes, two do, and these are not in one place.
     fn parts(&self, track: &Track) -> Option<[Part; 2]> {
         let all = track.sightings.all();
-        if self.is_good(&track.fitted, all) {
+        if self.is_good(&track.fitted, all, 1.0) {
             return None;
         }
         let error = |seen: &&Sighting| self.error(&track.fitted, seen);
@@ -89,12 +90,12 @@ impl Fitter<'_> {
         let [a, b] = &parts;
         let (one, two) = (&a.fitted.quadric, &b.fitted.quadric);
         let is_one_place = one.contains(&two.centroid()) && two.contains(&one.centroid());
-        let are_good = parts.iter().all(|part| self.is_good(&part.fitted, &part.sightings));
+        let are_good = parts.iter().all(|part| self.is_good(&part.fitted, &part.sightings, 1.0));
         (are_good && !is_one_place).then_some(parts)
     }
 
     /// All boxes of an object, put to the one or the other of two: the one with more of them, or that an earlier map has, first. `None`, where
-    /// one of them has too few.
+    /// one of them has too few, or both are one thing of no simple shape.
     fn halves(&self, track: &Track, [a, b]: [Part; 2], map: &dyn Map) -> Option<[Track; 2]> {
         let is_of_first = |seen: &Seen| {
             let seen = map.pose(seen.frame()).map(|pose| seen.from(pose));
@@ -111,7 +112,10 @@ impl Fitter<'_> {
         } else if halves[1].boxes.len() > halves[0].boxes.len() {
             halves.swap(0, 1);
         }
-        halves.iter().all(|half| half.boxes.len() >= FIRM).then_some(halves)
+        let is_firm = halves.iter().all(|half| half.boxes.len() >= FIRM);
+        // what would be united as one thing of no simple shape is not divided
+        let factor = if alike(&halves[0], &halves[1]) > SAME { LOOSER } else { 1.0 };
+        (is_firm && !self.is_good(&track.fitted, track.sightings.all(), factor)).then_some(halves)
     }
 
     /// An ellipsoid of its own for some sightings, about as far away as another, fitted from a start or from the first of them.
@@ -128,11 +132,11 @@ impl Fitter<'_> {
         squared_error(&fitted.quadric, seen, self.camera, &self.settings.noise())
     }
 
-    /// Whether an ellipsoid explains boxes as well as those of two have to be that are one.
-    fn is_good(&self, fitted: &Fitted, sightings: &[Sighting]) -> bool {
+    /// Whether an ellipsoid explains boxes as well as merging asks for, or that many times less well.
+    fn is_good(&self, fitted: &Fitted, sightings: &[Sighting], times: f64) -> bool {
         let rows: usize = sightings.iter().map(Sighting::rows).sum();
         let errors: f64 = sightings.iter().map(|seen| self.error(fitted, seen)).sum();
-        errors <= self.settings.merge_error.powi(2) * rows as f64
+        errors <= (times * self.settings.merge_error).powi(2) * rows as f64
     }
 }
 

@@ -24,9 +24,9 @@ const ALIKE: f64 = 0.1;
 /// by this factor;
 const STRICTER: f64 = 1.4;
 /// those whose classes are more alike than this, and that are at the same place, where there is room for one, need to fit less well,
-const SAME: f64 = 0.5;
+pub(super) const SAME: f64 = 0.5;
 /// by this factor: what has no simple shape has boxes that no ellipsoid explains.
-const LOOSER: f64 = 2.0;
+pub(super) const LOOSER: f64 = 2.0;
 
 /// Of so many objects it is asked in a frame, at most, whether they are the same as others,
 const LOOKS: usize = 20;
@@ -135,7 +135,7 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
 }
 
 /// How much the classes of two have in common, from 0 to 1 (Bhattacharyya).
-fn alike(one: &Track, two: &Track) -> f64 {
+pub(super) fn alike(one: &Track, two: &Track) -> f64 {
     one.votes.keys().map(|class| (one.share(class) * two.share(class)).sqrt()).sum()
 }
 
