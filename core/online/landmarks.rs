@@ -1,6 +1,7 @@
 //! Landmarks that nobody has named: what is seen is put to what is known, by the joint likelihood.
 mod candidates;
 mod hypotheses;
+mod saving;
 
 use crate::error::ChangeError;
 use crate::factor_id::FactorId;

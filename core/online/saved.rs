@@ -1,4 +1,4 @@
-//! A session as text: a line that says what it is, and a JSON document.
+//! A session, and landmarks, as text: a line that says what it is, and a JSON document.
 //!
 //! ```text
 //! manifactor session 3 90b4b1a3c2f0d7e1
@@ -10,13 +10,20 @@
 use crate::gone::{GoneKeys, Runs};
 use crate::settings::Settings;
 use manifactor_graph::{FactorEntry, GraphError, Key, Variable};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-const NAME: &str = "manifactor session";
-const VERSION: u32 = 3;
+/// What a text is of, and the version of its form.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Form {
+    pub(crate) what: &'static str,
+    pub(crate) version: u32,
+}
 
-/// Why a session cannot be saved.
+const SESSION: Form = Form { what: "session", version: 3 };
+
+/// Why a session or landmarks cannot be saved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SaveError {
@@ -24,28 +31,35 @@ pub enum SaveError {
     #[error("there are changes that no update has made yet; update the session, and save it then")]
     Pending,
     /// A value or a factor that has no text.
-    #[error("cannot write the session: {0}")]
+    #[error("cannot be saved: {0}")]
     Write(String),
 }
 
-/// Why a text is no session.
+/// Why a text is not what was saved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
-    /// Something else than a session.
-    #[error("not a saved session: expected a first line `{NAME} {VERSION} …`")]
-    Foreign,
-    /// A session that another version has saved.
-    #[error("a session of version {found}; this program reads version {VERSION}")]
+    /// Something else.
+    #[error("no saved {what}: expected a first line `manifactor {what} {version} …`")]
+    Foreign {
+        /// What is expected.
+        what: &'static str,
+        /// The version that this program reads.
+        version: u32,
+    },
+    /// A text that another version has saved.
+    #[error("saved in version {found}; this program reads version {version}")]
     Version {
         /// The version of the text.
         found: String,
+        /// The version that this program reads.
+        version: u32,
     },
     /// A text that is not as it was saved.
-    #[error("the saved session is damaged or cut off: its checksum does not fit")]
+    #[error("the saved text is damaged or cut off: its checksum does not fit")]
     Damaged,
     /// A document that cannot be read: a type that this program does not know, say.
-    #[error("cannot read the saved session: {0}")]
+    #[error("cannot read what was saved: {0}")]
     Read(String),
     /// Factors and values that do not fit each other.
     #[error("the saved session contradicts itself:{}", GraphError::list(.0))]
@@ -53,6 +67,9 @@ pub enum LoadError {
     /// Something else that no session can be.
     #[error("the saved session contradicts itself: {0}")]
     Inconsistent(&'static str),
+    /// Landmarks of another session, or of another time.
+    #[error("the saved landmarks do not fit the session: {0}")]
+    Landmarks(&'static str),
 }
 
 /// What is saved.
@@ -154,16 +171,33 @@ pub(crate) struct SavedFront {
 
 impl Saved {
     pub(crate) fn write(&self) -> Result<String, SaveError> {
-        let json = serde_json::to_string(self).map_err(|e| SaveError::Write(e.to_string()))?;
-        Ok(format!("{NAME} {VERSION} {:016x}\n{json}\n", checksum(json.as_bytes())))
+        SESSION.write(self)
     }
 
     pub(crate) fn read(text: &str) -> Result<Self, LoadError> {
+        SESSION.read(text)
+    }
+}
+
+impl Form {
+    /// A text of this form.
+    pub(crate) fn write(self, content: &impl Serialize) -> Result<String, SaveError> {
+        let Self { what, version } = self;
+        let json = serde_json::to_string(content).map_err(|e| SaveError::Write(e.to_string()))?;
+        Ok(format!("manifactor {what} {version} {:016x}\n{json}\n", checksum(json.as_bytes())))
+    }
+
+    pub(crate) fn read<T: DeserializeOwned>(self, text: &str) -> Result<T, LoadError> {
+        let Self { what, version } = self;
+        let foreign = || LoadError::Foreign { what, version };
         let (first, json) = text.split_once('\n').unwrap_or((text, ""));
-        let mut words = first.strip_prefix(NAME).ok_or(LoadError::Foreign)?.split_ascii_whitespace();
-        let version = words.next().ok_or(LoadError::Foreign)?;
-        if version != VERSION.to_string() {
-            return Err(LoadError::Version { found: version.to_owned() });
+        let mut words = first.split_ascii_whitespace();
+        if words.next() != Some("manifactor") || words.next() != Some(what) {
+            return Err(foreign());
+        }
+        let found = words.next().ok_or_else(foreign)?;
+        if found != version.to_string() {
+            return Err(LoadError::Version { found: found.to_owned(), version });
         }
         let json = json.strip_suffix('\n').ok_or(LoadError::Damaged)?;
         let stated = words.next().and_then(|word| u64::from_str_radix(word, 16).ok());

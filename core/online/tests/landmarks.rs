@@ -2,7 +2,8 @@
 use crate::world::{Beyond, Near, Space};
 use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values};
 use manifactor_online::{
-    Given, InnovationError, LandmarkSettings, Landmarks, Session, Settings, Sighting, SightingError,
+    Given, InnovationError, LandmarkSettings, Landmarks, LoadError, Named, Session, Settings, Sighting,
+    SightingError,
 };
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -135,5 +136,90 @@ fn what_does_not_fit_changes_nothing() {
         LandmarkSettings { odds: 0.5, ..LandmarkSettings::default() },
     ] {
         assert!(Landmarks::new("l", settings).is_err());
+    }
+}
+
+/// Walks along a row of landmarks and back, with the session and the landmarks as they are `kept` after each pose. Only so many poses stay.
+fn walk(
+    stay: usize,
+    kept: impl Fn(Session, Landmarks) -> (Session, Landmarks),
+) -> (Session, Landmarks, Vec<Named>) {
+    let mut session = Session::new(Settings::default()).unwrap();
+    let mut landmarks = Landmarks::new("l", LandmarkSettings::default()).unwrap();
+    let mut all = vec![];
+    for i in 0..60 {
+        let x = 0.5 * i.min(60 - i) as f64;
+        let key = format!("x{i}");
+        // off by what a wheel slips
+        put(&mut session, &key, [x + 0.05 * (i as f64).sin(), 0.0, 0.0], 0.2);
+        let near = (0..15).map(|l| 2.0 * f64::from(l) - x).filter(|by| by.abs() < 3.0);
+        let seen: Vec<Sighting> = near.map(|by| seen([x, 0.0, 0.0], [by, 1.0, 0.0])).collect();
+        all.push(landmarks.see(&mut session, &key.as_str().into(), &seen).unwrap());
+        session.update().unwrap();
+        if i >= stay {
+            session.marginalize(&[&Key::indexed("x", i - stay)]).unwrap();
+            session.update().unwrap();
+        }
+        (session, landmarks) = kept(session, landmarks);
+    }
+    (session, landmarks, all)
+}
+
+#[test]
+fn landmarks_go_on_after_a_restart_with_the_same_names_and_bits() {
+    for stay in [60, 10] {
+        let restart = |session: Session, landmarks: Landmarks| {
+            let (text, of_landmarks) = (session.save().unwrap(), landmarks.save().unwrap());
+            let session = Session::load(&text).unwrap();
+            let landmarks = Landmarks::load(&of_landmarks, &session).unwrap();
+            assert_eq!(landmarks.save().unwrap(), of_landmarks);
+            (session, landmarks)
+        };
+        let (session, landmarks, names) = walk(stay, |session, landmarks| (session, landmarks));
+        let (again, of_again, the_same) = walk(stay, restart);
+        assert_eq!(names, the_same);
+        assert!(session.save().unwrap() == again.save().unwrap());
+        assert_eq!(landmarks.save().unwrap(), of_again.save().unwrap());
+        assert_eq!(landmarks.keys().count(), 9);
+    }
+}
+
+#[test]
+fn landmarks_of_something_else_are_refused_with_a_reason() {
+    let (session, landmarks) = two(LandmarkSettings::default());
+    let text = landmarks.save().unwrap();
+    let told = |text: &str, session: &Session| Landmarks::load(text, session).unwrap_err();
+    assert_eq!(told("", &session), LoadError::Foreign { what: "landmarks", version: 1 });
+    assert_eq!(
+        told(&session.save().unwrap(), &session),
+        LoadError::Foreign { what: "landmarks", version: 1 }
+    );
+    for end in 0..text.len() {
+        assert!(Landmarks::load(&text[..end], &session).is_err());
+    }
+    assert_eq!(told(&text.replacen("\"born\":2", "\"born\":3", 1), &session), LoadError::Damaged);
+    // of another session, and of a time before and after
+    let empty = Session::new(Settings::default()).unwrap();
+    assert_eq!(told(&text, &empty), LoadError::Landmarks("it has never had one of them"));
+    let none = Landmarks::new("l", LandmarkSettings::default()).unwrap().save().unwrap();
+    assert_eq!(told(&none, &session), LoadError::Landmarks("it has more of them"));
+    let (mut other, mut more) = two(LandmarkSettings::default());
+    more.see(&mut other, &"x0".into(), &[seen([0.0; 3], [2.0, 0.0, 0.0])]).unwrap();
+    let later = more.save().unwrap();
+    assert_eq!(told(&later, &session), LoadError::Landmarks("its factors are not their sightings"));
+    let resealed = |from: &str, to: &str| {
+        let json = text.split_once('\n').unwrap().1.trim_end().replacen(from, to, 1);
+        assert!(!text.contains(&json));
+        let session = crate::saving::resealed(&json);
+        session.replacen("session 3", "landmarks 1", 1)
+    };
+    let cases = [
+        ("\"key\":\"l1\"", "\"key\":\"l0\"", "their names"),
+        ("\"key\":\"l1\"", "\"key\":\"x0\"", "their names"),
+        ("\"poses\":[\"x0\"]", "\"poses\":[]", "its factors are not their sightings"),
+        ("\"covariance\":null", "\"covariance\":[0]", "a covariance"),
+    ];
+    for (from, to, what) in cases {
+        assert_eq!(told(&resealed(from, to), &session), LoadError::Landmarks(what));
     }
 }

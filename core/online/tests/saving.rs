@@ -46,10 +46,11 @@ fn session(window: Option<Window>) -> Session {
 #[test]
 fn what_is_no_session_is_refused_with_a_reason() {
     let text = session(None).save().unwrap();
-    assert_eq!(Session::load("").unwrap_err(), LoadError::Foreign);
-    assert_eq!(Session::load("{\"factors\": []}").unwrap_err(), LoadError::Foreign);
+    let foreign = LoadError::Foreign { what: "session", version: 3 };
+    assert_eq!(Session::load("").unwrap_err(), foreign);
+    assert_eq!(Session::load("{\"factors\": []}").unwrap_err(), foreign);
     let later = text.replacen("session 3 ", "session 4 ", 1);
-    assert_eq!(Session::load(&later).unwrap_err(), LoadError::Version { found: "4".to_owned() });
+    assert_eq!(Session::load(&later).unwrap_err(), LoadError::Version { found: "4".to_owned(), version: 3 });
     for end in (0..text.len()).step_by(97) {
         assert!(Session::load(&text[..end]).is_err());
     }

@@ -2,6 +2,7 @@
 use crate::output::text::{self, Table, on_one_line, seconds};
 use manifactor::slam::mapping::object_key;
 use manifactor::slam::report::{Mean, Prediction, RunReport, VariantReport};
+use manifactor::slam::sequence::ObjectId;
 use manifactor::slam::variance::{BoxComponent, LastingComponent, MotionComponent, Score};
 
 /// What a run came to, in a table and a few lines.
@@ -36,6 +37,7 @@ pub(crate) fn of_run(report: &RunReport) -> String {
         out += &noise(variant);
         out += &held_out(variant);
         out += &prior_map(variant);
+        out += &gone(variant);
         out += &stream(variant);
     }
     for variant in &report.variants {
@@ -151,6 +153,20 @@ fn held_out(variant: &VariantReport) -> String {
     text::wrap(&line) + "\n"
 }
 
+fn keys(objects: &[ObjectId]) -> String {
+    objects.iter().map(|id| object_key(*id).to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// What the run has mapped itself, and is not there any more at its end.
+fn gone(variant: &VariantReport) -> String {
+    let of_prior = variant.prior_map.as_ref().map_or(&[][..], |prior| &prior.gone);
+    let own: Vec<ObjectId> = variant.gone.iter().copied().filter(|id| !of_prior.contains(id)).collect();
+    if own.is_empty() {
+        return String::new();
+    }
+    text::wrap(&format!("{}: seen, and gone at the end: {}", on_one_line(&variant.name), keys(&own))) + "\n"
+}
+
 /// What was seen again of a map that was made before, what is gone, and what is new.
 fn prior_map(variant: &VariantReport) -> String {
     let Some(prior) = variant.prior_map.as_ref().filter(|prior| prior.is_located) else {
@@ -160,8 +176,10 @@ fn prior_map(variant: &VariantReport) -> String {
         let matches = text::count(found.located.matches.len(), "object");
         format!(" found after {} by {matches},", text::count(found.frame + 1, "frame"))
     });
-    let gone: Vec<String> = prior.gone.iter().map(|id| object_key(*id).to_string()).collect();
-    let gone = if gone.is_empty() { "none gone".to_owned() } else { format!("gone are {}", gone.join(", ")) };
+    let gone = match prior.gone.as_slice() {
+        [] => "none gone".to_owned(),
+        gone => format!("gone are {}", keys(gone)),
+    };
     let line = format!(
         "{}: in {},{} {} of {} seen again, {gone}, {} added",
         on_one_line(&variant.name),

@@ -2,7 +2,7 @@
 use crate::estimate::{Estimate, Landmark};
 use crate::input::prior_map::Looks;
 use crate::input::sequence::ObjectId;
-use crate::mapping::measurements::Measured;
+use crate::mapping::measurements::{Measured, ObjectBox};
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
 use nalgebra::Vector3;
@@ -18,17 +18,55 @@ const HIDDEN: f64 = 0.2;
 /// their areas.
 const FAR: f64 = 0.5;
 
+/// It should be seen again from where it was seen: from no other direction than this, in radians.
+const NEAR: f64 = 0.26;
+
+/// The looks at an object.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Looked {
+    pub(crate) all: Looks,
+    /// Those that began until it was seen last.
+    pub(crate) before: Looks,
+    /// Those since then from where it was seen; from anywhere, where no view says.
+    pub(crate) since: usize,
+}
+
 /// The looks at an object so far, of which the last goes on.
 struct Counted {
-    looks: Looks,
+    looked: Looked,
+    seen_from: Vec<Vector3<f64>>,
     began: f64,
     from: Vector3<f64>,
     is_seen: bool,
 }
 
+impl Counted {
+    /// Begins another look.
+    fn look(&mut self, views: &[ObjectBox], frame: usize, seconds: f64, from: Vector3<f64>) {
+        self.looked.all.expected += 1;
+        let is_near = || self.seen_from.iter().any(|seen| seen.angle(&from) < NEAR);
+        match views.last() {
+            Some(last) if frame <= last.frame => self.looked.before.expected += 1,
+            Some(_) => self.looked.since += usize::from(is_near()),
+            None => self.looked.since += 1,
+        }
+        (self.began, self.from, self.is_seen) = (seconds, from, false);
+    }
+
+    /// Notes that the object is seen in the look that goes on.
+    fn see(&mut self, from: Vector3<f64>) {
+        if !self.is_seen {
+            self.looked.all.seen += 1;
+            self.looked.before.seen += 1;
+            self.seen_from.push(from);
+            self.is_seen = true;
+        }
+    }
+}
+
 /// The looks at each mapped object, by where it and the camera are estimated to be. It is there to be seen where all of its outline is in
 /// the image, `border` pixels from its sides, about as large at least as it was seen before, and nothing that is mapped hides it.
-pub(crate) fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Looks> {
+pub(crate) fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Looked> {
     let landmarks = estimate.landmarks();
     let expected = |landmark: &Landmark<'_>| {
         let measured = estimate.mapping.measurements.object(landmark.object.id);
@@ -36,26 +74,30 @@ pub(crate) fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Look
         Expected { id: landmark.object.id, quadric: *landmark.quadric, area: (FAR * least).powi(2) }
     };
     let objects: Vec<Expected> = landmarks.iter().map(expected).collect();
-    let has_box = |id: ObjectId, frame: usize| {
+    let views = |id: ObjectId| {
         let measured = estimate.mapping.measurements.object(id);
-        measured.is_some_and(|own| own.views.binary_search_by_key(&frame, |view| view.frame).is_ok())
+        measured.map_or(&[][..], |measured| &measured.views)
     };
     let mut all: BTreeMap<ObjectId, Counted> = BTreeMap::new();
     for (frame, stamped) in estimate.trajectory().iter().enumerate() {
         for (id, from) in in_view(&objects, &stamped.pose, &estimate.sequence.camera, border) {
-            let new = Counted { looks: Looks::default(), began: f64::NEG_INFINITY, from, is_seen: false };
-            let counted = all.entry(id).or_insert(new);
+            let counted = all.entry(id).or_insert_with(|| Counted {
+                looked: Looked::default(),
+                seen_from: vec![],
+                began: f64::NEG_INFINITY,
+                from,
+                is_seen: false,
+            });
+            let views = views(id);
             if stamped.timestamp - counted.began >= SECONDS || counted.from.angle(&from) >= ANGLE {
-                counted.looks.expected += 1;
-                (counted.began, counted.from, counted.is_seen) = (stamped.timestamp, from, false);
+                counted.look(views, frame, stamped.timestamp, from);
             }
-            if !counted.is_seen && has_box(id, frame) {
-                counted.looks.seen += 1;
-                counted.is_seen = true;
+            if views.binary_search_by_key(&frame, |view| view.frame).is_ok() {
+                counted.see(from);
             }
         }
     }
-    all.into_iter().map(|(id, counted)| (id, counted.looks)).collect()
+    all.into_iter().map(|(id, counted)| (id, counted.looked)).collect()
 }
 
 /// An object that may be there to be seen.

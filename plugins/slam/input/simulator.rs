@@ -2,18 +2,19 @@
 //!
 //! A scene of solids, a camera that moves around them, odometry and boxes with noise: each from a seed
 //! of its own, so that one can be varied while the others stay. The same settings give the same bits.
-use crate::input::sequence::{Acceleration, Detection, Frame, GroundTruth, Sequence};
+use crate::input::sequence::{Acceleration, Frame, GroundTruth, Sequence};
 use crate::input::source::{Folders, Source, SourceError};
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::Camera;
-use occlusion::DepthImage;
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 mod catalogue;
+mod detection;
+mod moves;
 mod noise;
 mod occlusion;
 mod scene;
@@ -24,6 +25,8 @@ pub use noise::{AccelerometerNoise, Detector, MotionNoise, Spread};
 pub use scene::{SceneObject, SceneSettings};
 pub use solid::{Boxes, Solid};
 pub use trajectory::TrajectorySettings;
+
+use detection::Errors;
 
 /// A simulated scene, trajectory and detector.
 ///
@@ -85,7 +88,7 @@ pub enum SimulationError {
     },
     /// Too many objects for the rectangle.
     #[error(
-        "there is no room for object {object} of the scene: make `scene.area` larger, or `scene.objects` or `scene.gap` less"
+        "there is no room for object {object} of the scene: make `scene.area` larger, or `scene.objects`, `scene.moved` or `scene.gap` less"
     )]
     NoRoom {
         /// Number of the object, from 0.
@@ -110,7 +113,7 @@ impl Simulated {
     /// Settings that make no sense, or a scene without room.
     pub fn simulate(&self) -> Result<Sequence, SimulationError> {
         self.check()?;
-        let objects = self.scene.objects(&mut Pcg64::seed_from_u64(self.scene.seed))?;
+        let scene = self.scene.scene()?;
         let mut path = Pcg64::seed_from_u64(self.trajectory.seed);
         let poses = self.trajectory.poses(self.scene.height, &mut path);
         // trials of other scenes or trajectories have noise of their own, whatever the seed: they are independent
@@ -118,7 +121,7 @@ impl Simulated {
         let mixed = seeds.iter().fold(0, |mixed, seed| Pcg64::seed_from_u64(mixed ^ seed).next_u64());
         // a stream for each, so that more of one does not change the other
         let mut noise = Pcg64::seed_from_u64(mixed);
-        let (mut motion, mut detector) = (Pcg64::from_rng(&mut noise), Pcg64::from_rng(&mut noise));
+        let (mut motion, boxes) = (Pcg64::from_rng(&mut noise), Pcg64::from_rng(&mut noise));
 
         let time = |i: usize| i as f64 * self.trajectory.interval;
         let mut frames: Vec<Frame> = vec![];
@@ -133,17 +136,19 @@ impl Simulated {
             frames.push(Frame { timestamp: time(i), world_from_camera });
         }
         let stamped = |(i, pose): (usize, &_)| StampedPose { timestamp: time(i), pose: *pose };
-        let [mut imagination, mut mistakes, mut felt, mut ranges] =
-            [(); 4].map(|()| Pcg64::from_rng(&mut noise));
-        let detections =
-            self.detect(&objects, &poses, [&mut detector, &mut imagination, &mut mistakes, &mut ranges]);
+        let [mut imagination, mistakes, mut felt, depths] = [(); 4].map(|()| Pcg64::from_rng(&mut noise));
+        let count = scene.objects.len();
+        let before = Errors::new(count, boxes, mistakes, depths);
+        let [boxes, mistakes, depths] = [(); 3].map(|()| Pcg64::from_rng(&mut noise));
+        let after = Errors::new(count, boxes, mistakes, depths);
+        let detections = self.detect(&scene, &poses, [before, after], &mut imagination);
         let readings = self.accelerometer.as_ref().map(|sensor| {
             let readings = sensor.read(&poses, self.trajectory.interval, &mut felt).into_iter().enumerate();
             readings.map(|(i, acceleration)| Acceleration { timestamp: time(i), acceleration }).collect()
         });
         let truth = GroundTruth {
             trajectory: poses.iter().enumerate().map(stamped).collect(),
-            objects: objects.into_iter().map(|object| object.truth).collect(),
+            objects: scene.truth(time(poses.len() - 1)),
         };
         Ok(Sequence {
             camera: self.camera,
@@ -155,63 +160,12 @@ impl Simulated {
         })
     }
 
-    fn detect(
-        &self,
-        objects: &[SceneObject],
-        poses: &[manifactor_geometry::Se3],
-        [rng, imagination, mistakes, ranges]: [&mut Pcg64; 4],
-    ) -> Vec<Detection> {
-        let classes: Vec<&str> = catalogue::KINDS.iter().map(|kind| kind.class).collect();
-        let mut usual = vec![];
-        for object in objects {
-            let (wrong, other) = (
-                rng.random_bool(self.detector.misclassified),
-                noise::another(&object.truth.class, &classes, rng),
-            );
-            usual.push(if wrong { other } else { object.truth.class.as_str() });
-        }
-        let mut detections = vec![];
-        // of each object: the noise of its last box, and the seconds since
-        let mut lasting = vec![([0.0; 4], f64::INFINITY); objects.len()];
-        for (frame, pose) in poses.iter().enumerate() {
-            let solids = objects.iter().map(|o| (&o.solid, pose.between(&o.truth.world_from_object)));
-            let depths = self.detector.occluded_by_objects.then(|| DepthImage::new(solids, &self.camera));
-            for (i, (usual, (noise, seconds))) in usual.iter().zip(&mut lasting).enumerate() {
-                let object = &objects[i];
-                *seconds += self.trajectory.interval;
-                let Some(boxes) = object.solid.boxes(&object.truth.world_from_object, &self.camera, pose)
-                else {
-                    continue;
-                };
-                let Boxes { whole, inside } = boxes;
-                let left = depths.as_ref().map_or(Some((inside, 1.0)), |depths| depths.left_of(i, inside));
-                // what is hidden draws its noise as well: one setting changes nothing but its own effect
-                let (seen, share) = left.unwrap_or((inside, 0.0));
-                let visible = share * inside.area() / whole.area();
-                let drawn = self.detector.draw(&seen, visible, &self.camera, (noise, *seconds), rng);
-                let bounding_box = drawn.filter(|_| left.is_some());
-                *seconds = 0.0;
-                let scores = self.detector.classify(usual, &classes, rng);
-                let taken_for = noise::mistaken(self.detector.wrong_object, i, objects.len(), mistakes);
-                let away = pose.inverse().act(&object.truth.world_from_object.translation).z;
-                let depth = self.detector.measure(away, ranges);
-                if let Some(bounding_box) = bounding_box {
-                    let object = Some(objects[taken_for].truth.id);
-                    detections.push(Detection { frame, object, scores, bounding_box, depth });
-                }
-            }
-            for (bounding_box, scores) in self.detector.imagine(&self.camera, &classes, imagination) {
-                detections.push(Detection { frame, object: None, scores, bounding_box, depth: None });
-            }
-        }
-        detections
-    }
-
     fn check(&self) -> Result<(), SimulationError> {
         let (s, t, o, d) = (&self.scene, &self.trajectory, &self.odometry, &self.detector);
         let shares = [
             ("scene.tilted", s.tilted),
             ("scene.size_variation", s.size_variation),
+            ("scene.moved", s.moved),
             ("detector.min_visible", d.min_visible),
             ("detector.missed", d.missed),
             ("detector.occluded", d.occluded),
@@ -224,6 +178,7 @@ impl Simulated {
             ("scene.area", s.area[0]),
             ("scene.area", s.area[1]),
             ("scene.gap", s.gap),
+            ("scene.moved_at_s", s.moved_at_s),
             ("trajectory.waves", t.waves[0]),
             ("trajectory.waves", t.waves[1]),
             ("trajectory.wander", t.wander),
@@ -429,6 +384,8 @@ mod tests {
             settings.simulate().unwrap_err().to_string()
         };
         assert!(refused(|s| s.scene.tilted = 1.5).contains("scene.tilted"));
+        assert!(refused(|s| s.scene.moved = -0.1).contains("scene.moved"));
+        assert!(refused(|s| s.scene.moved_at_s = f64::INFINITY).contains("scene.moved_at_s"));
         assert!(refused(|s| s.detector.sigma_px = f64::NAN).contains("detector.sigma_px"));
         assert!(refused(|s| s.detector.wrong_object = 2.0).contains("detector.wrong_object"));
         assert!(

@@ -1,7 +1,8 @@
 //! The map that a run leaves, for other runs to begin with.
-use crate::estimate::looks::looks;
+use crate::estimate::looks::{Looked, looks};
 use crate::estimate::{Estimate, Landmark};
-use crate::input::prior_map::{Looks, PriorMap, PriorObject};
+use crate::input::prior_map::{PriorMap, PriorObject};
+use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::Measured;
 use crate::mapping::object_key;
 use crate::settings::Settings;
@@ -33,7 +34,7 @@ const LEAST_WEIGHT: f64 = 1e-9;
 const UNKNOWN: [f64; 9] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0];
 
 impl PriorMap {
-    /// The map of an estimate, without those objects of an earlier map that are gone. Objects of that map without new views are as they were
+    /// The map of an estimate, without those objects that are gone. Objects of that map without new views are as they were
     /// read, so that a map does not fade from run to run.
     ///
     /// # Errors
@@ -44,13 +45,13 @@ impl PriorMap {
         let object = |landmark: Landmark<'_>| {
             let Landmark { object, quadric, .. } = landmark;
             let measured = estimate.mapping.measurements.object(object.id)?;
-            let looks = new.get(&object.id).copied().unwrap_or_default();
-            if is_gone(measured, looks) {
+            let looked = new.get(&object.id).copied().unwrap_or_default();
+            if is_gone(measured, looked, settings) {
                 return None;
             }
-            let before = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default();
+            let looks = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default().plus(looked.all);
             if let Some(prior) = measured.prior.as_ref().filter(|_| measured.views.is_empty()) {
-                let (classes, looks) = (measured.classes().clone(), before.plus(looks));
+                let classes = measured.classes().clone();
                 return Some(Arc::new(PriorObject { classes, looks, ..PriorObject::clone(prior) }));
             }
             Some(Arc::new(PriorObject {
@@ -58,7 +59,7 @@ impl PriorMap {
                 classes: measured.classes().clone(),
                 quadric: *quadric,
                 covariance: covariances.remove(object.key.as_str())?,
-                looks: before.plus(looks),
+                looks,
                 least_px: measured.least_px(),
             }))
         };
@@ -68,15 +69,26 @@ impl PriorMap {
 }
 
 /// The smallest chance to miss an object in all looks at which it is believed to be there.
-const MISSED: f64 = 0.01;
+const MISSED: f64 = 0.001;
 /// An object that is gone was looked at so many times.
-const LOOKS: usize = 5;
+const LOOKS: usize = 8;
 
-/// Whether an object of an earlier map is not there any more: it should have been seen, and was not.
-pub(super) fn is_gone(measured: &Measured, looks: Looks) -> bool {
-    let Some(prior) = &measured.prior else { return false };
-    let missed = (1.0 - prior.looks.rate()).powf(looks.expected as f64);
-    measured.views.is_empty() && looks.seen == 0 && looks.expected >= LOOKS && missed < MISSED
+/// The mapped objects that are not there any more, by number.
+pub(super) fn gone(estimate: &Estimate, settings: &Settings) -> Vec<ObjectId> {
+    let looks = looks(estimate, settings.detections.border_px);
+    let is_gone = |(id, looked): (ObjectId, Looked)| {
+        let measured = estimate.mapping.measurements.object(id)?;
+        is_gone(measured, looked, settings).then_some(id)
+    };
+    looks.into_iter().filter_map(is_gone).collect()
+}
+
+/// Whether an object is not there any more: it should have been seen since it was seen last, in this run or before, and was not.
+fn is_gone(measured: &Measured, looked: Looked, settings: &Settings) -> bool {
+    let prior = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default();
+    let missed = (1.0 - prior.plus(looked.before).rate()).powf(looked.since as f64);
+    // boxes that are held out are not missed
+    settings.evaluation.holdout.is_none() && looked.since >= LOOKS && missed < MISSED
 }
 
 /// Has the factors of an earlier map count by the covariances that were read, and not by those that were trusted: what is written says again

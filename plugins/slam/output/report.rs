@@ -3,6 +3,7 @@ use crate::estimate::variance::Components;
 use crate::estimate::{Estimate, Landmark};
 use crate::input::sequence::ObjectId;
 use crate::mapping::{MappedObject, Rejection, Warning};
+use crate::output::map::gone;
 use crate::settings::Settings;
 use manifactor_graph::Direction;
 use manifactor_quadric::{DualQuadric, LandmarkError};
@@ -84,6 +85,9 @@ pub struct VariantReport {
     pub held_out: Option<HeldOutReport>,
     /// Each object that was detected, by number.
     pub objects: Vec<ObjectReport>,
+    /// Mapped objects that are not there any more at the end, by number: they should have been seen again, and were not. `map.json` is without them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub gone: Vec<ObjectId>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
     /// Reading, mapping, solving and evaluating.
@@ -190,6 +194,7 @@ impl VariantReport {
             consistency: ConsistencyReport::new(estimate, &settings.evaluation),
             held_out: None,
             objects,
+            gone: gone(estimate, settings),
             warnings,
             seconds,
         }
@@ -199,7 +204,7 @@ impl VariantReport {
 impl VariantReport {
     /// Tells how it went in the map that the run was to begin with.
     pub(crate) fn tell_prior_map(&mut self, estimate: &Estimate, settings: &Settings, found: Option<Found>) {
-        self.prior_map = PriorMapReport::new(estimate, settings, found);
+        self.prior_map = PriorMapReport::new(estimate, settings, found, &self.gone);
         if let Some(prior) = self.prior_map.as_ref().filter(|prior| !prior.is_located) {
             self.warnings.push(Warning::NotLocated { file: prior.file.clone() });
         }

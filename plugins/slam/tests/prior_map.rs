@@ -37,13 +37,13 @@ detector = { missed = 0.1, misclassified = 0.05, sigma_px = 3.0 }
 /// Another walk around the same table.
 const AGAIN: [&str; 2] = ["source.seed=2", "source.trajectory.seed=2"];
 
-fn settings(sets: &[&str]) -> Settings {
+pub(crate) fn settings(sets: &[&str]) -> Settings {
     let mut document = Document::parse("table.toml", TABLE, Format::Toml).unwrap();
     document.set(sets).unwrap();
     RunDocument::read(&document).unwrap().variants.remove(0).settings
 }
 
-fn sequence(settings: &Settings) -> Arc<Sequence> {
+pub(crate) fn sequence(settings: &Settings) -> Arc<Sequence> {
     Arc::new(settings.source.load(&Folders::default()).unwrap())
 }
 
@@ -69,14 +69,14 @@ fn mapped(folder: &Path, change: impl FnOnce(&mut Sequence)) -> PriorMap {
     map
 }
 
-fn in_map(folder: &Path, more: &[&str]) -> Settings {
+pub(crate) fn in_map(folder: &Path, more: &[&str]) -> Settings {
     let file = format!("prior_map.file={}", folder.join("map.json").display());
     settings(&[&AGAIN[..], more, &[&file]].concat())
 }
 
 /// Notes the poses, the names in the first frame, and when the place was found.
 #[derive(Default)]
-struct Found {
+pub(crate) struct Found {
     poses: Vec<Se3>,
     first: Vec<ObjectId>,
     at: Option<usize>,
@@ -106,7 +106,7 @@ fn off(sequence: &Sequence, frame: usize, pose: &Se3) -> [f64; 2] {
     [error.rotation.log().norm().to_degrees(), error.translation.norm()]
 }
 
-fn told(report: &VariantReport) -> &PriorMapReport {
+pub(crate) fn told(report: &VariantReport) -> &PriorMapReport {
     report.prior_map.as_ref().unwrap()
 }
 
@@ -238,7 +238,7 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
 }
 
 /// Settings of a run that knows where it begins in the map: simulated walks begin at the pose that their odometry begins at.
-fn begun(folder: &Path, first: &Se3, more: &[&str]) -> Settings {
+pub(crate) fn begun(folder: &Path, first: &Se3, more: &[&str]) -> Settings {
     let rotation = format!("prior_map.start.rotation={:?}", first.rotation.quaternion_xyzw());
     let translation = format!("prior_map.start.translation={:?}", first.translation.as_slice());
     in_map(folder, &[more, &[&rotation, &translation]].concat())

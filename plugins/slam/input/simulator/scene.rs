@@ -34,6 +34,19 @@ pub struct SceneSettings {
     pub tilted: f64,
     /// By how much those are tilted, from and to, in degrees.
     pub tilt: [f64; 2],
+    /// Share of the objects that are put elsewhere, one after the other: to a free place that is apart from their own, and turned about the vertical.
+    /// Each has a new number from then on: to a map of what stands still it is another object. Default: 0.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub moved: f64,
+    /// When they are, in seconds. The truth has an object at each place where it is in some image. Default: 0, before the first image.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub moved_at_s: f64,
+}
+
+/// What is as usual is not written.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 impl Default for SceneSettings {
@@ -48,6 +61,8 @@ impl Default for SceneSettings {
             size_variation: 0.15,
             tilted: 0.0,
             tilt: [20.0, 90.0],
+            moved: 0.0,
+            moved_at_s: 0.0,
         }
     }
 }
@@ -125,7 +140,13 @@ impl SceneSettings {
         Ok(SceneObject { truth, solid, tilted })
     }
 
-    fn place(&self, radius: f64, placed: &[(Vector3<f64>, f64)], rng: &mut Pcg64) -> Option<Vector3<f64>> {
+    /// A place for something of this radius, apart from what there is.
+    pub(super) fn place(
+        &self,
+        radius: f64,
+        placed: &[(Vector3<f64>, f64)],
+        rng: &mut Pcg64,
+    ) -> Option<Vector3<f64>> {
         const TRIES: usize = 2000;
         let [x, y] = self.area.map(|extent| extent / 2.0);
         let anywhere =

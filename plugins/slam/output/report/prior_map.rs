@@ -1,10 +1,8 @@
 //! How a run went in a map that was made before.
 use crate::estimate::Estimate;
-use crate::estimate::looks::looks;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::Measured;
 use crate::online::Located;
-use crate::output::map::is_gone;
 use crate::settings::Settings;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -23,7 +21,7 @@ pub struct PriorMapReport {
     pub objects: usize,
     /// Those that were seen again.
     pub seen: Vec<ObjectId>,
-    /// Those that should have been seen, and were not.
+    /// Those that should have been seen, or seen again, and were not.
     pub gone: Vec<ObjectId>,
     /// Objects that are new.
     pub added: Vec<ObjectId>,
@@ -40,12 +38,15 @@ pub struct Found {
 }
 
 impl PriorMapReport {
-    /// The report; none, where there was no map before.
-    pub(crate) fn new(estimate: &Estimate, settings: &Settings, found: Option<Found>) -> Option<Self> {
+    /// The report, where these objects are `gone`; none, where there was no map before.
+    pub(crate) fn new(
+        estimate: &Estimate,
+        settings: &Settings,
+        found: Option<Found>,
+        gone: &[ObjectId],
+    ) -> Option<Self> {
         let prior = settings.prior_map.as_ref()?;
         let is_located = prior.start.is_some() || found.is_some();
-        let looks = looks(estimate, settings.detections.border_px);
-        let looks = |measured: &Measured| looks.get(&measured.id).copied().unwrap_or_default();
         let all = &estimate.mapping.measurements.objects;
         let ids = |which: &dyn Fn(&Measured) -> bool| all.iter().filter(|m| which(m)).map(|m| m.id).collect();
         let mapped: Vec<ObjectId> = estimate.mapping.mapped().map(|object| object.id).collect();
@@ -55,7 +56,7 @@ impl PriorMapReport {
             found,
             objects: prior.map.objects.len(),
             seen: ids(&|measured| measured.prior.is_some() && !measured.views.is_empty()),
-            gone: ids(&|measured| is_gone(measured, looks(measured))),
+            gone: ids(&|measured| measured.prior.is_some() && gone.contains(&measured.id)),
             added: ids(&|measured| is_located && measured.prior.is_none() && mapped.contains(&measured.id)),
         })
     }

@@ -1,0 +1,105 @@
+//! Objects that are put elsewhere, between two runs or within one.
+use crate::prior_map::{Found, begun, in_map, sequence, settings, told};
+use manifactor_slam::estimate::Estimate;
+use manifactor_slam::output::write_whole;
+use manifactor_slam::prior_map::PriorMap;
+use manifactor_slam::report::VariantReport;
+use manifactor_slam::run::{estimate, online};
+use manifactor_slam::sequence::{ObjectId, Sequence, TrueObject};
+use manifactor_slam::settings::Settings;
+use manifactor_solve::Silent;
+use nalgebra::Vector3;
+use std::collections::BTreeSet;
+
+/// A share of a quarter: three of twelve.
+const MOVED: &str = "source.scene.moved=0.25";
+
+/// The numbers of those objects of the truth that are at these places.
+fn at(places: impl Iterator<Item = Vector3<f64>>, truth: &[TrueObject]) -> BTreeSet<ObjectId> {
+    let distance =
+        |place: &Vector3<f64>, object: &TrueObject| (object.world_from_object.translation - place).norm();
+    let nearest = |place: Vector3<f64>| {
+        let nearest = truth.iter().min_by(|a, b| distance(&place, a).total_cmp(&distance(&place, b)));
+        nearest.filter(|object| distance(&place, object) < 0.1).map(|object| object.id)
+    };
+    places.filter_map(nearest).collect()
+}
+
+fn truth(sequence: &Sequence) -> Vec<TrueObject> {
+    sequence.ground_truth.clone().unwrap().objects
+}
+
+#[test]
+fn what_is_moved_between_two_runs_is_gone_and_added() {
+    let (folder, given) = (tempfile::tempdir().unwrap(), "association.type=given");
+    let first = settings(&[given]);
+    let before = sequence(&first);
+    let (made, _) = estimate("first", before.clone(), &first, &mut Silent).unwrap();
+    let map = serde_json::to_string(&PriorMap::of(&made, &first).unwrap()).unwrap();
+    write_whole(&folder.path().join("map.json"), map).unwrap();
+    let start = sequence(&in_map(folder.path(), &[])).frames[0].world_from_camera;
+    for association in [given, "association.type=likelihood"] {
+        let settings = begun(folder.path(), &start, &[MOVED, association]);
+        let second = sequence(&settings);
+        let ids = |sequence: &Sequence| truth(sequence).iter().map(|o| o.id).collect::<BTreeSet<_>>();
+        let (was, is) = (ids(&before), ids(&second));
+        let (estimate, report) = estimate("second", second.clone(), &settings, &mut Silent).unwrap();
+        let prior = told(&report);
+        let gone: BTreeSet<_> = prior.gone.iter().copied().collect();
+        let added = at(prior.added.iter().filter_map(|id| place(&estimate, *id)), &truth(&second));
+        let (left, new) = (was.difference(&is).copied().collect(), is.difference(&was).copied().collect());
+        match association == given {
+            true => assert_eq!((gone, added), (left, new)),
+            // what is moved a little is taken for what it was
+            false => assert!(gone.len() >= 2 && gone.is_subset(&left) && added.is_subset(&new), "{prior:?}"),
+        }
+        assert_eq!(report.gone, prior.gone);
+    }
+}
+
+fn place(estimate: &Estimate, id: ObjectId) -> Option<Vector3<f64>> {
+    let all = estimate.landmarks();
+    all.iter().find(|landmark| landmark.object.id == id).map(|landmark| landmark.quadric.centroid())
+}
+
+/// Twice around the table, of which things are moved after the first time.
+fn twice(more: &[&str]) -> Settings {
+    let twice = ["source.trajectory.sweep=720", "source.trajectory.frames=400", "source.scene.moved_at_s=20"];
+    settings(&[&twice[..], more].concat())
+}
+
+#[test]
+fn what_is_moved_within_a_stream_is_told_and_not_in_its_map() {
+    for association in ["association.type=given", "association.type=likelihood"] {
+        let settings = twice(&[MOVED, association]);
+        let all = sequence(&settings);
+        let truth = truth(&all);
+        let moved: Vec<_> = truth.iter().filter(|object| object.id.0 > 12).collect();
+        let old = truth
+            .iter()
+            .filter(|was| was.id.0 <= 12 && moved.iter().any(|is| is.half_extents == was.half_extents));
+        let old: BTreeSet<_> = old.map(|object| object.id).collect();
+        assert_eq!((truth.len(), old.len()), (15, 3));
+        let is_right = |(estimate, report): (Estimate, VariantReport)| {
+            let gone = report.gone.iter().filter_map(|id| place(&estimate, *id));
+            assert_eq!(at(gone, &truth), old, "{association} {:?}", report.gone);
+            let map = PriorMap::of(&estimate, &settings).unwrap();
+            let left = at(map.objects.iter().map(|object| object.quadric.centroid()), &truth);
+            assert!(left.is_disjoint(&old) && left.len() >= 11, "{association} {left:?}");
+        };
+        is_right(
+            online("stream", all.clone().into(), &settings, &mut Found::default(), &mut Silent).unwrap(),
+        );
+        is_right(estimate("batch", all, &settings, &mut Silent).unwrap());
+    }
+}
+
+#[test]
+fn what_stays_is_not_told() {
+    // nor what is not seen as its boxes are held out
+    for more in [&[][..], &["evaluation.holdout.last=0.3"]] {
+        let settings = twice(more);
+        let (_, report) = estimate("still", sequence(&settings), &settings, &mut Silent).unwrap();
+        assert!(report.gone.is_empty(), "{:?}", report.gone);
+    }
+}
