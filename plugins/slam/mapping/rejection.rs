@@ -95,6 +95,9 @@ pub(crate) fn start(
     still(measured, pose, &camera, &start, detections.depth_error).map(|()| start)
 }
 
+/// Of an object's boxes so many are looked at for motion, from the first to the last.
+const PLACES: usize = 128;
+
 /// Whether an object that began so stands still, as far as the depths of its boxes tell.
 pub(crate) fn still(
     measured: &Measured,
@@ -113,7 +116,10 @@ pub(crate) fn still(
         depths += depth;
         Some((view.frame as f64, pose.act(&(camera.ray(view.bounding_box.centre()) * depth))))
     };
-    let places: Vec<(f64, Vector3<f64>)> = measured.views.iter().filter_map(&mut place).collect();
+    // with each new box, so that all of them would be looked at again and again
+    let step = measured.views.len().div_ceil(PLACES).max(1);
+    let places: Vec<(f64, Vector3<f64>)> =
+        measured.views.iter().rev().step_by(step).rev().filter_map(&mut place).collect();
     let doubt_m = 3.0 * depth_error * depths / places.len().max(1) as f64;
     let (way_m, limit_m) = (way(&places), start.semi_axes.max().max(doubt_m));
     if way_m > limit_m { Err(Rejection::Moves { way_m, limit_m }) } else { Ok(()) }
