@@ -39,7 +39,7 @@ pub use locate::Located;
 /// A map that grows with each frame.
 ///
 /// It keeps what a batch solve at the end needs: some 70 bytes for each frame, and 50 for each box; and each object, where boxes are
-/// put to objects, with the frames that it was seen in. Everything else is bounded by the window of the session, where there is one.
+/// put to objects, with its detections. Everything else is bounded by the window of the session, where there is one.
 #[derive(Debug)]
 pub struct Mapper {
     settings: Arc<Settings>,

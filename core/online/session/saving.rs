@@ -202,7 +202,8 @@ fn insert(model: &mut Model, saved: &SavedVariable) -> Result<(), LoadError> {
     let SavedVariable { key, born, point, step, held, parked, .. } = saved;
     let value = point.erased();
     let dim = value.dim();
-    let is_known = born.is_some() && model.variable(key.as_str()).is_some();
+    // a number that is free may have had the name of a variable that is there
+    let is_known = born.is_some() && model.variable(key.as_str()).is_some_and(|v| model.place(v).is_there);
     if is_known || step.len() != dim || !value.is_finite() {
         return Err(LoadError::Inconsistent("a variable's key, point or step"));
     }

@@ -130,6 +130,7 @@ fn what_is_gone_is_named_and_nothing_can_be_added_to_it() {
     session = Session::load(&session.save().unwrap()).unwrap();
     session.push(&graph, &values).unwrap();
     session.update().unwrap();
+    session = Session::load(&session.save().unwrap()).unwrap();
     assert!((session.get::<Plane>("b7").unwrap().x - 5.0).abs() < 1e-9);
     session.marginalize(&["b7"]).unwrap();
     session.update().unwrap();
@@ -216,4 +217,29 @@ fn a_batch_solve_knows_what_has_left() {
     assert!((x.x - batch.x).abs() < 1e-6, "{x:?} {batch:?}");
     // 19 distances of 1.2 and 19 steps of 1 along a line, and the origin
     assert!((x.x - 19.0 * 1.1).abs() < 1e-6, "{x:?}");
+}
+
+#[test]
+fn a_name_that_is_used_again_is_saved_once() {
+    let mut session = Session::new(Settings::default()).unwrap();
+    let push = |session: &mut Session, key: &str| {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        graph.add([key], At { at: [1.0, 2.0] });
+        values.insert(key, Plane { x: 0.0, y: 0.0 });
+        let ids = session.push(&graph, &values).unwrap();
+        session.update().unwrap();
+        ids
+    };
+    let ids = ["b1", "b2", "stays"].map(|key| push(&mut session, key));
+    for (key, ids) in ["b1", "b2"].into_iter().zip(&ids) {
+        session.remove(ids).unwrap();
+        session.marginalize(&[key]).unwrap();
+        session.update().unwrap();
+    }
+    for key in ["b1", "b3", "b2"] {
+        push(&mut session, key);
+        let mut loaded = Session::load(&session.save().unwrap()).unwrap();
+        assert_eq!(loaded.variables(), session.variables());
+        assert_eq!(loaded.cost().to_bits(), session.cost().to_bits());
+    }
 }

@@ -105,8 +105,12 @@ impl Measurements {
         aliases: &Aliases,
     ) {
         let sifted = sift(detection, camera, settings);
+        if let Sifted::LowScore = sifted {
+            self.low_score = self.low_score.saturating_sub(1);
+            return;
+        }
         let Ok(place) = self.objects.binary_search_by_key(&from, |object| object.id) else { return };
-        let (false, object) = (matches!(sifted, Sifted::LowScore), &mut self.objects[place]) else { return };
+        let object = &mut self.objects[place];
         object.detections = object.detections.saturating_sub(1);
         object.fusion.take_back(&detection.scores, aliases);
         match sifted {

@@ -54,76 +54,74 @@ impl Mapper {
         let (mut names, mut owners) = (self.names.clone(), vec![]);
         for learned in all {
             for moved in &learned.moved {
-                self.put(moved, report);
+                self.put(moved);
                 names.put(moved);
             }
-            owners.extend(self.begin_again(&learned.moved, report));
+            report.moved.extend_from_slice(&learned.moved);
+            owners.extend(self.put_right(&learned.moved, report));
             for merge in &learned.merged {
                 owners.extend(self.unite(*merge, report));
                 names.merge(*merge);
             }
+            learned.forgotten.iter().for_each(|id| self.forget(*id));
         }
         let owners: BTreeSet<ObjectId> = owners.into_iter().map(|id| names.now(id)).collect();
         self.ask(&owners.into_iter().collect::<Vec<_>>(), report);
         names
     }
 
-    /// Gives a box to the object that it shows.
-    fn put(&mut self, moved: &Move, report: &mut FrameReport) {
-        let Move { frame, from, into, ref detection, .. } = *moved;
+    /// Counts a box for the object that it shows.
+    fn put(&mut self, Move { from, detection, .. }: &Move) {
         let Settings { detections, aliases, .. } = &*self.settings;
-        self.measurements.take_back(detection, from, &self.camera, detections, aliases);
+        self.measurements.take_back(detection, *from, &self.camera, detections, aliases);
         self.measurements.add(detection, &self.camera, detections, aliases);
-        if let Some(object @ Tracked::Withdrawn) = self.objects.get_mut(&from) {
+        if let Some(object @ Tracked::Withdrawn) = self.objects.get_mut(from) {
             // it may be one thing without it
             *object = Tracked::default();
         }
-        for id in [from, into] {
-            self.put_right(id, frame, report);
-        }
-        tracing::debug!(frame, "a box of object {from} is one of {into}");
-        report.moved.push(moved.clone());
     }
 
-    /// Takes objects out of the map that have so many other boxes now that they are better begun again, when they are seen the next time: where
-    /// they are is where other things are. Returns objects that rules had connected with them.
-    fn begin_again(&mut self, all: &[Move], report: &mut FrameReport) -> Vec<ObjectId> {
-        let mut changed: BTreeMap<ObjectId, usize> = BTreeMap::new();
-        for id in all.iter().flat_map(|moved| [moved.from, moved.into]) {
-            *changed.entry(id).or_default() += 1;
+    /// Brings the factors of objects whose boxes have moved into line with what is measured. Those that have so many other boxes
+    /// now that they are better begun again, as where they are is where other things are, are taken out of the map until they are seen the next time.
+    /// Returns objects that rules had connected with them.
+    fn put_right(&mut self, all: &[Move], report: &mut FrameReport) -> Vec<ObjectId> {
+        let mut changed: BTreeMap<ObjectId, BTreeSet<usize>> = BTreeMap::new();
+        for (id, frame) in all.iter().flat_map(|moved| [(moved.from, moved.frame), (moved.into, moved.frame)])
+        {
+            changed.entry(id).or_default().insert(frame);
         }
         let mut owners = vec![];
-        for (id, boxes) in changed {
-            let Some(measured) = self.measured(id).filter(|measured| measured.prior.is_none()) else {
-                continue;
-            };
-            let is_mapped = self.objects.get(&id).is_some_and(Tracked::is_mapped);
-            if is_mapped && boxes as f64 > OTHERS * measured.views.len() as f64 {
-                owners.extend(self.take_out(id, report));
-                let sights = self.sights(id);
-                self.objects.insert(id, Tracked::Waiting(sights));
-                report.withdrawn.push(object_key(id));
+        for (id, frames) in changed {
+            let others = self.measured(id).filter(|measured| measured.prior.is_none());
+            let is_other = others.is_some_and(|own| frames.len() as f64 > OTHERS * own.views.len() as f64);
+            let is_begun_again = is_other && self.leaves_nothing(id);
+            match self.objects.entry(id).or_default() {
+                Tracked::Mapped(_) if is_begun_again => {
+                    owners.extend(self.take_out(id, report));
+                    self.objects.insert(id, Tracked::Waiting(self.sights(id)));
+                    report.withdrawn.push(object_key(id));
+                }
+                Tracked::Mapped(mapped) => {
+                    let gone = mapped.boxes.extract_if(.., |(of, _)| frames.contains(of));
+                    let gone: Vec<FactorId> = gone.map(|(_, factor)| factor).collect();
+                    self.remove(&gone, report);
+                    let view = |frame: &usize| self.measured(id)?.view(*frame).copied();
+                    let views: Vec<ObjectBox> = frames.iter().filter_map(view).collect();
+                    self.push_boxes(id, &views, report);
+                }
+                Tracked::Waiting(_) => {
+                    self.objects.insert(id, Tracked::Waiting(self.sights(id)));
+                }
+                Tracked::Withdrawn => {}
             }
         }
         owners
     }
 
-    /// Brings the factors of an object's box in a frame into line with what is measured.
-    fn put_right(&mut self, id: ObjectId, frame: usize, report: &mut FrameReport) {
-        let view = self.measured(id).and_then(|measured| measured.view(frame)).copied();
-        match self.objects.entry(id).or_default() {
-            Tracked::Mapped(mapped) => {
-                let gone = mapped.boxes.extract_if(.., |(of, _)| *of == frame).map(|(_, factor)| factor);
-                let gone: Vec<FactorId> = gone.collect();
-                self.remove(&gone, report);
-                self.push_boxes(id, view.as_slice(), report);
-            }
-            Tracked::Waiting(_) => {
-                let sights = self.sights(id);
-                self.objects.insert(id, Tracked::Waiting(sights));
-            }
-            Tracked::Withdrawn => {}
-        }
+    /// Whether nothing of an object stays when it is taken out of the map, so that it can come back: no pose that it was seen from has left the window.
+    pub(super) fn leaves_nothing(&self, id: ObjectId) -> bool {
+        let Some(Tracked::Mapped(mapped)) = self.objects.get(&id) else { return true };
+        mapped.boxes.iter().all(|(_, factor)| self.session.entry(*factor).is_some())
     }
 
     /// From where an object is seen that is not in the map.

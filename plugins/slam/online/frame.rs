@@ -36,14 +36,14 @@ pub struct FrameReport {
     /// Objects that were seen too rarely to be any: their boxes are of none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forgotten: Vec<ObjectId>,
-    /// Boxes of earlier frames that turned out to show other objects.
+    /// Boxes, mostly of earlier frames, that turned out to show other objects.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moved: Vec<Move>,
     /// Objects that turned out to be others, after that.
     pub merged: Vec<Merge>,
     /// Objects that came into the map.
     pub born: Vec<Key>,
-    /// Objects that left it: their boxes turned out to be those of several things.
+    /// Objects that left it: their boxes turned out to be those of several things, or to be too few, or are others now, and they begin again.
     pub withdrawn: Vec<Key>,
     /// Objects that rules were asked about again, as their class has changed.
     pub revised: Vec<Key>,

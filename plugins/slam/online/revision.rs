@@ -42,9 +42,11 @@ impl Mapper {
             }
         }
         report.forgotten.clone_from(&seen.learned.forgotten);
-        report.forgotten.iter().for_each(|id| self.forget(*id));
         let mut learned = std::mem::take(&mut self.pending);
-        if !seen.learned.is_nothing() {
+        if learned.is_empty() && seen.learned.is_nothing() {
+            report.forgotten.iter().for_each(|id| self.forget(*id));
+        } else {
+            // what is forgotten may have had boxes that move
             learned.push(seen.learned.clone());
         }
         let is_due = |id: &ObjectId| self.due(*id).is_some();
@@ -135,11 +137,11 @@ impl Mapper {
 
     /// Takes an object out of the map.
     fn withdraw(&mut self, id: ObjectId, rejection: &Rejection, report: &mut FrameReport) {
+        let comes_back = matches!(rejection, Rejection::Views { .. }) && self.leaves_nothing(id);
         let owners = self.take_out(id, report);
-        if let Rejection::Views { .. } = rejection {
+        if comes_back {
             // its boxes were those of others; there may be more to come
-            let sights = self.sights(id);
-            self.objects.insert(id, Tracked::Waiting(sights));
+            self.objects.insert(id, Tracked::Waiting(self.sights(id)));
         }
         self.ask(&owners, report);
         tracing::info!(object = %id, "taken out of the map: {rejection}");
@@ -150,6 +152,7 @@ impl Mapper {
     pub(super) fn take_out(&mut self, id: ObjectId, report: &mut FrameReport) -> Vec<ObjectId> {
         let key = object_key(id);
         let (mut factors, owners) = self.ledger.revoke(|other| *other == key);
+        self.ledger.forget(id);
         if let Some(Tracked::Mapped(mapped)) = self.objects.insert(id, Tracked::Withdrawn) {
             factors.extend(mapped.boxes.into_iter().map(|(_, factor)| factor));
         }

@@ -88,6 +88,11 @@ impl Ledger {
         (ids, owners)
     }
 
+    /// Forgets that the rules were asked about an object.
+    pub(super) fn forget(&mut self, object: ObjectId) {
+        self.left_out.remove(&object);
+    }
+
     /// What the rules have for an object.
     fn verdict(&self, owner: ObjectId) -> Verdict {
         let own = || self.factors.iter().filter(|factor| factor.owner == owner);

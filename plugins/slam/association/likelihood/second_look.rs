@@ -51,44 +51,44 @@ impl Tracker {
         while let Some(past) = self.past.pop_front_if(|past| past.timestamp <= until) {
             let again = self.reconsider(&past.image(), &past.names, map);
             let Past { frame, detections, places, names, .. } = past;
+            let before = all.len();
             for (((detection, place), from), into) in detections.into_iter().zip(places).zip(names).zip(again)
             {
                 let (Some(from), Some(into)) = (from, into) else { continue };
                 if from != into {
                     let detection = Detection { frame, object: Some(into), ..detection };
-                    let moved = Move { frame, place, from, into, detection };
-                    self.move_box(&moved);
-                    all.push(moved);
+                    all.push(Move { frame, place, from, into, detection });
                 }
             }
+            self.move_boxes(&all[before..]);
         }
         all
     }
 
-    /// Moves a box from one object to another.
-    fn move_box(&mut self, moved: &Move) {
-        let (scores, noise) = (&moved.detection.scores, self.settings.noise());
-        let mut taken = None;
-        if let Some(t) = self.tracks.iter().position(|track| track.id == moved.from) {
-            let track = &mut self.tracks[t];
-            track.vote(scores, &self.aliases, -1.0);
-            let is_it = |seen: &Seen| seen.frame() == moved.frame && seen.place == moved.place;
-            // of twins, one was taken in
-            if let Some(i) = track.boxes.iter().position(is_it) {
-                taken = Some(track.boxes.remove(i));
-                track.sightings.remove(moved.frame);
-                track.fit_again(&self.camera, &noise);
-            }
-            if track.boxes.is_empty() && !track.is_known() {
-                self.tracks.remove(t);
-            }
-        }
-        if let Some(track) = self.tracks.iter_mut().find(|track| track.id == moved.into) {
-            track.vote(scores, &self.aliases, 1.0);
+    /// Moves boxes of a frame, which may change places.
+    fn move_boxes(&mut self, all: &[Move]) {
+        let taken: Vec<Option<Seen>> = all.iter().map(|moved| self.take_box(moved)).collect();
+        for (moved, taken) in all.iter().zip(taken) {
+            let Some(track) = self.tracks.iter_mut().find(|track| track.id == moved.into) else { continue };
+            track.vote(&moved.detection.scores, &self.aliases, 1.0);
             let place = track.boxes.binary_search_by_key(&moved.frame, Seen::frame);
             if let (Some(seen), Err(place)) = (taken, place) {
                 track.boxes.insert(place, seen);
             }
         }
+        let left = |id: ObjectId| all.iter().any(|moved| moved.from == id);
+        self.tracks.retain(|track| !(left(track.id) && track.boxes.is_empty() && !track.is_known()));
+    }
+
+    /// Takes a box from its object; of twins, one was taken in.
+    fn take_box(&mut self, moved: &Move) -> Option<Seen> {
+        let track = self.tracks.iter_mut().find(|track| track.id == moved.from)?;
+        track.vote(&moved.detection.scores, &self.aliases, -1.0);
+        let is_it = |seen: &Seen| seen.frame() == moved.frame && seen.place == moved.place;
+        let place = track.boxes.iter().position(is_it)?;
+        let seen = track.boxes.remove(place);
+        track.sightings.remove(moved.frame);
+        track.fit_again(&self.camera, &self.settings.noise());
+        Some(seen)
     }
 }

@@ -46,7 +46,10 @@ impl Notes {
             self.note(frame, &format!("{key} came into the map"));
         }
         for key in &report.withdrawn {
-            self.note(frame, &format!("{key} was withdrawn: its boxes are those of several things"));
+            self.note(
+                frame,
+                &format!("{key} was withdrawn: its boxes are those of several things, or are others now"),
+            );
         }
         for Move { frame: of, from, into, .. } in &report.moved {
             self.note(frame, &format!("a box of frame {of} shows object {into}, not {from}"));
