@@ -1,4 +1,5 @@
 //! Boxes put to objects that nobody has named.
+use crate::prior_map::Found;
 use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
 use manifactor_quadric::Camera;
@@ -8,17 +9,16 @@ use manifactor_slam::class::Aliases;
 use manifactor_slam::fusion::FusedClass;
 use manifactor_slam::measurements::Measured;
 use manifactor_slam::metrics::IdentityScores;
-use manifactor_slam::online::{FrameError, FrameReport, Mapper};
+use manifactor_slam::online::Mapper;
 use manifactor_slam::prior_map::PriorObject;
 use manifactor_slam::report::{AssociationReport, VariantReport};
-use manifactor_slam::run::{self, Run, Watch};
+use manifactor_slam::run::{self, Run};
 use manifactor_slam::run_document::RunDocument;
-use manifactor_slam::sequence::{Detection, ObjectId, Observation, Sequence};
+use manifactor_slam::sequence::{Detection, ObjectId, Sequence};
 use manifactor_slam::settings::Settings;
 use manifactor_slam::source::Folders;
 use manifactor_solve::Silent;
 use std::collections::BTreeSet;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// A desk whose objects come in three classes, seen by a detector that errs.
@@ -225,21 +225,6 @@ fn boxes_that_turn_out_to_show_another_object_are_its_in_the_map() {
     found_out(false);
 }
 
-/// Lets a stream run.
-struct Idle;
-
-impl Watch for Idle {
-    fn frame(
-        &mut self,
-        _: Result<&FrameReport, &FrameError>,
-        _: Option<&Observation>,
-        _: &mut Mapper,
-        _: f64,
-    ) -> ControlFlow<()> {
-        ControlFlow::Continue(())
-    }
-}
-
 #[test]
 fn what_is_named_wrongly_in_a_crowd_is_mended_while_frames_come() {
     let crowd =
@@ -247,7 +232,7 @@ fn what_is_named_wrongly_in_a_crowd_is_mended_while_frames_come() {
     let (settings, sequence) = scene(&crowd);
     let stream = |settings: &Settings| {
         let stream = Arc::clone(&sequence).into();
-        let found = run::online("crowd", stream, settings, &mut Idle, &mut Silent);
+        let found = run::online("crowd", stream, settings, &mut Found::default(), &mut Silent);
         found.unwrap().1.association.unwrap()
     };
     let with = stream(&settings);

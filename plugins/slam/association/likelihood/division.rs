@@ -8,7 +8,6 @@ use super::tracker::{FIRM, Tracker};
 use super::union::{LOOSER, SAME, alike};
 use crate::input::class::Aliases;
 use crate::input::sequence::ObjectId;
-use indexmap::IndexMap;
 use manifactor_quadric::Camera;
 
 /// Of so many objects it is asked in a frame, at most.
@@ -88,10 +87,8 @@ impl Fitter<'_> {
             }
         }
         let [a, b] = &parts;
-        let (one, two) = (&a.fitted.quadric, &b.fitted.quadric);
-        let is_one_place = one.contains(&two.centroid()) && two.contains(&one.centroid());
         let are_good = parts.iter().all(|part| self.is_good(&part.fitted, &part.sightings, 1.0));
-        (are_good && !is_one_place).then_some(parts)
+        (are_good && !a.fitted.is_where(&b.fitted)).then_some(parts)
     }
 
     /// All boxes of an object, put to the one or the other of two: the one with more of them, or that an earlier map has, first. `None`, where
@@ -144,15 +141,11 @@ impl Part {
     /// What is of another now: an object of these boxes.
     fn track(self, of: &Track, boxes: Vec<Seen>, aliases: &Aliases) -> Track {
         let mut track = Track {
-            id: of.id,
-            votes: IndexMap::new(),
-            belief: self.belief,
-            fitted: self.fitted,
             sightings: Sightings::of(self.sightings),
             seen_at: boxes.last().map(|seen| seen.timestamp),
-            boxes: vec![],
             next_look: of.next_look,
             next_doubt: of.next_doubt,
+            ..Track::bare(of.id, self.belief, self.fitted)
         };
         boxes.iter().for_each(|seen| track.vote(&seen.detection.scores, aliases, 1.0));
         Track { boxes, ..track }

@@ -60,6 +60,14 @@ pub(super) struct Fitted {
     pub covariance: Matrix9,
 }
 
+impl Fitted {
+    /// Whether each of two has its centre in the other.
+    pub(super) fn is_where(&self, other: &Self) -> bool {
+        let (own, others) = (&self.quadric, &other.quadric);
+        own.contains(&others.centroid()) && others.contains(&own.centroid())
+    }
+}
+
 /// Standard deviation of the logarithm of an axis beside the first box and the distance.
 const SHAPE: f64 = 0.5;
 /// Standard deviation of the rotation, in radians.

@@ -66,7 +66,12 @@ impl Track {
         noise: &BoxNoise,
     ) -> Option<Self> {
         let fitted = fit(&belief, belief.first(), &[*first], camera, noise)?;
-        Some(Self {
+        Some(Self::bare(id, belief, fitted))
+    }
+
+    /// An object without boxes.
+    pub(super) fn bare(id: ObjectId, belief: Belief, fitted: Fitted) -> Self {
+        Self {
             id,
             votes: IndexMap::new(),
             belief,
@@ -76,23 +81,14 @@ impl Track {
             seen_at: None,
             next_look: FIRST_LOOK,
             next_doubt: FIRST_DOUBT,
-        })
+        }
     }
 
     /// An object of an earlier map.
     pub(super) fn known(object: &PriorObject) -> Self {
         let fitted = Fitted { quadric: object.quadric, covariance: object.covariance() };
-        Self {
-            id: object.id,
-            votes: object.classes.sums().clone(),
-            belief: Belief::known(&fitted),
-            fitted,
-            sightings: Sightings::default(),
-            boxes: vec![],
-            seen_at: None,
-            next_look: FIRST_LOOK,
-            next_doubt: FIRST_DOUBT,
-        }
+        let votes = object.classes.sums().clone();
+        Self { votes, ..Self::bare(object.id, Belief::known(&fitted), fitted) }
     }
 
     /// Whether an earlier map has it.
@@ -102,8 +98,7 @@ impl Track {
 
     /// Whether each of two has its centre in the other.
     pub(super) fn is_where(&self, other: &Self) -> bool {
-        let (own, others) = (&self.fitted.quadric, &other.fitted.quadric);
-        own.contains(&others.centroid()) && others.contains(&own.centroid())
+        self.fitted.is_where(&other.fitted)
     }
 
     /// How far away it is, in metres.
