@@ -49,7 +49,7 @@ pub struct Mapper {
     associator: Box<dyn Associator>,
     /// What boxes are called now that were called otherwise when they came.
     names: Names,
-    /// What was learned of earlier frames, and the map has not taken in yet.
+    /// What was learned of earlier frames, for the next update.
     pending: Vec<Learned>,
     measurements: Measurements,
     objects: BTreeMap<ObjectId, Tracked>,
@@ -149,7 +149,7 @@ impl Mapper {
     pub fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
         let mut report = FrameReport::new(self.live.len(), observation.frame.timestamp);
         let seen = self.take_pose(observation, &mut report)?;
-        self.revise(&seen, &mut report);
+        self.revise(seen, &mut report);
         report.pose = self.pose(report.frame).unwrap_or(report.pose);
         self.live.push(StampedPose { timestamp: report.timestamp, pose: report.pose });
         Ok(report)

@@ -2,6 +2,7 @@
 use super::Mapper;
 use super::frame::FrameReport;
 use super::object::{Sights, Tracked};
+use super::revision::Before;
 use crate::association::{Learned, Map, Merge, Move, Names};
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::{Measurements, ObjectBox};
@@ -9,7 +10,7 @@ use crate::mapping::{object_key, pose_key};
 use crate::settings::Settings;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_graph::{Graph, Values};
+use manifactor_graph::{Graph, Key, Values};
 use manifactor_online::{FactorId, Session};
 use manifactor_quadric::DualQuadric;
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,16 +44,32 @@ impl Map for Known<'_> {
     }
 }
 
+/// What was corrected, and how all was before.
+pub(super) struct Corrected {
+    /// What boxes are called then.
+    pub names: Names,
+    learned: Vec<Learned>,
+    before: Before,
+    measurements: Measurements,
+}
+
 impl Mapper {
     /// What has been estimated so far, with a newest frame and its pose.
     pub(super) fn known(&self, newest: (usize, Se3)) -> Known<'_> {
         Known { newest, live: &self.live, session: &self.session, measurements: &self.measurements }
     }
 
-    /// Corrects what earlier frames were thought to show. Returns the names as they are then.
-    pub(super) fn correct(&mut self, all: &[Learned], report: &mut FrameReport) -> Names {
+    /// Corrects what earlier frames were thought to show, where they have taught anything: pushes it, for the next update. What
+    /// comes back is to be [undone](Self::undo) where that fails.
+    pub(super) fn correct(&mut self, report: &mut FrameReport) -> Option<Corrected> {
+        let learned = std::mem::take(&mut self.pending);
+        if learned.is_empty() {
+            return None;
+        }
+        let before = self.before();
+        let measurements = self.measurements.clone();
         let (mut names, mut owners) = (self.names.clone(), vec![]);
-        for learned in all {
+        for learned in &learned {
             for moved in &learned.moved {
                 self.put(moved);
                 names.put(moved);
@@ -67,7 +84,19 @@ impl Mapper {
         }
         let owners: BTreeSet<ObjectId> = owners.into_iter().map(|id| names.now(id)).collect();
         self.ask(&owners.into_iter().collect::<Vec<_>>(), report);
-        names
+        Some(Corrected { names, learned, before, measurements })
+    }
+
+    /// All is again as it was before a correction that could not be taken, and it is tried again with the next frame.
+    pub(super) fn undo(&mut self, corrected: Corrected, why: &str, report: &mut FrameReport) {
+        let moved = report.moved.drain(..).map(|moved| moved.from);
+        let gone = moved.chain(report.merged.drain(..).map(|merge| merge.from)).map(object_key);
+        let keys: BTreeSet<Key> = gone.chain(report.withdrawn.drain(..)).collect();
+        let keys: Vec<&str> = keys.iter().map(Key::as_str).collect();
+        report.refused.push(format!("changes of {}: {why}", keys.join(", ")));
+        self.restore(corrected.before);
+        self.measurements = corrected.measurements;
+        self.pending = corrected.learned;
     }
 
     /// Counts a box for the object that it shows.

@@ -1,17 +1,17 @@
 //! One frame: its pose and its boxes, then what they change in the map.
-use super::association::Known;
+use super::association::{Corrected, Known};
 use super::object::Tracked;
 use super::{FrameError, Located, Mapper};
 use crate::association::{Image, Learned, Merge, Move};
 use crate::gravity::MapFrame;
-use crate::input::sequence::{Detection, ObjectId, Observation};
+use crate::input::sequence::{Detection, Frame, ObjectId, Observation};
 use crate::mapping::measurements::{ObjectBox, Sifted, sift};
 use crate::mapping::{known_entry, object_key, odometry_entry, pose_key, prior_entry, view_entries};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, Graph, Key, Manifold, Values};
-use manifactor_online::Report;
+use manifactor_online::{ChangeError, FactorId, Report};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -36,10 +36,10 @@ pub struct FrameReport {
     /// Objects that were seen too rarely to be any: their boxes are of none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forgotten: Vec<ObjectId>,
-    /// Boxes, mostly of earlier frames, that turned out to show other objects.
+    /// Boxes of earlier frames that turned out to show other objects, before this one was named.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moved: Vec<Move>,
-    /// Objects that turned out to be others, after that.
+    /// Objects that turned out to be others, after that and before this frame was named.
     pub merged: Vec<Merge>,
     /// Objects that came into the map.
     pub born: Vec<Key>,
@@ -50,7 +50,7 @@ pub struct FrameReport {
     /// What could not be taken, and why.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refused: Vec<String>,
-    /// What the session did: once for the frame, and once more where the map has changed.
+    /// What the session did: once for the frame with what earlier ones have taught, and once more where objects come or go.
     pub updates: Vec<Report>,
 }
 
@@ -105,7 +105,8 @@ impl FrameReport {
 }
 
 impl Mapper {
-    /// Takes in a pose, with the boxes of objects that are mapped; where these cannot be taken, the pose alone.
+    /// Takes in a pose, with the boxes of objects that are mapped and what earlier frames have taught: in one update of the session. Where
+    /// that fails, without what they have taught; where that fails as well, the pose alone.
     pub(super) fn take_pose(
         &mut self,
         observation: &Observation,
@@ -120,31 +121,10 @@ impl Mapper {
             return Err(FrameError::Time { timestamp, before });
         }
         let up_moved = self.up.look(observation, &self.settings)?;
-        let map = self.up.frame().unwrap_or_else(|| MapFrame::of_odometry(None));
-        let (mut graph, mut values) = (Graph::new(), Values::new());
-        report.pose = match &self.last {
-            Some(last) => {
-                let relative = last.world_from_camera.between(&frame.world_from_camera);
-                graph.push(odometry_entry(
-                    [report.frame - 1, report.frame],
-                    relative,
-                    &self.settings.odometry,
-                ));
-                self.pose(report.frame - 1).unwrap_or_else(Se3::identity).compose(&relative)
-            }
-            None => {
-                self.check_rules(map.up)?;
-                let first = map.map_from_odometry.compose(&frame.world_from_camera);
-                graph.push(prior_entry(first, &self.settings));
-                self.settings.own.add_to(&mut graph, &mut values);
-                for known in self.measurements.objects.iter().filter_map(|measured| measured.prior.as_ref()) {
-                    graph.push(known_entry(known, &self.settings));
-                    values.insert(object_key(known.id), known.quadric);
-                }
-                first
-            }
-        };
-        values.insert(pose_key(report.frame), report.pose);
+        let (graph, values) = self.tied(frame, report)?;
+        self.session.set_time(timestamp)?;
+        self.session.push(&graph, &values)?;
+        let corrected = self.correct(report);
         let detections = &observation.detections;
         let image = Image { frame: report.frame, timestamp, detections };
         let predicted = self.known((report.frame, report.pose));
@@ -154,20 +134,9 @@ impl Mapper {
         let named: Vec<Detection> = named.collect();
         let mut seen = Seen { boxes: self.boxes(&named), learned: Learned::default(), up_moved };
         report.boxes = seen.boxes.len();
-        let alone = graph.clone();
-        let mut owners = vec![];
-        for (id, view) in
-            seen.boxes.iter().filter(|(id, _)| self.objects.get(id).is_some_and(Tracked::is_mapped))
-        {
-            for entry in view_entries(view, &object_key(*id), self.camera, &self.settings.detections) {
-                graph.push(entry);
-                owners.push(*id);
-            }
-        }
-        let pushed = self.push_frame(&graph, &values, owners, &alone, report);
-        pushed?;
+        let is_taken = self.update_with(&seen.boxes, corrected, (&graph, &values), report)?;
         self.last = Some(frame.clone());
-        if report.refused.is_empty() {
+        if is_taken {
             for detection in &named {
                 let Settings { detections, aliases, .. } = &*self.settings;
                 self.measurements.add(detection, &self.camera, detections, aliases);
@@ -183,37 +152,95 @@ impl Mapper {
         Ok(seen)
     }
 
-    /// Pushes a frame's factors, of which the last are the boxes of `owners`; where these cannot be taken, `alone`.
-    fn push_frame(
+    /// A frame's pose, tied to the last one or to the map's frame; `report` has the prediction.
+    fn tied(&mut self, frame: &Frame, report: &mut FrameReport) -> Result<(Graph, Values), FrameError> {
+        let map = self.up.frame().unwrap_or_else(|| MapFrame::of_odometry(None));
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        report.pose = match &self.last {
+            Some(last) => {
+                let relative = last.world_from_camera.between(&frame.world_from_camera);
+                let frames = [report.frame - 1, report.frame];
+                graph.push(odometry_entry(frames, relative, &self.settings.odometry));
+                self.pose(report.frame - 1).unwrap_or_else(Se3::identity).compose(&relative)
+            }
+            None => {
+                self.check_rules(map.up)?;
+                let first = map.map_from_odometry.compose(&frame.world_from_camera);
+                graph.push(prior_entry(first, &self.settings));
+                self.settings.own.add_to(&mut graph, &mut values);
+                for known in self.measurements.objects.iter().filter_map(|measured| measured.prior.as_ref()) {
+                    graph.push(known_entry(known, &self.settings));
+                    values.insert(object_key(known.id), known.quadric);
+                }
+                first
+            }
+        };
+        values.insert(pose_key(report.frame), report.pose);
+        Ok((graph, values))
+    }
+
+    /// Updates the session with a frame's boxes beside its pose, `alone`, and what was corrected, which are pushed. Whether the boxes were
+    /// taken.
+    fn update_with(
         &mut self,
-        graph: &Graph,
-        values: &Values,
-        owners: Vec<ObjectId>,
-        alone: &Graph,
+        boxes: &BTreeMap<ObjectId, ObjectBox>,
+        corrected: Option<Corrected>,
+        alone: (&Graph, &Values),
         report: &mut FrameReport,
-    ) -> Result<(), FrameError> {
-        self.session.set_time(report.timestamp)?;
-        let ids = self.session.push(graph, values)?;
-        match self.session.update() {
-            Ok(update) => {
+    ) -> Result<bool, FrameError> {
+        let mut pushed = self.push_boxes_of_frame(boxes);
+        let mut update = self.session.update();
+        match (corrected, &update) {
+            (Some(corrected), Ok(_)) => self.names = corrected.names,
+            (Some(corrected), Err(error)) => {
+                self.undo(corrected, &error.to_string(), report);
+                self.session.set_time(report.timestamp)?;
+                self.session.push(alone.0, alone.1)?;
+                pushed = self.push_boxes_of_frame(boxes);
+                update = self.session.update();
+            }
+            (None, _) => {}
+        }
+        let why = match (update, pushed) {
+            (Ok(update), Ok(pushed)) => {
                 report.updates.push(update);
-                let first = ids.len() - owners.len();
-                for (owner, id) in owners.into_iter().zip(ids.into_iter().skip(first)) {
+                for (owner, factor) in pushed {
                     if let Some(Tracked::Mapped(mapped)) = self.objects.get_mut(&owner) {
-                        mapped.boxes.push((report.frame, id));
+                        mapped.boxes.push((report.frame, factor));
                     }
                 }
-                Ok(())
+                return Ok(true);
             }
-            Err(error) if !owners.is_empty() => {
+            (Ok(update), Err(why)) => {
+                report.updates.push(update);
+                why.to_string()
+            }
+            (Err(why), Ok(pushed)) if !pushed.is_empty() => {
                 self.session.set_time(report.timestamp)?;
-                self.session.push(alone, values)?;
+                self.session.push(alone.0, alone.1)?;
                 report.updates.push(self.session.update()?);
-                report.refused.push(format!("the boxes at {} s: {error}", report.timestamp));
-                Ok(())
+                why.to_string()
             }
-            Err(error) => Err(error.into()),
+            (Err(why), _) => return Err(why.into()),
+        };
+        report.refused.push(format!("the boxes at {} s: {why}", report.timestamp));
+        Ok(false)
+    }
+
+    /// Pushes those boxes of a frame whose objects are mapped. Returns these, and their factors.
+    fn push_boxes_of_frame(
+        &mut self,
+        boxes: &BTreeMap<ObjectId, ObjectBox>,
+    ) -> Result<Vec<(ObjectId, FactorId)>, ChangeError> {
+        let (mut graph, mut owners) = (Graph::new(), vec![]);
+        for (id, view) in boxes.iter().filter(|(id, _)| self.objects.get(id).is_some_and(Tracked::is_mapped))
+        {
+            for entry in view_entries(view, &object_key(*id), self.camera, &self.settings.detections) {
+                graph.push(entry);
+                owners.push(*id);
+            }
         }
+        Ok(owners.into_iter().zip(self.session.push(&graph, &Values::new())?).collect())
     }
 
     /// That rules which need to know up do.

@@ -3,9 +3,10 @@ use super::Mapper;
 use super::frame::{FrameReport, Seen};
 use super::object::{Mapped, Tracked};
 use super::rules::Ledger;
+use crate::association::Learned;
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
-use crate::mapping::measurements::{Measurements, ObjectBox};
+use crate::mapping::measurements::ObjectBox;
 use crate::mapping::{Rejection, as_candidate, object_key, rejection, view_entries};
 use crate::semantics::Candidate;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
@@ -25,43 +26,53 @@ enum Due {
 }
 
 /// What a frame changes, as it was before it.
-struct Before {
+pub(super) struct Before {
     objects: BTreeMap<ObjectId, Tracked>,
     ledger: Ledger,
-    /// Where boxes get other objects.
-    measurements: Option<Measurements>,
 }
 
 impl Mapper {
     /// Makes the changes that the boxes of a frame call for: objects that are withdrawn, whose class is another, that are born.
-    pub(super) fn revise(&mut self, seen: &Seen, report: &mut FrameReport) {
+    pub(super) fn revise(&mut self, seen: Seen, report: &mut FrameReport) {
         let Some(pose) = self.pose(report.frame) else { return };
         for (id, view) in &seen.boxes {
             if let Tracked::Waiting(sights) = self.objects.entry(*id).or_default() {
                 sights.add(view, &pose, &self.camera);
             }
         }
-        report.forgotten.clone_from(&seen.learned.forgotten);
-        let mut learned = std::mem::take(&mut self.pending);
-        if learned.is_empty() && seen.learned.is_nothing() {
-            report.forgotten.iter().for_each(|id| self.forget(*id));
+        let moved = report.moved.iter().flat_map(|moved| [moved.from, moved.into]);
+        let changed = moved.chain(report.merged.iter().map(|merge| merge.into));
+        let ids: BTreeSet<ObjectId> =
+            seen.boxes.keys().copied().chain(changed.map(|id| self.names.now(id))).collect();
+        let due: Vec<(ObjectId, Due)> = ids.iter().filter_map(|id| Some((*id, self.due(*id)?))).collect();
+        let is_changed = seen.up_moved || !due.is_empty();
+        if is_changed {
+            self.change(due, seen.up_moved, report);
+        }
+        for id in report.moved.iter().map(|moved| moved.from) {
+            if self.measured(id).is_some_and(|measured| measured.detections == 0 && measured.prior.is_none())
+            {
+                self.forget(id);
+            }
+        }
+        self.teach(seen.learned, report);
+    }
+
+    /// Takes note of what a frame has taught of earlier ones: it is corrected with the next frame.
+    pub(super) fn teach(&mut self, learned: Learned, report: &mut FrameReport) {
+        report.forgotten.clone_from(&learned.forgotten);
+        if self.pending.is_empty() && learned.is_nothing() {
+            learned.forgotten.iter().for_each(|id| self.forget(*id));
         } else {
             // what is forgotten may have had boxes that move
-            learned.push(seen.learned.clone());
+            self.pending.push(learned);
         }
-        let is_due = |id: &ObjectId| self.due(*id).is_some();
-        if learned.is_empty() && !seen.up_moved && !seen.boxes.keys().any(is_due) {
-            return;
-        }
-        let before = self.before(!learned.is_empty());
-        let names = self.correct(&learned, report);
-        let moved = report.moved.iter().flat_map(|moved| [moved.from, moved.into]);
-        let changed =
-            seen.boxes.keys().copied().chain(moved).chain(report.merged.iter().map(|merge| merge.into));
-        let mut ids: BTreeSet<ObjectId> = changed.map(|id| names.now(id)).collect();
-        ids.retain(|id| !report.withdrawn.contains(&object_key(*id)));
-        let due: Vec<(ObjectId, Due)> = ids.iter().filter_map(|id| Some((*id, self.due(*id)?))).collect();
-        if seen.up_moved {
+    }
+
+    /// Changes the map; where that fails, all stays as it was.
+    fn change(&mut self, due: Vec<(ObjectId, Due)>, up_moved: bool, report: &mut FrameReport) {
+        let (before, gone) = (self.before(), report.withdrawn.len());
+        if up_moved {
             self.ask_all_again(report);
         }
         for (id, due) in due {
@@ -71,44 +82,28 @@ impl Mapper {
                 Due::Birth => self.bear(id, report),
             }
         }
-        for id in report.moved.iter().map(|moved| moved.from) {
-            if self.measured(id).is_some_and(|measured| measured.detections == 0 && measured.prior.is_none())
-            {
-                self.forget(id);
-            }
-        }
-        let is_same = report.born.is_empty() && report.withdrawn.is_empty() && report.revised.is_empty();
-        if is_same && report.merged.is_empty() && report.moved.is_empty() {
+        if report.born.is_empty() && report.withdrawn.len() == gone && report.revised.is_empty() {
             return;
         }
         match self.session.update() {
-            Ok(update) => {
-                self.names = names;
-                report.updates.push(update);
-            }
+            Ok(update) => report.updates.push(update),
             Err(error) => {
-                let moved = report.moved.drain(..).map(|moved| moved.from);
-                let corrected = moved.chain(report.merged.drain(..).map(|merge| merge.from));
-                let corrected: Vec<Key> = corrected.map(object_key).collect();
-                // it is true all the same
-                self.pending = learned;
-                let keys = [&corrected, &report.born, &report.withdrawn, &report.revised];
-                let keys: Vec<&str> = keys.into_iter().flatten().map(Key::as_str).collect();
+                let withdrawn = report.withdrawn.drain(gone..);
+                let keys = report.born.drain(..).chain(withdrawn).chain(report.revised.drain(..));
+                let keys: Vec<Key> = keys.collect();
+                let keys: Vec<&str> = keys.iter().map(Key::as_str).collect();
                 report.refused.push(format!("changes of {}: {error}", keys.join(", ")));
-                (self.objects, self.ledger) = (before.objects, before.ledger);
-                if let Some(measurements) = before.measurements {
-                    self.measurements = measurements;
-                }
-                for list in [&mut report.born, &mut report.withdrawn, &mut report.revised] {
-                    list.clear();
-                }
+                self.restore(before);
             }
         }
     }
 
-    fn before(&self, is_corrected: bool) -> Before {
-        let measurements = is_corrected.then(|| self.measurements.clone());
-        Before { objects: self.objects.clone(), ledger: self.ledger.clone(), measurements }
+    pub(super) fn before(&self) -> Before {
+        Before { objects: self.objects.clone(), ledger: self.ledger.clone() }
+    }
+
+    pub(super) fn restore(&mut self, Before { objects, ledger }: Before) {
+        (self.objects, self.ledger) = (objects, ledger);
     }
 
     /// What the boxes of an object call for, after another one of them.
