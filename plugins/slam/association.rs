@@ -49,6 +49,11 @@ pub trait Associator: Debug + Send {
 
     /// Learns from the boxes of a frame, which is in the map now, under these names.
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned;
+
+    /// Learns from all frames together when no other comes.
+    fn settle(&mut self, _: &dyn Map) -> Learned {
+        Learned::default()
+    }
 }
 
 /// What a frame has taught of earlier ones.

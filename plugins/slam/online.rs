@@ -20,6 +20,8 @@ use crate::mapping::measurements::{Measured, Measurements};
 use crate::mapping::{Mapping, MappingError, object_key, pose_key, rejection};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
+use association::Known;
+use frame::Seen;
 use gravity::Up;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -153,6 +155,30 @@ impl Mapper {
         report.pose = self.pose(report.frame).unwrap_or(report.pose);
         self.live.push(StampedPose { timestamp: report.timestamp, pose: report.pose });
         Ok(report)
+    }
+
+    /// Looks back at all frames when no other comes, and corrects what they were thought to show. What comes of it is told as if of the last
+    /// frame.
+    pub fn settle(&mut self) -> FrameReport {
+        let frame = self.live.len();
+        let last = self.last.as_ref().map_or(0.0, |last| last.timestamp);
+        let mut report = FrameReport::new(frame.saturating_sub(1), last);
+        let (live, session, measurements) = (&self.live, &self.session, &self.measurements);
+        let known = Known { newest: (frame, Se3::identity()), live, session, measurements };
+        let learned = self.associator.settle(&known);
+        self.teach(learned, &mut report);
+        if let Some(corrected) = self.correct(&mut report) {
+            match self.session.update() {
+                Ok(update) => {
+                    self.names = corrected.names;
+                    report.updates.push(update);
+                }
+                Err(error) => self.undo(corrected, &error.to_string(), &mut report),
+            }
+        }
+        self.revise(Seen::nothing(), &mut report);
+        report.pose = self.pose(report.frame).unwrap_or(report.pose);
+        report
     }
 
     /// The graph so far, with its estimate.

@@ -64,6 +64,13 @@ pub(super) struct Seen {
     pub up_moved: bool,
 }
 
+impl Seen {
+    /// No box.
+    pub(super) fn nothing() -> Self {
+        Self { boxes: BTreeMap::new(), learned: Learned::default(), up_moved: false }
+    }
+}
+
 impl FrameReport {
     pub(super) fn new(frame: usize, timestamp: f64) -> Self {
         Self {

@@ -45,6 +45,7 @@ pub(super) fn associated(
             }
         }
     }
+    mapper.settle().refused.iter().for_each(|refused| tracing::warn!("{refused}"));
     let mut first = 0;
     for (observation, frame) in sequence.observations().zip(taken) {
         let boxes = first..first + observation.detections.len();

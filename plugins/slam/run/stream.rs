@@ -68,6 +68,7 @@ pub fn online(
     }
     // what waits for a frame may wait for good, but holds what it reads no longer than it has to
     drop(awaited);
+    progress.tell(&taken.mapper.settle());
     progress.end(&mut taken.mapper);
     watch.end(&mut taken.mapper);
     let Taken { mapper, mut sequence, naming } = taken;

@@ -95,6 +95,11 @@ impl Associator for Tracker {
         moved.extend(self.divide(image.frame, map));
         Learned { moved, merged: self.merge(image.frame), forgotten }
     }
+
+    fn settle(&mut self, map: &dyn Map) -> Learned {
+        let moved = self.look_again(f64::INFINITY, map);
+        Learned { moved, merged: self.merge_all(), forgotten: vec![] }
+    }
 }
 
 impl Tracker {

@@ -37,28 +37,40 @@ impl Tracker {
     /// Makes one of objects that turn out to be one: looks at those that were seen in this frame and have many more boxes than when
     /// they were looked at last.
     pub(super) fn merge(&mut self, frame: usize) -> Vec<Merge> {
-        let mut merges = vec![];
         let due = self.tracks.iter_mut().filter_map(|track| track.is_due(frame));
         let due: Vec<ObjectId> = due.take(LOOKS).collect();
-        for id in due {
-            // it may be gone by now
-            let Some(own) = self.tracks.iter().position(|track| track.id == id) else { continue };
-            let unions = self.neighbours(own).into_iter().filter_map(|other| {
-                let (one, two) = (&self.tracks[own], &self.tracks[other]);
-                Some((other, of(one, two, &self.camera, &self.settings)?))
-            });
-            let best = unions.min_by(|(_, a), (_, b)| a.error.total_cmp(&b.error));
-            if let Some((other, union)) = best {
-                let gone = if union.track.id == id { other } else { own };
-                let stays = own + other - gone;
-                let merge = Merge { from: self.tracks[gone].id, into: union.track.id };
-                self.past.iter_mut().for_each(|past| past.rename(merge));
-                merges.push(merge);
-                self.tracks[stays] = union.track;
-                self.tracks.remove(gone);
+        due.into_iter().filter_map(|id| self.merge_one(id)).collect()
+    }
+
+    /// Makes one of all objects that turn out to be one.
+    pub(super) fn merge_all(&mut self) -> Vec<Merge> {
+        let mut merges = vec![];
+        loop {
+            let due: Vec<ObjectId> = self.tracks.iter().map(|track| track.id).collect();
+            let before = merges.len();
+            merges.extend(due.into_iter().filter_map(|id| self.merge_one(id)));
+            if merges.len() == before {
+                return merges;
             }
         }
-        merges
+    }
+
+    /// Makes one of an object and the one that it goes with best, if there is any.
+    fn merge_one(&mut self, id: ObjectId) -> Option<Merge> {
+        // it may be gone by now
+        let own = self.tracks.iter().position(|track| track.id == id)?;
+        let unions = self.neighbours(own).into_iter().filter_map(|other| {
+            let (one, two) = (&self.tracks[own], &self.tracks[other]);
+            Some((other, of(one, two, &self.camera, &self.settings)?))
+        });
+        let (other, union) = unions.min_by(|(_, a), (_, b)| a.error.total_cmp(&b.error))?;
+        let gone = if union.track.id == id { other } else { own };
+        let stays = own + other - gone;
+        let merge = Merge { from: self.tracks[gone].id, into: union.track.id };
+        self.past.iter_mut().for_each(|past| past.rename(merge));
+        self.tracks[stays] = union.track;
+        self.tracks.remove(gone);
+        Some(merge)
     }
 
     /// The objects that may be the same as this one, the nearest first.

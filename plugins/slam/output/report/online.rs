@@ -59,24 +59,30 @@ impl OnlineReport {
     /// Counts a frame in.
     pub(crate) fn count(&mut self, report: Result<&FrameReport, &FrameError>, seconds: f64) {
         self.seconds.push(seconds);
-        let refused = match report {
-            Ok(report) => {
-                self.born += report.born.len();
-                self.withdrawn += report.withdrawn.len();
-                self.revised += report.revised.len();
-                self.solved_batch += report.updates.iter().filter(|update| update.solved_batch).count();
-                report.refused.clone()
-            }
+        match report {
+            Ok(report) => self.tell(report),
             Err(error) => {
                 let (told, all) = &mut self.left_out;
                 *all += 1;
                 told.extend(Some(error.to_string()).filter(|_| told.len() < TOLD));
-                vec![error.to_string()]
+                self.refuse(&[error.to_string()]);
             }
-        };
+        }
+    }
+
+    /// Counts what a frame came to.
+    pub(crate) fn tell(&mut self, report: &FrameReport) {
+        self.born += report.born.len();
+        self.withdrawn += report.withdrawn.len();
+        self.revised += report.revised.len();
+        self.solved_batch += report.updates.iter().filter(|update| update.solved_batch).count();
+        self.refuse(&report.refused);
+    }
+
+    fn refuse(&mut self, refused: &[String]) {
         self.refusals += refused.len();
         let room = TOLD.saturating_sub(self.refused.len());
-        self.refused.extend(refused.into_iter().take(room));
+        self.refused.extend(refused.iter().take(room).cloned());
     }
 
     /// What there is to tell after the last frame.
