@@ -61,10 +61,10 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// Whether each of two has its centre in the other.
+    /// Whether one of two has its centre in the other.
     pub(super) fn is_where(&self, other: &Self) -> bool {
         let (own, others) = (&self.quadric, &other.quadric);
-        own.contains(&others.centroid()) && others.contains(&own.centroid())
+        own.contains(&others.centroid()) || others.contains(&own.centroid())
     }
 }
 

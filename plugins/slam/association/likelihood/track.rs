@@ -49,6 +49,8 @@ pub(super) struct Expected {
     covariance: SMatrix<f64, ROWS, ROWS>,
 }
 
+/// Where two are is not known where the way between them is known to this part of their sizes only.
+const VAGUE: f64 = 0.5;
 /// Boxes that an object has when it is first compared with others.
 const FIRST_LOOK: usize = 3;
 /// Boxes that it has when it is first asked whether it is two.
@@ -96,9 +98,19 @@ impl Track {
         matches!(self.belief, Belief::Known { .. })
     }
 
-    /// Whether each of two has its centre in the other.
+    /// Whether one of two has its centre in the other, and it is known where they are.
     pub(super) fn is_where(&self, other: &Self) -> bool {
-        self.fitted.is_where(&other.fitted)
+        self.fitted.is_where(&other.fitted) && self.spread(other) < VAGUE * self.sizes(other)
+    }
+
+    /// Standard deviation of the way between the centres of two, in metres.
+    pub(super) fn spread(&self, other: &Self) -> f64 {
+        (self.place_covariance() + other.place_covariance()).trace().sqrt()
+    }
+
+    /// How large two are together, in metres.
+    pub(super) fn sizes(&self, other: &Self) -> f64 {
+        self.fitted.quadric.semi_axes.norm() + other.fitted.quadric.semi_axes.norm()
     }
 
     /// How far away it is, in metres.

@@ -23,7 +23,7 @@ const APART: f64 = 3.0;
 const ALIKE: f64 = 0.1;
 /// by this factor;
 const STRICTER: f64 = 1.4;
-/// those whose classes are more alike than this, and that are at the same place, where there is room for one, need to fit less well,
+/// those whose classes are more alike than this, and of which one has its centre in the other, where there is room for one, need to fit less well,
 pub(super) const SAME: f64 = 0.5;
 /// by this factor: what has no simple shape has boxes that no ellipsoid explains.
 pub(super) const LOOSER: f64 = 2.0;
@@ -87,9 +87,7 @@ impl Tracker {
 /// were seen side by side, or an earlier map has both.
 fn gap(one: &Track, two: &Track) -> Option<f64> {
     let apart = (one.fitted.quadric.centroid() - two.fitted.quadric.centroid()).norm();
-    let sizes = one.fitted.quadric.semi_axes.norm() + two.fitted.quadric.semi_axes.norm();
-    let spread = (one.place_covariance() + two.place_covariance()).trace().sqrt();
-    let gap = apart / (sizes + APART * spread);
+    let gap = apart / (one.sizes(two) + APART * one.spread(two));
     if one.is_known() && two.is_known() {
         return None;
     }
