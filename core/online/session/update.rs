@@ -182,7 +182,7 @@ impl Session {
         for v in &moves.leaving {
             self.touch_around(*v, &mut affected);
         }
-        let last = self.last(touched);
+        let last = self.last(touched, &moves.entering);
         let postponed = self.postponed;
         let mut due = touched.held.clone();
         if touched.steps && self.settings.budget.is_none() {
@@ -222,12 +222,19 @@ impl Session {
         Ok(())
     }
 
-    /// The variables to eliminate last: those that are touched will be touched again. Where that is many, an object with all
+    /// The variables to eliminate last: those that are touched will be touched again. Where there are new ones, that is said of these and
+    /// of what they are coupled with: an old pose whose factor was removed or replaced is done with. Where all that is many, an object with all
     /// poses that have seen it, they would fill the root: then the newest of them.
-    fn last(&self, touched: &Touched) -> Vec<u32> {
+    fn last(&self, touched: &Touched, new: &[u32]) -> Vec<u32> {
         let mut last = touched.variables.clone();
         last.sort_unstable();
         last.dedup();
+        if !new.is_empty() {
+            let mut near: Vec<u32> = new.iter().flat_map(|v| self.model.coupled(*v)).collect();
+            near.extend(new);
+            near.sort_unstable();
+            last.retain(|v| near.binary_search(v).is_ok());
+        }
         if last.len() > MANY {
             last.sort_unstable_by_key(|v| Reverse(self.model.place(*v).born));
             last.truncate(NEWEST);
