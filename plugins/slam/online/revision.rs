@@ -42,8 +42,10 @@ impl Mapper {
         }
         let moved = report.moved.iter().flat_map(|moved| [moved.from, moved.into]);
         let changed = moved.chain(report.merged.iter().map(|merge| merge.into));
-        let ids: BTreeSet<ObjectId> =
+        let mut ids: BTreeSet<ObjectId> =
             seen.boxes.keys().copied().chain(changed.map(|id| self.names.now(id))).collect();
+        // what was taken out just now begins again when it is seen the next time
+        ids.retain(|id| !report.withdrawn.contains(&object_key(*id)));
         let due: Vec<(ObjectId, Due)> = ids.iter().filter_map(|id| Some((*id, self.due(*id)?))).collect();
         let is_changed = seen.up_moved || !due.is_empty();
         if is_changed {
