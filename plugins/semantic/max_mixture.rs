@@ -1,5 +1,5 @@
 //! An object that may be one thing or another: the best of several factors.
-use manifactor_graph::catalogue::{self, Kind};
+use manifactor_graph::catalogue::{self, Kind, Signature};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{
@@ -19,6 +19,8 @@ use std::sync::Arc;
 /// exp(-½|Wₖ rₖ|²), so components of different dimensions are compared by what they cost, not by how narrow they are. Rows: √(2 ln(w_max/wₖ)),
 /// then the whitened rows of the component; zeros, where it has fewer than another.
 ///
+/// Components may be over different variables: `over` says which of the mixture's, as a box may show the one object or the other.
+///
 /// The cost is continuous; where the best component changes, the rows jump. A component that is not defined takes no
 /// part; where none is, the mixture is not defined. It has noise of its own in each component: leave out `noise` beside it.
 /// Evaluating allocates a little for each component: it is for a prior on an object, not for each measurement.
@@ -33,6 +35,20 @@ use std::sync::Arc;
 ///     { weight = 0.6, factor = { type = "vertical_orientation_smooth" }, noise = { sigma = 0.1 } },
 ///     { weight = 0.3, factor = { type = "horizontal_orientation_smooth" }, noise = { sigma = 0.1 } },
 ///     { weight = 0.1 },
+/// ]
+/// ```
+///
+/// A box from x0 that shows q0, or q1 half as likely:
+///
+/// ```toml
+/// [[factors]]
+/// keys = ["x0", "q0", "q1"]
+///
+/// [factors.factor]
+/// type = "max_mixture"
+/// components = [
+///     { weight = 2.0, over = [0, 1], factor = { type = "centroid_depth", depth = 1.5 }, noise = { sigma = 0.05 } },
+///     { weight = 1.0, over = [0, 2], factor = { type = "centroid_depth", depth = 1.5 }, noise = { sigma = 0.05 } },
 /// ]
 /// ```
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -60,6 +76,9 @@ pub struct Component {
     /// The factor that holds then. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub factor: Option<Arc<dyn Factor>>,
+    /// Which of the mixture's variables the factor is over, in its order: places among `keys`, from 0. Default: all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub over: Option<Vec<usize>>,
     /// What the factor's residual is measured in.
     #[serde(default, skip_serializing_if = "Noise::is_default")]
     pub noise: Noise,
@@ -75,17 +94,37 @@ pub enum MixtureError {
     /// None of them says anything.
     #[error("none of the components has a factor")]
     NoFactor,
-    /// Components of different variables.
+    /// Components that do not agree what a variable is.
     #[error(
-        "component {component} is over {found}, the first factor over {expected}: all have to be over the same"
+        "component {component} has a {found} at place {place}, where another one has a {expected}: `over` says which variables a component is over"
     )]
     Variables {
         /// Which one, from 0.
         component: usize,
+        /// Of the mixture's variables, from 0.
+        place: usize,
+        /// What it has there.
+        found: &'static str,
+        /// What another one has.
+        expected: &'static str,
+    },
+    /// A component whose factor is not over as many variables as it says, or over one of them twice.
+    #[error(
+        "component {component}: its factor is over {found}; expected as many different places in `over`, got {over:?}"
+    )]
+    Over {
+        /// Which one, from 0.
+        component: usize,
         /// Its variables.
         found: String,
-        /// Those of the first.
-        expected: String,
+        /// What it says.
+        over: Vec<usize>,
+    },
+    /// A variable that no component is over.
+    #[error("no component is over variable {place}, but there is one at a later place")]
+    Unused {
+        /// From 0.
+        place: usize,
     },
     /// Noise of another size than its factor.
     #[error("component {component}: {error}")]
@@ -157,8 +196,21 @@ struct Mixture {
 struct Part {
     /// √(2 ln(w_max / w)).
     price: f64,
-    /// With its whitening.
-    factor: Option<(Arc<dyn Factor>, DMatrix<f64>)>,
+    factor: Option<Weighted>,
+}
+
+/// A component's factor, its whitening, and which of the mixture's variables it is over.
+#[derive(Debug)]
+struct Weighted {
+    factor: Arc<dyn Factor>,
+    whitening: DMatrix<f64>,
+    over: Vec<usize>,
+}
+
+impl Weighted {
+    fn of<'a>(&self, all: &[&'a dyn Variable]) -> Vec<&'a dyn Variable> {
+        self.over.iter().map(|place| all[*place]).collect()
+    }
 }
 
 impl Mixture {
@@ -166,38 +218,45 @@ impl Mixture {
         if components.len() < 2 {
             return Err(MixtureError::TooFew(components.len()));
         }
-        let signatures = || components.iter().map(|c| c.factor.as_ref().map(|f| f.erased().signature()));
-        let first = signatures().flatten().next().ok_or(MixtureError::NoFactor)?;
-        let names = |types: &[TypeId]| {
-            types.iter().map(|id| manifactor_graph::manifold_name(*id)).collect::<Vec<_>>().join(", ")
-        };
+        let mut types: Vec<Option<TypeId>> = vec![];
         let mut parts = vec![];
         let largest = components.iter().map(|c| c.weight.get()).fold(0.0, f64::max);
-        for (component, (of, signature)) in components.iter().zip(signatures()).enumerate() {
-            let mut factor = None;
-            if let (Some(f), Some(signature)) = (&of.factor, signature) {
-                if signature.variables != first.variables || signature.many {
-                    let (found, expected) = (names(&signature.variables), names(&first.variables));
-                    return Err(MixtureError::Variables { component, found, expected });
+        for (component, of) in components.iter().enumerate() {
+            let factor = of.factor.as_ref().map(|factor| {
+                let signature = factor.erased().signature();
+                let over = places(component, of.over.as_deref(), &signature)?;
+                for (place, id) in over.iter().zip(&signature.variables) {
+                    types.resize(types.len().max(place + 1), None);
+                    let known = *types[*place].get_or_insert(*id);
+                    if known != *id {
+                        let [found, expected] = [*id, known].map(manifactor_graph::manifold_name);
+                        return Err(MixtureError::Variables { component, place: *place, found, expected });
+                    }
                 }
                 let rows = signature.rows.unwrap_or(0);
                 let whitener = of.noise.whitener(rows);
                 let whitener = whitener.map_err(|error| MixtureError::Noise { component, error })?;
-                factor = Some((f.clone(), whitener.matrix(rows)));
-            }
-            parts.push(Part { price: (2.0 * (largest / of.weight.get()).ln()).sqrt(), factor });
+                Ok(Weighted { factor: factor.clone(), whitening: whitener.matrix(rows), over })
+            });
+            let price = (2.0 * (largest / of.weight.get()).ln()).sqrt();
+            parts.push(Part { price, factor: factor.transpose()? });
         }
+        if types.is_empty() {
+            return Err(MixtureError::NoFactor);
+        }
+        let known = |(place, id): (usize, Option<TypeId>)| id.ok_or(MixtureError::Unused { place });
+        let types = types.into_iter().enumerate().map(known).collect::<Result<Vec<_>, _>>()?;
         let manifolds = catalogue::entries(<dyn Variable as Kind>::NAME);
         let dimension = |id: &TypeId| {
             let entry = manifolds.iter().find(|entry| (entry.type_id)() == *id)?;
             Some(((entry.signature)().tangent.len(), as_variable(*id)?))
         };
-        let known: Option<Vec<_>> = first.variables.iter().map(dimension).collect();
+        let known: Option<Vec<_>> = types.iter().map(dimension).collect();
         // what is registered as a factor is over registered manifolds
         let (dimensions, casts) = known.unwrap_or_default().into_iter().unzip();
-        let rows = parts.iter().filter_map(|part| part.factor.as_ref()).map(|(_, w)| w.nrows());
+        let rows = parts.iter().filter_map(|part| part.factor.as_ref()).map(|of| of.whitening.nrows());
         let rows = 1 + rows.max().unwrap_or(0);
-        Ok(Self { parts: parts.into(), types: first.variables, dimensions, casts, rows })
+        Ok(Self { parts: parts.into(), types, dimensions, casts, rows })
     }
 
     fn variables<'a>(&self, variables: &[&'a dyn Any]) -> Vec<&'a dyn Variable> {
@@ -209,10 +268,10 @@ impl Mixture {
         let costs = self.parts.iter().filter_map(|part| {
             let residual = match &part.factor {
                 None => DVector::zeros(0),
-                Some((factor, whitening)) => {
-                    let factor = factor.erased();
-                    let defined = factor.is_defined(x)?;
-                    whitening * DVector::from(factor.residual(x).filter(|_| defined)?)
+                Some(of) => {
+                    let (factor, x) = (of.factor.erased(), of.of(x));
+                    let defined = factor.is_defined(&x)?;
+                    &of.whitening * DVector::from(factor.residual(&x).filter(|_| defined)?)
                 }
             };
             Some((part, residual))
@@ -260,10 +319,11 @@ impl DynamicResidual for Mixture {
         let x = self.variables(variables);
         let Some((part, rows)) = self.best(&x) else { return residual.fill(0.0) };
         self.write((part, &rows), residual);
-        let Some((factor, whitening)) = &part.factor else { return };
-        let Some(linearization) = factor.erased().linearize(&x) else { return };
-        for (variable, jacobian) in linearization.jacobians.iter().enumerate().filter(|(v, _)| free[*v]) {
-            let whitened = whitening * jacobian;
+        let Some(of) = &part.factor else { return };
+        let Some(linearization) = of.factor.erased().linearize(&of.of(&x)) else { return };
+        let over = of.over.iter().copied().zip(&linearization.jacobians);
+        for (variable, jacobian) in over.filter(|(v, _)| free[*v]) {
+            let whitened = &of.whitening * jacobian;
             let block = blocks.block_mut(variable);
             for (column, of) in whitened.column_iter().enumerate() {
                 for (row, entry) in of.iter().enumerate() {
@@ -273,6 +333,26 @@ impl DynamicResidual for Mixture {
         }
     }
 }
+
+/// Which of a mixture's variables a component's factor is over.
+fn places(
+    component: usize,
+    over: Option<&[usize]>,
+    signature: &Signature,
+) -> Result<Vec<usize>, MixtureError> {
+    let n = signature.variables.len();
+    let over: Vec<usize> = over.map_or_else(|| (0..n).collect(), <[usize]>::to_vec);
+    let is_once = |(i, place): (usize, &usize)| *place < PLACES && !over[..i].contains(place);
+    if signature.many || over.len() != n || !over.iter().enumerate().all(is_once) {
+        let names = signature.variables.iter().map(|id| manifactor_graph::manifold_name(*id));
+        let found = names.collect::<Vec<_>>().join(", ") + if signature.many { ", …" } else { "" };
+        return Err(MixtureError::Over { component, found, over });
+    }
+    Ok(over)
+}
+
+/// Variables that a mixture may have.
+const PLACES: usize = 64;
 
 #[cfg(test)]
 mod tests;

@@ -131,8 +131,9 @@ impl Rule {
         let nothing = (1.0 - share) * (-0.5 * DOUBT * DOUBT).exp();
         match (Positive::new(share), Positive::new(nothing)) {
             (Ok(weight), Ok(nothing)) if self.mixture => {
-                let holds = Component { weight, factor: Some(factor), noise };
-                let nothing = Component { weight: nothing, factor: None, noise: Noise::default() };
+                let holds = Component { weight, factor: Some(factor), over: None, noise };
+                let nothing =
+                    Component { weight: nothing, factor: None, over: None, noise: Noise::default() };
                 let mixture = MaxMixture::new(vec![holds, nothing]);
                 let name = || self.factor.name().to_owned();
                 let mixture = mixture.map_err(|source| RuleError::Mixture { factor: name(), source })?;
