@@ -1,5 +1,6 @@
 //! A sequence mapped and solved.
 pub(crate) mod looks;
+mod mixture;
 pub mod refine;
 pub mod variance;
 
@@ -152,7 +153,8 @@ impl Estimate {
     ) -> Result<Self, EstimateError> {
         let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
         let Some(variance) = &settings.variance_components else {
-            return Ok(Self::solve(sequence, mapping, start, most, settings, observer)?);
+            let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
+            return Ok(estimate.with_mixtures(settings, observer)?);
         };
         let begin = Components::begin(&mapping, variance);
         begin.apply(&mut mapping, &mut start, &sequence, variance, loss)?;
@@ -162,7 +164,26 @@ impl Estimate {
             let variance = VarianceSettings { lasting, ..variance.clone() };
             estimate = estimate.with_noise(&variance, settings, observer)?;
         }
-        Ok(estimate)
+        Ok(estimate.with_mixtures(settings, observer)?)
+    }
+
+    /// Solves once more where boxes may show either of two objects. That comes last: which of the two is the better explanation is decided where
+    /// both are known well.
+    fn with_mixtures(
+        mut self,
+        settings: &Settings,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, CompileError> {
+        let is_interrupted = self.solution.outcome.termination == Termination::Interrupted;
+        if is_interrupted || mixture::mix(&mut self.mapping) == 0 {
+            return Ok(self);
+        }
+        let Self { sequence, mapping, mut solution, components, .. } = self;
+        let values = std::mem::take(&mut solution.values);
+        drop(solution);
+        let solved =
+            Self::solve(sequence, mapping, values, settings.objects.refinements, settings, observer)?;
+        Ok(Self { components, ..solved })
     }
 
     /// Estimates the noise and solves, by turns.

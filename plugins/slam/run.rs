@@ -8,7 +8,7 @@ use crate::online::FinishError;
 use crate::output::report::{AssociationReport, Found, HeldOutReport, RunReport, VariantReport};
 use crate::settings::Settings;
 use crate::settings::run_document::{RunDocument, Variant};
-use association::associated;
+use association::{Associated, associated};
 use location::find;
 use manifactor_solve::{Observer, SettingError, Termination};
 use std::borrow::Cow;
@@ -80,12 +80,14 @@ impl<'a> Mapped<'a> {
             }
             None => Cow::Borrowed(settings),
         };
-        let (mut sequence, association) = associated(sequence, &settings, observer)?;
+        let Associated { mut sequence, ambiguities, report: association } =
+            associated(sequence, &settings, observer)?;
         let held_out = match settings.evaluation.holdout {
             Some(holdout) => holdout.take_from(Arc::make_mut(&mut sequence)),
             None => vec![],
         };
-        let mapping = Mapping::new(&sequence, &settings)?;
+        let mut mapping = Mapping::new(&sequence, &settings)?;
+        mapping.ambiguities = ambiguities;
         Ok(Self { sequence, mapping, settings, association, found, held_out })
     }
 }

@@ -1,11 +1,23 @@
 //! Boxes are put to objects, frame by frame and once more when all are there.
 use super::RunError;
-use crate::input::sequence::Sequence;
+use crate::association::Ambiguity;
+use crate::input::sequence::{ObjectId, Observation, Sequence};
 use crate::online::Mapper;
 use crate::output::report::{AssociationReport, Naming};
 use crate::settings::Settings;
 use manifactor_solve::Observer;
+use std::ops::Range;
 use std::sync::Arc;
+
+/// Boxes put to objects.
+pub(super) struct Associated {
+    /// The sequence with these names.
+    pub sequence: Arc<Sequence>,
+    /// Boxes that may show another object as well.
+    pub ambiguities: Vec<Ambiguity>,
+    /// How well it went; `None` where the names are those of the source.
+    pub report: Option<AssociationReport>,
+}
 
 /// The sequence with its boxes put to objects by the settings' `association`: frame by frame, as they would have come, then once more
 /// by what is known in the end. Frames that cannot be mapped so, and those after an interruption by `observer`, have boxes of no
@@ -17,9 +29,9 @@ pub(super) fn associated(
     sequence: Arc<Sequence>,
     settings: &Settings,
     observer: &mut dyn Observer,
-) -> Result<(Arc<Sequence>, Option<AssociationReport>), RunError> {
+) -> Result<Associated, RunError> {
     if settings.association.uses_names() {
-        return Ok((sequence, None));
+        return Ok(Associated { sequence, ambiguities: vec![], report: None });
     }
     let mut mapper = Mapper::new(sequence.opening(), settings)?;
     let (mut named, mut naming) = (Sequence::clone(&sequence), Naming::default());
@@ -46,16 +58,37 @@ pub(super) fn associated(
         }
     }
     mapper.settle().refused.iter().for_each(|refused| tracing::warn!("{refused}"));
-    let mut first = 0;
-    for (observation, frame) in sequence.observations().zip(taken) {
-        let boxes = first..first + observation.detections.len();
-        first = boxes.end;
-        if let Some(frame) = frame {
+    for ((observation, boxes), frame) in with_boxes(&sequence).zip(&taken) {
+        if let Some(frame) = *frame {
             naming.replace(boxes, mapper.names(), |names| mapper.reconsider(frame, &observation, names));
         }
     }
     for (detection, name) in named.detections.iter_mut().zip(naming.now(mapper.names())) {
         detection.object = name;
     }
-    Ok((Arc::new(named), naming.report(&*settings.association, mapper.names())))
+    let ambiguities = ambiguities(&mapper, &named, &taken);
+    let report = naming.report(&*settings.association, ambiguities.len(), mapper.names());
+    Ok(Associated { sequence: Arc::new(named), ambiguities, report })
+}
+
+/// The boxes of a sequence that may show another object than they are put to. `taken` has the number of each frame in the map, where it is there.
+pub(super) fn ambiguities(mapper: &Mapper, named: &Sequence, taken: &[Option<usize>]) -> Vec<Ambiguity> {
+    let mut all = vec![];
+    for (of_sequence, ((observation, boxes), of_map)) in with_boxes(named).zip(taken).enumerate() {
+        let Some(of_map) = *of_map else { continue };
+        let names: Vec<Option<ObjectId>> = named.detections[boxes].iter().map(|d| d.object).collect();
+        let found = mapper.ambiguities(of_map, &observation, &names);
+        all.extend(found.into_iter().map(|ambiguity| Ambiguity { frame: of_sequence, ..ambiguity }));
+    }
+    all
+}
+
+/// The frames of a sequence, each with the places of its boxes among all.
+fn with_boxes(sequence: &Sequence) -> impl Iterator<Item = (Observation, Range<usize>)> {
+    let mut first = 0;
+    sequence.observations().map(move |observation| {
+        let boxes = first..first + observation.detections.len();
+        first = boxes.end;
+        (observation, boxes)
+    })
 }

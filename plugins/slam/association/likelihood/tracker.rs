@@ -1,5 +1,5 @@
 //! All objects: boxes are put to them, and they learn from boxes.
-use super::super::{Associator, Image, Learned, Map, assignment};
+use super::super::{Ambiguity, Associator, Image, Learned, Map, assignment};
 use super::Likelihood;
 use super::fit::Belief;
 use super::second_look::Past;
@@ -63,6 +63,13 @@ impl Associator for Tracker {
         let is_free = |before: &ObjectId| !again.contains(&Some(*before));
         let keep = |(now, before): (&Option<ObjectId>, &Option<ObjectId>)| now.or(before.filter(is_free));
         again.iter().zip(names).map(keep).collect()
+    }
+
+    fn ambiguities(&self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Vec<Ambiguity> {
+        match (self.settings.mixture_odds, map.pose(image.frame)) {
+            (Some(odds), Some(pose)) => self.ambiguous(image, names, &pose, odds.get()),
+            _ => vec![],
+        }
     }
 
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {
@@ -135,16 +142,14 @@ impl Tracker {
 
     /// What there is to gain by putting boxes to objects instead of new ones, as (row, column, gain), and the objects of
     /// the columns.
-    fn gains(
+    pub(super) fn gains(
         &self,
         image: &Image<'_>,
         boxes: &[usize],
         pose: &Se3,
     ) -> (Vec<(usize, usize, f64)>, Vec<usize>) {
         let usual = self.usual_depth(pose);
-        let class =
-            |i: &usize| image.detections[*i].scores.best().map(|(class, _)| self.aliases.canonical(class));
-        let classes: Vec<Option<String>> = boxes.iter().map(class).collect();
+        let classes: Vec<Option<String>> = boxes.iter().map(|i| self.class(&image.detections[*i])).collect();
         let began = self.began.unwrap_or(image.timestamp - AT_LARGE);
         let (mut gains, mut tracks) = (vec![], vec![]);
         for (t, track) in self.tracks.iter().enumerate() {
@@ -160,9 +165,8 @@ impl Tracker {
                     continue;
                 }
                 let new = self.settings.cost_of_new(&self.camera, detection.depth, usual);
-                let share = classes[row].as_deref().map_or(1.0, |class| track.share(class));
                 let cost = expected.cost(&detection.bounding_box, detection.depth)
-                    - 2.0 * self.settings.likelihood(share).ln();
+                    - 2.0 * self.class_likelihood(track, classes[row].as_deref()).ln();
                 if cost < new {
                     gains.push((row, tracks.len(), new - cost));
                 }
@@ -172,6 +176,16 @@ impl Tracker {
             }
         }
         (gains, tracks)
+    }
+
+    /// The class of a box.
+    pub(super) fn class(&self, detection: &Detection) -> Option<String> {
+        detection.scores.best().map(|(class, _)| self.aliases.canonical(class))
+    }
+
+    /// The likelihood that a box of an object has a class.
+    pub(super) fn class_likelihood(&self, track: &Track, class: Option<&str>) -> f64 {
+        self.settings.likelihood(class.map_or(1.0, |class| track.share(class)))
     }
 
     /// The name of the box that is nearly the same, if there is one.
@@ -218,7 +232,7 @@ impl Tracker {
 }
 
 /// The boxes that are looked at, in order.
-fn best_scores(detections: &[Detection]) -> Vec<usize> {
+pub(super) fn best_scores(detections: &[Detection]) -> Vec<usize> {
     let mut all: Vec<usize> = (0..detections.len()).collect();
     if all.len() > BOXES {
         let score = |i: &usize| detections[*i].scores.best().map_or(0.0, |(_, score)| score);
