@@ -32,25 +32,24 @@ pub(crate) struct Looked {
 }
 
 /// The looks at an object so far, of which the last goes on.
+#[derive(Default)]
 struct Counted {
     looked: Looked,
     seen_from: Vec<Vector3<f64>>,
-    began: f64,
-    from: Vector3<f64>,
     is_seen: bool,
 }
 
 impl Counted {
     /// Begins another look.
-    fn look(&mut self, views: &[ObjectBox], frame: usize, seconds: f64, from: Vector3<f64>) {
+    fn look(&mut self, views: &[ObjectBox], sight: &Sight) {
         self.looked.all.expected += 1;
-        let is_near = || self.seen_from.iter().any(|seen| seen.angle(&from) < NEAR);
+        let is_near = || self.seen_from.iter().any(|seen| seen.angle(&sight.from) < NEAR);
         match views.last() {
-            Some(last) if frame <= last.frame => self.looked.before.expected += 1,
+            Some(last) if sight.frame <= last.frame => self.looked.before.expected += 1,
             Some(_) => self.looked.since += usize::from(is_near()),
             None => self.looked.since += 1,
         }
-        (self.began, self.from, self.is_seen) = (seconds, from, false);
+        self.is_seen = false;
     }
 
     /// Notes that the object is seen in the look that goes on.
@@ -64,48 +63,81 @@ impl Counted {
     }
 }
 
-/// The looks at each mapped object, by where it and the camera are estimated to be. It is there to be seen where all of its outline is in
-/// the image, `border` pixels from its sides, about as large at least as it was seen before, and nothing that is mapped hides it.
+/// The looks at each mapped object, by where it and the camera are estimated to be.
 pub(crate) fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Looked> {
-    let landmarks = estimate.landmarks();
+    let measured = |id: ObjectId| estimate.mapping.measurements.object(id);
     let expected = |landmark: &Landmark<'_>| {
-        let measured = estimate.mapping.measurements.object(landmark.object.id);
-        let least = measured.and_then(Measured::least_px).unwrap_or_default();
-        Expected { id: landmark.object.id, quadric: *landmark.quadric, area: (FAR * least).powi(2) }
+        let id = landmark.object.id;
+        Expected::new(id, *landmark.quadric, measured(id).and_then(Measured::least_px))
     };
-    let objects: Vec<Expected> = landmarks.iter().map(expected).collect();
-    let views = |id: ObjectId| {
-        let measured = estimate.mapping.measurements.object(id);
-        measured.map_or(&[][..], |measured| &measured.views)
-    };
+    let objects: Vec<Expected> = estimate.landmarks().iter().map(expected).collect();
+    let trajectory = estimate.trajectory();
+    let poses = trajectory.iter().enumerate().map(|(frame, at)| (frame, at.timestamp, at.pose));
     let mut all: BTreeMap<ObjectId, Counted> = BTreeMap::new();
-    for (frame, stamped) in estimate.trajectory().iter().enumerate() {
-        for (id, from) in in_view(&objects, &stamped.pose, &estimate.sequence.camera, border) {
-            let counted = all.entry(id).or_insert_with(|| Counted {
-                looked: Looked::default(),
-                seen_from: vec![],
-                began: f64::NEG_INFINITY,
-                from,
-                is_seen: false,
-            });
-            let views = views(id);
-            if stamped.timestamp - counted.began >= SECONDS || counted.from.angle(&from) >= ANGLE {
-                counted.look(views, frame, stamped.timestamp, from);
-            }
-            if views.binary_search_by_key(&frame, |view| view.frame).is_ok() {
-                counted.see(from);
-            }
+    sights(&objects, poses, &estimate.sequence.camera, border, |sight| {
+        let counted = all.entry(sight.id).or_default();
+        let views = measured(sight.id).map_or(&[][..], |measured| &measured.views);
+        if sight.begins {
+            counted.look(views, &sight);
         }
-    }
+        if views.binary_search_by_key(&sight.frame, |view| view.frame).is_ok() {
+            counted.see(sight.from);
+        }
+    });
     all.into_iter().map(|(id, counted)| (id, counted.looked)).collect()
 }
 
+/// A frame in which an object is there to be seen.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sight {
+    pub(crate) id: ObjectId,
+    pub(crate) frame: usize,
+    /// The camera.
+    pub(crate) pose: Se3,
+    /// The camera, from the object's centre.
+    from: Vector3<f64>,
+    /// Whether it is another look, and not the one that goes on.
+    pub(crate) begins: bool,
+}
+
+/// Tells of all sights of objects from frames, each with its time stamp in seconds and its pose. An object is there to be seen where all of its outline is
+/// in the image, `border` pixels from its sides, about as large at least as it was seen before, and nothing that is mapped hides it.
+pub(crate) fn sights(
+    objects: &[Expected],
+    frames: impl Iterator<Item = (usize, f64, Se3)>,
+    camera: &Camera,
+    border: f64,
+    mut tell: impl FnMut(Sight),
+) {
+    // when the look that goes on began, and from where
+    let mut looks: BTreeMap<ObjectId, (f64, Vector3<f64>)> = BTreeMap::new();
+    for (frame, seconds, pose) in frames {
+        for (id, from) in in_view(objects, &pose, camera, border) {
+            let goes_on = |(began, first): &(f64, Vector3<f64>)| {
+                seconds - began < SECONDS && first.angle(&from) < ANGLE
+            };
+            let begins = !looks.get(&id).is_some_and(goes_on);
+            if begins {
+                looks.insert(id, (seconds, from));
+            }
+            tell(Sight { id, frame, pose, from, begins });
+        }
+    }
+}
+
 /// An object that may be there to be seen.
-struct Expected {
+pub(crate) struct Expected {
     id: ObjectId,
     quadric: DualQuadric,
     /// An outline of less is too small to be seen, in square pixels.
     area: f64,
+}
+
+impl Expected {
+    /// One whose smallest box had this size, in pixels: the root of its area.
+    pub(crate) fn new(id: ObjectId, quadric: DualQuadric, least_px: Option<f64>) -> Self {
+        Self { id, quadric, area: (FAR * least_px.unwrap_or_default()).powi(2) }
+    }
 }
 
 /// Objects that are there to be seen from a pose, with the directions from which they are.

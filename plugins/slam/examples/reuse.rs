@@ -140,7 +140,7 @@ fn main() {
         let same = located.matches.iter().filter(|(a, b)| a == b).count();
         let [turn, shift] = rmse(sequence, &frame, &estimate.trajectory());
         println!(
-            "{place}: after {at} frames, {:.1} s, off by {}, in the end {}; {} matches ({same} of one name), lead {:.1}, IoU {:.2}; longest frame {:.0} ms; seen {} of {}, gone {:?}, added {}; objects {}; rmse {:.1}° {:.3} m",
+            "{place}: after {at} frames, {:.1} s, off by {}, in the end {}; {} matches ({same} of one name), lead {:.1}, IoU {:.2}, {:.2} of what should be seen; longest frame {:.0} ms; seen {} of {}, gone {:?}, added {}; objects {}; rmse {:.1}° {:.3} m",
             poses[0].timestamp - began,
             // the truth has gaps
             told(poses.iter().find_map(|pose| off(sequence, &frame, pose))),
@@ -148,6 +148,7 @@ fn main() {
             located.matches.len(),
             located.lead,
             located.overlap,
+            located.seen,
             found.longest * 1e3,
             prior.seen.len(),
             prior.objects,

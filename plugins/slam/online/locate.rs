@@ -2,16 +2,18 @@
 use super::Mapper;
 use crate::input::prior_map::PriorMap;
 use crate::input::sequence::ObjectId;
-use crate::mapping::measurements::{Measured, ObjectBox};
+use crate::mapping::measurements::Measured;
 use crate::mapping::object_key;
 use manifactor_geometry::Se3;
 use manifactor_graph::Noise;
-use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, DualQuadric};
+use manifactor_quadric::DualQuadric;
 use serde::Serialize;
 
+mod agreement;
 mod layout;
 
-use layout::{Aligned, Layout, Mark};
+use agreement::Agreement;
+use layout::{Layout, Mark};
 
 /// Where a run begins in a map that was made before.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,12 +29,10 @@ pub struct Located {
     pub lead: f64,
     /// Mean intersection over union of the boxes of these objects with the outlines of the map's.
     pub overlap: f64,
+    /// Of what should have been seen of the map until then, the share that was, from 0 to 1.
+    pub seen: f64,
 }
 
-/// Boxes of an object that are compared with its outline.
-const BOXES: usize = 20;
-/// Their mean intersection over union is at least this.
-const OVERLAP: f64 = 0.4;
 /// Variance of the centre of an object of which it is not known, as a part of its distance squared.
 const UNKNOWN: f64 = 0.04;
 
@@ -43,20 +43,11 @@ impl Mapper {
         let first = self.pose_of(0)?;
         let marks = self.objects().filter_map(|(measured, quadric)| self.mark(measured, &quadric));
         let layout = Layout::new(marks.collect(), self.up(), map, self.settings.association.uses_names());
-        let aligned = layout.align()?;
-        let overlap = self.overlap(&aligned, map);
-        tracing::debug!(
-            lead = aligned.lead,
-            matches = aligned.matches.len(),
-            overlap,
-            "a place in the prior map"
-        );
-        if overlap < OVERLAP {
-            return None;
-        }
+        let (aligned, agreement) = layout.align(|aligned| self.agreement(aligned, &layout, map))?;
         let start = aligned.known_from_local.compose(&first);
         let noise = aligned.noise(&first).ok()?;
-        Some(Located { start, noise, lead: aligned.lead, overlap, matches: aligned.matches })
+        let (Agreement { overlap, seen }, lead) = (agreement, aligned.lead);
+        Some(Located { start, noise, lead, overlap, seen, matches: aligned.matches })
     }
 
     fn mark(&self, measured: &Measured, quadric: &DualQuadric) -> Option<Mark> {
@@ -66,28 +57,6 @@ impl Mapper {
         let variance = variance
             .map_or(UNKNOWN * distance * distance, |of| (3..6).map(|i| of[(i, i)]).sum::<f64>() / 3.0);
         Some(Mark::new(measured.id, quadric, variance, measured.classes()))
-    }
-
-    /// How well the boxes of matched objects agree with the outlines of the map's.
-    fn overlap(&self, aligned: &Aligned, map: &PriorMap) -> f64 {
-        let of_pair = |(local, known): &(ObjectId, ObjectId)| {
-            let (measured, object) = (self.measured(*local)?, map.object(*known)?);
-            let every = measured.views.len().div_ceil(BOXES).max(1);
-            let overlaps = measured.views.iter().step_by(every).filter_map(|view| {
-                let pose = aligned.known_from_local.compose(&self.pose(view.frame)?);
-                Some(
-                    self.outline(&pose, &object.quadric, view)
-                        .map_or(0.0, |outline| outline.iou(&view.bounding_box)),
-                )
-            });
-            mean(overlaps)
-        };
-        mean(aligned.matches.iter().filter_map(of_pair)).unwrap_or_default()
-    }
-
-    fn outline(&self, pose: &Se3, quadric: &DualQuadric, view: &ObjectBox) -> Option<BoundingBox> {
-        let (bounding_box, camera) = (view.bounding_box, self.camera);
-        BoundingBoxFactor { bounding_box, camera, model: BoxModel::Truncated }.predict(pose, quadric)
     }
 }
 

@@ -202,6 +202,22 @@ fn another_table_is_not_taken_for_this_one() {
 }
 
 #[test]
+fn a_room_with_a_few_things_that_stand_as_in_the_map_is_not_taken_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = mapped(folder.path(), |_| {});
+    let settings = in_map(folder.path(), &[]);
+    let all = sequence(&settings);
+    // of twelve things, the layout of five fits; the others are nowhere
+    let mut few = Sequence::clone(&all);
+    few.detections.retain(|detection| detection.object.is_some_and(|id| id.0 <= 5));
+    for (stream, is_located) in [(all, true), (Arc::new(few), false)] {
+        let mut watch = Found::default();
+        let (_, report) = online("stream", stream.into(), &settings, &mut watch, &mut Silent).unwrap();
+        assert_eq!(told(&report).is_located, is_located, "{:?} of {}", watch.at, map.objects.len());
+    }
+}
+
+#[test]
 fn what_is_gone_is_told_and_what_is_new_is_added() {
     let folder = tempfile::tempdir().unwrap();
     let known = |id: u32| {

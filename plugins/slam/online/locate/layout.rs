@@ -2,6 +2,7 @@
 //!
 //! Two pairs of objects of like classes, as far apart in the one map as in the other, make a hypothesis where up is known; three, where it
 //! is not. What else fits under it, and what should and does not, is its score; it is believed where no other one comes near.
+use super::agreement::Agreement;
 use crate::association::assignment;
 use crate::input::fusion::Fusion;
 use crate::input::prior_map::{PriorMap, PriorObject};
@@ -174,15 +175,32 @@ impl Layout {
         pairs
     }
 
-    /// Where the local marks lie, if there is one place for them.
-    pub(crate) fn align(&self) -> Option<Aligned> {
-        let mut places = self.ranked().into_iter();
-        let (score, place, matches) = places.next()?;
-        let lead = score - places.next().map_or(0.0, |(next, ..)| next.max(0.0));
+    /// The local marks that may be this known one.
+    pub(super) fn may_be(&self, known: ObjectId) -> impl Iterator<Item = ObjectId> {
+        let pairs = self.pairs.iter().filter(move |pair| self.known[pair.known].id == known);
+        pairs.map(|pair| self.local[pair.local].id)
+    }
+
+    /// Where the local marks lie, if there is one place for them. `agreement` says how well boxes agree with a place; one with which they do not
+    /// is none, whatever its score.
+    pub(super) fn align(
+        &self,
+        agreement: impl Fn(&Aligned) -> Option<Agreement>,
+    ) -> Option<(Aligned, Agreement)> {
+        let mut possible = self.ranked().into_iter().filter_map(|(score, place, matches)| {
+            let aligned = self.aligned(place, &matches, score);
+            let agreement = agreement(&aligned)?;
+            Some((aligned, agreement))
+        });
+        let (mut best, agreement) = possible.next()?;
+        best.lead -= possible.next().map_or(0.0, |(next, _)| next.lead.max(0.0));
+        let place = &best.known_from_local;
         let among = self.local.iter().filter(|mark| self.is_among(&place.act(&mark.centre))).count();
+        let Aligned { lead, matches, .. } = &best;
+        tracing::debug!(lead, matches = matches.len(), among, ?agreement, "a place in the prior map");
         let is_clear =
-            matches.len() >= MATCHES && matches.len() as f64 >= MOST * among as f64 && lead >= LEAD;
-        is_clear.then(|| self.aligned(place, &matches, lead))
+            matches.len() >= MATCHES && matches.len() as f64 >= MOST * among as f64 && *lead >= LEAD;
+        (is_clear && agreement.is_believed()).then_some((best, agreement))
     }
 
     /// Places where the local marks may lie, each with its score and its matches, the best first.

@@ -3,6 +3,8 @@ use crate::input::class::Aliases;
 use crate::input::prior_map::Looks;
 use crate::input::sequence::ClassScores;
 
+/// Boxes that agree with every place.
+const AGREES: Agreement = Agreement { overlap: 1.0, seen: 1.0 };
 const CLASSES: [&str; 3] = ["cup", "book", "bottle"];
 
 fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
@@ -64,7 +66,7 @@ fn a_layout_is_found_again_with_and_without_up() {
     for up in [Some(Direction::Z), None] {
         let map = table(&CLASSES, up);
         let (marks, local_up) = seen(&map, &elsewhere(), 2);
-        let found = Layout::new(marks, local_up, &map, false).align().unwrap();
+        let found = Layout::new(marks, local_up, &map, false).align(|_| Some(AGREES)).unwrap().0;
         let error = found.known_from_local.between(&elsewhere());
         assert!(error.log().norm() < 1e-6, "{up:?} {error:?}");
         assert_eq!(found.matches.len(), 6);
@@ -78,31 +80,49 @@ fn what_looks_the_same_from_two_sides_is_nowhere() {
     let bottles = square.iter().zip(10..).map(|([x, y], id)| object(id, "bottle", Vector3::new(*x, *y, 0.0)));
     let map = PriorMap::new(Some(Direction::Z), bottles.collect());
     let (marks, up) = seen(&map, &elsewhere(), 0);
-    assert!(Layout::new(marks, up, &map, false).align().is_none());
+    assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
     // names tell them apart
     let (mut marks, up) = seen(&map, &elsewhere(), 0);
     marks.iter_mut().for_each(|mark| mark.id.0 += 10);
-    let found = Layout::new(marks, up, &map, true).align().unwrap();
+    let found = Layout::new(marks, up, &map, true).align(|_| Some(AGREES)).unwrap().0;
     assert!(found.known_from_local.between(&elsewhere()).log().norm() < 1e-6);
+}
+
+#[test]
+fn a_place_is_one_where_boxes_agree_with_it() {
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let map = floor(square.map(|place| (place, "bottle")));
+    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let layout = Layout::new(marks, up, &map, false);
+    let is_right = |aligned: &Aligned| aligned.known_from_local.between(&elsewhere()).log().norm() < 0.1;
+    let found = layout.align(|aligned| is_right(aligned).then_some(AGREES)).unwrap().0;
+    assert!(is_right(&found), "{found:?}");
+    // others are possible as well
+    let less = Agreement { seen: 0.5, ..AGREES };
+    assert!(layout.align(|aligned| Some(if is_right(aligned) { AGREES } else { less })).is_none());
+    // most of what should be seen is missing
+    let missing = Agreement { seen: 0.4, ..AGREES };
+    assert!(layout.align(|aligned| is_right(aligned).then_some(missing)).is_none());
+    assert!(layout.align(|_| None).is_none());
 }
 
 #[test]
 fn too_few_objects_or_others_are_nowhere() {
     let map = table(&CLASSES, Some(Direction::Z));
     let (marks, up) = seen(&map, &elsewhere(), 5);
-    assert!(Layout::new(marks, up, &map, false).align().is_none());
+    assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
     let (marks, up) = seen(&table(&["laptop"], map.up), &elsewhere(), 0);
-    assert!(Layout::new(marks, up, &map, false).align().is_none());
-    assert!(Layout::new(vec![], up, &map, false).align().is_none());
+    assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
+    assert!(Layout::new(vec![], up, &map, false).align(|_| Some(AGREES)).is_none());
     let (marks, up) = seen(&map, &elsewhere(), 0);
-    assert!(Layout::new(marks, up, &PriorMap::default(), false).align().is_none());
+    assert!(Layout::new(marks, up, &PriorMap::default(), false).align(|_| Some(AGREES)).is_none());
 }
 
 #[test]
 fn tilt_is_known_better_than_heading() {
     let map = table(&CLASSES, Some(Direction::Z));
     let (marks, up) = seen(&map, &elsewhere(), 0);
-    let found = Layout::new(marks, up, &map, false).align().unwrap();
+    let found = Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).unwrap().0;
     let level = Se3::new(elsewhere().rotation.inverse(), Vector3::zeros());
     let information = found.noise(&level).unwrap().information_matrix(6).unwrap();
     assert!(information[(0, 0)] > 2.0 * information[(2, 2)], "{information}");
@@ -133,7 +153,7 @@ fn many_objects_of_one_class_are_found_again() {
     let map = floor(scattered(70).map(|place| (place, "bottle")));
     for without in [0, 50] {
         let (marks, up) = seen(&map, &elsewhere(), without);
-        let found = Layout::new(marks, up, &map, false).align().unwrap();
+        let found = Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).unwrap().0;
         assert!(found.known_from_local.between(&elsewhere()).log().norm() < 1e-6, "{found:?}");
         assert_eq!(found.matches.len(), 70 - without);
     }
