@@ -53,7 +53,7 @@ fn either(weights: [f64; 2]) -> MaxMixture {
     let depth = CentroidDepth { depth: Positive::new(1.5).unwrap() };
     let [first, second] = [1, 2].map(|object| Component {
         over: Some(vec![0, object]),
-        ..component(weights[object - 1], depth.clone())
+        ..component(weights[object - 1], depth)
     });
     MaxMixture::new(vec![first, second]).unwrap()
 }
