@@ -51,10 +51,8 @@ fn what_fits_none_of_them_is_left_where_it_is() {
 /// A depth of 1.5 m from x that is the depth of q0 or of q1.
 fn either(weights: [f64; 2]) -> MaxMixture {
     let depth = CentroidDepth { depth: Positive::new(1.5).unwrap() };
-    let [first, second] = [1, 2].map(|object| Component {
-        over: Some(vec![0, object]),
-        ..component(weights[object - 1], depth)
-    });
+    let [first, second] = [1, 2]
+        .map(|object| Component { over: Some(vec![0, object]), ..component(weights[object - 1], depth) });
     MaxMixture::new(vec![first, second]).unwrap()
 }
 
