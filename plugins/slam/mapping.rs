@@ -12,6 +12,7 @@ use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
 use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, Verdict, unmatched};
 use crate::settings::{DetectionSettings, OdometrySettings, Settings};
 use manifactor_formats::plausible;
+use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Between, Prior, Se3};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values};
@@ -21,6 +22,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 pub mod measurements;
+mod motion;
 pub(crate) mod rejection;
 mod warning;
 
@@ -105,9 +107,12 @@ impl Mapping {
         let frame = settings.anchor().map_or(located, |anchor| anchor.frame(first, located));
         let measurements = Measurements::gather(sequence, settings);
         let all = &measurements.objects;
-        let pose =
-            |i: usize| Some(frame.map_from_odometry.compose(&sequence.frames.get(i)?.world_from_camera));
-        let start = |measured| rejection::start(measured, pose, sequence.camera, settings);
+        let at = |i: usize| {
+            let seen = sequence.frames.get(i)?;
+            let pose = frame.map_from_odometry.compose(&seen.world_from_camera);
+            Some(StampedPose { timestamp: seen.timestamp, pose })
+        };
+        let start = |measured| rejection::start(measured, at, sequence.camera, settings);
         let starts: Vec<_> = all.iter().map(start).collect();
         let candidates = all.iter().zip(&starts).filter_map(|(object, start)| candidate(object, start));
         let mut judge = Judge::new(

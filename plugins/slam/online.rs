@@ -248,8 +248,8 @@ impl Mapper {
         let start = |measured: &Measured| match self.objects.get(&measured.id).and_then(Tracked::born_as) {
             Some(start) => Ok(start),
             None => {
-                let pose = |i: usize| poses.get(i).copied();
-                rejection::start(measured, pose, self.camera, &self.settings)
+                let at = |i: usize| Some(StampedPose { pose: *poses.get(i)?, ..*self.live.get(i)? });
+                rejection::start(measured, at, self.camera, &self.settings)
             }
         };
         let starts = self.measurements.objects.iter().map(start).collect();
@@ -272,6 +272,11 @@ impl Mapper {
     /// The estimate of a pose; `None`, where it is not there, or not any more.
     fn pose(&self, frame: usize) -> Option<Se3> {
         self.session.get(pose_key(frame).as_str()).ok()
+    }
+
+    /// The same, with its time.
+    fn at(&self, frame: usize) -> Option<StampedPose> {
+        Some(StampedPose { pose: self.pose(frame)?, ..*self.live.get(frame)? })
     }
 
     fn measured(&self, id: ObjectId) -> Option<&Measured> {

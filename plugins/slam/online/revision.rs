@@ -120,7 +120,7 @@ impl Mapper {
             }
             Tracked::Mapped(mapped) => match rejection::sound(measured, settings).and_then(|()| {
                 let depth_error = self.settings.detections.depth_error;
-                rejection::still(measured, |frame| self.pose(frame), &self.camera, &mapped.start, depth_error)
+                rejection::still(measured, |frame| self.at(frame), &self.camera, depth_error)
             }) {
                 Err(rejection) => Some(Due::Withdrawal(rejection)),
                 Ok(()) if measured.class_name() != mapped.class.as_deref() => {
@@ -183,7 +183,7 @@ impl Mapper {
     /// Puts an object into the map that can be placed now.
     fn bear(&mut self, id: ObjectId, report: &mut FrameReport) {
         let Some(measured) = self.measured(id) else { return };
-        let started = rejection::start(measured, |i| self.pose(i), self.camera, &self.settings);
+        let started = rejection::start(measured, |i| self.at(i), self.camera, &self.settings);
         let (views, class) = (measured.views.clone(), measured.class_name().map(str::to_owned));
         let born = started.map_err(|rejection| rejection.to_string());
         let born = born.and_then(|start| self.push_object(id, start, &views));

@@ -374,5 +374,5 @@ fn depths_place_objects_at_once_and_tell_what_moves() {
     let report = estimate(&by(&settings, Given {}), &Arc::new(moved));
     let rejected: Vec<_> = report.objects.iter().filter(|object| object.rejected_because.is_some()).collect();
     assert_eq!(rejected.iter().map(|object| object.object.id).collect::<Vec<_>>(), [id]);
-    assert!(rejected[0].rejected_because.as_ref().unwrap().starts_with("it moves by"), "{rejected:?}");
+    assert!(rejected[0].rejected_because.as_ref().unwrap().starts_with("it moves at"), "{rejected:?}");
 }

@@ -1,0 +1,177 @@
+//! Whether an object stands still, as far as the depths of its boxes tell.
+use super::Rejection;
+use super::measurements::ObjectBox;
+use manifactor_formats::tum::StampedPose;
+use manifactor_quadric::Camera;
+use nalgebra::{Matrix3x4, Matrix4, Vector3, Vector4};
+
+/// So many of the last boxes are looked at, with each new one.
+const LAST: usize = 256;
+/// Seconds for which odometry counts as exact.
+const WINDOW: f64 = 2.0;
+/// Seconds after which another thing may be in the same place.
+const GAP: f64 = 0.5;
+/// Twice the log-likelihood ratio of moving to standing still that is allowed.
+const EVIDENCE: f64 = 9.0;
+/// What is allowed of the root mean square by which places differ within a window, in standard deviations of a depth.
+const SCATTER: f64 = 2.0;
+/// Differences between places that are believed to be as expected, before any is seen.
+const EXPECTED: f64 = 4.0;
+/// How fast something may move, as a standard deviation, in m/s.
+const FAST: f64 = 100.0;
+
+/// Where a box and its depth put an object's centre.
+struct Place {
+    /// In seconds.
+    time: f64,
+    /// Where the camera was, in the frame of the map.
+    camera: Vector3<f64>,
+    /// Where the object seems to have been, in that frame.
+    place: Vector3<f64>,
+    /// In metres.
+    depth: f64,
+}
+
+/// Whether an object stands still within short windows. `at` has the time and pose of a frame.
+///
+/// # Errors
+/// Where it does not.
+pub(super) fn still(
+    views: &[ObjectBox],
+    at: impl Fn(usize) -> Option<StampedPose>,
+    camera: &Camera,
+    depth_error: f64,
+) -> Result<(), Rejection> {
+    let place = |view: &ObjectBox| {
+        // the centre of a box that the border cuts is not that of the object
+        let depth = view.depth.filter(|_| view.inside == [true; 4])?;
+        let StampedPose { timestamp: time, pose } = at(view.frame)?;
+        let place = pose.act(&(camera.ray(view.bounding_box.centre()) * depth));
+        Some(Place { time, camera: pose.translation, place, depth })
+    };
+    let last = &views[views.len().saturating_sub(LAST)..];
+    let Motion { speed, evidence, scatter } =
+        Motion::of(&last.iter().filter_map(place).collect::<Vec<_>>(), depth_error);
+    if evidence > EVIDENCE {
+        return Err(Rejection::Moves { speed, evidence, limit: EVIDENCE });
+    }
+    if scatter > SCATTER {
+        return Err(Rejection::Scatters { scatter: scatter * depth_error, limit: SCATTER * depth_error });
+    }
+    Ok(())
+}
+
+/// What places tell of motion.
+#[derive(Debug, Default)]
+struct Motion {
+    /// In m/s.
+    speed: f64,
+    /// Twice the log-likelihood ratio of that to standing still.
+    evidence: f64,
+    /// Root mean square by which places differ within windows, in standard deviations of their depths.
+    scatter: f64,
+}
+
+impl Motion {
+    /// Within each window, places go along a line, or they are one place; where one thing after the other passes through a place, each moves in
+    /// its own window. Depths may be off by a factor that is common to all: one of a detector's as often as `depth_error` says, or any if the
+    /// object moves.
+    fn of(places: &[Place], depth_error: f64) -> Self {
+        let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
+        let (mut squares, mut differences) = (0.0_f64, 0.0);
+        for window in windows(places).filter(|window| window.len() > 1) {
+            let n = window.len() as f64;
+            let mean = |of: fn(&Place) -> Vector3<f64>| window.iter().map(of).sum::<Vector3<f64>>() / n;
+            let (camera, centre) = (mean(|place| place.camera), mean(|place| place.place));
+            let time = window.iter().map(|place| place.time).sum::<f64>() / n;
+            let sigma = depth_error * window.iter().map(|place| place.depth).sum::<f64>() / n;
+            let span = window[window.len() - 1].time - window[0].time;
+            let square: f64 = window.iter().map(|place| (place.time - time).powi(2)).sum();
+            // errors of depths last: a window tells as much as its two ends, however many frames it has
+            let weight = span.powi(2) / (2.0 * square * sigma.powi(2));
+            for place in window {
+                let off = place.place - centre;
+                let mut row = Matrix3x4::identity() * (place.time - time);
+                row.set_column(3, &(camera - place.camera));
+                information += weight * row.transpose() * row;
+                gradient += weight * row.transpose() * off;
+                squares += off.norm_squared() / sigma.powi(2);
+            }
+            differences += n - 1.0;
+        }
+        let still = gradient[3].powi(2) / (information[(3, 3)] + depth_error.powi(-2));
+        let weak = Vector4::new(FAST.powi(-2), FAST.powi(-2), FAST.powi(-2), 1.0);
+        match (information + Matrix4::from_diagonal(&weak)).cholesky() {
+            Some(factor) if differences > 0.0 => {
+                let moving = factor.solve(&gradient);
+                let evidence = moving.dot(&gradient) - still;
+                Self {
+                    speed: moving.xyz().norm(),
+                    evidence,
+                    scatter: ((squares + EXPECTED) / (differences + EXPECTED)).sqrt(),
+                }
+            }
+            // nothing to compare
+            _ => Self::default(),
+        }
+    }
+}
+
+/// Places that belong together: in a short time, and without a gap.
+fn windows(places: &[Place]) -> impl Iterator<Item = &[Place]> {
+    places.chunk_by(|a, b| b.time - a.time <= GAP).flat_map(|run| {
+        let window = |place: &Place| ((place.time - run[0].time) / WINDOW).floor();
+        run.chunk_by(move |a, b| window(a) == window(b))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Something in this place, from a camera that goes along x at 2 m/s; depths are off by a factor.
+    fn seen(time: f64, x: f64, factor: f64) -> Place {
+        let camera = Vector3::new(2.0 * time, 0.0, 0.0);
+        let sight = (Vector3::new(x, 0.0, 7.0) - camera) * factor;
+        Place { time, camera, place: camera + sight, depth: sight.z }
+    }
+
+    fn at(time: f64, x: f64) -> Place {
+        seen(time, x, 1.0)
+    }
+
+    /// Ten frames of each second that is even, from 0 to 6 s.
+    fn times() -> impl Iterator<Item = f64> {
+        (0..60).map(|i| 0.1 * f64::from(i)).filter(|time| time.rem_euclid(2.0) < 0.95)
+    }
+
+    #[test]
+    fn things_that_pass_through_one_place_move() {
+        let places: Vec<Place> = times().map(|time| at(time, 20.0 + 5.0 * time.rem_euclid(2.0))).collect();
+        let Motion { speed, evidence, .. } = Motion::of(&places, 0.03);
+        assert!((speed - 5.0).abs() < 0.1 && evidence > EVIDENCE, "{speed} {evidence}");
+    }
+
+    #[test]
+    fn two_things_at_once_are_not_one_that_stands_still() {
+        let places: Vec<Place> =
+            times().enumerate().map(|(i, time)| at(time, 20.0 + (i % 2) as f64)).collect();
+        let Motion { evidence, scatter, .. } = Motion::of(&places, 0.03);
+        assert!(evidence < EVIDENCE && scatter > SCATTER, "{evidence} {scatter}");
+    }
+
+    #[test]
+    fn what_stands_still_does_not_move_though_depths_are_off_and_odometry_drifts() {
+        for places in [
+            times().map(|time| seen(time, 20.0, 1.05)).collect::<Vec<_>>(),
+            times().map(|time| at(time, 20.0 + 0.3 * time)).collect(),
+            times().map(|time| at(time, 20.0 + 0.4 * (40.0 * time).sin())).collect(),
+            vec![],
+            vec![at(1.0, 20.0), at(3.0, 25.0)],
+            vec![at(1.0, 20.0)],
+        ] {
+            let motion = Motion::of(&places, 0.03);
+            assert!(motion.evidence < EVIDENCE && motion.scatter < SCATTER, "{motion:?}");
+        }
+    }
+}
