@@ -274,9 +274,11 @@ impl Mapper {
         self.session.get(pose_key(frame).as_str()).ok()
     }
 
-    /// The same, with its time.
+    /// The same, with its time; of the frame that is being taken as well.
     fn at(&self, frame: usize) -> Option<StampedPose> {
-        Some(StampedPose { pose: self.pose(frame)?, ..*self.live.get(frame)? })
+        let timestamp = self.live.get(frame).map(|live| live.timestamp);
+        let newest = self.last.as_ref().map(|last| last.timestamp);
+        Some(StampedPose { timestamp: timestamp.or(newest)?, pose: self.pose(frame)? })
     }
 
     fn measured(&self, id: ObjectId) -> Option<&Measured> {
