@@ -226,6 +226,8 @@ impl Mapping {
         }
         if self.mapped().next().is_none() {
             self.warnings.push(Warning::NoObjects { detected: self.objects.len() });
+        } else if !settings.association.uses_names() && settings.detections.loss.is_none() {
+            self.warnings.push(Warning::NotRobust);
         }
     }
 }

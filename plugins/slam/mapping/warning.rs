@@ -26,6 +26,8 @@ pub enum Warning {
         /// Objects that were detected.
         detected: usize,
     },
+    /// Boxes that may be put to wrong objects, and would count in full.
+    NotRobust,
     /// Factors that take no part at the end.
     Inactive {
         /// How many.
@@ -83,6 +85,10 @@ impl fmt::Display for Warning {
             Self::NoObjects { detected } => {
                 write!(f, "none of {detected} detected objects is mapped; see why in objects.json")
             }
+            Self::NotRobust => f.write_str(
+                "boxes without names are put to wrong objects now and then, and count in full; \
+                 `detections.loss = { type = \"cauchy\", scale = 1.0 }` takes weight from them",
+            ),
             Self::Inactive { inactive, factors } => write!(
                 f,
                 "{inactive} of {factors} factors mean nothing at the estimate and take no part in its cost: \
