@@ -128,6 +128,9 @@ fn windows(places: &[Place]) -> impl Iterator<Item = &[Place]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_pcg::Pcg64;
 
     /// Something in this place, from a camera that goes along x at 2 m/s; depths are off by a factor.
     fn seen(time: f64, x: f64, factor: f64) -> Place {
@@ -173,5 +176,35 @@ mod tests {
             let motion = Motion::of(&places, 0.03);
             assert!(motion.evidence < EVIDENCE && motion.scatter < SCATTER, "{motion:?}");
         }
+    }
+
+    /// What stands still, seen for 15 s, with depths as wrong as they are said to be, for as long.
+    fn at_rest(errors: &mut Pcg64, frames_per_second: u32, lasts: f64) -> bool {
+        let step = 1.0 / f64::from(frames_per_second);
+        let kept = if lasts > 0.0 { (-step / lasts).exp() } else { 0.0 };
+        let mut error: f64 = StandardNormal.sample(errors);
+        let places: Vec<Place> = (0..15 * frames_per_second)
+            .map(|i| {
+                let time = f64::from(i) * step;
+                let draw: f64 = StandardNormal.sample(errors);
+                error = kept * error + (1.0 - kept * kept).sqrt() * draw;
+                let camera = Vector3::new((0.3 * time).sin(), 0.0, 0.3 * (0.5 * time).sin());
+                let sight = Vector3::new(0.0, 0.0, 2.0) - camera;
+                Place { time, camera, place: camera + sight * (1.0 + 0.03 * error), depth: sight.z }
+            })
+            .collect();
+        (3..places.len()).step_by(frames_per_second as usize / 5).all(|end| {
+            let motion = Motion::of(&places[end.saturating_sub(LAST)..end], 0.03);
+            motion.evidence < EVIDENCE && motion.scatter < SCATTER
+        })
+    }
+
+    #[test]
+    fn errors_of_depths_that_last_are_no_motion() {
+        let mut errors = Pcg64::seed_from_u64(1);
+        let ways = [10, 30].into_iter().flat_map(|rate| [0.0, 0.5, 1.0, 3.0].map(|lasts| (rate, lasts)));
+        let trials = ways.flat_map(|way| [way; 25]);
+        let moved = trials.filter(|(rate, lasts)| !at_rest(&mut errors, *rate, *lasts)).count();
+        assert!(moved <= 10, "{moved} of 200");
     }
 }
