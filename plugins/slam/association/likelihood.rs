@@ -2,6 +2,8 @@
 mod ambiguity;
 mod division;
 mod fit;
+#[cfg(test)]
+mod rail;
 mod second_look;
 mod sightings;
 mod track;

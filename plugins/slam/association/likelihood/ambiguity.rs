@@ -56,37 +56,11 @@ impl Tracker {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::{Association, Image, Map};
+    use super::super::super::{Association, Image};
     use super::super::Likelihood;
-    use super::super::fit::predict;
+    use super::super::rail::{CAMERA, Rail, seen};
     use super::*;
     use crate::input::class::Aliases;
-    use crate::input::sequence::{ClassScores, Detection};
-    use manifactor_quadric::{BoundingBox, Camera, DualQuadric};
-    use nalgebra::Vector3;
-
-    const CAMERA: Camera =
-        Camera { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
-
-    /// A camera that moves to the right and looks ahead.
-    struct Rail;
-
-    impl Map for Rail {
-        fn pose(&self, frame: usize) -> Option<Se3> {
-            Some(Se3 { translation: Vector3::x() * (0.02 * frame as f64 - 0.4), ..Se3::identity() })
-        }
-        fn object(&self, _: ObjectId) -> Option<DualQuadric> {
-            None
-        }
-    }
-
-    fn seen(frame: usize, x: f64, class: &str) -> Detection {
-        let pose = Se3 { translation: Vector3::new(x, 0.0, 2.0), ..Se3::identity() };
-        let quadric = DualQuadric { pose, semi_axes: Vector3::new(0.1, 0.15, 0.1) };
-        let bounding_box: BoundingBox =
-            predict(&Rail.pose(frame).unwrap(), &quadric, &CAMERA).unwrap().bounding_box;
-        Detection { frame, object: None, scores: ClassScores::single(class, 0.8), bounding_box, depth: None }
-    }
 
     /// The ambiguities of a box at `x` that was put to the left one of two cups, at 0 and at 0.2 m.
     fn ambiguities(x: f64, odds: Option<f64>) -> Vec<Ambiguity> {

@@ -155,35 +155,9 @@ impl Part {
 #[cfg(test)]
 mod tests {
     use super::super::super::{Association, Image};
-    use super::super::fit::predict;
+    use super::super::rail::{CAMERA, Rail, seen};
     use super::*;
-    use crate::input::sequence::{ClassScores, Detection};
-    use manifactor_geometry::Se3;
-    use manifactor_quadric::DualQuadric;
-    use nalgebra::Vector3;
     use std::collections::BTreeSet;
-
-    const CAMERA: Camera =
-        Camera { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
-
-    /// A camera that moves to the right and looks ahead.
-    struct Rail;
-
-    impl Map for Rail {
-        fn pose(&self, frame: usize) -> Option<Se3> {
-            Some(Se3 { translation: Vector3::x() * (0.02 * frame as f64 - 0.4), ..Se3::identity() })
-        }
-        fn object(&self, _: ObjectId) -> Option<DualQuadric> {
-            None
-        }
-    }
-
-    fn seen(frame: usize, x: f64, class: &str) -> Detection {
-        let pose = Se3 { translation: Vector3::new(x, 0.0, 2.0), ..Se3::identity() };
-        let quadric = DualQuadric { pose, semi_axes: Vector3::new(0.1, 0.15, 0.1) };
-        let bounding_box = predict(&Rail.pose(frame).unwrap(), &quadric, &CAMERA).unwrap().bounding_box;
-        Detection { frame, object: None, scores: ClassScores::single(class, 0.8), bounding_box, depth: None }
-    }
 
     /// Tells a tracker that all boxes are of one object: every third is at `x`, the others in the middle. Returns the boxes that were moved.
     fn moved(x: f64) -> (BTreeSet<usize>, Vec<Option<ObjectId>>) {
