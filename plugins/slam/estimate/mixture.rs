@@ -1,10 +1,11 @@
 //! Boxes that may show either of two objects.
+use super::variance::box_of;
 use crate::association::Ambiguity;
 use crate::input::sequence::ObjectId;
 use crate::mapping::{Mapping, object_key, pose_key};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{FactorEntry, Key, Noise};
-use manifactor_quadric::{BoundingBoxFactor, CentroidDepth};
+use manifactor_quadric::CentroidDepth;
 use manifactor_semantic::{Component, MaxMixture};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -22,8 +23,8 @@ pub(super) fn mix(mapping: &mut Mapping) -> usize {
         .collect();
     let mut mixed = 0;
     for entry in mapping.graph.factors_mut().iter_mut().filter(|entry| is_of_box(entry)) {
-        let keys = <[Key; 2]>::try_from(entry.keys.clone());
-        if let Some(ambiguity) = keys.ok().and_then(|keys| ambiguous.get(&keys)) {
+        let [pose, object, ..] = &entry.keys[..] else { continue };
+        if let Some(ambiguity) = ambiguous.get(&[pose.clone(), object.clone()]) {
             mixed += usize::from(make_mixture(entry, ambiguity));
         }
     }
@@ -31,18 +32,22 @@ pub(super) fn mix(mapping: &mut Mapping) -> usize {
 }
 
 fn is_of_box(entry: &FactorEntry) -> bool {
-    let factor = entry.factor.erased().as_any();
-    factor.is::<BoundingBoxFactor>() || factor.is::<CentroidDepth>()
+    box_of(entry).is_some() || entry.factor.erased().as_any().is::<CentroidDepth>()
 }
 
 fn make_mixture(entry: &mut FactorEntry, ambiguity: &Ambiguity) -> bool {
+    let keys = entry.keys.len();
     let component = |weight, object| Component {
         weight,
         factor: Some(entry.factor.clone()),
-        over: Some(vec![0, object]),
+        // the pose, the object, and what offset the box has
+        over: Some([0, object].into_iter().chain(2..keys).collect()),
         noise: entry.noise.clone(),
     };
-    let components = vec![component(Positive::literal(1.0), 1), component(ambiguity.class_ratio, 2)];
+    let even = Positive::literal(1.0);
+    // a depth says nothing of the class, and the box beside it has said it
+    let ratio = box_of(entry).map_or(even, |_| ambiguity.class_ratio);
+    let components = vec![component(even, 1), component(ratio, keys)];
     // one factor with one noise always fits itself
     let Ok(mixture) = MaxMixture::new(components) else { return false };
     entry.keys.push(object_key(ambiguity.other));

@@ -20,3 +20,4 @@ pub use components::{Components, VarianceError};
 pub use cross_validation::Score;
 pub use lasting::LastingComponent;
 pub use motion::{MotionChoice, MotionComponent};
+pub(super) use offsets::box_of;

@@ -5,18 +5,16 @@ use manifactor_formats::tum::StampedPose;
 use manifactor_quadric::Camera;
 use nalgebra::{Matrix3x4, Matrix4, Vector3, Vector4};
 
-/// So many of the last boxes are looked at, with each new one.
-const LAST: usize = 256;
 /// Seconds for which odometry counts as exact.
 const WINDOW: f64 = 2.0;
-/// Seconds after which another thing may be in the same place.
-const GAP: f64 = 0.5;
 /// Twice the log-likelihood ratio of moving to standing still that is allowed.
 const EVIDENCE: f64 = 9.0;
-/// What is allowed of the root mean square by which places differ within a window, in standard deviations of a depth.
+/// What is allowed of the root mean square by which places differ within a window, in standard deviations.
 const SCATTER: f64 = 2.0;
 /// Differences between places that are believed to be as expected, before any is seen.
 const EXPECTED: f64 = 4.0;
+/// By how many pixels the centre of a box may be off.
+const CENTRE_PX: f64 = 5.0;
 /// How fast something may move, as a standard deviation, in m/s.
 const FAST: f64 = 100.0;
 
@@ -28,8 +26,8 @@ struct Place {
     camera: Vector3<f64>,
     /// Where the object seems to have been, in that frame.
     place: Vector3<f64>,
-    /// In metres.
-    depth: f64,
+    /// How well it is known, in metres.
+    sigma: f64,
 }
 
 /// Whether an object stands still within short windows. `at` has the time and pose of a frame.
@@ -42,21 +40,21 @@ pub(super) fn still(
     camera: &Camera,
     depth_error: f64,
 ) -> Result<(), Rejection> {
+    let error = depth_error.hypot(CENTRE_PX / camera.fx);
     let place = |view: &ObjectBox| {
         // the centre of a box that the border cuts is not that of the object
         let depth = view.depth.filter(|_| view.inside == [true; 4])?;
         let StampedPose { timestamp: time, pose } = at(view.frame)?;
         let place = pose.act(&(camera.ray(view.bounding_box.centre()) * depth));
-        Some(Place { time, camera: pose.translation, place, depth })
+        Some(Place { time, camera: pose.translation, place, sigma: depth * error })
     };
-    let last = &views[views.len().saturating_sub(LAST)..];
-    let Motion { speed, evidence, scatter } =
-        Motion::of(&last.iter().filter_map(place).collect::<Vec<_>>(), depth_error);
+    let places: Vec<Place> = views.iter().filter_map(place).collect();
+    let Motion { speed, evidence, scatter } = Motion::of(&places, depth_error);
     if evidence > EVIDENCE {
         return Err(Rejection::Moves { speed, evidence, limit: EVIDENCE });
     }
     if scatter > SCATTER {
-        return Err(Rejection::Scatters { scatter: scatter * depth_error, limit: SCATTER * depth_error });
+        return Err(Rejection::Scatters { scatter: scatter * error, limit: SCATTER * error });
     }
     Ok(())
 }
@@ -68,23 +66,24 @@ struct Motion {
     speed: f64,
     /// Twice the log-likelihood ratio of that to standing still.
     evidence: f64,
-    /// Root mean square by which places differ within windows, in standard deviations of their depths.
+    /// Root mean square by which places differ within windows, in standard deviations.
     scatter: f64,
 }
 
 impl Motion {
-    /// Within each window, places go along a line, or they are one place; where one thing after the other passes through a place, each moves in
-    /// its own window. Depths may be off by a factor that is common to all: one of a detector's as often as `depth_error` says, or any if the
-    /// object moves.
+    /// Within each window, places go along a line, at one velocity for all windows, or they are one place: things that pass through a place one
+    /// after the other move. Depths may be off by a factor that is common to all: one of a detector's as often as `depth_error` says, or any if
+    /// the object moves.
     fn of(places: &[Place], depth_error: f64) -> Self {
         let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
         let (mut squares, mut differences) = (0.0_f64, 0.0);
-        for window in windows(places).filter(|window| window.len() > 1) {
+        let window = |place: &Place| (place.time / WINDOW).floor();
+        for window in places.chunk_by(|a, b| window(a) == window(b)).filter(|window| window.len() > 1) {
             let n = window.len() as f64;
             let mean = |of: fn(&Place) -> Vector3<f64>| window.iter().map(of).sum::<Vector3<f64>>() / n;
             let (camera, centre) = (mean(|place| place.camera), mean(|place| place.place));
             let time = window.iter().map(|place| place.time).sum::<f64>() / n;
-            let sigma = depth_error * window.iter().map(|place| place.depth).sum::<f64>() / n;
+            let sigma = window.iter().map(|place| place.sigma).sum::<f64>() / n;
             let span = window[window.len() - 1].time - window[0].time;
             let square: f64 = window.iter().map(|place| (place.time - time).powi(2)).sum();
             // errors of depths last: a window tells as much as its two ends, however many frames it has
@@ -117,14 +116,6 @@ impl Motion {
     }
 }
 
-/// Places that belong together: in a short time, and without a gap.
-fn windows(places: &[Place]) -> impl Iterator<Item = &[Place]> {
-    places.chunk_by(|a, b| b.time - a.time <= GAP).flat_map(|run| {
-        let window = |place: &Place| ((place.time - run[0].time) / WINDOW).floor();
-        run.chunk_by(move |a, b| window(a) == window(b))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,7 +127,7 @@ mod tests {
     fn seen(time: f64, x: f64, factor: f64) -> Place {
         let camera = Vector3::new(2.0 * time, 0.0, 0.0);
         let sight = (Vector3::new(x, 0.0, 7.0) - camera) * factor;
-        Place { time, camera, place: camera + sight, depth: sight.z }
+        Place { time, camera, place: camera + sight, sigma: 0.03 * sight.z }
     }
 
     fn at(time: f64, x: f64) -> Place {
@@ -190,11 +181,11 @@ mod tests {
                 error = kept * error + (1.0 - kept * kept).sqrt() * draw;
                 let camera = Vector3::new((0.3 * time).sin(), 0.0, 0.3 * (0.5 * time).sin());
                 let sight = Vector3::new(0.0, 0.0, 2.0) - camera;
-                Place { time, camera, place: camera + sight * (1.0 + 0.03 * error), depth: sight.z }
+                Place { time, camera, place: camera + sight * (1.0 + 0.03 * error), sigma: 0.03 * sight.z }
             })
             .collect();
         (3..places.len()).step_by(frames_per_second as usize / 5).all(|end| {
-            let motion = Motion::of(&places[end.saturating_sub(LAST)..end], 0.03);
+            let motion = Motion::of(&places[..end], 0.03);
             motion.evidence < EVIDENCE && motion.scatter < SCATTER
         })
     }

@@ -109,12 +109,13 @@ pub(crate) fn start(
     }
     let started = settings.initialiser.initialise(&views);
     let start = started.map_err(|error| Rejection::Initialisation { message: error.to_string() })?;
-    still(measured, at, &camera, detections.depth_error).map(|()| start)
+    still(measured, &measured.views, at, &camera, detections.depth_error).map(|()| start)
 }
 
-/// Whether an object stands still, as far as the depths of its boxes tell; what an earlier map has does.
+/// Whether an object stands still, as far as the depths of these boxes of it tell; what an earlier map has does.
 pub(crate) fn still(
     measured: &Measured,
+    views: &[ObjectBox],
     at: impl Fn(usize) -> Option<StampedPose>,
     camera: &Camera,
     depth_error: f64,
@@ -122,7 +123,7 @@ pub(crate) fn still(
     if measured.prior.is_some() {
         return Ok(());
     }
-    motion::still(&measured.views, at, camera, depth_error)
+    motion::still(views, at, camera, depth_error)
 }
 
 /// Whether an object has boxes enough, and such as one object has; what an earlier map has needs none.

@@ -59,8 +59,3 @@ impl Mapper {
         Some(Mark::new(measured.id, quadric, variance, measured.classes()))
     }
 }
-
-fn mean(of: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, n) = of.fold((0.0, 0), |(sum, n), x| (sum + x, n + 1));
-    (n > 0).then(|| sum / f64::from(n))
-}

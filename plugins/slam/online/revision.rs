@@ -15,6 +15,9 @@ use manifactor_quadric::DualQuadric;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+/// So many of an object's last boxes are looked at for motion, with each new one.
+const LAST: usize = 256;
+
 /// What becomes of an object.
 enum Due {
     /// It is taken out of the map.
@@ -119,8 +122,9 @@ impl Mapper {
                 is_due.then_some(Due::Birth)
             }
             Tracked::Mapped(mapped) => match rejection::sound(measured, settings).and_then(|()| {
+                let last = &measured.views[measured.views.len().saturating_sub(LAST)..];
                 let depth_error = self.settings.detections.depth_error;
-                rejection::still(measured, |frame| self.at(frame), &self.camera, depth_error)
+                rejection::still(measured, last, |frame| self.at(frame), &self.camera, depth_error)
             }) {
                 Err(rejection) => Some(Due::Withdrawal(rejection)),
                 Ok(()) if measured.class_name() != mapped.class.as_deref() => {

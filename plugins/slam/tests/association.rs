@@ -2,6 +2,7 @@
 use crate::prior_map::Found;
 use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
+use manifactor_graph::FactorEntry;
 use manifactor_graph::checked::Positive;
 use manifactor_quadric::Camera;
 use manifactor_slam::association::{
@@ -326,6 +327,27 @@ fn boxes_of_a_crowd_are_mixtures_where_that_is_asked_for() {
     assert_eq!((mixtures(batch(&settings)), mixtures(stream(&settings))), (0, 0));
     assert!(mixtures(batch(&mixed)) > 10);
     assert!(mixtures(stream(&mixed)) > 10);
+}
+
+#[test]
+fn depths_and_boxes_whose_errors_last_are_mixtures_as_well() {
+    let crowd = ["source.scene.classes=[\"bottle\"]", "source.scene.area=[1.2,1.2]"];
+    let with = ["source.detector.depth_error=0.02", "variance_components={lasting=true}"];
+    let (settings, sequence) = scene(&[&crowd[..], &with].concat());
+    let odds = Some(Positive::new(10.0).unwrap());
+    let mixed = by(&settings, Likelihood { mixture_odds: odds, ..Likelihood::default() });
+    let (estimate, _) = run::estimate("crowd", sequence, &mixed, &mut Silent).unwrap();
+    let of = |name: &str, keys: usize| {
+        let factors = estimate.mapping.graph.factors().iter();
+        let named = factors.filter(|entry| entry.factor.typetag_name() == name && entry.keys.len() == keys);
+        named.collect::<Vec<_>>()
+    };
+    // a depth over the pose and either object; a box with its offset besides
+    assert!(of("max_mixture", 3).len() > 10 && of("max_mixture", 4).len() > 10);
+    // what the noise of boxes is found to be is not that of depths
+    let depths = of("centroid_depth", 2);
+    let information = |entry: &FactorEntry| entry.noise.information_matrix(1).unwrap()[(0, 0)];
+    assert!(!depths.is_empty() && depths.iter().all(|depth| information(depth) > 100.0));
 }
 
 #[test]

@@ -25,6 +25,10 @@ impl Tracker {
         let gain = |place: usize, id: ObjectId| gains.get(&(place, id)).copied();
         let ambiguity = |place: &usize| {
             let own = names[*place]?;
+            // of twins it is not known which is mapped
+            if places.iter().filter(|twin| names[**twin] == Some(own)).count() > 1 {
+                return None;
+            }
             let now = gain(*place, own)?;
             // twice the logarithm of how many times as likely the box, or the two boxes, are as they are
             let lost = |other: ObjectId, then: f64| {

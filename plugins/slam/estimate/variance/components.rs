@@ -179,12 +179,11 @@ pub(super) fn times(sequence: &Sequence) -> HashMap<Key, f64> {
 }
 
 pub(super) fn measures(entry: &FactorEntry) -> Measures {
-    let (pose, object) = (TypeId::of::<Se3>(), TypeId::of::<DualQuadric>());
+    let pose = TypeId::of::<Se3>();
     let variables = entry.factor.erased().signature().variables;
     match (&entry.keys[..], &variables[..]) {
         ([_, _], [a, b]) if *a == pose && *b == pose => Measures::Motion,
-        ([_, seen], [a, b]) if *a == pose && *b == object => Measures::Box { object: seen.clone() },
-        ([_, seen, _], _) if box_of(entry).is_some() => Measures::Box { object: seen.clone() },
+        ([_, seen, ..], _) if box_of(entry).is_some() => Measures::Box { object: seen.clone() },
         _ => Measures::Other,
     }
 }

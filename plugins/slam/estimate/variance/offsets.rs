@@ -29,7 +29,7 @@ pub(super) fn zero() -> Point4 {
 }
 
 /// The box that a factor measures, with an offset or without.
-pub(super) fn box_of(entry: &FactorEntry) -> Option<&BoundingBoxFactor> {
+pub(in crate::estimate) fn box_of(entry: &FactorEntry) -> Option<&BoundingBoxFactor> {
     let factor = entry.factor.erased().as_any();
     let shifted = || factor.downcast_ref::<BoundingBoxOffset>().map(|shifted| &shifted.0);
     factor.downcast_ref::<BoundingBoxFactor>().or_else(shifted)

@@ -3,7 +3,6 @@
 //! A place predicts boxes. Those of objects that it matches should lie where the map's ellipsoids are seen, and what the map has besides should be
 //! seen as well where it is in view: in another room, a few objects may stand as in the map, but the others are missing.
 use super::layout::{Aligned, Layout};
-use super::mean;
 use crate::estimate::looks::{Expected, Sight, sights};
 use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::ObjectId;
@@ -109,4 +108,9 @@ impl Mapper {
         let (bounding_box, camera) = (view.bounding_box, self.camera);
         BoundingBoxFactor { bounding_box, camera, model: BoxModel::Truncated }.predict(pose, quadric)
     }
+}
+
+fn mean(of: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, n) = of.fold((0.0, 0), |(sum, n), x| (sum + x, n + 1));
+    (n > 0).then(|| sum / f64::from(n))
 }

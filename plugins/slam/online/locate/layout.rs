@@ -187,13 +187,19 @@ impl Layout {
         &self,
         agreement: impl Fn(&Aligned) -> Option<Agreement>,
     ) -> Option<(Aligned, Agreement)> {
-        let mut possible = self.ranked().into_iter().filter_map(|(score, place, matches)| {
+        let mut ranked = self.ranked();
+        // what boxes say of a place is costly, and no lead is more than a score
+        if ranked.first().is_none_or(|(score, ..)| *score < LEAD) {
+            return None;
+        }
+        ranked.retain(|(score, ..)| *score > 0.0);
+        let mut possible = ranked.into_iter().filter_map(|(score, place, matches)| {
             let aligned = self.aligned(place, &matches, score);
             let agreement = agreement(&aligned)?;
             Some((aligned, agreement))
         });
         let (mut best, agreement) = possible.next()?;
-        best.lead -= possible.next().map_or(0.0, |(next, _)| next.lead.max(0.0));
+        best.lead -= possible.next().map_or(0.0, |(next, _)| next.lead);
         let place = &best.known_from_local;
         let among = self.local.iter().filter(|mark| self.is_among(&place.act(&mark.centre))).count();
         let Aligned { lead, matches, .. } = &best;
