@@ -742,7 +742,7 @@ def max_mixture(*, components: Sequence[types.Component]) -> Factor:
 
     The cost is continuous; where the best component changes, the rows jump. A component that is not defined takes no
     part; where none is, the mixture is not defined. It has noise of its own in each component: leave out `noise` beside it.
-    Evaluating allocates a little for each component: it is for a prior on an object, not for each measurement.
+    Evaluating allocates a little for each component: it is for priors on objects, and for some boxes, not for each measurement.
 
     ```toml
     [[factors]]
