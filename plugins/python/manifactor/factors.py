@@ -740,6 +740,8 @@ def max_mixture(*, components: Sequence[types.Component]) -> Factor:
     exp(-½|Wₖ rₖ|²), so components of different dimensions are compared by what they cost, not by how narrow they are. Rows: √(2 ln(w_max/wₖ)),
     then the whitened rows of the component; zeros, where it has fewer than another.
 
+    Components may be over different variables: `over` says which of the mixture's, as a box may show the one object or the other.
+
     The cost is continuous; where the best component changes, the rows jump. A component that is not defined takes no
     part; where none is, the mixture is not defined. It has noise of its own in each component: leave out `noise` beside it.
     Evaluating allocates a little for each component: it is for priors on objects, and for some boxes, not for each measurement.
@@ -754,6 +756,20 @@ def max_mixture(*, components: Sequence[types.Component]) -> Factor:
         { weight = 0.6, factor = { type = "vertical_orientation_smooth" }, noise = { sigma = 0.1 } },
         { weight = 0.3, factor = { type = "horizontal_orientation_smooth" }, noise = { sigma = 0.1 } },
         { weight = 0.1 },
+    ]
+    ```
+
+    A box from x0 that shows q0, or q1 half as likely:
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "q0", "q1"]
+
+    [factors.factor]
+    type = "max_mixture"
+    components = [
+        { weight = 2.0, over = [0, 1], factor = { type = "centroid_depth", depth = 1.5 }, noise = { sigma = 0.05 } },
+        { weight = 1.0, over = [0, 2], factor = { type = "centroid_depth", depth = 1.5 }, noise = { sigma = 0.05 } },
     ]
     ```
 

@@ -35,6 +35,9 @@ class Component(TypedDict, total=False):
     weight: Required[float]
     #: The factor that holds then. Default: none.
     factor: Factor | None
+    #: Which of the mixture's variables the factor is over, in its order: places among `keys`, from 0.
+    #: Default: all of them.
+    over: Any
     #: What the factor's residual is measured in.
     noise: Noise
 
