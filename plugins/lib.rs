@@ -167,6 +167,8 @@ use manifactor_viz as _;
 /// The blocks of Rust in the book are tests.
 #[cfg(doctest)]
 mod book {
+    #[doc = include_str!("../README.md")]
+    mod readme {}
     #[doc = include_str!("../docs/concepts.md")]
     mod concepts {}
     #[doc = include_str!("../docs/first-factor.md")]

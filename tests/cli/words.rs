@@ -3,3 +3,4 @@ mod book;
 mod log;
 mod mistakes;
 mod terminal;
+mod tutorial;

@@ -131,6 +131,40 @@ fn every_link_within_the_book_leads_somewhere() {
     assert!(count > 100, "{count} links");
 }
 
+/// The ratios of our time to the best peer's, of the pose graphs in the first table of `docs/benchmarks.md`.
+fn pose_graph_ratios(page: &str) -> Vec<f64> {
+    let table =
+        page.split("## How fast is the default solver?").nth(1).unwrap().split("\n## ").next().unwrap();
+    let object_maps = ["fifty_objects", "fr2_desk", "bundle"];
+    let rows = table.lines().filter(|line| line.starts_with("| "));
+    let cells = rows.map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
+    cells.filter(|cells| !object_maps.contains(&cells[1])).filter_map(|cells| cells[8].parse().ok()).collect()
+}
+
+#[test]
+fn the_readme_has_the_ratios_of_the_benchmarks() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let ratios = pose_graph_ratios(&std::fs::read_to_string(root.join("docs/benchmarks.md")).unwrap());
+    assert!(ratios.len() >= 8, "{ratios:?}");
+    let slowest = ratios.iter().copied().fold(0.0, f64::max);
+    let fastest = ratios.iter().copied().fold(1.0, f64::min);
+    let claim = format!("{:.1} to {:.1} times faster on public pose graphs", 1.0 / slowest, 1.0 / fastest);
+    let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
+    assert!(readme.contains(&claim), "README.md does not have `{claim}`");
+}
+
+#[test]
+fn the_front_page_lists_every_page() {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let front = std::fs::read_to_string(docs.join("README.md")).unwrap();
+    for page in std::fs::read_dir(&docs).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = page.file_name().unwrap().to_string_lossy().into_owned();
+        let listed =
+            ["README.md", "SUMMARY.md"].contains(&name.as_str()) || front.contains(&format!("({name})"));
+        assert!(listed || page.extension().is_none_or(|e| e != "md"), "docs/README.md does not list {name}");
+    }
+}
+
 /// The peers' factors in the book, by the interpreter that `python3` is; said aloud, where it lacks a peer.
 #[test]
 fn blocks_of_python_run_where_their_packages_are() {

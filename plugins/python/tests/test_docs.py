@@ -23,6 +23,14 @@ def test_an_example_of_the_book_runs(number: int, tmp_path: Path, monkeypatch: p
     exec(compile(block, f"{BOOK.name}, block {number}", "exec"), {"__name__": "book"})  # noqa: S102
 
 
+def test_the_example_of_the_readme_runs() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    space: dict[str, object] = {}
+    exec(compile(block, "README.md", "exec"), space)  # noqa: S102
+    assert space["solution"].converged  # type: ignore[attr-defined]
+
+
 def test_the_quickstart_is_short() -> None:
     assert len(BLOCKS) >= 10 and len(BLOCKS[0].strip().splitlines()) <= 20
 
