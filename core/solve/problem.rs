@@ -89,6 +89,14 @@ impl Problem {
         total
     }
 
+    /// The same, and the last factor by Cholesky stays: it is that of another H.
+    pub(crate) fn linearize_keeping_factor(&mut self) -> Evaluation {
+        let direct = self.system.take_direct();
+        let evaluation = self.linearize();
+        self.system.put_direct(direct);
+        evaluation
+    }
+
     /// Fills H and g, unless they are those of the estimate already.
     pub(crate) fn linearize_once(&mut self) {
         if self.linearized != Some(self.model.revision()) {

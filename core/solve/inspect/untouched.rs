@@ -27,6 +27,11 @@ impl Problem {
         let mut takes_part = vec![true; self.factors()];
         self.model.batches.iter().for_each(|batch| batch.inactive(&mut |factor| takes_part[factor] = false));
         takes_part.iter_mut().zip(self.weights()).for_each(|(part, weight)| *part &= *weight != 0.0);
+        if self.has_flat_variable() {
+            // a redescending loss gives no weight to what is far off
+            let idle = self.model.inspect().into_iter().filter(|state| state.weight == 0.0);
+            idle.for_each(|state| takes_part[state.entry] = false);
+        }
         let mut touched = vec![false; self.model.variables.len()];
         for (factor, _) in self.model.factors.iter().zip(&takes_part).filter(|(_, part)| **part) {
             factor.variables.iter().for_each(|variable| touched[*variable as usize] = true);
@@ -36,5 +41,14 @@ impl Problem {
             free.filter(|(_, touched)| !**touched).map(|(place, _)| place.key.clone()).collect();
         let active = takes_part.iter().filter(|part| **part).count();
         (!keys.is_empty()).then(|| Untouched { keys, active, factors: self.factors() })
+    }
+
+    /// Whether there is a free variable on which no residual depends to first order.
+    fn has_flat_variable(&self) -> bool {
+        let diagonal: Vec<f64> = self.system.diagonal().copied().collect();
+        self.model.variables.iter().any(|place| {
+            let mut unknowns = place.unknowns().flatten().peekable();
+            unknowns.peek().is_some() && unknowns.all(|unknown| diagonal[unknown] == 0.0)
+        })
     }
 }

@@ -66,6 +66,16 @@ impl LinearSystem {
         NormalEquations { h: &mut self.h, g: &mut self.g }
     }
 
+    /// The factor that is kept beside the method's own, to be put back after a linearization.
+    pub(crate) fn take_direct(&mut self) -> Option<Cholesky> {
+        self.direct.take()
+    }
+
+    /// Puts a factor back.
+    pub(crate) fn put_direct(&mut self, direct: Option<Cholesky>) {
+        self.direct = direct;
+    }
+
     /// Once all factors are added: the diagonal of what is held.
     pub(crate) fn finish(&mut self) {
         for &i in &self.held {

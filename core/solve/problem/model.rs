@@ -174,11 +174,16 @@ impl Model {
         self.batches.iter().map(|b| b.cost(columns)).fold(Evaluation::default(), Evaluation::and)
     }
 
-    /// Makes `estimate ⊞ step` the trial, and returns its cost.
-    pub(crate) fn try_step(&mut self, step: &[f64]) -> Evaluation {
+    /// Makes `estimate ⊞ step` the trial.
+    pub(crate) fn retract(&mut self, step: &[f64]) {
         for (i, starts) in self.starts.iter().enumerate() {
             self.trial.column_mut(i).retract_from(self.columns.column(i), starts, step);
         }
+    }
+
+    /// Makes `estimate ⊞ step` the trial, and returns its cost.
+    pub(crate) fn try_step(&mut self, step: &[f64]) -> Evaluation {
+        self.retract(step);
         self.cost_at(&self.trial)
     }
 
@@ -190,8 +195,18 @@ impl Model {
 
     /// ½ρ of each factor at the estimate, whatever its weight; zero where it is not defined.
     pub(crate) fn factor_costs(&self, costs: &mut Vec<f64>) {
+        self.factor_costs_at(&self.columns, costs);
+    }
+
+    /// The same at `estimate ⊞ step`, which becomes the trial.
+    pub(crate) fn factor_costs_beside(&mut self, step: &[f64], costs: &mut Vec<f64>) {
+        self.retract(step);
+        self.factor_costs_at(&self.trial, costs);
+    }
+
+    fn factor_costs_at(&self, columns: &Columns, costs: &mut Vec<f64>) {
         costs.resize(self.factors.len(), 0.0);
-        self.batches.iter().for_each(|b| b.costs(&self.columns, costs));
+        self.batches.iter().for_each(|b| b.costs(columns, costs));
     }
 
     /// Each factor as it stands at the estimate, in the order of the graph.

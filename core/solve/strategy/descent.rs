@@ -1,6 +1,7 @@
 //! A solve under way: what strategies share.
 mod account;
 mod best;
+mod minimum;
 mod undamped;
 
 use crate::linear::system::{dot, norm};
@@ -95,6 +96,10 @@ pub struct Descent<'a> {
     interrupted: bool,
     /// Something is open: steps that are not damped cannot be had.
     is_open: bool,
+    /// Stationary points that were left because they are no minima.
+    escapes: usize,
+    /// The last factorization is not that of a step.
+    pub(crate) is_refactorized: bool,
 }
 
 impl<'a> Descent<'a> {
@@ -124,6 +129,8 @@ impl<'a> Descent<'a> {
             history: Vec::with_capacity(stop.max_iterations.min(HISTORY)),
             interrupted: false,
             is_open: false,
+            escapes: 0,
+            is_refactorized: false,
         };
         match descent.not_finite() {
             None => Ok(descent),
@@ -188,6 +195,7 @@ impl<'a> Descent<'a> {
 
     /// Factorizes H + diag(damping), and takes -g half the way to the step; whether that was possible.
     fn factorize(&mut self, damping: Option<&[f64]>) -> bool {
+        self.is_refactorized = false;
         let Self { problem, observer, interrupted, .. } = self;
         problem.factorize(damping, &mut || go_on(*observer, interrupted)).is_ok()
     }
@@ -209,9 +217,9 @@ impl<'a> Descent<'a> {
             Some(termination)
         } else if self.interrupted {
             Some(Termination::Interrupted)
-        } else if self.at.cost <= self.stop.absolute_cost {
+        } else if self.at.cost <= self.stop.absolute_cost * self.unit() {
             Some(Termination::Converged { reason: Tolerance::AbsoluteCost })
-        } else if gradient <= self.stop.gradient {
+        } else if gradient <= self.stop.gradient * self.unit() {
             Some(Termination::Converged { reason: Tolerance::Gradient })
         } else if self.iterations >= self.stop.max_iterations {
             Some(Termination::MaxIterations)
@@ -223,6 +231,23 @@ impl<'a> Descent<'a> {
     /// Whether an observer has asked for an end.
     pub fn interrupted(&self) -> bool {
         self.interrupted
+    }
+
+    /// The share of absolute tolerances that holds here. They are meant for information of one or more, in the units of the
+    /// tangent; if all of it is less, they shrink with it, so that no unit of the noise makes a start look like a minimum.
+    pub(crate) fn unit(&self) -> f64 {
+        match self.problem.system.largest() {
+            largest if largest > 0.0 => largest.min(1.0),
+            _ => 1.0,
+        }
+    }
+
+    /// The largest cosine between the residuals and a column of the Jacobian: zero where the gradient is, whatever the units.
+    /// The test `gtol` of MINPACK.
+    fn largest_cosine(&self) -> f64 {
+        let length = (2.0 * self.at.cost).sqrt();
+        let cosine = |(g, d): (&f64, &f64)| if *d > 0.0 { g.abs() / (d.sqrt() * length) } else { 0.0 };
+        self.problem.system.g.iter().zip(self.problem.system.diagonal()).map(cosine).fold(0.0, f64::max)
     }
 
     fn largest_gradient(&self) -> f64 {
@@ -259,6 +284,8 @@ impl<'a> Descent<'a> {
     /// The same; `other`, where the last step shows nothing.
     pub(crate) fn stalled_by(&self, other: Stall) -> Termination {
         const ROUNDING: f64 = 1e-10;
+        /// At a minimum the cost has half of the digits for the estimate: a cosine below this is rounding.
+        const ORTHOGONAL: f64 = 1e-6;
         let Evaluation { cost, left, not_finite, .. } = self.trial;
         let reason = if self.interrupted {
             return Termination::Interrupted;
@@ -268,6 +295,8 @@ impl<'a> Descent<'a> {
             return self.blame(not_finite.unwrap_or_else(|| self.problem.model.not_finite_factor()));
         } else if cost - self.at.cost > ROUNDING * self.at.cost.abs() {
             Stall::Jump
+        } else if self.largest_cosine() <= ORTHOGONAL {
+            return Termination::Converged { reason: Tolerance::Gradient };
         } else {
             other
         };

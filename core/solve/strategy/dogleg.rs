@@ -55,7 +55,12 @@ impl Optimizer for Dogleg {
             Ok(descent) => descent,
             Err(outcome) => return *outcome,
         };
-        let termination = self.iterate(&mut descent);
+        let termination = loop {
+            let termination = self.iterate(&mut descent);
+            if !descent.leave_stationary_point(&termination) {
+                break termination;
+            }
+        };
         let open = descent.open_direction();
         descent.account(termination, open)
     }
@@ -74,7 +79,11 @@ impl Path {
     fn new(problem: &Problem, newton: &[f64]) -> Self {
         let mut path = Self { newton: newton.to_vec(), ..Self::default() };
         path.scale.extend(problem.system.diagonal());
-        path.scale.iter_mut().for_each(|d| *d = d.max(1e-12));
+        let least = match problem.system.largest() {
+            largest if largest > 0.0 => 1e-12 * largest.min(1.0),
+            _ => 1e-12,
+        };
+        path.scale.iter_mut().for_each(|d| *d = d.max(least));
         // steepest descent where lengths are measured by the diagonal: -D⁻¹g
         path.cauchy = problem.system.g.iter().zip(&path.scale).map(|(g, d)| -g / d).collect();
         let curvature = dot(&path.cauchy, &problem.system.multiply(&path.cauchy));

@@ -51,8 +51,14 @@ impl Optimizer for GaussNewton {
             Err(outcome) => return *outcome,
         };
         let mut best = Best::new(&descent);
-        let termination = iterate(&mut descent, &mut best);
-        best.restore(&mut descent);
+        let termination = loop {
+            let termination = iterate(&mut descent, &mut best);
+            best.restore(&mut descent);
+            if !descent.leave_stationary_point(&termination) {
+                break termination;
+            }
+            best = Best::new(&descent);
+        };
         let open = descent.open_direction();
         descent.account(termination, open)
     }

@@ -93,7 +93,8 @@ impl Optimizer for LevenbergMarquardt {
     }
 
     fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        self.solve_within(&|_| self.diagonal, problem, observer)
+        let [least, most] = self.diagonal;
+        self.solve_within(&|descent| [least * descent.unit(), most], problem, observer)
     }
 }
 register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
@@ -114,12 +115,20 @@ impl LevenbergMarquardt {
             Err(outcome) => return *outcome,
         };
         let mut lambda = self.initial_lambda;
-        let termination = self.iterate(&mut descent, &mut lambda, bounds);
+        let termination = loop {
+            let termination = self.iterate(&mut descent, &mut lambda, bounds);
+            if !descent.leave_stationary_point(&termination) {
+                break termination;
+            }
+            lambda = self.initial_lambda;
+        };
         // damping hides what nothing else holds; by now there is little left of it
         let open = match termination {
             Termination::Interrupted | Termination::NonFinite { .. } => None,
             _ if descent.iterations == 0 => None,
-            _ => undetermined(descent.problem, false, lambda * descent.problem.dim() as f64),
+            _ => {
+                undetermined(descent.problem, descent.is_refactorized, lambda * descent.problem.dim() as f64)
+            }
         };
         descent.account(termination, open)
     }

@@ -1,0 +1,245 @@
+//! Whether an ending is a minimum of the cost, and a way on if it is a maximum, a saddle or a singular point.
+//!
+//! The gradient vanishes at all of these, and so do the steps of every solver. JᵀJ cannot tell them apart: the curvature of
+//! the cost is JᵀJ + Σ r ∇²r, and only the second term can be negative.
+use super::Descent;
+use crate::linear::system::{dot, norm};
+use crate::outcome::{Termination, Tolerance};
+use nalgebra::DMatrix;
+
+/// Most ways on in one solve.
+const ESCAPES: usize = 10;
+/// Share of a standard deviation by which the test moves a variable.
+const SHARE: f64 = 0.1;
+/// Most that the test moves a variable, in the units of its tangent.
+const MOST: f64 = 0.05;
+/// The same for a direction in which no factor has a slope.
+const UNKNOWN: f64 = 1e-3;
+/// Share of a factor's cost below which its second difference is rounding.
+const ROUNDING: f64 = 1e-8;
+/// Share of the test's step for differences of gradients.
+const DIFFERENCE: f64 = 1e-2;
+/// Most products with the Hessian.
+const PRODUCTS: usize = 8;
+/// Curvature, as a share of JᵀJ's, above which a minimum is not in doubt.
+const SOUND: f64 = 0.5;
+/// Directions without a slope that are tried one by one.
+const FLAT: usize = 32;
+/// Shares of the diagonal that make JᵀJ positive definite: the least that will do.
+const SHIFTS: [f64; 3] = [1e-10, 1e-6, 1e-3];
+/// Share of the largest entry of the diagonal that counts as the least.
+const FLOOR: f64 = 1e-9;
+/// Solves that are to end roughly, such as the inner ones of graduated non-convexity, are not tested.
+const ROUGH: f64 = 1e-4;
+
+/// What a probe of all factors on both sides of the estimate has found.
+struct Probe {
+    /// Unknowns of factors whose own curvature is negative.
+    bent: Vec<bool>,
+    /// Whether a factor is not defined at the estimate, and defined on both sides of it.
+    is_singular: bool,
+}
+
+impl Descent<'_> {
+    /// Leaves a point at which the solve has ended although the cost falls beside it. Whether it has: the solve then goes on.
+    pub(crate) fn leave_stationary_point(&mut self, termination: &Termination) -> bool {
+        let Termination::Converged { reason } = termination else { return false };
+        let is_zero = *reason == Tolerance::AbsoluteCost && self.at.inactive == 0;
+        if is_zero || self.stop.relative_cost > ROUGH || self.escapes >= ESCAPES || self.gradient().is_empty()
+        {
+            return false;
+        }
+        let steps = self.probe_steps();
+        let probe = self.probe(&steps);
+        if probe.is_singular {
+            self.escapes += 1;
+            self.move_by(&steps);
+            return self.at.not_finite.is_none();
+        }
+        let flat: Vec<usize> = self.flat_unknowns().take(FLAT).collect();
+        if flat.is_empty() && !probe.bent.contains(&true) {
+            return false;
+        }
+        let unit = |i: &usize| {
+            let mut direction = vec![0.0; steps.len()];
+            direction[*i] = steps[*i].abs();
+            direction
+        };
+        let found = flat.iter().map(unit).any(|direction| self.go_down(&direction))
+            || self.bent_direction(&steps, &probe.bent).is_some_and(|direction| self.go_down(&direction));
+        self.escapes += usize::from(found);
+        found
+    }
+
+    /// A step for each unknown, a tenth of its standard deviation, with the noise scaled to fit the residuals: the same for
+    /// any unit of the noise.
+    fn probe_steps(&self) -> Vec<f64> {
+        let rows: u32 = self.problem.model.factors.iter().map(|factor| factor.rows).sum();
+        let fit = (2.0 * self.at.cost / f64::from(rows.max(1))).sqrt();
+        // factors that take no part have no say in how good the fit is
+        let fit = if self.at.inactive > 0 { fit.max(1.0) } else { fit };
+        let step = |(i, d): (usize, &f64)| {
+            let wave = ((i * 7919 % 104_729) as f64 + 1.0).sin();
+            let size = if *d > 0.0 { (SHARE * fit / d.sqrt()).min(MOST) } else { UNKNOWN };
+            size * (0.5 + 0.5 * wave.abs()).copysign(wave)
+        };
+        let mut steps: Vec<f64> = self.problem.system.diagonal().enumerate().map(step).collect();
+        self.problem.system.held.iter().for_each(|i| steps[*i] = 0.0);
+        steps
+    }
+
+    /// Unknowns on which no whitened and weighted residual depends to first order.
+    fn flat_unknowns(&self) -> impl Iterator<Item = usize> {
+        self.problem.system.diagonal().enumerate().filter(|(_, d)| **d == 0.0).map(|(i, _)| i)
+    }
+
+    /// Second differences of each factor's cost.
+    fn probe(&mut self, steps: &[f64]) -> Probe {
+        let model = &mut self.problem.model;
+        let (mut here, mut ahead, mut behind) = (vec![], vec![], vec![]);
+        model.factor_costs(&mut here);
+        model.factor_costs_beside(steps, &mut ahead);
+        let back: Vec<f64> = steps.iter().map(|x| -x).collect();
+        model.factor_costs_beside(&back, &mut behind);
+        let mut is_inactive = vec![false; here.len()];
+        if self.at.inactive > 0 {
+            model.batches.iter().for_each(|batch| batch.inactive(&mut |factor| is_inactive[factor] = true));
+        }
+        let mut probe = Probe { bent: vec![false; steps.len()], is_singular: false };
+        let weights = model.weights();
+        for (i, place) in model.factors.iter().enumerate() {
+            if weights.get(i) == Some(&0.0) {
+                continue;
+            }
+            let (ahead, behind, here) = (ahead[i], behind[i], here[i]);
+            probe.is_singular |= is_inactive[i] && ahead > 0.0 && behind > 0.0;
+            if is_inactive[i] || ahead + behind - 2.0 * here > -ROUNDING * (ahead + behind + here) {
+                continue;
+            }
+            for variable in &place.variables {
+                let variable = &model.variables[*variable as usize];
+                variable.unknowns().flatten().for_each(|unknown| probe.bent[unknown] = true);
+            }
+        }
+        probe
+    }
+
+    /// A direction of negative curvature, if there is one: the Lanczos method in the metric of JᵀJ, in which all of a good
+    /// minimum's curvatures are close to one. Begins at the unknowns of factors with negative curvature.
+    fn bent_direction(&mut self, steps: &[f64], bent: &[bool]) -> Option<Vec<f64>> {
+        let largest = self.problem.system.largest();
+        let floor = if largest > 0.0 { FLOOR * largest } else { 1.0 };
+        let scale: Vec<f64> = self.problem.system.diagonal().map(|d| d.max(floor)).collect();
+        let shift = SHIFTS.into_iter().map(|share| scale.iter().map(|d| share * d).collect::<Vec<f64>>());
+        let shift =
+            shift.into_iter().find(|shift| self.problem.system.factorize_directly(Some(shift)).is_ok())?;
+        self.is_refactorized = true;
+        let found = self.lanczos(steps, bent, &shift);
+        self.at = self.problem.linearize();
+        found
+    }
+
+    /// The search itself, with JᵀJ + `shift` factorized. Leaves the linearization of another point.
+    fn lanczos(&mut self, steps: &[f64], bent: &[bool], shift: &[f64]) -> Option<Vec<f64>> {
+        let gradient = self.problem.system.g.clone();
+        let metric = self.problem.system.h.clone();
+        let weighed = |system: &crate::linear::system::LinearSystem, x: &[f64]| {
+            let mut y: Vec<f64> = x.iter().zip(shift).map(|(x, s)| x * s).collect();
+            system.layout.multiply_add(&metric, x, &mut y);
+            y
+        };
+        let mut next: Vec<f64> =
+            steps.iter().zip(bent).map(|(x, bent)| if *bent { *x } else { 0.0 }).collect();
+        let (mut basis, mut products): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (vec![], vec![]);
+        while basis.len() < PRODUCTS.min(steps.len()) {
+            // twice is enough (Parlett)
+            for vector in basis.iter().chain(&basis) {
+                let along = dot(&weighed(&self.problem.system, &next), vector);
+                next.iter_mut().zip(vector).for_each(|(x, v)| *x -= along * v);
+            }
+            let length = dot(&weighed(&self.problem.system, &next), &next).sqrt();
+            if !(length > 0.0 && length.is_finite()) {
+                break;
+            }
+            next.iter_mut().for_each(|x| *x /= length);
+            let product = self.hessian_product(&next, steps, &gradient)?;
+            basis.push(next);
+            next = product.clone();
+            products.push(product);
+            let projected = DMatrix::from_fn(basis.len(), basis.len(), |i, j| {
+                0.5 * (dot(&basis[i], &products[j]) + dot(&basis[j], &products[i]))
+            });
+            let eigen = projected.symmetric_eigen();
+            let least = eigen.eigenvalues.imin();
+            if eigen.eigenvalues[least] < 0.0 {
+                let mut direction = vec![0.0; steps.len()];
+                for (vector, share) in basis.iter().zip(eigen.eigenvectors.column(least).iter()) {
+                    direction.iter_mut().zip(vector).for_each(|(d, v)| *d += share * v);
+                }
+                return Some(direction);
+            }
+            if basis.len() > 2 && eigen.eigenvalues[least] > SOUND {
+                break;
+            }
+            self.problem.system.cholesky()?.solve(&mut next);
+        }
+        None
+    }
+
+    /// The Hessian of the cost times a direction, by a difference of gradients; `None` where that is not finite.
+    fn hessian_product(&mut self, direction: &[f64], steps: &[f64], gradient: &[f64]) -> Option<Vec<f64>> {
+        let share = shortest(direction, steps)?;
+        let step: Vec<f64> = direction.iter().map(|d| DIFFERENCE * share * d).collect();
+        self.problem.model.retract(&step);
+        self.problem.model.accept();
+        let there = self.problem.linearize_keeping_factor();
+        let mut product: Vec<f64> = self.problem.system.g.iter().zip(gradient).map(|(a, b)| a - b).collect();
+        self.problem.model.accept();
+        product.iter_mut().for_each(|x| *x /= DIFFERENCE * share);
+        self.problem.system.held.iter().for_each(|i| product[*i] = 0.0);
+        (there.not_finite.is_none() && norm(&product).is_finite()).then_some(product)
+    }
+
+    /// Goes along a direction, or against it, as long as the cost falls; whether it does by more than the tolerance.
+    fn go_down(&mut self, direction: &[f64]) -> bool {
+        let steps = self.probe_steps();
+        let Some(share) = shortest(direction, &steps) else { return false };
+        let enough = self.at.cost * (1.0 - self.stop.relative_cost.max(ROUNDING));
+        let mut best: Option<(f64, Vec<f64>)> = None;
+        for sign in [1.0, -1.0] {
+            let mut size = sign * share;
+            let mut before = self.at.cost;
+            while let Some(cost) = self.cost_beside(direction, size).filter(|cost| *cost < before) {
+                if cost < enough && best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                    best = Some((cost, direction.iter().map(|d| size * d).collect()));
+                }
+                (before, size) = (cost, 2.0 * size);
+            }
+        }
+        let Some((cost, step)) = best else { return false };
+        tracing::debug!(cost, "left a stationary point that is no minimum");
+        self.move_by(&step);
+        self.at.not_finite.is_none()
+    }
+
+    /// The cost beside the estimate, if all factors that take part are defined and finite there.
+    fn cost_beside(&mut self, direction: &[f64], size: f64) -> Option<f64> {
+        let step: Vec<f64> = direction.iter().map(|d| size * d).collect();
+        let there = self.problem.try_step(&step);
+        (there.left == 0 && there.not_finite.is_none() && there.cost.is_finite()).then_some(there.cost)
+    }
+
+    fn move_by(&mut self, step: &[f64]) {
+        self.problem.model.retract(step);
+        self.problem.model.accept();
+        self.at = self.problem.linearize();
+        self.trial = self.at;
+    }
+}
+
+/// By how much a direction may be multiplied so that no unknown moves by more than its step.
+fn shortest(direction: &[f64], steps: &[f64]) -> Option<f64> {
+    let moving = direction.iter().zip(steps).filter(|(d, s)| **d != 0.0 && **s != 0.0);
+    let share = moving.map(|(d, s)| (s / d).abs()).fold(f64::INFINITY, f64::min);
+    (share.is_finite() && share > 0.0).then_some(share)
+}
