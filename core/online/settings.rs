@@ -44,8 +44,8 @@ pub struct Settings {
 
 /// The test that a factor has to pass: what it costs on top of what is known must be below the χ² quantile for its rows.
 ///
-/// Candidates are those of [`Gnc`](manifactor_solve::Gnc): factors that couple variables, but for odometry, between variables of one type
-/// that came one after the other.
+/// Candidates are those of [`Gnc`](manifactor_solve::Gnc): factors that couple variables, except odometry, the first trusted factor
+/// between variables of one type that came one after the other.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Outliers {

@@ -23,7 +23,7 @@ pub use setting::SettingError;
 pub use strategy::{
     Auto, BadParameter, Candidates, Descent, Dogleg, FactorType, GaussNewton, Given, Gnc, Growth,
     LevenbergMarquardt, Optimizer, Probability, Start, StartError, Step, Stopping, Tried, Truncation,
-    UnknownFactor,
+    UnknownFactor, is_sequential,
 };
 
 /// The dense kernel of a front, for solvers that keep fronts of their own.

@@ -12,7 +12,9 @@ pub use auto::Auto;
 pub use descent::{Descent, Step, Tried};
 pub use dogleg::Dogleg;
 pub use gauss_newton::GaussNewton;
-pub use gnc::{BadParameter, Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor};
+pub use gnc::{
+    BadParameter, Candidates, FactorType, Gnc, Growth, Probability, Truncation, UnknownFactor, is_sequential,
+};
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use optimizer::{Optimizer, Stopping};
 pub use start::{Given, Start, StartError};

@@ -9,6 +9,7 @@ mod factors;
 mod functions;
 mod groups;
 mod initialise;
+mod procrustes;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
@@ -22,3 +23,4 @@ pub use groups::{
     Se3, So2, So3, atan2, wrap,
 };
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
+pub use procrustes::{NearestRotation, nearest_rotation};

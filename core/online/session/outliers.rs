@@ -17,6 +17,7 @@ use crate::factor_id::FactorId;
 use crate::report::{Rejection, Report};
 use crate::saved::Suspect;
 use manifactor_graph::{FactorEntry, Resolved};
+use manifactor_solve::is_sequential;
 use std::collections::BTreeSet;
 
 /// Factors that may go out after one update, as they do not fit any more.
@@ -38,15 +39,27 @@ impl Session {
         let outliers = self.settings.outliers.as_ref()?;
         let name = entry.factor.typetag_name();
         let is_named = outliers.types.is_empty() || outliers.types.iter().any(|t| t.as_str() == name);
-        let follows = |pair: &[u32]| {
-            let (a, b) = (self.model.place(pair[0]), self.model.place(pair[1]));
-            a.column == b.column && a.ordinal.abs_diff(b.ordinal) == 1
-        };
         let variables = &resolved.variables;
-        let couples = variables.len() > 1 && !variables.windows(2).all(follows);
+        let couples = variables.len() > 1 && !self.is_odometry(variables);
         let rows = entry.factor.erased().signature().rows.filter(|rows| *rows > 0)?;
         let (bound, gain) = (outliers.probability.chi_squared(rows), outliers.gain * rows as f64);
         (is_named && couples).then_some(Suspect { bound, gain, since: Some(self.updates + 1) })
+    }
+
+    /// Whether a new factor between these variables is odometry: they follow one another, and no other factor between the
+    /// same variables is trusted already.
+    fn is_odometry(&self, variables: &[u32]) -> bool {
+        let places = variables.iter().map(|v| self.model.place(*v));
+        if !is_sequential(places.map(|place| (place.column as usize, place.ordinal))) {
+            return false;
+        }
+        let mut sorted = variables.to_vec();
+        sorted.sort_unstable();
+        let is_trusted = |f: &u32| {
+            let factor = self.model.factor(*f).filter(|factor| factor.entry.is_some() && !factor.rejected);
+            !self.suspects.contains_key(f) && factor.is_some_and(|f| f.variables().eq(sorted.iter().copied()))
+        };
+        !self.model.factors_of(variables).iter().any(is_trusted)
     }
 
     /// Notes new factors that may be wrong, and forgets those that are gone; returns which of the new are still there.

@@ -28,6 +28,8 @@ pub struct Step {
     pub norm: f64,
     /// What the solver controls it by, for the record: its damping, say, or the radius of its trust region.
     pub control: f64,
+    /// Share of the slope along the step that damping takes, from 0 to 1: δᵀDδ / δᵀ(H + D)δ. Zero without damping.
+    pub damped: f64,
 }
 
 impl Step {
@@ -177,7 +179,9 @@ impl<'a> Descent<'a> {
             return false;
         }
         let damped = step.delta.iter().zip(damping).map(|(d, a)| a * d * d).sum::<f64>();
-        step.predicted = 0.5 * (damped - dot(&step.delta, &self.problem.system.g));
+        let slope = -dot(&step.delta, &self.problem.system.g);
+        step.predicted = 0.5 * (damped + slope);
+        step.damped = if slope > 0.0 { damped / slope } else { 0.0 };
         step.norm = norm(&step.delta);
         true
     }
@@ -189,6 +193,7 @@ impl<'a> Descent<'a> {
             return false;
         }
         step.predicted = -0.5 * dot(&step.delta, &self.problem.system.g);
+        step.damped = 0.0;
         step.norm = norm(&step.delta);
         true
     }

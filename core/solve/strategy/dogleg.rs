@@ -137,7 +137,7 @@ impl Dogleg {
                 let delta = path.point(within);
                 let (g, length) = (dot(&delta, descent.gradient()), path.length(&delta));
                 let predicted = -g - 0.5 * dot(&delta, &descent.problem.system.multiply(&delta));
-                let step = Step { predicted, norm: norm(&delta), control: within, delta };
+                let step = Step { predicted, norm: norm(&delta), control: within, delta, ..Step::default() };
                 let tried = descent.attempt(&step);
                 let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
                 descent.record(&step, accepted);

@@ -68,8 +68,10 @@ impl Default for LevenbergMarquardt {
 const GAIN: f64 = 1e-4;
 /// Damping that changes a step by next to nothing: one that is refused with less calls for more than twice as much.
 const NEGLIGIBLE: f64 = 1e-3;
-/// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal.
+/// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal; and the largest share of the slope
+/// along it that damping may take, since a diagonal with bounds may be far above that of H.
 const TRUSTED: f64 = 1.0;
+const TRUSTED_SHARE: f64 = 0.5;
 /// Damping up to which one small step means convergence; above, it takes two.
 const LIGHT: f64 = 1e-2;
 
@@ -146,6 +148,7 @@ impl LevenbergMarquardt {
                 damping.extend(descent.problem.system.diagonal().map(|d| *lambda * d.max(least).min(most)));
                 step.control = *lambda;
                 if descent.damped(&damping, &mut step) {
+                    let is_trusted = step.control <= TRUSTED && step.damped <= TRUSTED_SHARE;
                     let tried = descent.attempt(&step);
                     let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
                     descent.record(&step, accepted);
@@ -154,7 +157,6 @@ impl LevenbergMarquardt {
                         (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
                         let ended = descent.take(&step);
                         // a step that damping has made small says little of the cost around
-                        let is_trusted = step.control <= TRUSTED;
                         let small = ended.is_some() && is_trusted;
                         match ended {
                             Some(termination) if small && (small_before || step.control <= LIGHT) => {
@@ -167,11 +169,10 @@ impl LevenbergMarquardt {
                         }
                         continue 'linearized;
                     }
-                    if !matches!(tried, Tried::Undefined) && step.control <= TRUSTED && descent.settled(&step)
-                    {
+                    if !matches!(tried, Tried::Undefined) && is_trusted && descent.settled(&step) {
                         return Termination::Converged { reason: Tolerance::RelativeCost };
                     }
-                    if step.control <= TRUSTED && step.norm <= descent.stop.step {
+                    if is_trusted && step.norm <= descent.stop.step {
                         return Termination::Converged { reason: Tolerance::Step };
                     }
                 }

@@ -1,6 +1,6 @@
 //! What linear methods need of rotations and poses, in the plane and in space alike.
 use crate::groups::LieGroup;
-use crate::{Se2, Se3, So2, So3, atan2};
+use crate::{Se2, Se3, So2, So3, atan2, nearest_rotation};
 use manifactor_graph::Variable;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 
@@ -33,17 +33,11 @@ fn log_in_plane(r: &Matrix2<f64>) -> (Vector3<f64>, Matrix2<f64>) {
     (Vector3::new(0.0, 0.0, theta), inverse.fixed_view::<2, 2>(0, 0).transpose())
 }
 
-/// U diag(1, 1, det(UVᵀ)) Vᵀ of the singular value decomposition.
+/// The closest rotation, of determinant 1.
 fn nearest_in_space(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    let svd = m.svd(true, true);
-    let (mut u, v) = (svd.u?, svd.v_t?);
-    let last = svd.singular_values.imin();
-    if (u * v).determinant() < 0.0 {
-        u.column_mut(last).neg_mut();
-    }
-    let r = u * v;
-    let orthogonal = (r.tr_mul(&r) - Matrix3::identity()).norm() < 1e-3;
-    (orthogonal && r.determinant() > 0.0).then_some(r)
+    let found = nearest_rotation(m);
+    let is_finite = found.singular_values.iter().all(|value| value.is_finite());
+    (is_finite && found.singular_values[0] > 0.0).then(|| found.rotation.matrix())
 }
 
 fn log_in_space(r: &Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {

@@ -63,10 +63,10 @@ impl Manifold for Plane {
 }
 register_manifold!("plane", Plane);
 
-/// A plane is known beforehand: r = (n × n₀, offset - offset₀), in radians and metres.
+/// A plane is known beforehand: r = (n - n₀, offset - offset₀), in radians and metres.
 ///
-/// Four rows: the sine of the angle between the normals, and the distance. Turning the normal over by half a turn is a
-/// maximum, where the derivative of the cost vanishes. Defined everywhere.
+/// Four rows: the difference of the unit normals, of length 2 sin(θ/2) for an angle θ, and the distance. The plane turned over
+/// is another plane: its cost is the maximum, and the derivative vanishes there. Smooth and defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -87,7 +87,7 @@ impl Residual for PlanePrior {
 
     fn residual<T: Scalar>(&self, (plane,): Lifted<Self::Variables, T>) -> nalgebra::Vector4<T> {
         let expected = self.value.lift::<T>();
-        plane.normal.cross(&expected.normal).push(plane.offset - expected.offset)
+        (plane.normal - expected.normal).push(plane.offset - expected.offset)
     }
 }
 register_factor!("prior_plane", PlanePrior);
@@ -108,5 +108,19 @@ mod tests {
         let plane = table.lift::<f64>();
         assert!(plane.height(&Vector3::new(7.0, 1.2, 1.6)).abs() < 1e-12);
         assert!((plane.height(&Vector3::new(0.0, 1.8, 2.4)) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_plane_turned_over_costs_the_most() {
+        let prior = |normal: Vector3<f64>, offset| {
+            let value = Plane { normal: Direction::new(Vector3::z()).unwrap(), offset: 0.7 };
+            let plane = Plane { normal: Direction::new(normal).unwrap(), offset };
+            PlanePrior { value }.residual::<f64>((plane.lift(),)).norm()
+        };
+        assert_eq!(prior(Vector3::z(), 0.7), 0.0);
+        // the same points, seen from below
+        assert!((prior(-Vector3::z(), -0.7) - 2.0_f64.hypot(1.4)).abs() < 1e-12);
+        assert!((prior(-Vector3::z(), 0.7) - 2.0).abs() < 1e-12);
+        assert!((prior(Vector3::x(), 0.7) - 2.0_f64.sqrt()).abs() < 1e-12);
     }
 }

@@ -1,6 +1,6 @@
 //! Bringing an estimate into the frame of the truth.
 use super::{MetricsError, PosePair};
-use manifactor_geometry::{Se3, So3};
+use manifactor_geometry::{NearestRotation, Se3, So3, nearest_rotation};
 use nalgebra::{Matrix3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -68,6 +68,9 @@ pub fn align(pairs: &[PosePair], kind: Alignment) -> Result<(Similarity, Vec<Pos
     Ok((similarity, pairs.iter().map(aligned).collect()))
 }
 
+/// Share of the largest singular value below which positions lie on one line: 0.3 mm on 300 m.
+const FLAT: f64 = 1e-12;
+
 /// Umeyama, Least-Squares Estimation of Transformation Parameters Between Two Point Patterns, 1991,
 /// equations 38 to 43.
 fn umeyama(pairs: &[PosePair], with_scale: bool) -> Result<Similarity, MetricsError> {
@@ -80,16 +83,12 @@ fn umeyama(pairs: &[PosePair], with_scale: bool) -> Result<Similarity, MetricsEr
         variance += x.norm_squared() / n;
         covariance += y * x.transpose() / n;
     }
-    let svd = covariance.svd(true, true);
-    let (Some(u), Some(vt)) = (svd.u, svd.v_t) else { return Err(MetricsError::Degenerate) };
-    let d = svd.singular_values;
-    // rank 1 or 0, to rounding: the second direction is anyone's guess
-    if d.iter().filter(|d| **d > 1e-12 * d.max(f64::MIN_POSITIVE)).count() < 2 {
+    let NearestRotation { rotation, singular_values } = nearest_rotation(&covariance);
+    // rank 1 or 0, to rounding: the rotation about a line is arbitrary
+    if singular_values[1] <= FLAT * singular_values[0] {
         return Err(MetricsError::Degenerate);
     }
-    let s = Vector3::new(1.0, 1.0, (u.determinant() * vt.determinant()).signum());
-    let rotation = So3::from_matrix(&(u * Matrix3::from_diagonal(&s) * vt));
-    let scale = if with_scale { d.dot(&s) / variance } else { 1.0 };
+    let scale = if with_scale { singular_values.iter().sum::<f64>() / variance } else { 1.0 };
     let translation = y_mean - rotation.act(&x_mean) * scale;
     Ok(Similarity { scale, rotation, translation })
 }

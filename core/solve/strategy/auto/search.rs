@@ -1,5 +1,5 @@
 //! Other starts, where the given values lead nowhere.
-use super::watch::{Pause, Watch};
+use super::watch::{InDomain, Pause, Watch};
 use super::{Auto, DAMPING};
 use crate::observer::Observer;
 use crate::outcome::Outcome;
@@ -113,9 +113,14 @@ impl Auto {
         if let Some(damping) = point.damping {
             return self.damped(damping, problem, observer);
         }
-        let outcome = self.full_steps(problem, observer);
+        let mut watch = InDomain { observer, has_left: false };
+        let outcome = self.full_steps(problem, &mut watch);
+        let InDomain { observer, has_left } = watch;
         match outcome.termination {
             Termination::Stalled { .. } => outcome.then(self.damped(DAMPING, problem, observer), true),
+            Termination::Interrupted if has_left => {
+                outcome.then(self.damped(REFUSED, problem, observer), true)
+            }
             _ => outcome,
         }
     }

@@ -84,3 +84,23 @@ impl Observer for Watch<'_> {
         if self.stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
+
+/// Ends a solve by full steps once one leaves the domain of a factor: halved until it does not, it leads anywhere.
+pub(super) struct InDomain<'a> {
+    pub observer: &'a mut dyn Observer,
+    pub has_left: bool,
+}
+
+impl Observer for InDomain<'_> {
+    fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()> {
+        self.has_left |= record.trial_cost.is_none();
+        match self.observer.iteration(record) {
+            ControlFlow::Continue(()) if self.has_left => ControlFlow::Break(()),
+            flow => flow,
+        }
+    }
+
+    fn poll(&mut self) -> ControlFlow<()> {
+        self.observer.poll()
+    }
+}

@@ -1,15 +1,18 @@
 //! Which factors may be outliers.
 use crate::problem::{FactorPlace, Problem};
-use manifactor_graph::catalogue;
+use manifactor_graph::{VariableIndices, catalogue};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
+use std::collections::HashSet;
 
 /// The factors that may be outliers. All others are trusted, and keep their full weight.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Candidates {
-    /// Factors that couple variables, but for odometry: between variables of one type that follow one another in
-    /// the order of the values. Priors and other factors of a single variable are trusted too.
+    /// Factors that couple variables, except odometry: the first factor between variables of one type that follow one another
+    /// in the order of the values. Further factors between the same variables are candidates. Priors and other factors of a
+    /// single variable are trusted.
     #[default]
     LoopClosures,
     /// Every factor.
@@ -53,15 +56,32 @@ impl FactorType {
 impl Candidates {
     /// By factor: whether it is a candidate.
     pub(crate) fn of(self, problem: &Problem) -> Vec<bool> {
-        let follows = |pair: &[u32]| {
-            let (a, b) =
-                (&problem.model.variables[pair[0] as usize], &problem.model.variables[pair[1] as usize]);
-            a.column == b.column && a.index.abs_diff(b.index) == 1
-        };
-        let may = |factor: &FactorPlace| match self {
+        let mut connected = HashSet::new();
+        let mut may = |factor: &FactorPlace| match self {
             Self::All => true,
-            Self::LoopClosures => factor.variables.len() > 1 && !factor.variables.windows(2).all(follows),
+            Self::LoopClosures => {
+                let place = |variable: &u32| &problem.model.variables[*variable as usize];
+                let places =
+                    factor.variables.iter().map(place).map(|place| (place.column, place.index as u64));
+                factor.variables.len() > 1
+                    && !(is_sequential(places) && connected.insert(sorted(&factor.variables)))
+            }
         };
-        problem.model.factors.iter().map(may).collect()
+        problem.model.factors.iter().map(&mut may).collect()
     }
+}
+
+/// Whether variables are of one type and follow one another, as those of odometry do. Of several factors between the same
+/// variables only the first is odometry: a wrong loop closure between neighbours would be trusted otherwise.
+///
+/// A variable is given by its column, one for each type, and its position among the variables of that type.
+pub fn is_sequential(variables: impl IntoIterator<Item = (usize, u64)>) -> bool {
+    let variables: SmallVec<[(usize, u64); 4]> = variables.into_iter().collect();
+    variables.windows(2).all(|pair| pair[0].0 == pair[1].0 && pair[0].1.abs_diff(pair[1].1) == 1)
+}
+
+fn sorted(variables: &[u32]) -> VariableIndices {
+    let mut sorted = VariableIndices::from_slice(variables);
+    sorted.sort_unstable();
+    sorted
 }

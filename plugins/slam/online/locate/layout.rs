@@ -7,7 +7,7 @@ use crate::association::assignment;
 use crate::input::fusion::Fusion;
 use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::ObjectId;
-use manifactor_geometry::{Se3, So3};
+use manifactor_geometry::{NearestRotation, Se3, nearest_rotation};
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{Direction, Noise};
 use manifactor_quadric::DualQuadric;
@@ -276,18 +276,10 @@ impl Layout {
             // up is known better than any mark
             products += *v * u.transpose() * (UP * spread);
         }
-        let svd = products.svd(true, true);
-        let (Some(u), Some(vt)) = (svd.u, svd.v_t) else { return None };
-        let mut values: Vec<f64> = svd.singular_values.iter().copied().collect();
-        values.sort_by(|a, b| b.total_cmp(a));
-        if values[1] <= FLAT * values[0] {
+        let NearestRotation { rotation, singular_values } = nearest_rotation(&products);
+        if singular_values[1] <= FLAT * singular_values[0] {
             return None;
         }
-        let sign = (u.determinant() * vt.determinant()).signum();
-        let mut turned = vt;
-        let least = svd.singular_values.imin();
-        turned.row_mut(least).scale_mut(sign);
-        let rotation = So3::from_matrix(&(u * turned));
         Some(Se3::new(rotation, known - rotation.act(&local)))
     }
 

@@ -1,0 +1,115 @@
+//! The rotation closest to a matrix: orthogonal Procrustes.
+use crate::So3;
+use nalgebra::{Matrix3, Vector3};
+
+/// The rotation R for which tr(Rᵀ M) is largest, and the singular values of M.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestRotation {
+    /// R. About the first direction it is arbitrary if `singular_values[1]` is zero, and about all if the first is.
+    pub rotation: So3,
+    /// In descending order; the last one is negative if M has a negative determinant. Their sum is tr(Rᵀ M).
+    pub singular_values: [f64; 3],
+}
+
+/// Most sweeps over the three pairs of columns; four or five are the rule.
+const SWEEPS: usize = 30;
+
+/// Finds the rotation closest to a matrix (Kabsch, 1976; Umeyama, 1991, equation 40).
+///
+/// One-sided Jacobi rotations give small singular values to full relative accuracy (Demmel and Veselić, 1992). A
+/// decomposition by bidiagonalization resolves them only to rounding of the largest one, which turns a nearly straight
+/// trajectory by a wrong angle about its direction.
+pub fn nearest_rotation(matrix: &Matrix3<f64>) -> NearestRotation {
+    let (mut a, mut v) = (*matrix, Matrix3::identity());
+    for _ in 0..SWEEPS {
+        let mut is_done = true;
+        for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+            let (alpha, beta) = (a.column(i).norm_squared(), a.column(j).norm_squared());
+            let gamma = a.column(i).dot(&a.column(j));
+            if gamma.abs() <= f64::EPSILON * (alpha * beta).sqrt() {
+                continue;
+            }
+            is_done = false;
+            let zeta = (beta - alpha) / (2.0 * gamma);
+            let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
+            let cosine = 1.0 / tangent.hypot(1.0);
+            let sine = cosine * tangent;
+            for columns in [&mut a, &mut v] {
+                let (x, y) = (columns.column(i).clone_owned(), columns.column(j).clone_owned());
+                columns.set_column(i, &(x * cosine - y * sine));
+                columns.set_column(j, &(x * sine + y * cosine));
+            }
+        }
+        if is_done {
+            break;
+        }
+    }
+    let mut order = [0, 1, 2];
+    order.sort_by(|i, j| a.column(*j).norm().total_cmp(&a.column(*i).norm()));
+    let [first, second, third] = order.map(|i| a.column(i).clone_owned());
+    let [v0, v1, v2] = order.map(|i| v.column(i).clone_owned());
+    let u0 = first.try_normalize(0.0).unwrap_or(v0);
+    let u1 = (second - u0 * u0.dot(&second)).try_normalize(0.0).unwrap_or_else(|| across(&u0, &v1));
+    let (u2, w2) = (u0.cross(&u1), v0.cross(&v1));
+    let rotation = u0 * v0.transpose() + u1 * v1.transpose() + u2 * w2.transpose();
+    let last = third.norm().copysign(third.dot(&u2) * v2.dot(&w2));
+    NearestRotation {
+        rotation: So3::from_matrix(&rotation),
+        singular_values: [first.norm(), second.norm(), last],
+    }
+}
+
+/// A unit vector across `direction`, close to `wanted` if that is not along it.
+fn across(direction: &Vector3<f64>, wanted: &Vector3<f64>) -> Vector3<f64> {
+    let candidates = [*wanted, Vector3::x(), Vector3::y()].map(|c| c - direction * direction.dot(&c));
+    candidates.into_iter().find_map(|c| c.try_normalize(0.1)).unwrap_or_else(Vector3::z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::any_so3;
+    use manifactor_testing::strategies::vector;
+    use proptest::prelude::*;
+
+    fn trace(rotation: &So3, matrix: &Matrix3<f64>) -> f64 {
+        (rotation.matrix().transpose() * matrix).trace()
+    }
+
+    proptest! {
+        #[test]
+        fn no_rotation_nearby_is_closer(u in any_so3(), v in any_so3(), turn in vector::<3>(1.0), k in 0..12_i32, flip in any::<bool>()) {
+            let least = 10.0_f64.powi(-k) * if flip { -1.0 } else { 1.0 };
+            let matrix = u.matrix() * Matrix3::from_diagonal(&Vector3::new(1.0, least.abs().sqrt(), least)) * v.matrix();
+            let found = nearest_rotation(&matrix);
+            let best = trace(&found.rotation, &matrix);
+            prop_assert!((best - found.singular_values.iter().sum::<f64>()).abs() < 1e-12);
+            let other = found.rotation.compose(&So3::exp(&(turn * 1e-3)));
+            prop_assert!(trace(&other, &matrix) <= best + 1e-15);
+        }
+
+        #[test]
+        fn small_singular_values_are_accurate(u in any_so3(), k in 2..14_i32) {
+            let least = 10.0_f64.powi(-k);
+            // columns of very different lengths: each entry is exact to rounding, and so is each singular value
+            let matrix = u.matrix() * Matrix3::from_diagonal(&Vector3::new(1.0, least, least * least));
+            let found = nearest_rotation(&matrix);
+            prop_assert!((found.singular_values[1] / least - 1.0).abs() < 1e-12);
+            prop_assert!((found.singular_values[2] / (least * least) - 1.0).abs() < 1e-12);
+            prop_assert!(found.rotation.local(&u).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_rotation_comes_out_of_matrices_without_rank() {
+        for matrix in [Matrix3::zeros(), Vector3::x() * Vector3::y().transpose(), Matrix3::identity() * -1.0]
+        {
+            let found = nearest_rotation(&matrix);
+            let rotation = found.rotation.matrix();
+            assert!((rotation * rotation.transpose() - Matrix3::identity()).norm() < 1e-12, "{matrix}");
+            assert!(
+                (trace(&found.rotation, &matrix) - found.singular_values.iter().sum::<f64>()).abs() < 1e-12
+            );
+        }
+    }
+}
