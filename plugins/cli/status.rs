@@ -1,4 +1,5 @@
 //! Exit codes.
+use manifactor::slam::mapping::Warning;
 use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::solve::{Stall, Termination};
 
@@ -14,6 +15,8 @@ pub enum Status {
     NotConverged,
     /// Objects were detected, and none is in the map: exit code 1.
     NothingMapped,
+    /// More detections were left out than the source expects: exit code 1.
+    DetectionsLeftOut,
     /// A factor was checked, and breaks a law: exit code 1.
     Broken,
     /// Ctrl-C before all was done; the best values so far are written: exit code 130.
@@ -42,7 +45,9 @@ impl From<&VariantReport> for Status {
     fn from(report: &VariantReport) -> Self {
         let nothing = report.counts.detections > 0 && report.counts.objects == 0;
         let mapped = if nothing { Self::NothingMapped } else { Self::Done };
-        mapped.max(Self::from(&report.solve.termination))
+        let is_partial = report.warnings.iter().any(|w| matches!(w, Warning::TooManyUnused { .. }));
+        let used = if is_partial { Self::DetectionsLeftOut } else { Self::Done };
+        mapped.max(used).max(Self::from(&report.solve.termination))
     }
 }
 
@@ -50,7 +55,7 @@ impl From<Status> for u8 {
     fn from(status: Status) -> u8 {
         match status {
             Status::Done => 0,
-            Status::NotConverged | Status::NothingMapped | Status::Broken => 1,
+            Status::NotConverged | Status::NothingMapped | Status::DetectionsLeftOut | Status::Broken => 1,
             Status::Interrupted => 130,
         }
     }

@@ -88,9 +88,9 @@ impl Detection {
             return row(format!("expected a score from 0 to 1, got {}", self.score));
         }
         let sides = [self.xmin, self.ymin, self.xmax, self.ymax];
-        let ordered = self.xmin < self.xmax && self.ymin < self.ymax;
+        let ordered = self.xmin <= self.xmax && self.ymin <= self.ymax;
         if !(ordered && sides.iter().all(|s| s.is_finite())) {
-            return row(format!("expected a box with xmin < xmax and ymin < ymax, got {sides:?}"));
+            return row(format!("expected a box with xmin ≤ xmax and ymin ≤ ymax, got {sides:?}"));
         }
         if let Some(depth) = self.depth.filter(|depth| !(*depth > 0.0 && depth.is_finite())) {
             return row(format!("expected a depth above 0 m, or none, got {depth}"));
@@ -207,7 +207,7 @@ mod tests {
             "d.csv:2: expected 8 fields as in the header, got 5\n\
              d.csv:3: column `score`, the 3. of the row: invalid float literal\n\
              d.csv:5: expected a score from 0 to 1, got 1.5\n\
-             d.csv:6: expected a box with xmin < xmax and ymin < ymax, got [3.0, 2.0, 3.0, 4.0]"
+             d.csv:6: expected a box with xmin ≤ xmax and ymin ≤ ymax, got [3.0, 2.0, 3.0, 4.0]"
         );
     }
 

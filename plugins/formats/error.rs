@@ -90,6 +90,24 @@ pub enum Mistake {
         /// The line of the first definition.
         first: usize,
     },
+    /// The same sensor again.
+    #[error("PARAMS_SE3OFFSET {id} is defined twice, first in line {first}; remove one of the two")]
+    DuplicateSensor {
+        /// Its number.
+        id: u64,
+        /// The line of the first definition.
+        first: usize,
+    },
+    /// Tags that no reader knows.
+    #[error(
+        "unknown tags, on {lines} lines: {}; check their spelling, or leave these lines out with --lenient", tags.join(", ")
+    )]
+    UnknownTags {
+        /// How many lines have one.
+        lines: usize,
+        /// The first few of them.
+        tags: Vec<String>,
+    },
     /// An edge from a vertex to itself.
     #[error("the edge connects vertex {id} with itself")]
     SelfEdge {

@@ -54,6 +54,8 @@ pub struct Reading {
     pub repair: Repair,
     /// Whether to hold what nothing in the file fixes: a pose, or a scale.
     pub anchor: bool,
+    /// Whether to leave out lines that the format does not know.
+    pub lenient: bool,
 }
 
 /// What to do with an information matrix that is not positive definite.

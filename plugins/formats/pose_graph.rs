@@ -9,7 +9,7 @@
 //! - in each connected part of the graph that no `FIX` line holds, the first pose is held, unless
 //!   [`Options::anchor`] says not to.
 use crate::error::{FormatError, Mistake, Problems};
-use crate::graph_format::{GraphFormat, GraphRead};
+use crate::graph_format::{GraphFormat, GraphRead, Reading};
 use crate::lines::lines;
 use crate::text::read_text;
 use crate::words::{count, list};
@@ -37,7 +37,8 @@ crate::register_graph_format!(GraphFormat {
     extensions: &["g2o", "toro", "graph"],
     begins: |text| lines(text).next().is_some_and(|(_, line)| parser(tag_of(line).0).is_some()),
     parse: |text, path, reading| {
-        let options = Options { repair: reading.repair, anchor: reading.anchor, ..Options::default() };
+        let Reading { repair, anchor, lenient } = reading;
+        let options = Options { repair, anchor, lenient, ..Options::default() };
         let PoseGraph { graph, values, report } = parse(text, path, &options)?;
         Ok(GraphRead { graph, values, notes: report.notes() })
     },
@@ -66,6 +67,8 @@ pub struct Options {
     pub repair: Repair,
     /// Hold the first pose of each connected part that nothing else holds.
     pub anchor: bool,
+    /// Leave lines with unknown tags out. Otherwise they are an error: the file is more than the graph that is read.
+    pub lenient: bool,
     /// For vertices that only edges name.
     pub tree: Tree,
     /// Standard deviation of an `EQUIV` without an edge, in metres and radians.
@@ -77,6 +80,7 @@ impl Default for Options {
         Self {
             repair: Repair::Error,
             anchor: true,
+            lenient: false,
             tree: Tree::Chain,
             equivalence_sigma: Positive::literal(1e-3),
         }
@@ -112,8 +116,13 @@ impl Report {
     /// In words, what the file left open and how it was filled in.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        for (tag, n) in &self.unknown {
-            notes.push(format!("unknown tag `{tag}`: {} left out", count(*n, "line")));
+        for (tag, n) in self.unknown.iter().take(SHOWN_TAGS) {
+            notes.push(format!("unknown tag {}: {} left out", shown(tag), count(*n, "line")));
+        }
+        if self.unknown.len() > SHOWN_TAGS {
+            let rest: usize = self.unknown.values().skip(SHOWN_TAGS).sum();
+            let tags = count(self.unknown.len() - SHOWN_TAGS, "more unknown tag");
+            notes.push(format!("{tags}: {} left out", count(rest, "line")));
         }
         if !self.filled.is_empty() {
             let filled = count(self.filled.len(), "variable");
@@ -143,6 +152,16 @@ impl Report {
     }
 }
 
+/// Unknown tags that are named.
+const SHOWN_TAGS: usize = 10;
+
+/// A tag between backquotes, as much of it as a message has room for.
+fn shown(tag: &str) -> String {
+    const LONGEST: usize = 40;
+    let start: String = tag.chars().take(LONGEST).collect();
+    if start.len() < tag.len() { format!("`{start}…`") } else { format!("`{tag}`") }
+}
+
 /// The tag of a line, and what follows it.
 fn tag_of(line: &str) -> (&str, &str) {
     line.split_once(char::is_whitespace).unwrap_or((line, ""))
@@ -158,7 +177,7 @@ fn parser(tag: &str) -> Option<record::Parse> {
 /// # Errors
 /// All malformed lines; vertices defined twice, used as another type or fixed without being there;
 /// edges of a vertex with itself; information that is not positive definite, unless it is repaired; a
-/// file without any vertex or edge. Unknown tags are no error, but in the report.
+/// file without any vertex or edge; unknown tags, unless [`Options::lenient`] leaves them out.
 pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path, options)
@@ -183,8 +202,12 @@ pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<Po
         }
     }
     if records.is_empty() && problems.is_empty() {
-        let unknown = unknown.keys().take(10).cloned().collect();
+        let unknown = unknown.keys().take(SHOWN_TAGS).map(|tag| shown(tag)).collect();
         problems.push(0, Mistake::Empty { expected: "vertices or edges of a g2o or TORO file", unknown });
+    }
+    if !options.lenient && !records.is_empty() && !unknown.is_empty() {
+        let tags = unknown.keys().take(SHOWN_TAGS).map(|tag| shown(tag)).collect();
+        problems.push(0, Mistake::UnknownTags { lines: unknown.values().sum(), tags });
     }
     let built = build::build(&records, options, &mut problems);
     problems.finish()?;

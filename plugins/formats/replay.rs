@@ -16,6 +16,8 @@ pub struct Replay {
     known: HashSet<Key>,
     /// What is held, and has not been told yet.
     fixed: Graph,
+    /// Initial values of the whole graph.
+    initial: Values,
 }
 
 /// What one step brings: factors, and the first values of their new variables.
@@ -23,7 +25,8 @@ pub struct Replay {
 pub struct Step {
     /// New factors; what the whole graph holds of the new variables is held.
     pub factors: Graph,
-    /// By new variable, where odometry leads from the estimate of what is known.
+    /// By new variable: its initial value if it is held, else where odometry leads from the estimate of known variables, else
+    /// its initial value.
     pub values: Values,
 }
 
@@ -33,8 +36,8 @@ fn number(key: &Key) -> Option<u64> {
 }
 
 impl Replay {
-    /// The steps of a graph; none, where it has no poses.
-    pub fn of(graph: &Graph) -> Self {
+    /// The steps of a graph with these initial values; none, where it has no poses.
+    pub fn of(graph: &Graph, initial: &Values) -> Self {
         let poses = |entry: &FactorEntry| entry.keys.iter().filter_map(number).collect::<Vec<_>>();
         let first = graph.factors().iter().flat_map(poses).min();
         let mut steps: BTreeMap<u64, Vec<FactorEntry>> = BTreeMap::new();
@@ -56,6 +59,7 @@ impl Replay {
             waiting: Waiting::default(),
             known: HashSet::new(),
             fixed,
+            initial: initial.clone(),
         }
     }
 
@@ -93,12 +97,22 @@ impl Replay {
                 values.insert_boxed(key.clone(), value);
             }
         }
+        let held: Vec<&Key> = keys.iter().filter(|key| self.fixed.fixed().contains_key(*key)).collect();
+        // the first pose of all is where the file has it: other factors may say where in the world that is
+        let first =
+            keys.iter().find(|key| number(key).is_some()).filter(|_| values.is_empty() && held.is_empty());
+        for key in held.into_iter().chain(first) {
+            if let Some(value) = self.initial.variable(key.as_str()) {
+                values.insert_boxed(key.clone(), value.erased().clone_box());
+            }
+        }
         let placed = spanning_tree(&graph, &values, Tree::Chain)?;
         for key in keys {
             if let Some(held) = self.fixed.fixed().get(&key) {
                 graph.set_fixed(&key, held.clone());
             }
-            if let Some(value) = placed.variable(key.as_str()) {
+            if let Some(value) = placed.variable(key.as_str()).or_else(|| self.initial.variable(key.as_str()))
+            {
                 step.values.insert_boxed(key, value.erased().clone_box());
             }
         }
@@ -192,7 +206,32 @@ impl Latencies {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use manifactor_geometry::{Between, Se2};
+    use manifactor_geometry::{Between, Point2, Range, Se2, So2};
+    use manifactor_graph::checked::Positive;
+
+    #[test]
+    fn held_variables_and_those_without_odometry_start_at_their_initial_values() {
+        let at = |x: f64| Se2::new(So2::identity(), [x, 0.0].into());
+        let (mut graph, mut initial) = (Graph::new(), Values::new());
+        for (key, x) in [("x0", 5.0), ("x1", 9.0), ("x2", 20.0)] {
+            initial.insert(key, at(x));
+        }
+        initial.insert("l0", Point2::new([7.0, 8.0]));
+        graph.add(["x0", "l0"], Range::<Se2, Point2>::new(Positive::literal(2.0)));
+        graph.add(["x0", "x1"], Between { relative: at(1.0) });
+        graph.add(["x1", "x2"], Between { relative: at(1.0) });
+        graph.fix("x2");
+        let (mut replay, mut known) = (Replay::of(&graph, &initial), Values::new());
+        while let Some(step) = replay.step(|key| known.variable(key).map(|v| v.erased().clone_box())).unwrap()
+        {
+            for (key, value) in step.values.iter() {
+                known.insert_boxed(key.clone(), value.erased().clone_box());
+            }
+        }
+        let x = |key: &str| known.get::<Se2>(key).unwrap().translation.x;
+        assert_eq!([x("x0"), x("x1"), x("x2")], [5.0, 6.0, 20.0]);
+        assert_eq!(known.get::<Point2>("l0").unwrap().0[1], 8.0);
+    }
 
     #[test]
     fn factors_wait_until_something_known_reaches_them_and_come_in_their_order() {
@@ -204,7 +243,7 @@ mod tests {
         [("x0", "x1"), ("x1", "x2"), ("x3", "m"), ("m", "x4"), ("x2", "x5"), ("x4", "x5")]
             .into_iter()
             .for_each(|(a, b)| link(a, b));
-        let mut replay = Replay::of(&graph);
+        let mut replay = Replay::of(&graph, &Values::new());
         let mut told: Vec<Vec<String>> = vec![];
         let mut known = Values::new();
         while let Some(step) = replay.step(|key| known.variable(key).map(|v| v.erased().clone_box())).unwrap()

@@ -109,6 +109,7 @@ pub(crate) mod tests {
             up: None,
             accelerometer: vec![],
             ground_truth: None,
+            unused: vec![],
         }
     }
 

@@ -7,7 +7,7 @@ use crate::association::Ambiguity;
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::fusion::FusedClass;
 use crate::input::prior_map::PriorObject;
-use crate::input::sequence::{ObjectId, Sequence};
+use crate::input::sequence::{ObjectId, Sequence, UnusedDetection};
 use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
 use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, Verdict, unmatched};
 use crate::settings::{DetectionSettings, OdometrySettings, Settings};
@@ -214,6 +214,10 @@ impl Mapping {
         let odometry = sequence.frames.iter().map(|frame| (frame.timestamp, frame.world_from_camera));
         let doubts = plausible::trajectory(odometry).into_iter().map(|what| Warning::Implausible { what });
         self.warnings.extend(doubts);
+        self.warnings.extend(unused(sequence, self.measurements.without_area));
+        let detected = self.objects.iter().filter(|object| object.detections > 0);
+        self.warnings
+            .extend(not_mapped(detected.filter_map(|object| Some((object, object.rejected.as_ref()?)))));
         let classes = self.objects.iter().filter_map(|object| Some(object.class.as_ref()?.name.clone()));
         let mut seen: Vec<String> = classes.collect();
         seen.sort();
@@ -230,6 +234,61 @@ impl Mapping {
             self.warnings.push(Warning::NotRobust);
         }
     }
+}
+
+/// Detections that are not used, a warning for each reason.
+fn unused(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
+    let mut warnings = vec![];
+    let (mut boxes, mut first) = (0, None);
+    for unused in &sequence.unused {
+        match unused {
+            UnusedDetection::WithoutPose(without) => {
+                warnings.push(Warning::Unused { what: without.to_string() })
+            }
+            UnusedDetection::Box { timestamp, place, fault } => {
+                boxes += 1;
+                first.get_or_insert_with(|| format!("box {place} at {timestamp} s: {fault}"));
+            }
+        }
+    }
+    if let Some(first) = first {
+        let what = format!("boxes that cannot be read are left out: {boxes}, the first {first}");
+        warnings.push(Warning::Unused { what });
+    }
+    if without_area > 0 {
+        let what = format!(
+            "boxes without width or height are left out: {without_area}; check the detector's output"
+        );
+        warnings.push(Warning::Unused { what });
+    }
+    warnings
+}
+
+/// Objects that are not mapped, a warning for each kind of reason.
+fn not_mapped<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a Rejection)>) -> Vec<Warning> {
+    const NAMED: usize = 5;
+    let mut kinds: Vec<(&Rejection, Vec<String>)> = vec![];
+    for (object, rejection) in objects {
+        let class = object.class.as_ref().map(|class| format!(" ({})", class.name)).unwrap_or_default();
+        let named = format!("{}{class}", object.key);
+        match kinds
+            .iter_mut()
+            .find(|(kind, _)| std::mem::discriminant(*kind) == std::mem::discriminant(rejection))
+        {
+            Some((_, keys)) => keys.push(named),
+            None => kinds.push((rejection, vec![named])),
+        }
+    }
+    let warning = |(rejection, keys): (&Rejection, Vec<String>)| {
+        let more = match keys.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let named = keys.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let what = format!("{named}{more}: {rejection}");
+        Warning::NotMapped { what, remedy: rejection.remedy() }
+    };
+    kinds.into_iter().map(warning).collect()
 }
 
 /// What was decided of an object.

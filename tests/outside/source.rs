@@ -29,6 +29,7 @@ impl Source for Nothing {
             up: Some(Direction::Z),
             accelerometer: vec![],
             ground_truth: None,
+            unused: vec![],
         })
     }
 }

@@ -11,7 +11,7 @@ use manifactor::slam::metrics::{
     Alignment, MetricsError, Pairing, Statistics, absolute_error, align, associate, identity, relative_error,
 };
 use serde_json::json;
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -87,9 +87,19 @@ impl Evaluate {
             Ok((similarity.scale, pairs.len(), ate, rpe))
         };
         let (scale, pairs, ate, rpe) = measure().map_err(Failure::input)?;
+        let poses = [estimate.poses.len(), truth.poses.len()];
+        let warning = (2 * pairs < poses[0].min(poses[1])).then(|| {
+            let within = self.within.get();
+            format!(
+                "the errors are over {pairs} poses, less than half of the {} of the estimate and of the {} of the truth: no other \
+                 pose has a partner within {within} s; --within SECONDS sets the limit",
+                poses[0], poses[1]
+            )
+        });
         if self.json {
             output::json(&json!({
-                "pairs": pairs, "scale": scale, "ate": ate,
+                "pairs": pairs, "poses": { "estimate": poses[0], "truth": poses[1] }, "warning": warning,
+                "scale": scale, "ate": ate,
                 "rpe": { "translation": rpe.translation, "rotation": rpe.rotation },
             }));
             return Ok(Status::Done);
@@ -99,7 +109,15 @@ impl Evaluate {
         table.row(row("RPE translation, m", &rpe.translation));
         table.row(row("RPE rotation, rad", &rpe.rotation));
         let pairs = text::count(pairs, "matched pose");
-        output::print(&format!("{pairs}, scale {scale:.6}\n{}\n", table.text()));
+        output::print(&format!(
+            "{pairs} ({} in the estimate, {} in the truth), scale {scale:.6}\n{}\n",
+            poses[0],
+            poses[1],
+            table.text()
+        ));
+        if let Some(warning) = warning {
+            output::say(&format!("warning: {warning}"));
+        }
         Ok(Status::Done)
     }
 }
@@ -108,11 +126,17 @@ impl Evaluate {
     /// Objects of boxes.
     fn boxes(&self) -> Result<Status, Failure> {
         let (truth, put) = (detections::read(&self.truth)?, detections::read(&self.estimate)?);
-        let key = |d: &Detection| (d.timestamp.to_bits(), [d.xmin, d.ymin, d.xmax, d.ymax].map(f64::to_bits));
+        // 0.0 and -0.0 are equal, and have different bits
+        let bits = |x: f64| (x + 0.0).to_bits();
+        let key = |d: &Detection| (bits(d.timestamp), [d.xmin, d.ymin, d.xmax, d.ymax].map(bits));
         let object = |d: &Detection| d.object_key.filter(|key| *key != 0);
-        let put: HashMap<_, _> = put.iter().map(|detection| (key(detection), object(detection))).collect();
-        let named = truth.iter().filter_map(|detection| Some((object(detection)?, put.get(&key(detection)))));
-        let named: Vec<_> = named.collect();
+        // a box may be there twice, under two names: they are compared in the order of the files
+        let mut boxes: HashMap<_, VecDeque<Option<u32>>> = HashMap::new();
+        put.iter().for_each(|d| boxes.entry(key(d)).or_default().push_back(object(d)));
+        let mut found = |d: &Detection| boxes.get_mut(&key(d)).and_then(VecDeque::pop_front);
+        let named = truth.iter().map(|d| (object(d), found(d)));
+        let named: Vec<(u32, Option<Option<u32>>)> =
+            named.filter_map(|(object, put)| Some((object?, put))).collect();
         let missing = named.iter().filter(|(_, put)| put.is_none()).count();
         if named.is_empty() || missing == named.len() {
             let (truth, put) = (self.truth.display(), self.estimate.display());
@@ -121,7 +145,7 @@ impl Evaluate {
                 text::count(named.len(), "box")
             )));
         }
-        let scores = identity(named.iter().map(|(truth, put)| (*truth, put.copied().flatten())));
+        let scores = identity(named.iter().map(|(truth, put)| (*truth, put.flatten())));
         if self.json {
             output::json(&json!({ "missing": missing, "scores": scores }));
             return Ok(Status::Done);

@@ -121,7 +121,7 @@ impl Replay {
         let session = Session::new(input.online.clone()).map_err(Failure::input)?;
         let report = Report::default();
         let mut replayed = Replayed { session, times: vec![], report, interrupted: false, left_out: 0 };
-        let mut steps = Steps::of(&input.graph);
+        let mut steps = Steps::of(&input.graph, &input.values);
         if steps.is_empty() {
             return Err(Failure::with_help(
                 format!("{}: there are no poses to replay", self.graph.display()),

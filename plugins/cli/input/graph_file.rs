@@ -22,6 +22,9 @@ pub(crate) struct Reading {
     /// Do not hold the first pose where nothing in a pose graph fixes it; nor a scale, where images alone are seen.
     #[arg(long)]
     no_anchor: bool,
+    /// Leave out lines with unknown tags, and report them; otherwise they are an error.
+    #[arg(long)]
+    lenient: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -85,7 +88,7 @@ impl Reading {
             RepairChoice::Reject => Repair::Reject,
             RepairChoice::Clamp => Repair::Clamp,
         };
-        formats::Reading { repair, anchor: !self.no_anchor }
+        formats::Reading { repair, anchor: !self.no_anchor, lenient: self.lenient }
     }
 }
 

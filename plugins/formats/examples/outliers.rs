@@ -113,7 +113,7 @@ fn online(truth: &Graph, misled: &Misled) -> Line {
         places.entry(text(entry)).or_default().push(i);
     }
     let (mut times, mut ids): (Vec<f64>, Vec<(FactorId, usize)>) = (vec![], vec![]);
-    let mut replay = Replay::of(&misled.graph);
+    let mut replay = Replay::of(&misled.graph, &Values::new());
     let (mut batches, mut trials) = (0, 0);
     while let Some(step) = replay.step(|key| session.estimate(key)).unwrap() {
         let begin = cpu_seconds();

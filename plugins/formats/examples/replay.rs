@@ -5,7 +5,7 @@
 //! odometry, never from the file's vertices. CPU time of one
 //! thread, in milliseconds; the gap is (cost − optimum) / optimum, every N poses.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
-use manifactor_formats::pose_graph::{self, Options, Repair};
+use manifactor_formats::pose_graph::{self, Options, PoseGraph, Repair};
 use manifactor_formats::replay::{Latencies, Replay};
 use manifactor_online::{Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
@@ -36,11 +36,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         );
     }
     for path in files {
-        let graph = pose_graph::read(&path, &options)?.graph;
+        let PoseGraph { graph, values, .. } = pose_graph::read(&path, &options)?;
         let mut session = Session::new(Settings::default())?;
         let (mut times, mut differences) = (vec![], vec![]);
         let (mut damped, mut batches) = (0, 0);
-        let mut replay = Replay::of(&graph);
+        let mut replay = Replay::of(&graph, &values);
         while let Some(step) = replay.step(|key| session.estimate(key))? {
             let begin = cpu_seconds();
             session.push(&step.factors, &step.values)?;

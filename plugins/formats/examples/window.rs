@@ -4,7 +4,7 @@
 //! again from where the last one ended, with new names; factors to poses that have left are left out. CPU time of one
 //! thread, in milliseconds.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
-use manifactor_formats::pose_graph::{self, Options};
+use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use manifactor_formats::replay::{Latencies, Replay};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_online::{Session, Settings, Span, Window};
@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             _ => path = argument,
         }
     }
-    let graph = pose_graph::read(&path, &Options::default())?.graph;
+    let PoseGraph { graph, values, .. } = pose_graph::read(&path, &Options::default())?;
     let window = Some(Window::from(Span::Poses(poses)));
     let mut session = Session::new(Settings { window, ..Settings::default() })?;
     let name = |pass: usize, key: &Key| Key::from(format!("{pass}:{key}"));
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("| pass | left out | p50 | p99 | max | MB of fronts | MB of the process | bytes saved |");
     println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for pass in 0..passes {
-        let (mut replay, mut times, mut left_out) = (Replay::of(&graph), vec![], 0);
+        let (mut replay, mut times, mut left_out) = (Replay::of(&graph, &values), vec![], 0);
         // where the pass would be without a window: odometry goes on from there
         let mut all = Values::new();
         while let Some(step) = replay.step(|key| {

@@ -1,14 +1,16 @@
 //! Which variables have to be held so that every connected part of a graph stays where it is.
 use manifactor_graph::{Fixed, Graph, Key, Values};
 
-/// The first pose of each connected part in which nothing is held; of a part without a pose, its first
-/// variable.
+/// The first pose of each connected part in which nothing is held, and nothing is measured in the frame of the world; of a
+/// part without a pose, its first variable.
 pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> bool) -> Vec<Key> {
     let mut parts = Parts::connected(graph, values);
     let place = |key: &Key| values.position(key.as_str());
     let mut held = vec![false; values.len()];
     let whole = graph.fixed().iter().filter(|(_, fixed)| **fixed == Fixed::Whole(true));
     whole.filter_map(|(key, _)| place(key)).for_each(|i| held[i] = true);
+    let absolute = graph.factors().iter().filter(|entry| entry.keys.len() == 1);
+    absolute.flat_map(|entry| &entry.keys).filter_map(place).for_each(|i| held[i] = true);
     let mut part_is_held = vec![false; values.len()];
     for (i, held) in held.into_iter().enumerate() {
         part_is_held[parts.root(i)] |= held;

@@ -1,13 +1,18 @@
 //! From the lines of a file to a graph and its values.
 use super::anchor::anchors;
 use super::information::{Outcome, noise};
-use super::record::{Edge, Measurement, Record, Vertex, VertexType};
+use super::record::{Absolute, AbsoluteMeasurement, Edge, Measurement, Record, Vertex, VertexType};
 use super::{Options, PoseGraph, Report};
 use crate::error::{Mistake, Problems};
 use crate::text::plausible;
-use manifactor_geometry::{Between, Coordinates, Landmark, Point3, Se2, Se3, spanning_tree};
+use manifactor_geometry::{
+    BearingRange2, Between, Coordinates, Landmark, LieGroup, Point3, Position, Prior, Se2, Se3, So2,
+    spanning_tree,
+};
+use manifactor_graph::checked::Positive;
 use manifactor_graph::{Factor, FactorEntry, Graph, Key, Noise, ValueError, Values};
 use nalgebra::DMatrix;
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
@@ -22,19 +27,18 @@ pub(crate) fn build(
     for (line, record) in records {
         let defined = match record {
             Record::Vertex { id, value } => builder.define(*line, *id, value),
-            Record::Sensor { id, pose } => {
-                builder.sensors.insert(*id, *pose);
-                Ok(())
-            }
+            Record::Sensor { id, pose } => builder.sensor(*line, *id, *pose),
             _ => Ok(()),
         };
         problems.ok(*line, defined);
     }
     for (line, record) in records {
-        if let Record::Edge(edge) = record {
-            let added = builder.edge(*line, edge);
-            problems.ok(*line, added);
-        }
+        let added = match record {
+            Record::Edge(edge) => builder.edge(*line, edge),
+            Record::Absolute(absolute) => builder.absolute(*line, absolute),
+            _ => Ok(()),
+        };
+        problems.ok(*line, added);
     }
     for (line, record) in records {
         let added = match record {
@@ -62,7 +66,10 @@ struct Builder<'a> {
     types: HashMap<u64, (usize, VertexType)>,
     /// Vertices without a line of their own.
     missing: BTreeMap<u64, VertexType>,
-    sensors: HashMap<u64, Se3>,
+    /// Poses of sensors on the vehicle, each with its line.
+    sensors: HashMap<u64, (usize, Se3)>,
+    /// Poses as absolute measurements have them, for those without a line of their own.
+    located: Values,
     /// Pairs with an edge between them, the smaller number first.
     linked: HashSet<(u64, u64)>,
 }
@@ -82,6 +89,7 @@ impl<'a> Builder<'a> {
             types: HashMap::new(),
             missing: BTreeMap::new(),
             sensors: HashMap::new(),
+            located: Values::new(),
             linked: HashSet::new(),
         }
     }
@@ -115,6 +123,59 @@ impl<'a> Builder<'a> {
         Err(Mistake::VertexType { id, expected: expected.name(), found: found.name(), first })
     }
 
+    fn sensor(&mut self, line: usize, id: u64, pose: Se3) -> Result<(), Mistake> {
+        match self.sensors.entry(id) {
+            Entry::Occupied(known) => Err(Mistake::DuplicateSensor { id, first: known.get().0 }),
+            Entry::Vacant(new) => {
+                new.insert((line, pose));
+                Ok(())
+            }
+        }
+    }
+
+    fn sensor_pose(&self, id: u64) -> Result<Se3, Mistake> {
+        let known = self.sensors.get(&id).map(|(_, pose)| *pose);
+        known.ok_or(Mistake::Unknown { what: "PARAMS_SE3OFFSET", id })
+    }
+
+    fn absolute(&mut self, line: usize, absolute: &Absolute) -> Result<(), Mistake> {
+        self.report.edges += 1;
+        let Absolute { id, measurement, information } = absolute;
+        let of_pose = match measurement {
+            AbsoluteMeasurement::Se3 { .. } => VertexType::Se3,
+            AbsoluteMeasurement::Se2(_) | AbsoluteMeasurement::Position2(_) => VertexType::Se2,
+        };
+        let key = self.use_as(line, *id, of_pose)?;
+        let (factor, information): (Arc<dyn Factor>, _) = match *measurement {
+            AbsoluteMeasurement::Se2(value) => {
+                self.located.insert(key.clone(), value);
+                (Arc::new(Prior { value }), information.clone())
+            }
+            AbsoluteMeasurement::Position2(position) => {
+                self.located.insert(key.clone(), Se2::new(So2::identity(), position.0));
+                let position = Coordinates::new(position.0)?;
+                (Arc::new(Position { position, lever_arm: Coordinates::default() }), information.clone())
+            }
+            AbsoluteMeasurement::Se3 { pose, sensor } => {
+                // Log(z⁻¹ x o) = Ad(o⁻¹) Log((z o⁻¹)⁻¹ x), with the sensor at o on the vehicle and at z in the world
+                let offset = self.sensor_pose(sensor)?;
+                let value = pose.compose(&offset.inverse());
+                let adjoint = Se3::adjoint_of_inverse(&offset);
+                let adjoint = DMatrix::from_column_slice(6, 6, adjoint.as_slice());
+                let mut turned = adjoint.transpose() * information * &adjoint;
+                // symmetric up to rounding only
+                turned.fill_lower_triangle_with_upper_triangle();
+                self.located.insert(key.clone(), value);
+                (Arc::new(Prior { value }), turned)
+            }
+        };
+        self.with_noise(
+            line,
+            FactorEntry { keys: vec![key], name: None, factor, noise: Noise::unit(), loss: None },
+            Some(information),
+        )
+    }
+
     fn edge(&mut self, line: usize, edge: &Edge) -> Result<(), Mistake> {
         self.report.edges += 1;
         let Edge { from, to, .. } = *edge;
@@ -127,6 +188,24 @@ impl<'a> Builder<'a> {
         let mut entry = entry(keys, measurement)?;
         self.measured.push(entry.clone());
         self.linked.insert((from.min(to), from.max(to)));
+        if let (Measurement::Bearing2(_), Some(information)) = (measurement, &information) {
+            // the factor has a range as well, which was not measured
+            let [bearing, range] = [information[(0, 0)], 1.0];
+            let both = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![bearing, range]));
+            entry.noise = Noise::information(both)?.observing(&[true, false]);
+            self.graph.push(entry);
+            return Ok(());
+        }
+        self.with_noise(line, entry, information)
+    }
+
+    /// Adds a factor with the information of its line, or leaves it out.
+    fn with_noise(
+        &mut self,
+        line: usize,
+        mut entry: FactorEntry,
+        information: Option<DMatrix<f64>>,
+    ) -> Result<(), Mistake> {
         match information.map(|m| noise(&m, self.options.repair)).transpose()? {
             None => {}
             Some(Outcome::AsWritten(noise)) => entry.noise = noise,
@@ -148,7 +227,7 @@ impl<'a> Builder<'a> {
         let Measurement::Point3 { position, sensor: Some(id) } = edge.measurement else {
             return Ok((edge.measurement, edge.information.clone()));
         };
-        let sensor = self.sensors.get(&id).ok_or(Mistake::Unknown { what: "PARAMS_SE3OFFSET", id })?;
+        let sensor = self.sensor_pose(id)?;
         let position = Point3::new(sensor.act(&position));
         let r = sensor.rotation.matrix();
         let turned = |m: &DMatrix<f64>| {
@@ -204,6 +283,10 @@ impl<'a> Builder<'a> {
         if !alone.is_empty() {
             // poses that only see points: nothing says where they are
             for (key, vertex_type) in alone {
+                if let Some(value) = self.located.variable(key.as_str()) {
+                    all.insert_boxed(key, value.erased().clone_box());
+                    continue;
+                }
                 match vertex_type {
                     VertexType::Se2 => all.insert(key, Se2::identity()),
                     _ => all.insert(key, Se3::identity()),
@@ -249,6 +332,7 @@ fn entry(keys: [Key; 2], measurement: Measurement) -> Result<FactorEntry, Mistak
         Measurement::Se2(relative) => Arc::new(Between { relative }),
         Measurement::Se3(relative) => Arc::new(Between { relative }),
         Measurement::Point2(p) => Arc::new(Landmark { position: Coordinates::new(p.0)? }),
+        Measurement::Bearing2(bearing) => Arc::new(BearingRange2::new(bearing, Positive::literal(1.0))),
         Measurement::Point3 { position: p, .. } => Arc::new(Landmark { position: Coordinates::new(p.0)? }),
     };
     Ok(FactorEntry { keys: keys.into(), name: None, factor, noise: Noise::unit(), loss: None })

@@ -1,6 +1,6 @@
 //! What the lines of a pose graph say, whichever format they are in.
 use crate::error::Mistake;
-use manifactor_geometry::{Point2, Point3, Se2, Se3};
+use manifactor_geometry::{Point2, Point3, Se2, Se3, So2};
 use nalgebra::DMatrix;
 
 /// One line.
@@ -11,6 +11,8 @@ pub(crate) enum Record {
         value: Vertex,
     },
     Edge(Edge),
+    /// A measurement of one vertex in the frame of the world.
+    Absolute(Absolute),
     /// These vertices are held at their values.
     Fix(Vec<u64>),
     /// Two vertices are the same place.
@@ -39,12 +41,35 @@ pub(crate) struct Edge {
     pub(crate) information: Option<DMatrix<f64>>,
 }
 
+#[derive(Debug, Clone)]
+pub(crate) struct Absolute {
+    pub(crate) id: u64,
+    pub(crate) measurement: AbsoluteMeasurement,
+    /// In the tangent order of this framework.
+    pub(crate) information: DMatrix<f64>,
+}
+
+/// Where a vertex is in the world.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum AbsoluteMeasurement {
+    Se2(Se2),
+    /// The position of a pose in the plane, along the axes of the world.
+    Position2(Point2),
+    /// The pose of the sensor of that number.
+    Se3 {
+        pose: Se3,
+        sensor: u64,
+    },
+}
+
 /// The second vertex, seen from the first.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Measurement {
     Se2(Se2),
     Se3(Se3),
     Point2(Point2),
+    /// The direction of a point in the plane, counter-clockwise from the pose's x axis.
+    Bearing2(So2),
     /// Seen by the sensor of that number, or from the vehicle's own frame.
     Point3 {
         position: Point3,
@@ -91,7 +116,7 @@ impl Measurement {
         match self {
             Self::Se2(_) => (VertexType::Se2, VertexType::Se2),
             Self::Se3(_) => (VertexType::Se3, VertexType::Se3),
-            Self::Point2(_) => (VertexType::Se2, VertexType::Point2),
+            Self::Point2(_) | Self::Bearing2(_) => (VertexType::Se2, VertexType::Point2),
             Self::Point3 { .. } => (VertexType::Se3, VertexType::Point3),
         }
     }

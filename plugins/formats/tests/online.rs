@@ -1,5 +1,5 @@
 //! Published pose graphs through a session, pose by pose, beside batch solves.
-use manifactor_formats::pose_graph::{self, Options};
+use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use manifactor_formats::replay::Replay;
 use manifactor_geometry::{Between, Point2, Range, Se2, Se3};
 use manifactor_graph::checked::Positive;
@@ -22,7 +22,7 @@ fn data(path: &str) -> Option<PathBuf> {
 /// All steps, and the report of the last.
 fn replay(graph: &Graph, most: usize) -> (Session, Report) {
     let mut session = Session::new(Settings::default()).unwrap();
-    let (mut steps, mut report) = (Replay::of(graph), Report::default());
+    let (mut steps, mut report) = (Replay::of(graph, &Values::new()), Report::default());
     for _ in 0..most {
         let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
         session.push(&step.factors, &step.values).unwrap();
@@ -38,7 +38,7 @@ fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
         [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 600, 2e-3)]
     {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
-        let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+        let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
         let (mut session, report) = replay(&graph, most);
         assert!(report.parked.is_empty() && report.undetermined.is_empty(), "{name}: {report:?}");
         let finished = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap();
@@ -53,7 +53,7 @@ fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
 #[test]
 fn a_covariance_from_the_fronts_is_that_of_a_batch() {
     let Some(path) = data("g2o/intel.g2o") else { return };
-    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
     let (session, _) = replay(&graph, 300);
     let keys = ["x299", "x17"];
     let mut problem = Problem::compile(&session.graph().0, &session.estimates()).unwrap();
@@ -66,7 +66,7 @@ fn a_covariance_from_the_fronts_is_that_of_a_batch() {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let Some(path) = data("g2o/parking-garage.g2o") else { return };
-    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
     let bits = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let session = pool.install(|| replay(&graph, 250).0);
@@ -81,8 +81,9 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn a_replay_goes_on_after_a_restart_bit_for_bit() {
     for name in ["intel", "parking-garage", "input_M3500_g2o"] {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
-        let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
-        let (mut steps, mut session) = (Replay::of(&graph), Session::new(Settings::default()).unwrap());
+        let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
+        let (mut steps, mut session) =
+            (Replay::of(&graph, &values), Session::new(Settings::default()).unwrap());
         let mut other = None;
         for n in 0..400 {
             let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
@@ -107,10 +108,10 @@ fn a_replay_goes_on_after_a_restart_bit_for_bit() {
 #[test]
 fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
     let Some(path) = data("g2o/input_M3500_g2o.g2o") else { return };
-    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
     let run = |budget: Option<f64>| {
         let mut session = Session::new(Settings { budget, ..Settings::default() }).unwrap();
-        let (mut steps, mut reports) = (Replay::of(&graph), vec![]);
+        let (mut steps, mut reports) = (Replay::of(&graph, &values), vec![]);
         for _ in 0..1000 {
             let step = steps.step(|key| session.estimate(key)).unwrap().unwrap();
             session.push(&step.factors, &step.values).unwrap();
@@ -145,10 +146,10 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
 #[test]
 fn a_window_that_holds_all_closures_is_as_good_as_all() {
     let Some(path) = data("g2o/sphere2500.g2o") else { return };
-    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
+    let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
     let window = Some(Window::from(Span::Poses(120)));
     let mut narrow = Session::new(Settings { window, ..Settings::default() }).unwrap();
-    let (mut all, mut steps) = (Session::new(Settings::default()).unwrap(), Replay::of(&graph));
+    let (mut all, mut steps) = (Session::new(Settings::default()).unwrap(), Replay::of(&graph, &values));
     let mut bytes = vec![];
     for n in 0..500 {
         let step = steps.step(|key| all.estimate(key)).unwrap().unwrap();

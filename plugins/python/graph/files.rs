@@ -31,8 +31,14 @@ pub(crate) fn document(
 /// Reads a graph from a file: a literal graph in TOML, JSON or YAML, or one in another format that is linked. Returns the
 /// graph, its values, and notes of what the reader had to decide.
 #[pyfunction]
-#[pyo3(signature = (path, *, repair = "error", anchor = true))]
-fn read(py: Python<'_>, path: PathBuf, repair: &str, anchor: bool) -> PyResult<(Graph, Values, Vec<String>)> {
+#[pyo3(signature = (path, *, repair = "error", anchor = true, lenient = false))]
+fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    repair: &str,
+    anchor: bool,
+    lenient: bool,
+) -> PyResult<(Graph, Values, Vec<String>)> {
     let repair = match repair {
         "error" => Repair::Error,
         "reject" => Repair::Reject,
@@ -50,7 +56,7 @@ fn read(py: Python<'_>, path: PathBuf, repair: &str, anchor: bool) -> PyResult<(
     let read = py.detach(|| {
         let text = read_text(&path)?;
         let format = GraphFormat::of(&path, &text);
-        format.map(|format| (format.parse)(&text, &path, Reading { repair, anchor })).transpose()
+        format.map(|format| (format.parse)(&text, &path, Reading { repair, anchor, lenient })).transpose()
     });
     match read.map_err(unreadable)? {
         Some(read) => Ok((Graph(read.graph), Values(read.values), read.notes)),

@@ -89,13 +89,16 @@ __all__ += losses.__all__
 __all__ += variables.__all__
 
 
-def load(path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True) -> tuple[Graph, Values]:
+def load(
+    path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True, lenient: bool = False
+) -> tuple[Graph, Values]:
     """Reads a graph and its values from a file: TOML, JSON, YAML, or g2o, TORO, BAL.
 
     `repair` says what becomes of information matrices that are not positive definite: `"error"`, `"reject"` or `"clamp"`.
-    `anchor` holds the first pose where nothing in the file does.
+    `anchor` holds the first pose where nothing in the file does. `lenient` leaves out lines with unknown tags, which are an
+    error otherwise.
     """
-    graph, values, _ = _read(path, repair=repair, anchor=anchor)
+    graph, values, _ = _read(path, repair=repair, anchor=anchor, lenient=lenient)
     return graph, values
 
 

@@ -56,6 +56,12 @@ impl BoundingBox {
     pub fn area(&self) -> f64 {
         self.width() * self.height()
     }
+    /// Whether it is as wide and as high as the least that a detector resolves: a hundredth of a pixel. A box without width
+    /// shows nothing, and a map that took it for a measurement would make its object thin.
+    pub fn has_area(&self) -> bool {
+        const LEAST: f64 = 0.01;
+        self.width() >= LEAST && self.height() >= LEAST
+    }
     /// The middle.
     pub fn centre(&self) -> Vector2<f64> {
         Vector2::new(self.xmin + self.xmax, self.ymin + self.ymax) / 2.0

@@ -28,6 +28,58 @@ pub struct Sequence {
     pub accelerometer: Vec<Acceleration>,
     /// What the estimate can be compared with.
     pub ground_truth: Option<GroundTruth>,
+    /// Detections that the source has and that are not used.
+    pub unused: Vec<UnusedDetection>,
+}
+
+/// Detections that a source has and that are not used, and why.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum UnusedDetection {
+    /// Rows of a file for which there is no pose at their time.
+    WithoutPose(WithoutPose),
+    /// A box that cannot be read.
+    Box {
+        /// Timestamp of its frame, in seconds.
+        timestamp: f64,
+        /// Its place in the frame, from 1.
+        place: usize,
+        /// The fault, with the expected form.
+        fault: String,
+    },
+}
+
+/// Detections for which there is no pose at their time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WithoutPose {
+    /// Rows without a pose.
+    pub rows: usize,
+    /// All rows.
+    pub of: usize,
+    /// Largest share of the rows for which that is expected, from 0 to 1.
+    pub allowed: f64,
+    /// Largest difference in time that counts as a match, in seconds.
+    pub within: f64,
+    /// The row among them that is closest to a pose: its timestamp, and its distance from the pose, in seconds.
+    pub nearest: (f64, f64),
+}
+
+impl WithoutPose {
+    /// Whether they are more than was expected.
+    pub fn is_too_many(&self) -> bool {
+        self.rows as f64 > self.allowed * self.of as f64
+    }
+}
+
+impl fmt::Display for WithoutPose {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { rows, of, within, nearest: (at, away), .. } = self;
+        write!(
+            f,
+            "{rows} of {of} detections have no pose within {within} s and are left out; the closest, at {at} s, is {away:.6} s away \
+             from a pose; `source.max_time_difference` sets the limit"
+        )
+    }
 }
 
 /// What is known of a recording before its first frame.
@@ -50,6 +102,8 @@ pub struct Observation {
     pub detections: Vec<Detection>,
     /// Readings of the accelerometer since the frame before.
     pub accelerometer: Vec<Acceleration>,
+    /// Boxes that cannot be used.
+    pub unused: Vec<UnusedDetection>,
 }
 
 impl Opening {
@@ -61,7 +115,15 @@ impl Opening {
     /// A sequence without frames.
     pub fn into_sequence(self) -> Sequence {
         let Self { camera, up, ground_truth } = self;
-        Sequence { camera, frames: vec![], detections: vec![], up, accelerometer: vec![], ground_truth }
+        Sequence {
+            camera,
+            frames: vec![],
+            detections: vec![],
+            up,
+            accelerometer: vec![],
+            ground_truth,
+            unused: vec![],
+        }
     }
 }
 

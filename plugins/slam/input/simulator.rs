@@ -157,6 +157,7 @@ impl Simulated {
             up: Some(Direction::Z),
             accelerometer: readings.unwrap_or_default(),
             ground_truth: Some(truth),
+            unused: vec![],
         })
     }
 

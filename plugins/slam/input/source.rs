@@ -132,6 +132,17 @@ pub enum SourceError {
         /// Of the detection that is closest to a pose: its time stamp, and how far the pose is away, in seconds.
         nearest: Option<(f64, f64)>,
     },
+    /// A timestamp far ahead of the frames around it.
+    #[error(
+        "the timestamp {timestamp} s is {ahead:.3} s ahead of the frame before, and the next frame does not confirm it: \
+         the frame is left out"
+    )]
+    Ahead {
+        /// In seconds.
+        timestamp: f64,
+        /// By how much, in seconds.
+        ahead: f64,
+    },
     /// A line that is no frame.
     #[error("{}, line {line}: {message}", file.display())]
     Line {

@@ -1,6 +1,9 @@
 //! Frames one at a time, as they come.
+mod confirmed;
+
 use crate::input::sequence::{Detection, Observation, Opening, Sequence};
 use crate::input::source::SourceError;
+use confirmed::Confirmed;
 use std::fmt;
 use std::ops::ControlFlow;
 use std::panic::resume_unwind;
@@ -25,7 +28,7 @@ impl Stream {
         opening: Opening,
         observations: impl Iterator<Item = Result<Observation, SourceError>> + Send + 'static,
     ) -> Self {
-        Self { opening, observations: Box::new(observations), past: f64::NEG_INFINITY }
+        Self { opening, observations: Box::new(Confirmed::new(observations)), past: f64::NEG_INFINITY }
     }
 
     /// Waits for the last frame, and keeps all of them.
@@ -121,7 +124,14 @@ impl<S: AsRef<Sequence>> Iterator for Observations<S> {
         let felt = &felt[..felt.partition_point(|reading| reading.timestamp <= frame.timestamp)];
         self.readings += felt.len();
         self.frames += 1;
-        Some(Observation { frame: frame.clone(), detections: own.to_vec(), accelerometer: felt.to_vec() })
+        // those of a file belong to no frame: the first one carries them
+        let unused = if self.frames == 1 { sequence.unused.clone() } else { vec![] };
+        Some(Observation {
+            frame: frame.clone(),
+            detections: own.to_vec(),
+            accelerometer: felt.to_vec(),
+            unused,
+        })
     }
 }
 
@@ -132,5 +142,6 @@ impl Sequence {
         self.frames.push(observation.frame);
         self.detections.extend(observation.detections.into_iter().map(|d| Detection { frame, ..d }));
         self.accelerometer.extend(observation.accelerometer);
+        self.unused.extend(observation.unused);
     }
 }

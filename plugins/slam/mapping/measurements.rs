@@ -1,6 +1,6 @@
 //! What is measured of each object: its class, and its boxes after the filters.
 //!
-//! In this order: detections of no object and of low score are left out; the class is fused from all others; boxes cut
+//! In this order: boxes without area, detections of no object and of low score are left out; the class is fused from all others; boxes cut
 //! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
 use crate::input::class::Aliases;
 use crate::input::fusion::{FusedClass, Fusion};
@@ -44,6 +44,8 @@ pub struct Measurements {
     pub objects: Vec<Measured>,
     /// Detections of no object.
     pub unassociated: usize,
+    /// Boxes without width or height.
+    pub without_area: usize,
     /// Detections that score too low.
     pub low_score: usize,
     /// Boxes that the border cuts, and that were dropped for it.
@@ -76,12 +78,16 @@ impl Measurements {
         settings: &DetectionSettings,
         aliases: &Aliases,
     ) {
+        let sifted = sift(detection, camera, settings);
+        if let Sifted::WithoutArea = sifted {
+            self.without_area += 1;
+            return;
+        }
         let Some(id) = detection.object else {
             self.unassociated += 1;
             return;
         };
-        let sifted = sift(detection, camera, settings);
-        if matches!(sifted, Sifted::LowScore) {
+        if let Sifted::LowScore = sifted {
             self.low_score += 1;
             return;
         }
@@ -105,9 +111,13 @@ impl Measurements {
         aliases: &Aliases,
     ) {
         let sifted = sift(detection, camera, settings);
-        if let Sifted::LowScore = sifted {
-            self.low_score = self.low_score.saturating_sub(1);
-            return;
+        match sifted {
+            Sifted::WithoutArea => return,
+            Sifted::LowScore => {
+                self.low_score = self.low_score.saturating_sub(1);
+                return;
+            }
+            Sifted::Cut | Sifted::View(_) => {}
         }
         let Ok(place) = self.objects.binary_search_by_key(&from, |object| object.id) else { return };
         let object = &mut self.objects[place];
@@ -171,6 +181,8 @@ impl Measurements {
 
 /// What a detection is good for.
 pub(crate) enum Sifted {
+    /// For nothing: its box has no width or no height.
+    WithoutArea,
     /// For nothing: it scores too low.
     LowScore,
     /// For the class of its object: the border cuts its box.
@@ -181,6 +193,9 @@ pub(crate) enum Sifted {
 
 /// Passes a detection through the filters.
 pub(crate) fn sift(detection: &Detection, camera: &Camera, settings: &DetectionSettings) -> Sifted {
+    if !detection.bounding_box.has_area() {
+        return Sifted::WithoutArea;
+    }
     if detection.scores.best().is_some_and(|(_, score)| score < settings.min_score) {
         return Sifted::LowScore;
     }

@@ -57,6 +57,21 @@ pub enum Rejection {
     },
 }
 
+impl Rejection {
+    /// The setting that would map the object, or what to change in the recording.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Views { .. } => "`objects.min_views` sets the least number",
+            Self::BoxDeviation { .. } => "`objects.max_box_deviation_px` sets the limit",
+            Self::Parallax { .. } => "move around the object, or lower `objects.min_parallax_deg`",
+            Self::Moves { .. } | Self::Scatters { .. } => {
+                "larger errors of depths are allowed by `detections.depth_error`"
+            }
+            Self::Initialisation { .. } => "try `objects.initialiser = { type = \"rays\" }`, or more views",
+        }
+    }
+}
+
 impl fmt::Display for Rejection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -21,6 +21,25 @@ pub enum Warning {
         /// Which.
         what: String,
     },
+    /// Detections that the source has and that are not used.
+    Unused {
+        /// How many of what, why, and the remedy.
+        what: String,
+    },
+    /// The same, and more of them than is expected: the map is not one of the whole recording.
+    TooManyUnused {
+        /// How many of what, why, and the remedy.
+        what: String,
+        /// The share that is expected, from 0 to 1.
+        allowed: f64,
+    },
+    /// Objects that were detected and are not mapped, for one reason.
+    NotMapped {
+        /// The reason, how many objects it holds for, and their keys.
+        what: String,
+        /// The setting to change.
+        remedy: &'static str,
+    },
     /// A map without objects.
     NoObjects {
         /// Objects that were detected.
@@ -44,6 +63,17 @@ pub enum Warning {
     Undetermined {
         /// Which.
         what: String,
+    },
+    /// Errors over less than half of the poses.
+    FewPoses {
+        /// Poses with a true one at their time.
+        covered: usize,
+        /// Poses of the estimate.
+        poses: usize,
+        /// Poses of the truth.
+        truth: usize,
+        /// Largest difference in time, in seconds.
+        within: f64,
     },
     /// An error that grew.
     WorseThanOdometry {
@@ -79,6 +109,11 @@ impl fmt::Display for Warning {
                     None => write!(f, "; there are {}", quoted_list(seen)),
                 }
             }
+            Self::Unused { what } => f.write_str(what),
+            Self::TooManyUnused { what, allowed } => {
+                write!(f, "{what}; `source.max_without_pose` expects a larger share than {allowed}")
+            }
+            Self::NotMapped { what, remedy } => write!(f, "not mapped: {what}; {remedy}"),
             Self::NoObjects { detected: 0 } => f.write_str(
                 "no box says which object it shows; `association = { type = \"likelihood\" }` finds out",
             ),
@@ -97,6 +132,11 @@ impl fmt::Display for Warning {
             Self::NotConverged { termination } => f.write_str(termination),
             Self::Undetermined { what } => f.write_str(what),
             Self::Implausible { what } => write!(f, "odometry: {what}"),
+            Self::FewPoses { covered, poses, truth, within } => write!(
+                f,
+                "trajectory errors are over {covered} poses of {poses}; the truth has {truth}, and the others are more than {within} s \
+                 away from these; `evaluation.max_time_difference` sets the limit"
+            ),
             Self::WorseThanOdometry { alignment, odometry, estimate } => write!(
                 f,
                 "the trajectory is worse than the odometry that came in: ATE ({alignment}) {odometry:.5} m before, \

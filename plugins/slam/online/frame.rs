@@ -4,7 +4,7 @@ use super::object::Tracked;
 use super::{FrameError, Located, Mapper};
 use crate::association::{Image, Learned, Merge, Move};
 use crate::gravity::MapFrame;
-use crate::input::sequence::{Detection, Frame, ObjectId, Observation};
+use crate::input::sequence::{Detection, Frame, ObjectId, Observation, UnusedDetection};
 use crate::mapping::measurements::{ObjectBox, Sifted, sift};
 use crate::mapping::{known_entry, object_key, odometry_entry, pose_key, prior_entry, view_entries};
 use crate::semantics::RuleError;
@@ -129,6 +129,10 @@ impl Mapper {
         }
         let up_moved = self.up.look(observation, &self.settings)?;
         let (graph, values) = self.tied(frame, report)?;
+        report.refused.extend(observation.unused.iter().filter_map(|unused| match unused {
+            UnusedDetection::Box { place, fault, .. } => Some(format!("box {place} is left out: {fault}")),
+            UnusedDetection::WithoutPose(_) => None,
+        }));
         self.session.set_time(timestamp)?;
         self.session.push(&graph, &values)?;
         let corrected = self.correct(report);

@@ -103,6 +103,8 @@ pub struct Counts {
     pub detections: usize,
     /// Detections of no object.
     pub unassociated: usize,
+    /// Detections without width or height.
+    pub without_area: usize,
     /// Detections that score too low.
     pub low_score: usize,
     /// Boxes dropped because the border cuts them.
@@ -219,6 +221,7 @@ impl Counts {
             frames: sequence.frames.len(),
             detections: sequence.detections.len(),
             unassociated: m.unassociated,
+            without_area: m.without_area,
             low_score: m.low_score,
             cut: m.cut,
             duplicates: m.duplicates,

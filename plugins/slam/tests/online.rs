@@ -253,7 +253,9 @@ fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
         bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
     };
     let measured = mapper.measurements().clone();
-    let taken = mapper.take(&Observation { frame, detections: vec![far], accelerometer: vec![] }).unwrap();
+    let taken = mapper
+        .take(&Observation { frame, detections: vec![far], accelerometer: vec![], unused: vec![] })
+        .unwrap();
     assert!(taken.refused.len() == 1 && taken.refused[0].starts_with("the boxes at"), "{:?}", taken.refused);
     assert_eq!(taken.names, [None], "they are of no object");
     assert_eq!(*mapper.measurements(), measured);
@@ -271,12 +273,14 @@ fn a_pose_that_cannot_be_taken_is_an_error_and_the_stream_goes_on() {
     // a camera that has jumped by more than any square of it can hold
     frame.world_from_camera = Se3::new(frame.world_from_camera.rotation, nalgebra::Vector3::repeat(1e200));
     let detections: Vec<Detection> = last.detections;
-    let taken = mapper.take(&Observation { frame, detections, accelerometer: vec![] });
+    let taken = mapper.take(&Observation { frame, detections, accelerometer: vec![], unused: vec![] });
     assert!(matches!(taken, Err(FrameError::Update(_))), "{taken:?}");
     // and the stream goes on from the frame before
     let mut next = sequence.frames.last().unwrap().clone();
     next.timestamp += 2.0;
-    let taken = mapper.take(&Observation { frame: next, detections: vec![], accelerometer: vec![] }).unwrap();
+    let taken = mapper
+        .take(&Observation { frame: next, detections: vec![], accelerometer: vec![], unused: vec![] })
+        .unwrap();
     assert_eq!((taken.frame, taken.refused.len()), (80, 0));
 }
 

@@ -233,7 +233,8 @@ impl Tracker {
 
 /// The boxes that are looked at, in order.
 pub(super) fn best_scores(detections: &[Detection]) -> Vec<usize> {
-    let mut all: Vec<usize> = (0..detections.len()).collect();
+    let mut all: Vec<usize> =
+        (0..detections.len()).filter(|i| detections[*i].bounding_box.has_area()).collect();
     if all.len() > BOXES {
         let score = |i: &usize| detections[*i].scores.best().map_or(0.0, |(_, score)| score);
         all.sort_by(|a, b| score(b).total_cmp(&score(a)));

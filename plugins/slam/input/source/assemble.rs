@@ -1,19 +1,39 @@
 //! Frames and detections put together by time.
 use super::SourceError;
 use crate::input::recording::OBJECTS;
-use crate::input::sequence::{ClassScores, Detection, Frame, GroundTruth, ObjectId, TrueObject};
+use crate::input::sequence::{
+    ClassScores, Detection, Frame, GroundTruth, ObjectId, TrueObject, UnusedDetection, WithoutPose,
+};
 use manifactor_config::{Document, Errors};
 use manifactor_formats::tum::{StampedPose, Trajectory};
 use manifactor_formats::{detections, tum};
 use manifactor_quadric::BoundingBox;
 use std::path::Path;
 
-/// Frames, and the detections in them.
-pub(super) type Matched = (Vec<Frame>, Vec<Detection>);
+/// Frames, the detections in them, and those that belong to none.
+pub(super) type Matched = (Vec<Frame>, Vec<Detection>, Vec<UnusedDetection>);
 
-/// Reads odometry and detections; each detection goes to the frame nearest in time, if it is near enough. Detections
-/// of images that the odometry does not cover are left out.
-pub(super) fn read_matched(odometry: &Path, file: &Path, within: f64) -> Result<Matched, SourceError> {
+/// Detections for which a frame is looked for by time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Matching {
+    /// Largest difference in time, in seconds.
+    pub within: f64,
+    /// Largest share of the detections that may be without a frame.
+    pub without_pose: f64,
+}
+
+/// A tenth of the detections may be made where the odometry has no pose, as at the beginning of a recording.
+pub(super) fn a_tenth() -> f64 {
+    0.1
+}
+
+/// Reads odometry and detections; each detection goes to the frame nearest in time, if it is near enough. Others are
+/// left out.
+///
+/// # Errors
+/// Files that cannot be read; detections of which none has a frame.
+pub(super) fn read_matched(odometry: &Path, file: &Path, by: Matching) -> Result<Matched, SourceError> {
+    let within = by.within;
     let frames = read_poses(odometry)?.into_iter();
     let frames = frames.map(|StampedPose { timestamp, pose }| Frame { timestamp, world_from_camera: pose });
     let frames: Vec<Frame> = frames.collect();
@@ -30,9 +50,19 @@ pub(super) fn read_matched(odometry: &Path, file: &Path, within: f64) -> Result<
         let nearest = rows.iter().filter_map(|row| away(row.timestamp)).min_by(|a, b| a.1.total_cmp(&b.1));
         return Err(SourceError::NothingMatches { file, odometry, detections: rows.len(), within, nearest });
     }
+    let without = without_frame(&frames, &rows, by);
     // stable: the order of a file decides between duplicates
     matched.sort_by_key(|detection| detection.frame);
-    Ok((frames, matched))
+    Ok((frames, matched, without.map(UnusedDetection::WithoutPose).into_iter().collect()))
+}
+
+/// The rows without a frame; `None` if there are none.
+fn without_frame(frames: &[Frame], rows: &[detections::Detection], by: Matching) -> Option<WithoutPose> {
+    let Matching { within, without_pose: allowed } = by;
+    let away = |row: &detections::Detection| Some((row.timestamp, nearest(frames, row.timestamp)?.1));
+    let far: Vec<(f64, f64)> = rows.iter().filter_map(away).filter(|(_, away)| *away > within).collect();
+    let nearest = far.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(WithoutPose { rows: far.len(), of: rows.len(), allowed, within, nearest })
 }
 
 /// The poses of a file; what had to be repaired is logged.

@@ -1,7 +1,7 @@
 use super::assemble::read_ground_truth;
 use super::{CameraChoice, Folders, Source, SourceError};
 use crate::input::sequence::{
-    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening, Sequence,
+    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening, Sequence, UnusedDetection,
 };
 use crate::input::stream::Stream;
 use indexmap::IndexMap;
@@ -28,7 +28,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// {"timestamp": 0.1, "pose": {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}, "boxes": [{"box": [10.0, 20.0, 90.0, 80.0], "class": "cup", "score": 0.8}]}
 /// ```
 ///
-/// A line that is no frame is told and left out where frames are mapped as they come, and an error where all are read before.
+/// A box that cannot be read is left out and reported; the frame stays. A line that is no frame is left out and reported by
+/// `manifactor online`, and an error in `manifactor run`, which reads all lines first.
 ///
 /// ```toml
 /// source = { type = "json_lines", camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
@@ -57,7 +58,7 @@ struct Line {
     timestamp: f64,
     pose: Se3,
     #[serde(default)]
-    boxes: Vec<LineBox>,
+    boxes: Vec<serde_json::Value>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     accelerometer: Vec<Reading>,
 }
@@ -113,7 +114,12 @@ pub fn line(observation: &Observation) -> String {
     let line = Line {
         timestamp: observation.frame.timestamp,
         pose: observation.frame.world_from_camera,
-        boxes: observation.detections.iter().map(of_box).collect(),
+        boxes: observation
+            .detections
+            .iter()
+            .map(of_box)
+            .filter_map(|b| serde_json::to_value(b).ok())
+            .collect(),
         accelerometer: observation.accelerometer.iter().map(of_reading).collect(),
     };
     serde_json::to_string(&line).unwrap_or_default()
@@ -121,33 +127,45 @@ pub fn line(observation: &Observation) -> String {
 
 /// A frame of such a line.
 pub(crate) fn parse(line: &[u8]) -> Result<Observation, String> {
-    let line: Line = serde_json::from_slice(line).map_err(|error| error.to_string())?;
-    for (class, score) in line.boxes.iter().flat_map(|seen| &seen.scores) {
-        if !(0.0..=1.0).contains(score) {
-            return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
+    let Line { timestamp, pose, boxes, accelerometer } =
+        serde_json::from_slice(line).map_err(|error| error.to_string())?;
+    let (mut detections, mut unused) = (vec![], vec![]);
+    for (place, value) in boxes.into_iter().enumerate() {
+        match LineBox::read(value) {
+            Ok(seen) => detections.push(seen.into()),
+            Err(fault) => unused.push(UnusedDetection::Box { timestamp, place: place + 1, fault }),
         }
     }
-    if let Some(twice) = line.boxes.iter().find(|seen| seen.class.is_some() && !seen.scores.is_empty()) {
-        let class = twice.class.as_deref().unwrap_or_default();
-        return Err(format!("a box has `class` and `score`, or `scores`, and not both: `{class}`"));
-    }
-    Ok(line.into())
+    let of_reading = |r: Reading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
+    Ok(Observation {
+        frame: Frame { timestamp, world_from_camera: pose },
+        detections,
+        accelerometer: accelerometer.into_iter().map(of_reading).collect(),
+        unused,
+    })
 }
 
-impl From<Line> for Observation {
-    fn from(line: Line) -> Self {
-        let of_box = |b: LineBox| {
-            let single = b.class.map(|class| (class, b.score));
-            let scores: ClassScores = b.scores.into_iter().chain(single).collect();
-            let (bounding_box, depth) = (b.bounding_box, b.depth.map(Positive::get));
-            Detection { frame: 0, object: b.object, scores, bounding_box, depth }
-        };
-        let of_reading = |r: Reading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
-        Self {
-            frame: Frame { timestamp: line.timestamp, world_from_camera: line.pose },
-            detections: line.boxes.into_iter().map(of_box).collect(),
-            accelerometer: line.accelerometer.into_iter().map(of_reading).collect(),
+impl LineBox {
+    fn read(value: serde_json::Value) -> Result<Self, String> {
+        let seen: Self = serde_json::from_value(value).map_err(|error| error.to_string())?;
+        if let Some((class, score)) = seen.scores.iter().find(|(_, score)| !(0.0..=1.0).contains(*score)) {
+            return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
         }
+        match &seen.class {
+            Some(class) if !seen.scores.is_empty() => {
+                Err(format!("a box has `class` and `score`, or `scores`, and not both: `{class}`"))
+            }
+            _ => Ok(seen),
+        }
+    }
+}
+
+impl From<LineBox> for Detection {
+    fn from(seen: LineBox) -> Self {
+        let single = seen.class.map(|class| (class, seen.score));
+        let scores: ClassScores = seen.scores.into_iter().chain(single).collect();
+        let (bounding_box, depth) = (seen.bounding_box, seen.depth.map(Positive::get));
+        Self { frame: 0, object: seen.object, scores, bounding_box, depth }
     }
 }
 
@@ -155,6 +173,8 @@ impl From<Line> for Observation {
 static READ: AtomicBool = AtomicBool::new(false);
 /// What standard input is called.
 const STDIN: &str = "standard input";
+/// Some editors begin a file with it.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// A longer line is no frame, in bytes.
 const LONGEST: u64 = 1 << 26;
 
@@ -209,6 +229,9 @@ impl Lines {
         if read as u64 == LONGEST && !self.text.ends_with(b"\n") {
             // the rest of it is not kept
             self.reader.skip_until(b'\n')?;
+        }
+        if self.line == 1 && self.text.starts_with(BYTE_ORDER_MARK) {
+            self.text.drain(..BYTE_ORDER_MARK.len());
         }
         Ok(read)
     }
@@ -271,18 +294,20 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_no_frame_is_told_and_the_next_is_read() {
+    fn a_line_that_is_no_frame_is_reported_and_a_bad_box_leaves_its_frame() {
         let good = r#"{"timestamp": 1.0, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}"#;
         let bad_box = good.replace("}}", r#"}, "boxes": [{"box": [9, 0, 1, 1]}]}"#);
-        let text = format!("{good}\n{{\n{bad_box}\n{good}");
+        let text = format!("\u{feff}{good}\n{{\n{bad_box}\n{good}");
         let folder = tempfile::tempdir().unwrap();
         let folders = Folders { data: None, document: folder.path().into() };
         let source = source(folder.path(), &text);
         let stream = source.open(&folders).unwrap().unwrap();
         let read: Vec<_> = stream.observations.collect();
-        assert_eq!(read.iter().map(Result::is_ok).collect::<Vec<_>>(), [true, false, false, true]);
-        let error = read[2].as_ref().unwrap_err().to_string();
-        assert!(error.contains("frames.jsonl, line 3: expected [xmin, ymin, xmax, ymax]"), "{error}");
+        assert_eq!(read.iter().map(Result::is_ok).collect::<Vec<_>>(), [true, false, true, true]);
+        let UnusedDetection::Box { place, fault, .. } = &read[2].as_ref().unwrap().unused[0] else {
+            panic!()
+        };
+        assert!(*place == 1 && fault.contains("expected [xmin, ymin, xmax, ymax]"), "{fault}");
         let error = source.load(&folders).unwrap_err().to_string();
         assert!(error.contains("line 2"), "{error}");
     }
@@ -303,8 +328,10 @@ mod tests {
             (r#"{"box": [1, 1, 5, 5], "class": "cup", "scores": {"cup": 0.7}}"#, "and not both: `cup`"),
         ];
         for (seen, words) in wrong {
-            let error = parse(line(seen).as_bytes()).unwrap_err();
-            assert!(error.contains(words), "{error}");
+            let good = r#"{"box": [1, 1, 5, 5], "class": "cup"}"#;
+            let read = parse(line(&format!("{seen}, {good}")).as_bytes()).unwrap();
+            let UnusedDetection::Box { place, fault, .. } = &read.unused[0] else { panic!() };
+            assert!(*place == 1 && fault.contains(words) && read.detections.len() == 1, "{fault}");
         }
         let two =
             parse(line(r#"{"box": [1, 1, 5, 5], "scores": {"cup": 0.7, "bowl": 0.2}}"#).as_bytes()).unwrap();

@@ -1,9 +1,9 @@
-use super::assemble::{read_ground_truth, read_matched, read_objects};
+use super::assemble::{Matching, a_tenth, read_ground_truth, read_matched, read_objects};
 use super::camera::CameraChoice;
 use super::distortion::{Distortion, straighten};
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::Sequence;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::{not_negative, within};
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -48,6 +48,10 @@ pub struct Recorded {
     #[serde(default = "exact", deserialize_with = "not_negative")]
     #[schemars(extend("minimum" = 0))]
     pub max_time_difference: f64,
+    /// Largest expected share of detections without a pose at their time, from 0 to 1. With more, the run ends with exit code 1.
+    #[serde(default = "a_tenth", deserialize_with = "within::<0, 1, _>")]
+    #[schemars(range(min = 0, max = 1))]
+    pub max_without_pose: f64,
 }
 
 fn odometry() -> PathBuf {
@@ -66,14 +70,23 @@ impl Source for Recorded {
         let folder = folders.data_set(&self.folder)?;
         let camera = self.camera.camera();
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
-        let (frames, mut detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
+        let by = Matching { within: self.max_time_difference, without_pose: self.max_without_pose };
+        let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
         straighten(self.distortion, &camera, &mut detections)?;
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         if self.objects.is_some() || truth.is_some() {
             let objects = read_objects(&folder, self.objects.as_deref())?;
             truth.get_or_insert_default().objects = objects;
         }
-        Ok(Sequence { camera, frames, detections, up: self.up, accelerometer: vec![], ground_truth: truth })
+        Ok(Sequence {
+            camera,
+            frames,
+            detections,
+            up: self.up,
+            accelerometer: vec![],
+            ground_truth: truth,
+            unused,
+        })
     }
 }
 register!(dyn Source, "recorded", Recorded);

@@ -1,10 +1,10 @@
-use super::assemble::{read_ground_truth, read_matched};
+use super::assemble::{Matching, a_tenth, read_ground_truth, read_matched};
 use super::camera::{CameraChoice, by_folder};
 use super::distortion::{Distortion, straighten};
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::{not_negative, within};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,6 +44,10 @@ pub struct TumRgbd {
     #[serde(default = "exact", deserialize_with = "not_negative")]
     #[schemars(extend("minimum" = 0))]
     pub max_time_difference: f64,
+    /// Largest expected share of detections without a pose at their time, from 0 to 1. With more, the run ends with exit code 1.
+    #[serde(default = "a_tenth", deserialize_with = "within::<0, 1, _>")]
+    #[schemars(range(min = 0, max = 1))]
+    pub max_without_pose: f64,
 }
 
 fn detections() -> PathBuf {
@@ -62,7 +66,8 @@ impl Source for TumRgbd {
             None => by_folder(&folder)?,
         };
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
-        let (frames, mut detections) = read_matched(&odometry, &detections, self.max_time_difference)?;
+        let by = Matching { within: self.max_time_difference, without_pose: self.max_without_pose };
+        let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
         straighten(self.distortion, &camera, &mut detections)?;
         let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         let file = folder.join("accelerometer.txt");
@@ -78,6 +83,7 @@ impl Source for TumRgbd {
             up: None,
             accelerometer: readings.into_iter().map(reading).collect(),
             ground_truth: truth,
+            unused,
         })
     }
 }

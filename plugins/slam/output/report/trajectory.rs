@@ -13,6 +13,8 @@ use serde::Serialize;
 pub struct TrajectoryReport {
     /// How it was brought into the frame of the truth.
     pub alignment: Alignment,
+    /// Poses of the estimate for which there is a true one, and all of its poses.
+    pub covered: [usize; 2],
     /// By odometry alone.
     pub odometry: TrajectoryError,
     /// As it is estimated.
@@ -44,10 +46,18 @@ pub(super) fn compare(
         let rpe = relative_error(aligned, settings.relative_over.get(), Pairing::All).ok();
         Ok(TrajectoryError { ate: absolute_error(aligned)?, rpe })
     };
+    let poses = after.len();
     let report = |alignment: Alignment| -> Result<TrajectoryReport, MetricsError> {
         let (before, after) = (aligned(before, alignment)?, aligned(after, alignment)?);
         let change = change_of_error(&before, &after);
-        Ok(TrajectoryReport { alignment, odometry: error(&before)?, estimate: error(&after)?, change })
+        let covered = [after.len(), poses];
+        Ok(TrajectoryReport {
+            alignment,
+            covered,
+            odometry: error(&before)?,
+            estimate: error(&after)?,
+            change,
+        })
     };
     let mut reports = vec![];
     for alignment in &settings.alignments {
@@ -56,6 +66,7 @@ pub(super) fn compare(
             Err(error) => warnings.push(Warning::NotEvaluated { reason: error.to_string() }),
         }
     }
+    warnings.extend(reports.first().and_then(|report| few(report, truth.trajectory.len(), settings)));
     warnings.extend(reports.first().and_then(worse));
     reports
 }
@@ -77,6 +88,13 @@ fn aligned(
 ) -> Result<Vec<PosePair>, MetricsError> {
     let pairs = associate(&truth.trajectory, estimate, settings.max_time_difference)?;
     Ok(align(&pairs, alignment)?.1)
+}
+
+/// A figure over less than half of the poses says little of the rest.
+fn few(report: &TrajectoryReport, truth: usize, settings: &EvaluationSettings) -> Option<Warning> {
+    let [covered, poses] = report.covered;
+    let within = settings.max_time_difference;
+    (2 * covered < poses.min(truth)).then_some(Warning::FewPoses { covered, poses, truth, within })
 }
 
 fn worse(report: &TrajectoryReport) -> Option<Warning> {

@@ -2,6 +2,7 @@ use super::*;
 use crate::input::class::Aliases;
 use crate::input::prior_map::Looks;
 use crate::input::sequence::ClassScores;
+use manifactor_geometry::So3;
 
 /// Boxes that agree with every place.
 const AGREES: Agreement = Agreement { overlap: 1.0, seen: 1.0 };
