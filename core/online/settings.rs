@@ -1,7 +1,7 @@
 //! How a session trades time for accuracy.
 mod window;
 
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::{at_least_one, not_negative};
 use manifactor_solve::{FactorType, Probability, SettingError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,9 @@ pub use window::{ManifoldType, NotOneSpan, Span, UnknownManifold, Window};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Updates from one relinearization to the next. Default: 10.
+    /// Updates from one relinearization to the next, at least 1. Default: 10.
+    #[serde(deserialize_with = "at_least_one")]
+    #[schemars(range(min = 1))]
     pub relinearize_every: usize,
     /// Error that a linearization may have, in standard deviations of the factors around. A variable is linearized anew
     /// where a component of its step δ is larger than √(bend · σ), with σ = 1/√Hᵢᵢ. 0 relinearizes all that moves.
@@ -88,6 +90,12 @@ impl Settings {
     /// # Errors
     /// Names the one that is not.
     pub fn check(&self) -> Result<(), SettingError> {
+        if self.relinearize_every == 0 {
+            return Err(SettingError { setting: "relinearize_every", expected: "1 or more", got: 0.0 });
+        }
+        if self.window.as_ref().is_some_and(|window| matches!(window.span, Span::Poses(0))) {
+            return Err(SettingError { setting: "window.poses", expected: "1 or more", got: 0.0 });
+        }
         let all = [("bend", self.bend), ("deviation", self.deviation), ("urgent", self.urgent)];
         let budget = self.budget.map(|budget| ("budget", budget));
         let gain = self.outliers.as_ref().map(|outliers| ("outliers.gain", outliers.gain));

@@ -3,6 +3,7 @@ use crate::output::{self, text};
 use manifactor::config::{Diagnostic, Diagnostics, Fault, SourceText};
 use manifactor::formats::{FormatError, Malformed};
 use manifactor::slam::experiment::JournalError;
+use manifactor::slam::journal::JournalError as FrameJournalError;
 use manifactor::slam::output::{FolderError, OutputError};
 use manifactor::slam::run::RunError;
 use manifactor::slam::source::SourceError;
@@ -142,6 +143,7 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
             RunError::Source(error) => error.into(),
+            RunError::Journal(FrameJournalError::File(error)) => error.into(),
             other => Self::input(other),
         }
     }

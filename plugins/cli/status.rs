@@ -19,6 +19,8 @@ pub enum Status {
     DetectionsLeftOut,
     /// A factor was checked, and breaks a law: exit code 1.
     Broken,
+    /// All is written but a journal, which lacks frames: exit code 3.
+    JournalIncomplete,
     /// Ctrl-C before all was done; the best values so far are written: exit code 130.
     Interrupted,
 }
@@ -47,7 +49,9 @@ impl From<&VariantReport> for Status {
         let mapped = if nothing { Self::NothingMapped } else { Self::Done };
         let is_partial = report.warnings.iter().any(|w| matches!(w, Warning::TooManyUnused { .. }));
         let used = if is_partial { Self::DetectionsLeftOut } else { Self::Done };
-        mapped.max(used).max(Self::from(&report.solve.termination))
+        let is_lost = report.warnings.iter().any(|w| matches!(w, Warning::JournalIncomplete(_)));
+        let kept = if is_lost { Self::JournalIncomplete } else { Self::Done };
+        mapped.max(used).max(kept).max(Self::from(&report.solve.termination))
     }
 }
 
@@ -56,6 +60,7 @@ impl From<Status> for u8 {
         match status {
             Status::Done => 0,
             Status::NotConverged | Status::NothingMapped | Status::DetectionsLeftOut | Status::Broken => 1,
+            Status::JournalIncomplete => 3,
             Status::Interrupted => 130,
         }
     }

@@ -1,5 +1,6 @@
 //! Files that are written whole or not at all: the one place that writes files.
 use std::fs::{File, Metadata, OpenOptions};
+use std::hash::Hasher;
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use tempfile::{Builder, NamedTempFile};
@@ -74,6 +75,17 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
     if is_same(&file.metadata()?, &path.symlink_metadata()?) { Ok(file) } else { Err(refused()) }
 }
 
+/// The bytes of a regular file. A pipe, which would be waited for without end, is refused.
+///
+/// # Errors
+/// Where it cannot be read, or is a link or no regular file.
+pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    if !path.symlink_metadata()?.is_file() {
+        return Err(io::Error::new(ErrorKind::InvalidInput, "it is a link, or not a regular file"));
+    }
+    std::fs::read(path)
+}
+
 #[cfg(unix)]
 fn is_same(a: &Metadata, b: &Metadata) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -122,6 +134,38 @@ fn create(path: &Path, replaced: Option<&Metadata>) -> io::Result<File> {
     // a file system without permissions is no reason to lose results; a file that only its owner can read does no harm
     let _ = file.set_permissions(replaced.permissions());
     Ok(file)
+}
+
+/// Hexadecimal digits of a line's checksum.
+const DIGITS: usize = 16;
+
+fn checksum(text: &[u8]) -> String {
+    let mut hash = fnv::FnvHasher::default();
+    hash.write(text);
+    format!("{:0DIGITS$x}", hash.finish())
+}
+
+/// A line of a log with its checksum (FNV-1a of 64 bits, after a tab) and its end. A log that is read again after months is
+/// otherwise believed, whatever has become of a byte.
+pub fn checked_line(text: &str) -> String {
+    format!("{text}\t{}\n", checksum(text.as_bytes()))
+}
+
+/// The text of such a line, which comes without its end.
+///
+/// # Errors
+/// In words, if there is no checksum, or one of another text.
+pub fn read_checked_line(line: &[u8]) -> Result<&[u8], &'static str> {
+    let place = line.len().checked_sub(DIGITS + 1).filter(|place| line[*place] == b'\t');
+    let Some(place) = place else {
+        return Err("the line has no checksum: it is damaged, or of an earlier version");
+    };
+    let (text, sum) = (&line[..place], &line[place + 1..]);
+    if checksum(text).as_bytes() == sum {
+        Ok(text)
+    } else {
+        Err("the line is damaged: its checksum is that of another text")
+    }
 }
 
 #[cfg(test)]
@@ -229,6 +273,21 @@ mod tests {
             write_whole(&link, b"text").unwrap();
             assert!(link.symlink_metadata().unwrap().is_symlink());
             assert!(open_regular(Path::new("/dev/null")).is_err());
+        }
+    }
+
+    #[test]
+    fn every_change_of_a_character_is_found() {
+        let line = checked_line(r#"{"class":"wine glass"}"#);
+        let line = line.trim_end_matches('\n').as_bytes();
+        assert_eq!(read_checked_line(line).unwrap(), br#"{"class":"wine glass"}"#);
+        for place in 0..line.len() {
+            for bit in 0..8 {
+                let mut damaged = line.to_vec();
+                damaged[place] ^= 1 << bit;
+                assert!(read_checked_line(&damaged).is_err(), "byte {place}, bit {bit}");
+            }
+            assert!(read_checked_line(&line[..place]).is_err());
         }
     }
 }

@@ -81,6 +81,17 @@ pub fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> 
     }
 }
 
+/// The same for a count that is 1 or more.
+///
+/// # Errors
+/// Where it is less than 1, or no whole number.
+pub fn at_least_one<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
+    match usize::deserialize(from)? {
+        0 => Err(D::Error::custom("expected a whole number, 1 or more, got 0")),
+        count => Ok(count),
+    }
+}
+
 /// The same for a least and a most, neither of them negative.
 ///
 /// # Errors

@@ -3,6 +3,7 @@ use manifactor_graph::catalogue;
 use manifactor_graph::checked::Positive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::num::NonZeroUsize;
 
 /// A window that moves with the newest variables. Older ones leave at the end of an update, as
 /// [`Session::marginalize`](crate::Session::marginalize) takes them out.
@@ -34,7 +35,7 @@ struct Document {
     /// Variables that stay, the newest of those whose type is not kept; at least one. Older ones leave at the end of an update,
     /// as `Session::marginalize` takes them out. Either this or `seconds`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    poses: Option<usize>,
+    poses: Option<NonZeroUsize>,
     /// Seconds for which a variable stays after it came, by the times of `Session::set_time`; the newest always stays. Either this or
     /// `poses`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -58,7 +59,7 @@ impl TryFrom<Document> for Window {
     type Error = NotOneSpan;
     fn try_from(Document { poses, seconds, keep }: Document) -> Result<Self, NotOneSpan> {
         let span = match (poses, seconds) {
-            (Some(poses), None) => Span::Poses(poses),
+            (Some(poses), None) => Span::Poses(poses.get()),
             (None, Some(seconds)) => Span::Seconds(seconds),
             (poses, _) => return Err(NotOneSpan { both: poses.is_some() }),
         };
@@ -69,7 +70,7 @@ impl TryFrom<Document> for Window {
 impl From<Window> for Document {
     fn from(Window { span, keep }: Window) -> Self {
         let (poses, seconds) = match span {
-            Span::Poses(poses) => (Some(poses), None),
+            Span::Poses(poses) => (NonZeroUsize::new(poses), None),
             Span::Seconds(seconds) => (None, Some(seconds)),
         };
         Self { poses, seconds, keep }

@@ -94,8 +94,9 @@ impl Plugin {
                 format!("{} is no checkout of Manifactor: it has no plugins/cli/Cargo.toml", root.display());
             return Err(Failure::with_help(what, "give the folder that has Manifactor's README in it"));
         }
-        // a literal string of TOML takes backslashes as they are
-        Ok((format!("path = '{}'", root.display()), format!("path = '{}'", cli.display())))
+        // a basic string of TOML, which JSON's are too, takes any character
+        let text = |path: &Path| serde_json::to_string(&path.display().to_string()).unwrap_or_default();
+        Ok((format!("path = {}", text(&root)), format!("path = {}", text(&cli))))
     }
 }
 
@@ -111,7 +112,10 @@ impl Names {
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '-';
         let words: Vec<&str> = name.split(['_', '-']).collect();
         let begins = |w: &&str| w.starts_with(|c: char| c.is_ascii_lowercase());
-        if !(name.chars().all(plain) && words.iter().all(begins)) || KEYWORDS.contains(&name) {
+        if !(name.chars().all(plain) && words.iter().all(begins))
+            || KEYWORDS.contains(&name)
+            || TAKEN.contains(&name)
+        {
             return Err(Failure::with_help(
                 format!("`{name}` cannot be the name of a crate and of a factor"),
                 "use words of small letters and digits, joined by `_` or `-`, such as `on_the_shelf`; no keyword of Rust",
@@ -125,6 +129,12 @@ impl Names {
         })
     }
 }
+
+/// Words that Rust keeps for later, and files of a crate that are not modules of it.
+const TAKEN: [&str; 15] = [
+    "abstract", "become", "box", "do", "final", "macro", "override", "priv", "try", "typeof", "unsized",
+    "virtual", "yield", "main", "lib",
+];
 
 /// Words that cannot be the name of a module, and crates that a plugin depends on.
 const KEYWORDS: [&str; 42] = [
@@ -180,7 +190,20 @@ mod tests {
     fn names_follow_the_conventions_of_rust() {
         let names = Names::of("on-the_shelf2").unwrap();
         assert_eq!((names.factor.as_str(), names.of_type.as_str()), ("on_the_shelf2", "OnTheShelf2"));
-        for bad in ["", "Shelf", "2shelf", "on__shelf", "the shelf", "match", "shelf-", "../é"] {
+        for bad in [
+            "",
+            "Shelf",
+            "2shelf",
+            "on__shelf",
+            "the shelf",
+            "match",
+            "try",
+            "yield",
+            "main",
+            "lib",
+            "shelf-",
+            "../é",
+        ] {
             assert!(Names::of(bad).is_err(), "{bad}");
         }
     }

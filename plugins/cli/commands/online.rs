@@ -8,14 +8,15 @@ use crate::output::watch::Watch as Progress;
 use crate::status::Status;
 use crate::view::{Solve, View, address};
 use clap::Args;
+use manifactor::slam::journal::JournalError;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
-use manifactor::slam::run::Watch;
+use manifactor::slam::run::{RunError, Watch};
 use manifactor::slam::sequence::Observation;
 use manifactor::solve::{All, Interrupt};
 use serde_json::json;
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -59,6 +60,7 @@ impl Online {
                 view.begin(&run.document.title, &variant.name, self.options.json);
             }
             if let Some(journal) = &self.journal {
+                check_journal(journal, &run.document.output)?;
                 run.keep_frames(journal.clone());
             }
             let mut progress = Progress::new(verbose, &variant.name);
@@ -85,6 +87,22 @@ impl Online {
             output::json_line(&report);
         }
         Ok(Status::from(&report))
+    }
+}
+
+/// A journal in the folder of the results could be written over by them, or taken for one of them.
+fn check_journal(journal: &Path, output: &Path) -> Result<(), RunError> {
+    // the folder of the results is there by now
+    let folder = journal.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let is_inside = match (folder.canonicalize(), output.canonicalize()) {
+        (Ok(folder), Ok(output)) => folder.starts_with(output),
+        _ => false,
+    };
+    match is_inside {
+        true => {
+            Err(JournalError::AmongResults { path: journal.to_owned(), output: output.to_owned() }.into())
+        }
+        false => Ok(()),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The log of trials that are done: one JSON document a line, appended and synced when a trial ends.
+//! The log of trials that are done: one JSON document a line with its checksum, appended and synced when a trial ends.
 //!
 //! A program that is killed leaves at most one line without an end, the last: it is dropped, and its trial run again.
 //! A file that is no such log is refused and not touched. Of several lines for one trial the last counts, as a trial that
@@ -7,7 +7,7 @@
 use super::shard::folders;
 use super::{Trial, TrialRecord};
 use crate::output::OutputFolder;
-use manifactor_formats::whole::open_regular;
+use manifactor_formats::whole::{checked_line, open_regular, read_checked_line, read_regular};
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -83,7 +83,7 @@ impl Journal {
         let output = self.path.parent().map(Path::to_owned).unwrap_or_default();
         for folder in folders(&output) {
             let path = folder.join(NAME);
-            let bytes = match std::fs::read(&path) {
+            let bytes = match read_regular(&path) {
                 Ok(bytes) => bytes,
                 // one that has not begun
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
@@ -118,9 +118,8 @@ impl Journal {
     /// Where it cannot be written.
     pub fn append(&mut self, record: TrialRecord) -> Result<(), JournalError> {
         let io = |source| JournalError::Io { path: self.path.clone(), source };
-        let mut line = serde_json::to_vec(&record).map_err(|error| io(error.into()))?;
-        line.push(b'\n');
-        self.file.write_all(&line).and_then(|()| self.file.sync_data()).map_err(io)?;
+        let line = checked_line(&serde_json::to_string(&record).map_err(|error| io(error.into()))?);
+        self.file.write_all(line.as_bytes()).and_then(|()| self.file.sync_data()).map_err(io)?;
         self.records.insert((record.labels.clone(), record.fingerprint.clone()), record);
         Ok(())
     }
@@ -140,8 +139,9 @@ fn read(bytes: &[u8], path: &Path) -> Result<(Records, usize), JournalError> {
         };
         whole += line.len() + 1;
         if !line.is_empty() {
+            let text = read_checked_line(line).map_err(|fault| mistake(i + 1, fault.to_owned()))?;
             let record: TrialRecord =
-                serde_json::from_slice(line).map_err(|error| mistake(i + 1, error.to_string()))?;
+                serde_json::from_slice(text).map_err(|error| mistake(i + 1, error.to_string()))?;
             records.insert((record.labels.clone(), record.fingerprint.clone()), record);
         }
     }

@@ -1,18 +1,21 @@
 //! Frames on disk as they come, so that a stream that was cut off goes on.
 //!
-//! The first line says for which settings; each other is a frame, as the source `json_lines` has it. The same frames give the
-//! same bits: a program that was killed reads them again, and has the map that it had. A last line without an end is dropped. A file that
-//! is no journal, or that of other settings, is refused and not touched.
+//! The first line says for which settings; each other is a frame, as the source `json_lines` has it, and its checksum. The same
+//! frames give the same bits: a program that was killed reads them again, and has the map that it had. A last line without an end is
+//! dropped. A file that is no journal, that of other settings, or has a damaged line is refused and not touched.
+//!
+//! A frame that cannot be written, on a full disk, is mapped all the same. The journal ends there, and the run reports it.
 use crate::input::sequence::Observation;
 use crate::input::source::{line, parse};
 use crate::input::stream::Stream;
 use manifactor_formats::FormatError;
-use manifactor_formats::whole::open_regular;
+use manifactor_formats::whole::{checked_line, open_regular, read_checked_line};
 use manifactor_graph::Manifold;
 use std::collections::HashSet;
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Why frames cannot be kept.
 #[derive(Debug, thiserror::Error)]
@@ -39,11 +42,25 @@ pub enum JournalError {
         /// Which.
         path: PathBuf,
     },
+    /// A journal among files that the run writes.
+    #[error(
+        "the journal {} lies in {}, where the run writes its results: name a file outside of that folder",
+        path.display(), output.display()
+    )]
+    AmongResults {
+        /// The journal.
+        path: PathBuf,
+        /// The folder of the results.
+        output: PathBuf,
+    },
     /// A run that is several.
     #[error("a journal is that of one variant: name another document, or leave all others out")]
     Variants,
     /// A whole line that is no frame.
-    #[error("{}:{line} is no frame: {message}; move the file away to begin anew", path.display())]
+    #[error(
+        "{}:{line} is no frame: {message}; move the file away to begin anew, or keep its lines before {line} to go on from there",
+        path.display()
+    )]
     Line {
         /// The file.
         path: PathBuf,
@@ -55,7 +72,9 @@ pub enum JournalError {
 }
 
 /// How the first line begins; a fingerprint of the settings follows.
-const BEGINNING: &str = r#"{"frames_for":""#;
+const BEGINNING: &str = r#"{"checked_frames_for":""#;
+/// The same of journals without checksums.
+const EARLIER: &str = r#"{"frames_for":""#;
 
 /// The frames of a journal, which is begun where it is not there, then those of the stream that come after them, which are added to it.
 ///
@@ -76,7 +95,7 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
         bytes.clear();
     } else if !bytes.starts_with(header.as_bytes()) {
         let path = path.to_owned();
-        let is_ours = bytes.starts_with(BEGINNING.as_bytes());
+        let is_ours = [BEGINNING, EARLIER].iter().any(|beginning| bytes.starts_with(beginning.as_bytes()));
         return Err(if is_ours {
             JournalError::OtherSettings { path }
         } else {
@@ -87,38 +106,79 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
     let lines =
         bytes[..whole].split(|byte| *byte == b'\n').enumerate().skip(1).filter(|(_, line)| !line.is_empty());
     let frame = |(i, line): (usize, &[u8])| {
-        parse(line).map_err(|message| JournalError::Line { path: path.to_owned(), line: i + 1, message })
+        let text = read_checked_line(line).map_err(str::to_owned);
+        let frame = text.and_then(parse);
+        frame.map_err(|message| JournalError::Line { path: path.to_owned(), line: i + 1, message })
     };
     let before = lines.map(frame).collect::<Result<Vec<Observation>, _>>()?;
     if whole < bytes.len() {
         file.set_len(whole as u64).map_err(io)?;
     }
     let past = before.iter().map(|frame| frame.frame.timestamp).fold(f64::NEG_INFINITY, f64::max);
-    let path = path.to_owned();
     let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
     let is_new = move |frame: &Result<Observation, _>| {
         frame.as_ref().map_or(true, |frame| !had.contains(&frame.frame.timestamp.to_bits()))
     };
     let new = stream.observations.filter(is_new);
+    let lost = Lost::default();
+    let (path, counted) = (path.to_owned(), lost.clone());
     let kept = new.map(move |frame| {
-        let keep = keep(&mut file, frame?);
-        Ok(keep.map_err(|source| FormatError::Io { path: path.clone(), source })?)
+        let frame = frame?;
+        // a journal with a gap would give another map
+        if counted.get().is_some() {
+            counted.add(&path, None);
+            return Ok(frame);
+        }
+        Ok(keep(&mut file, &frame).unwrap_or_else(|source| {
+            counted.add(&path, Some(source));
+            frame
+        }))
     });
     let observations = Box::new(before.into_iter().map(Ok).chain(kept));
-    Ok(Stream { opening: stream.opening, observations, past })
+    Ok(Stream { opening: stream.opening, observations, past, lost })
+}
+
+/// The frames that a journal could not keep, counted while they come.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Lost(Arc<Mutex<Option<LostFrames>>>);
+
+/// Frames that a journal could not keep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LostFrames {
+    /// The journal.
+    pub path: PathBuf,
+    /// How many frames, from the first that could not be written to the end.
+    pub frames: usize,
+    /// The system's reason.
+    pub reason: String,
+}
+
+impl Lost {
+    /// Those so far; `None` if all are kept.
+    pub(crate) fn get(&self) -> Option<LostFrames> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn add(&self, path: &Path, error: Option<io::Error>) {
+        let mut lost = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let reason = || error.map_or_else(String::new, |error| error.to_string());
+        lost.get_or_insert_with(|| LostFrames { path: path.to_owned(), frames: 0, reason: reason() })
+            .frames += 1;
+    }
 }
 
 /// Adds a frame, and returns it as it will be read: a rotation that is written and read may differ in its last digit. One that is not finite, which
 /// no map takes, cannot be written either.
-fn keep(file: &mut File, frame: Observation) -> io::Result<Observation> {
+fn keep(file: &mut File, frame: &Observation) -> io::Result<Observation> {
     if !(frame.frame.timestamp.is_finite() && frame.frame.world_from_camera.is_finite()) {
-        return Ok(frame);
+        return Ok(frame.clone());
     }
-    let line = line(&frame);
+    let line = line(frame);
     // what cannot be read again is not written
-    let read = parse(line.as_bytes()).map_err(io::Error::other)?;
+    let mut read = parse(line.as_bytes()).map_err(io::Error::other)?;
+    read.unused.clone_from(&frame.unused);
     let length = file.metadata()?.len();
-    if let Err(error) = file.write_all(format!("{line}\n").as_bytes()) {
+    if let Err(error) = file.write_all(checked_line(&line).as_bytes()) {
         // half a line would end the journal
         file.set_len(length)?;
         return Err(error);
@@ -130,7 +190,6 @@ fn keep(file: &mut File, frame: Observation) -> io::Result<Observation> {
 mod tests {
     use super::*;
     use crate::input::simulator::Simulated;
-    use std::sync::Arc;
 
     fn stream() -> Stream {
         let mut settings = Simulated::default();
@@ -165,8 +224,9 @@ mod tests {
         let others = [
             ("notes", "no journal"),
             ("{\"frames\": 1}\n", "no journal"),
-            ("{\"frames_for\":\"8\"}\n", "other settings"),
-            ("{\"frames_for\":\"7\"}\nnotes\n", ":2 is no frame"),
+            ("{\"frames_for\":\"7\"}\n", "other settings"),
+            ("{\"checked_frames_for\":\"8\"}\n", "other settings"),
+            ("{\"checked_frames_for\":\"7\"}\nnotes\n", ":2 is no frame"),
         ];
         for (text, words) in others {
             std::fs::write(&path, text).unwrap();
@@ -185,5 +245,23 @@ mod tests {
         assert!(matches!(error, JournalError::InUse { .. }), "{error}");
         drop(held);
         journaled(stream(), &path, "7").unwrap();
+    }
+
+    #[test]
+    fn a_damaged_line_is_refused_with_its_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.jsonl");
+        frames(journaled(stream(), &path, "7").unwrap(), 4);
+        let whole = std::fs::read(&path).unwrap();
+        let line = |place: usize| whole[..place].iter().filter(|byte| **byte == b'\n').count() + 1;
+        let second = whole.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+        for place in (second..whole.len()).step_by(53).filter(|place| whole[*place] != b'\n') {
+            let mut damaged = whole.clone();
+            damaged[place] = if damaged[place] == b'7' { b'8' } else { b'7' };
+            std::fs::write(&path, &damaged).unwrap();
+            let error = journaled(stream(), &path, "7").unwrap_err().to_string();
+            assert!(error.contains(&format!(":{} is no frame", line(place))), "{error}");
+            assert_eq!(std::fs::read(&path).unwrap(), damaged);
+        }
     }
 }

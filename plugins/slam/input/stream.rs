@@ -1,6 +1,7 @@
 //! Frames one at a time, as they come.
 mod confirmed;
 
+use crate::input::journal::Lost;
 use crate::input::sequence::{Detection, Observation, Opening, Sequence};
 use crate::input::source::SourceError;
 use confirmed::Confirmed;
@@ -20,6 +21,8 @@ pub struct Stream {
     pub observations: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send>,
     /// Seconds: frames up to this time have come before, and come again at once.
     pub past: f64,
+    /// Frames that its journal could not keep.
+    pub(crate) lost: Lost,
 }
 
 impl Stream {
@@ -28,7 +31,12 @@ impl Stream {
         opening: Opening,
         observations: impl Iterator<Item = Result<Observation, SourceError>> + Send + 'static,
     ) -> Self {
-        Self { opening, observations: Box::new(Confirmed::new(observations)), past: f64::NEG_INFINITY }
+        Self {
+            opening,
+            observations: Box::new(Confirmed::new(observations)),
+            past: f64::NEG_INFINITY,
+            lost: Lost::default(),
+        }
     }
 
     /// Waits for the last frame, and keeps all of them.

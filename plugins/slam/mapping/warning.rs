@@ -1,3 +1,4 @@
+use crate::input::journal::LostFrames;
 use manifactor_config::{nearest, quoted_list};
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -89,6 +90,8 @@ pub enum Warning {
         /// The file of that map.
         file: PathBuf,
     },
+    /// A journal that does not have all frames of its run.
+    JournalIncomplete(LostFrames),
     /// Boxes that were to be held out, and took part.
     NotHeldOut,
     /// An estimate without the ground truth that it should be compared with.
@@ -147,6 +150,12 @@ impl fmt::Display for Warning {
                 "it is not clear where in {} the run begins, so the map is one of its own: too few objects of it were seen, or they may \
                  be in several places; `prior_map.start` says where, if it is known",
                 file.display()
+            ),
+            Self::JournalIncomplete(LostFrames { path, frames, reason }) => write!(
+                f,
+                "the journal {} is incomplete: it lacks the last {frames} frames ({reason}); the map has them, and a run that goes on \
+                 from this journal would not",
+                path.display()
             ),
             Self::NotHeldOut => f.write_str(
                 "`evaluation.holdout` is for `manifactor run`, which knows all boxes before it begins: here none was held out",

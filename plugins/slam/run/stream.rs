@@ -28,6 +28,7 @@ pub fn online(
     observer: &mut dyn Observer,
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
+    let lost = stream.lost.clone();
     let mut taken = Taken::new(stream.opening, settings)?;
     let (mut progress, mut search, mut found) = (OnlineReport::default(), Search::new(settings), None);
     let mut awaited = Awaited::new(stream.observations);
@@ -86,6 +87,7 @@ pub fn online(
     if settings.evaluation.holdout.is_some() {
         report.warnings.push(Warning::NotHeldOut);
     }
+    report.warnings.extend(lost.get().map(Warning::JournalIncomplete));
     report.tell_prior_map(&estimate, settings, found);
     report.online = Some(progress);
     report.seconds = clock.elapsed().as_secs_f64();

@@ -177,6 +177,8 @@ const STDIN: &str = "standard input";
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// A longer line is no frame, in bytes.
 const LONGEST: u64 = 1 << 26;
+/// After so many bytes more without an end of the line, the file is given up.
+const ENDLESS: u64 = 1 << 30;
 
 #[typetag::serialize(name = "json_lines")]
 impl Source for JsonLines {
@@ -227,8 +229,11 @@ impl Lines {
         self.text.clear();
         let read = self.reader.by_ref().take(LONGEST).read_until(b'\n', &mut self.text)?;
         if read as u64 == LONGEST && !self.text.ends_with(b"\n") {
-            // the rest of it is not kept
-            self.reader.skip_until(b'\n')?;
+            // the rest of it is not kept; what has no end is no file of lines
+            let skipped = self.reader.by_ref().take(ENDLESS).skip_until(b'\n')?;
+            if skipped as u64 == ENDLESS {
+                return Err(std::io::Error::other("there is no end of a line within a gigabyte"));
+            }
         }
         if self.line == 1 && self.text.starts_with(BYTE_ORDER_MARK) {
             self.text.drain(..BYTE_ORDER_MARK.len());
