@@ -2,7 +2,7 @@
 mod about;
 mod check;
 mod evaluate;
-mod experiment;
+pub(crate) mod experiment;
 mod graph;
 mod laws;
 mod new;

@@ -26,6 +26,7 @@ mod status;
 mod view;
 
 pub use arguments::Cli;
+pub use commands::experiment::write_experiment;
 pub use failure::Failure;
 pub use status::Status;
 

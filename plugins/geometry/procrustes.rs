@@ -69,6 +69,7 @@ fn across(direction: &Vector3<f64>, wanted: &Vector3<f64>) -> Vector3<f64> {
 mod tests {
     use super::*;
     use crate::testing::any_so3;
+    use manifactor_graph::Manifold;
     use manifactor_testing::strategies::vector;
     use proptest::prelude::*;
 

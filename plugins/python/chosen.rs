@@ -1,6 +1,7 @@
 //! What is chosen by name: factors, losses, solvers, starts and values of variables.
 use crate::errors::{self, Mistake};
-use crate::input::{Untagged, array, json_to_python, node, numbers, to_array, to_python};
+use crate::input::{Untagged, array, json_to_python, node, numbers, to_array, to_python, unchangeable};
+use crate::threads::detach;
 use manifactor::config::{Errors, Field, Node, Place, Value, nearest};
 use manifactor::graph::catalogue::{entries, find};
 use manifactor::graph::loss::Loss;
@@ -109,15 +110,11 @@ impl Chosen {
         json_to_python(py, &self.json()?)
     }
 
-    /// A field: numbers as an array.
+    /// A field, which does not change: numbers as an array for reading, fields within it as a mapping.
     fn __getattr__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let (py, json) = (slf.py(), slf.get().json()?);
         match json.get(name) {
-            Some(Json::Array(items)) if is_numeric(items) => {
-                let list = json_to_python(py, &Json::Array(items.clone()))?;
-                py.import("numpy")?.call_method1("array", (list, "float64"))
-            }
-            Some(value) => json_to_python(py, value),
+            Some(value) => unchangeable(py, value),
             None => {
                 let fields: Vec<&str> =
                     json.as_object().map(|o| o.keys().map(String::as_str).collect()).unwrap_or_default();
@@ -145,20 +142,26 @@ impl Chosen {
         }
     }
 
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    /// For `pickle`: its kind and its fields, to the last bit.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&'static str, String))> {
+        let read = py.import("manifactor._native")?.getattr("unpickle")?;
+        Ok((read, (self.0.names().0, self.json()?.to_string())))
+    }
+
     fn __hash__(&self) -> isize {
         use std::hash::{DefaultHasher, Hash, Hasher};
         let mut hasher = DefaultHasher::new();
         self.0.names().hash(&mut hasher);
         hasher.finish() as isize
     }
-}
-
-fn is_numeric(items: &[Json]) -> bool {
-    !items.is_empty()
-        && items.iter().all(|item| match item {
-            Json::Array(inner) => is_numeric(inner),
-            other => other.is_number(),
-        })
 }
 
 impl Chosen {
@@ -172,6 +175,19 @@ impl Chosen {
         };
         json.map_err(|error| errors::argument(self.0.names().1, "", error))
     }
+}
+
+/// What [`Chosen::__reduce__`] has written.
+#[pyfunction]
+fn unpickle<'py>(py: Python<'py>, kind: &str, text: &str) -> PyResult<Bound<'py, PyAny>> {
+    let read = match kind {
+        "factor" => serde_json::from_str::<Box<dyn Factor>>(text).map(|x| What::Factor(x.into())),
+        "loss" => serde_json::from_str::<Box<dyn Loss>>(text).map(|x| What::Loss(x.into())),
+        "solver" => serde_json::from_str::<Box<dyn Optimizer>>(text).map(|x| What::Solver(x.into())),
+        "start" => serde_json::from_str::<Box<dyn Start>>(text).map(|x| What::Start(x.into())),
+        _ => serde_json::from_str::<Box<dyn Variable>>(text).map(|x| What::Variable(x.into())),
+    };
+    read.map_err(|error| errors::argument("pickle", kind, error))?.into_python(py)
 }
 
 /// A value without the name of its type; anything else as it is.
@@ -260,10 +276,10 @@ fn linearize<'py>(
     at: &Bound<'py, PyAny>,
 ) -> PyResult<(Floats<'py>, Vec<Floats<'py>>)> {
     let (py, of, at) = (of.py(), factor("factor", of)?, variables(at)?);
-    let linearization = py.detach(|| {
+    let linearization = detach(py, || {
         let refs: Vec<&dyn Variable> = at.iter().map(|x| &**x).collect();
         of.erased().linearize(&refs)
-    });
+    })?;
     let Some(linearization) = linearization else {
         let types: Vec<_> = at.iter().map(|x| x.typetag_name()).collect();
         let message = format!("`{}` does not take ({})", of.typetag_name(), types.join(", "));
@@ -319,12 +335,13 @@ fn check_factor<'py>(
         }
         subject.around = around.iter().map(|x| x.erased().clone_box()).collect();
     }
-    let report = py.detach(|| FactorCheck { points, seed, ..FactorCheck::default() }.run(&subject));
+    let report = detach(py, || FactorCheck { points, seed, ..FactorCheck::default() }.run(&subject))?;
     crate::raised::raise()?;
     Ok((report.holds(), report.to_string(), to_python(py, &report)?))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(unpickle, module)?)?;
     module.add_function(wrap_pyfunction!(untagged, module)?)?;
     module.add_function(wrap_pyfunction!(retract, module)?)?;
     module.add_function(wrap_pyfunction!(local, module)?)?;

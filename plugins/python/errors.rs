@@ -1,5 +1,6 @@
 //! Errors as exceptions: `manifactor.errors` has their classes.
 use manifactor::config::{Diagnostic, Diagnostics, Fault, ReadError};
+use manifactor_cli::Failure;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -105,6 +106,16 @@ pub(crate) fn graph(error: impl Display) -> PyErr {
 /// What could not be done with input that is right: a `SolveError`, which is a `RuntimeError`.
 pub(crate) fn solve(error: impl Display) -> PyErr {
     exception("SolveError", &error.to_string(), vec![])
+}
+
+/// What keeps an experiment from its files: a `SolveError`, and an `OSError` too if a file cannot be written or read.
+pub(crate) fn failure(error: impl Into<Failure>) -> PyErr {
+    let error = error.into();
+    match &error {
+        Failure::File { .. } => exception("FileError", &error.to_string(), vec![]),
+        Failure::Input { message, help: Some(help) } => solve(format!("{message} ({help})")),
+        _ => solve(error),
+    }
 }
 
 /// For what cannot happen.

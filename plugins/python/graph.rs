@@ -1,26 +1,29 @@
 //! Graphs, values and noise.
 mod files;
 mod noise;
+mod shared;
 mod values;
 
 use crate::chosen::{What, factor, known, loss};
 use crate::errors;
 use crate::input::{Columns, key_rows, keys, to_python};
+use crate::threads::detach;
 use manifactor::graph::catalogue::find;
-use manifactor::graph::{Factor, FactorEntry, Fixed, Graph as Inner, Key};
+use manifactor::graph::{Factor, FactorEntry, Fixed, Graph as Inner, GraphError, Key};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict};
+use pyo3::types::{PyBool, PyBytes, PyDict, PyMappingProxy};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 pub(crate) use files::{document, register};
 pub(crate) use noise::Noise;
+pub(crate) use shared::Shared;
 pub(crate) use values::Values;
 
 /// Factors between named variables, and which variables are held.
 #[pyclass(module = "manifactor")]
 #[derive(Default)]
-pub(crate) struct Graph(pub Inner);
+pub(crate) struct Graph(pub Shared<Inner>);
 
 #[pymethods]
 impl Graph {
@@ -46,8 +49,11 @@ impl Graph {
         let factor = self::factor("factor", factor)?;
         let noise = noise::one("add", noise)?;
         let loss = loss.map(|loss| self::loss("loss", loss)).transpose()?;
-        self.0.push(FactorEntry { keys, name: name.map(Into::into), factor, noise, loss });
-        Ok(self.0.factors().len() - 1)
+        let (at, graph) = (self.0.factors().len(), self.0.change("graph")?);
+        let entry = FactorEntry { keys, name: name.map(Into::into), factor, noise, loss };
+        check(&entry, at)?;
+        graph.push(entry);
+        Ok(at)
     }
 
     /// Adds many factors of one type, and returns the range of their places.
@@ -66,31 +72,42 @@ impl Graph {
         let loss = loss.map(|loss| self::loss("loss", loss)).transpose()?;
         let mut noises = noise::Rows::new("add_many", rows, noise)?;
         let mut factors = Factors::new(factor, rows, fields)?;
-        let first = self.0.factors().len();
+        let (first, graph) = (self.0.factors().len(), self.0.change("graph")?);
         // all or none
         let mut entries = Vec::with_capacity(rows);
         for (row, keys) in keys.chunks_exact(width.max(1)).enumerate() {
             let (keys, factor, noise) = (keys.to_vec(), factors.row(row)?, noises.row(row)?);
-            entries.push(FactorEntry { keys, name: None, factor, noise, loss: loss.clone() });
+            let entry = FactorEntry { keys, name: None, factor, noise, loss: loss.clone() };
+            // all rows have the same number of keys and the same size of noise
+            if row == 0 {
+                check(&entry, first)?;
+            } else {
+                distinct(&entry, first + row)?;
+            }
+            entries.push(entry);
         }
-        self.0.factors_mut().append(&mut entries);
+        graph.factors_mut().append(&mut entries);
         Ok((first, first + rows))
     }
 
     /// Holds a variable at its initial value: all of it, or the directions of its tangent space that are named.
     #[pyo3(signature = (key, directions = None))]
-    fn fix(&mut self, key: &str, directions: Option<Vec<String>>) {
-        self.0.set_fixed(key, directions.map_or(Fixed::Whole(true), Fixed::Directions));
+    fn fix(&mut self, key: &str, directions: Option<Vec<String>>) -> PyResult<()> {
+        let key = crate::input::key("fix", key)?;
+        let fixed = directions.map_or(Fixed::Whole(true), Fixed::Directions);
+        self.0.change("graph")?.set_fixed(key, fixed);
+        Ok(())
     }
 
     /// Lets a variable move again.
-    fn free(&mut self, key: &str) {
-        self.0.set_fixed(key, Fixed::Whole(false));
+    fn free(&mut self, key: &str) -> PyResult<()> {
+        self.0.change("graph")?.set_fixed(key, Fixed::Whole(false));
+        Ok(())
     }
 
     /// The variables that are held: `True`, or names of directions, by key.
     #[getter]
-    fn fixed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn fixed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let dict = PyDict::new(py);
         for (key, fixed) in self.0.fixed() {
             match fixed {
@@ -98,16 +115,17 @@ impl Graph {
                 Fixed::Directions(names) => dict.set_item(key.as_str(), names)?,
             }
         }
-        Ok(dict)
+        // a change would be lost: `fix` and `free` make it
+        Ok(PyMappingProxy::new(py, dict.as_mapping()))
     }
 
     /// Everything that is wrong between the graph and these values; empty where it can be solved.
-    fn check(&self, py: Python<'_>, values: PyRef<'_, Values>) -> Vec<String> {
-        let values = &values.0;
-        py.detach(|| self.0.check(values).iter().map(ToString::to_string).collect())
+    fn check(&self, py: Python<'_>, values: PyRef<'_, Values>) -> PyResult<Vec<String>> {
+        let (graph, values) = (&*self.0, &*values.0);
+        detach(py, || graph.check(values).iter().map(ToString::to_string).collect())
     }
 
-    /// The factor at a place, from 0, as it stands in documents: `keys`, `factor`, `noise`, `loss`, `name`.
+    /// A copy of the factor at a place, from 0, as it stands in documents: `keys`, `factor`, `noise`, `loss`, `name`.
     fn __getitem__<'py>(&self, py: Python<'py>, at: isize) -> PyResult<Bound<'py, PyAny>> {
         let count = self.0.factors().len();
         let place = if at < 0 { at.checked_add_unsigned(count) } else { Some(at) };
@@ -140,11 +158,25 @@ impl Graph {
     }
 
     fn __copy__(&self) -> Self {
-        Self(self.0.clone())
+        Self(self.0.copy())
     }
 
     fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        Self(self.0.clone())
+        Self(self.0.copy())
+    }
+
+    /// For `pickle`: its content as bytes.
+    fn __getstate__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        pickled(py, &*self.0)
+    }
+
+    fn __setstate__(&mut self, state: &[u8]) -> PyResult<()> {
+        self.0 = unpickled("Graph", state)?;
+        Ok(())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        Ok((slf.get_type().into_any(), (), slf.borrow().__getstate__(slf.py())?))
     }
 
     fn __repr__(&self) -> String {
@@ -166,6 +198,45 @@ impl Graph {
             *types.entry(entry.factor.typetag_name()).or_default() += 1;
         }
         types
+    }
+}
+
+/// A class, its arguments, and a state, as `pickle` makes an object of them.
+pub(crate) type Reduced<'py> = (Bound<'py, PyAny>, (), Bound<'py, PyBytes>);
+
+/// The content of an object as bytes, to the last bit.
+pub(crate) fn pickled<'py>(
+    py: Python<'py>,
+    content: &impl serde::Serialize,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let bytes = serde_json::to_vec(content).map_err(|error| errors::argument("pickle", "", error))?;
+    Ok(PyBytes::new(py, &bytes))
+}
+
+pub(crate) fn unpickled<T: serde::de::DeserializeOwned>(what: &str, state: &[u8]) -> PyResult<Shared<T>> {
+    let read = serde_json::from_slice::<T>(state);
+    read.map(Shared::from).map_err(|error| errors::argument(what, "state", error))
+}
+
+/// Checks all of a factor that needs no values: the number of its keys, and the size of its noise.
+fn check(entry: &FactorEntry, at: usize) -> PyResult<()> {
+    let mut found = vec![];
+    entry.resolve(at, |_| None, &mut found);
+    match found.iter().find(|error| !matches!(error, GraphError::MissingVariable { .. })) {
+        Some(error) => Err(errors::graph(error)),
+        None => distinct(entry, at),
+    }
+}
+
+/// Checks that a factor has no variable twice.
+fn distinct(entry: &FactorEntry, factor: usize) -> PyResult<()> {
+    let is_repeated = |(position, key): &(usize, &Key)| entry.keys.iter().take(*position).any(|k| k == *key);
+    match entry.keys.iter().enumerate().find(is_repeated) {
+        None => Ok(()),
+        Some((position, key)) => {
+            let (name, key) = (entry.factor.typetag_name(), key.clone());
+            Err(errors::graph(GraphError::RepeatedVariable { factor, name, position, key }))
+        }
     }
 }
 

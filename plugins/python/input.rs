@@ -4,7 +4,7 @@ mod columns;
 mod keys;
 mod node;
 
-pub(crate) use arrays::{Numbers, array, numbers, numbers_or_nan, to_array};
+pub(crate) use arrays::{Numbers, array, frozen, numbers, numbers_or_nan, to_array};
 pub(crate) use columns::Columns;
-pub(crate) use keys::{key_rows, keys};
-pub(crate) use node::{Untagged, json_to_python, node, to_python};
+pub(crate) use keys::{key, key_rows, keys};
+pub(crate) use node::{Untagged, json_to_python, node, to_python, unchangeable};

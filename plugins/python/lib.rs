@@ -16,6 +16,7 @@ mod raised;
 mod runs;
 mod session;
 mod solution;
+mod threads;
 
 use pyo3::prelude::*;
 

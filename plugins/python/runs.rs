@@ -1,6 +1,7 @@
 //! Runs and experiments from their documents, and the command line.
 use crate::errors;
 use crate::solution::Watch;
+use crate::threads::detach;
 use manifactor::config::{Diagnostics, Document, Format};
 use manifactor::slam::experiment::{self, Experiment, Journal, Progress, Shard, Trial};
 use manifactor::slam::output::OutputFolder;
@@ -10,6 +11,7 @@ use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::source::Folders;
 use manifactor::solve::Interrupt;
 use manifactor::viz::run_page;
+use manifactor_cli::{Failure, write_experiment};
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -22,6 +24,13 @@ fn open(config: &Path, json: Option<String>, set: &[String]) -> Result<Document,
     };
     document.set(set)?;
     Ok(document)
+}
+
+/// An experiment, and the text of its document.
+fn opened(config: &Path, json: Option<String>, set: &[String]) -> PyResult<(Experiment, String)> {
+    let read = open(config, json, set)
+        .and_then(|document| Ok((Experiment::read(&document)?, document.source().text().to_owned())));
+    read.map_err(|error| errors::document(&error))
 }
 
 /// A run as JSON: its report, its table and its record; and its page.
@@ -41,7 +50,7 @@ fn run(
     let mut watch = Watch::new(observer);
     let read = open(&config, json, &set).and_then(|document| RunDocument::read(&document));
     let document = read.map_err(|error| errors::document(&error))?;
-    let done = py.detach(|| {
+    let done = detach(py, || {
         let mut run = Run::new(&document, data);
         let (mut records, mut configs) = (vec![], vec![]);
         for variant in &document.variants {
@@ -54,12 +63,12 @@ fn run(
         let json = |value: Result<String, serde_json::Error>| value.map_err(|error| error.to_string());
         let (told, table) = (serde_json::to_string(&report), serde_json::to_string(&report.table()));
         Ok((json(told)?, json(table)?, json(serde_json::to_string(&record))?, page))
-    });
+    })?;
     watch.finish()?;
     done.map_err(|error: String| errors::solve(error))
 }
 
-/// Runs the trials of an experiment that are not done yet, writes its tables, and returns the summary as JSON and the folder.
+/// Runs the trials of an experiment that are not done yet, writes its tables, pictures and page, and returns the summary as JSON and the folder.
 #[pyfunction]
 #[pyo3(name = "experiment", signature = (config, json, set, data, out, force, retry_failed, threads, shard = None, progress = None))]
 #[expect(clippy::too_many_arguments, reason = "the arguments of the command")]
@@ -76,8 +85,7 @@ fn experiment_of(
     shard: Option<String>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<(Option<String>, PathBuf)> {
-    let read = open(&config, json, &set).and_then(|document| Experiment::read(&document));
-    let mut sweep = read.map_err(|error| errors::document(&error))?;
+    let (mut sweep, text) = opened(&config, json, &set)?;
     if let Some(out) = out {
         sweep.output = out;
     }
@@ -99,32 +107,33 @@ fn experiment_of(
             raised = Some(error);
         }
     };
-    let done = py.detach(|| {
-        let claimed =
-            OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(|e| e.to_string())?;
-        let mut journal = Journal::open(claimed).map_err(|error| error.to_string())?;
-        journal.take_over_shards().map_err(|error| error.to_string())?;
+    let done = detach(py, || {
+        let claimed = OutputFolder::claim(&sweep.output, "experiment", &config, force)?;
+        let mut journal = Journal::open(claimed)?;
+        journal.take_over_shards()?;
         if retry_failed {
             journal.retry_failed();
         }
         let threads = threads.unwrap_or_else(rayon::current_num_threads);
-        experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show)
-            .map_err(|e| e.to_string())?;
+        experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show)?;
         // a part has no tables
         if shard.is_some() {
             return Ok(None);
         }
-        let summary = experiment::write(&sweep, &journal).map_err(|error| error.to_string())?;
-        serde_json::to_string(&summary).map(Some).map_err(|error| error.to_string())
-    });
+        write_experiment(&sweep, &journal, &text).map(Some)
+    })?;
     raised.map_or(Ok(()), Err)?;
-    Ok((done.map_err(|error: String| errors::solve(error))?, sweep.output))
+    let summary = done.map_err(|error: Failure| errors::failure(error))?;
+    let summary = summary.map(|summary| serde_json::to_string(&summary)).transpose();
+    Ok((summary.map_err(errors::internal)?, sweep.output))
 }
 
 /// The trials of an experiment, for a driver that has them run elsewhere.
 #[pyclass(module = "manifactor._native")]
 struct Sweep {
     sweep: Experiment,
+    /// Its document.
+    text: String,
     folders: Folders,
     journal: Option<Journal>,
 }
@@ -143,18 +152,24 @@ impl Sweep {
         force: bool,
         is_driver: bool,
     ) -> PyResult<Self> {
-        let read = open(&config, json, &set).and_then(|document| Experiment::read(&document));
-        let mut sweep = read.map_err(|error| errors::document(&error))?;
+        let (mut sweep, text) = opened(&config, json, &set)?;
         if let Some(out) = out {
             sweep.output = out;
         }
         let folders = Folders { data, document: sweep.folder.clone() };
         let journal = is_driver.then(|| {
             let claimed =
-                OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(errors::solve)?;
-            Journal::open(claimed).map_err(errors::solve)
+                OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(errors::failure)?;
+            let mut journal = Journal::open(claimed).map_err(errors::failure)?;
+            journal.take_over_shards().map_err(errors::failure)?;
+            Ok::<_, PyErr>(journal)
         });
-        Ok(Self { journal: journal.transpose()?, sweep, folders })
+        Ok(Self { journal: journal.transpose()?, sweep, text, folders })
+    }
+
+    /// Opens the trials again that failed before.
+    fn retry_failed(&mut self) {
+        self.journal.iter_mut().for_each(Journal::retry_failed);
     }
 
     /// Numbers of the trials that are not done yet.
@@ -170,7 +185,7 @@ impl Sweep {
             return Err(errors::argument("Sweep.run", "number", format!("there is no trial {number}")));
         };
         let mut watch = Watch::new(None);
-        let record = py.detach(|| experiment::alone(trial, &self.folders, &mut watch));
+        let record = detach(py, || experiment::alone(trial, &self.folders, &mut watch))?;
         watch.finish()?;
         let record = record.ok_or_else(|| errors::solve("the trial was interrupted"))?;
         serde_json::to_string(&record).map_err(errors::internal)
@@ -180,13 +195,14 @@ impl Sweep {
     fn keep(&mut self, line: &str) -> PyResult<()> {
         let record =
             serde_json::from_str(line).map_err(|error| errors::argument("Sweep.keep", "line", error))?;
-        self.journal.as_mut().map_or(Ok(()), |journal| journal.append(record).map_err(errors::solve))
+        self.journal.as_mut().map_or(Ok(()), |journal| journal.append(record).map_err(errors::failure))
     }
 
-    /// Writes the tables, and returns the summary as JSON and the folder.
-    fn write(&self) -> PyResult<(String, PathBuf)> {
+    /// Writes the tables, pictures and page, and returns the summary as JSON and the folder.
+    fn write(&self, py: Python<'_>) -> PyResult<(String, PathBuf)> {
         let journal = self.journal.as_ref().ok_or_else(|| errors::solve("a worker has no journal"))?;
-        let summary = experiment::write(&self.sweep, journal).map_err(errors::solve)?;
+        let written = detach(py, || write_experiment(&self.sweep, journal, &self.text));
+        let summary = written?.map_err(errors::failure)?;
         let summary = serde_json::to_string(&summary).map_err(errors::internal)?;
         Ok((summary, self.sweep.output.clone()))
     }
@@ -194,8 +210,8 @@ impl Sweep {
 
 /// The command line, the name of the program first; returns the exit code.
 #[pyfunction]
-fn main(py: Python<'_>, arguments: Vec<String>) -> u8 {
-    py.detach(|| manifactor_cli::main_with(arguments))
+fn main(py: Python<'_>, arguments: Vec<String>) -> PyResult<u8> {
+    detach(py, || manifactor_cli::main_with(arguments))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,9 +1,10 @@
 //! A graph that grows while it is solved.
 use crate::chosen::{What, solver};
 use crate::errors;
-use crate::graph::{Graph, Values};
+use crate::graph::{Graph, Shared, Values};
 use crate::input::{keys, node, to_array, to_python};
 use crate::solution::Watch;
+use crate::threads::detach;
 use manifactor::config::Errors;
 use manifactor::graph::Key;
 use manifactor::online::{FactorId as InnerId, Session as Inner, Settings};
@@ -20,6 +21,14 @@ pub(crate) struct FactorId(InnerId);
 
 #[pymethods]
 impl FactorId {
+    fn __copy__(&self) -> Self {
+        *self
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        *self
+    }
+
     fn __repr__(&self) -> String {
         format!("FactorId({})", self.0)
     }
@@ -74,7 +83,7 @@ impl Session {
     /// `undetermined` and so on. Where it fails, the session is as it was.
     fn update<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let inner = &mut self.0;
-        let report = py.detach(|| inner.update().map_err(|error| error.to_string()));
+        let report = detach(py, || inner.update().map_err(|error| error.to_string()))?;
         crate::raised::raise()?;
         to_python(py, &report.map_err(errors::solve)?)
     }
@@ -97,14 +106,14 @@ impl Session {
 
     /// All estimates, in the order in which the variables came.
     #[getter]
-    fn values(&self, py: Python<'_>) -> Values {
-        Values(py.detach(|| self.0.estimates()))
+    fn values(&self, py: Python<'_>) -> PyResult<Values> {
+        Ok(Values(Shared::of("session", detach(py, || self.0.estimates())?)))
     }
 
     /// ½ Σ ρ at the estimate. It looks at every factor.
     fn cost(&mut self, py: Python<'_>) -> PyResult<f64> {
         let inner = &mut self.0;
-        let cost = py.detach(|| inner.cost());
+        let cost = detach(py, || inner.cost())?;
         crate::raised::raise()?;
         Ok(cost)
     }
@@ -117,7 +126,7 @@ impl Session {
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let keys = self::keys("covariance", keys)?;
         let names: Vec<&str> = keys.iter().map(Key::as_str).collect();
-        let joint = py.detach(|| self.0.covariance(&names).map_err(|error| error.to_string()));
+        let joint = detach(py, || self.0.covariance(&names).map_err(|error| error.to_string()))?;
         let joint = joint.map_err(errors::solve)?;
         to_array(py, &[joint.nrows(), joint.ncols()], joint.as_slice().to_vec())
     }
@@ -129,7 +138,7 @@ impl Session {
 
     /// The factors that count, as a graph with what is held.
     fn graph(&self) -> Graph {
-        Graph(self.0.graph().0)
+        Graph(self.0.graph().0.into())
     }
 
     /// Solves all that is there as one batch, from the estimate, and returns the values and the account of the solver. The
@@ -143,21 +152,21 @@ impl Session {
         let solver: Arc<dyn Optimizer> =
             solver.map_or_else(|| Ok(Arc::new(Auto::default()) as _), |s| self::solver("solver", s))?;
         let mut watch = Watch::new(None);
-        let finished = py.detach(|| self.0.finish(&*solver, &mut watch).map_err(|error| error.to_string()));
+        let finished = detach(py, || self.0.finish(&*solver, &mut watch).map_err(|error| error.to_string()))?;
         watch.finish()?;
         let finished = finished.map_err(errors::graph)?;
-        Ok((Values(finished.values), to_python(py, &finished.outcome)?))
+        Ok((Values(finished.values.into()), to_python(py, &finished.outcome)?))
     }
 
     /// The session as a text, from which `Session.load` goes on, bit for bit.
     fn save(&self, py: Python<'_>) -> PyResult<String> {
-        py.detach(|| self.0.save().map_err(|error| error.to_string())).map_err(errors::solve)
+        detach(py, || self.0.save().map_err(|error| error.to_string()))?.map_err(errors::solve)
     }
 
     /// A session that was saved.
     #[staticmethod]
     fn load(py: Python<'_>, text: &str) -> PyResult<Self> {
-        let loaded = py.detach(|| Inner::load(text).map_err(|error| error.to_string()));
+        let loaded = detach(py, || Inner::load(text).map_err(|error| error.to_string()))?;
         loaded.map(Self).map_err(|error| errors::argument("Session.load", "text", error))
     }
 
@@ -171,6 +180,10 @@ impl Session {
         every: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("manifactor.rerun")?.call_method1("Live", (slf, path, name, every))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        Ok((slf.get_type().getattr("load")?, (slf.borrow().save(slf.py())?,)))
     }
 
     fn __repr__(&self) -> String {

@@ -1,15 +1,19 @@
 //! Solving a graph, and what a solution can be asked.
+mod account;
+
 use crate::chosen::{solver, start};
 use crate::errors;
-use crate::graph::{Graph, Values, html, optional_keys};
-use crate::input::{json_to_python, to_array, to_python};
-use manifactor::graph::Key;
+use crate::graph::{Graph, Shared, Values, html, optional_keys};
+use crate::input::{frozen, json_to_python, to_array, to_python};
+use crate::threads::detach;
+use account::{Account, State, parsed, restored};
+use manifactor::graph::{Graph as InnerGraph, Key, Values as InnerValues};
 use manifactor::solve::{
     Auto, Given, IterationRecord, Observer, Optimizer, Solution as Inner, Start, solve as solve_inner,
 };
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -65,8 +69,11 @@ impl Observer for Watch {
 #[pyclass(module = "manifactor", frozen)]
 pub(crate) struct Solution {
     inner: Inner,
-    graph: Py<Graph>,
-    values: Py<Values>,
+    /// As it was solved: changes of the program's graph leave it alone.
+    graph: Arc<InnerGraph>,
+    values: Arc<InnerValues>,
+    /// The account of the solver; that of `inner` is another one in a solution that was pickled.
+    account: Account,
 }
 
 /// Solves a graph from these values. Returns a solution however the solve ends: `solution.converged` tells.
@@ -77,8 +84,8 @@ pub(crate) struct Solution {
 #[pyo3(signature = (graph, values, solver = None, *, start = None, observer = None))]
 fn solve(
     py: Python<'_>,
-    graph: Py<Graph>,
-    values: Py<Values>,
+    graph: PyRef<'_, Graph>,
+    values: PyRef<'_, Values>,
     solver: Option<&Bound<'_, PyAny>>,
     start: Option<&Bound<'_, PyAny>>,
     observer: Option<&Bound<'_, PyAny>>,
@@ -88,86 +95,86 @@ fn solve(
     let start: Arc<dyn Start> =
         start.map_or_else(|| Ok(Arc::new(Given::default()) as _), |s| self::start("start", s))?;
     let mut watch = Watch::new(observer);
-    let solved = {
-        let (graph, values) = (graph.borrow(py), values.borrow(py));
-        let (graph, values) = (&graph.0, &values.0);
-        py.detach(|| {
-            let values = start.start(graph, values).map_err(|error| error.to_string())?;
-            solve_inner(graph, &values, &*solver, &mut watch).map_err(|error| error.to_string())
-        })
-    };
+    let (graph, values) = (graph.0.snapshot(), values.0.snapshot());
+    let solved = detach(py, || {
+        let values = start.start(&graph, &values).map_err(|error| error.to_string())?;
+        solve_inner(&graph, &values, &*solver, &mut watch).map_err(|error| error.to_string())
+    })?;
     watch.finish()?;
     let inner = solved.map_err(errors::graph)?;
-    let values = Py::new(py, Values(inner.values.clone()))?;
-    Ok(Solution { inner, graph, values })
+    let values = Arc::new(inner.values.clone());
+    let account = Account::new(&inner.outcome)?;
+    Ok(Solution { inner, graph, values, account })
 }
 
 #[pymethods]
 impl Solution {
     /// The estimate: the best values found, however the solve ended.
     #[getter]
-    fn values(&self, py: Python<'_>) -> Py<Values> {
-        self.values.clone_ref(py)
+    fn values(&self) -> Values {
+        Values(Shared::of("solution", self.values.clone()))
     }
 
-    /// The graph that was solved.
+    /// The graph that was solved, as it was then.
     #[getter]
-    fn graph(&self, py: Python<'_>) -> Py<Graph> {
-        self.graph.clone_ref(py)
+    fn graph(&self) -> Graph {
+        Graph(Shared::of("solution", self.graph.clone()))
     }
 
     /// Whether the values are a minimum, to a tolerance.
     #[getter]
     fn converged(&self) -> bool {
-        self.inner.outcome.termination.is_converged()
+        self.account.converged
     }
 
     /// How the solve ended, in words.
     #[getter]
     fn termination(&self) -> String {
-        self.inner.outcome.termination.to_string()
+        self.account.termination.clone()
     }
 
     /// ½ Σ ρ(‖r‖²) at the estimate.
     #[getter]
     fn cost(&self) -> f64 {
-        self.inner.outcome.final_cost
+        self.account.final_cost
     }
 
     /// The same at the values that the solve began with.
     #[getter]
     fn initial_cost(&self) -> f64 {
-        self.inner.outcome.initial_cost
+        self.account.initial_cost
     }
 
     /// Linearizations that were followed by a step.
     #[getter]
     fn iterations(&self) -> usize {
-        self.inner.outcome.iterations
+        self.account.iterations
     }
 
     /// Seconds by stage.
     #[getter]
     fn seconds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        to_python(py, &self.inner.outcome.times)
+        json_to_python(py, &parsed(&self.account.times)?)
     }
 
     /// All that the solver has to tell, as a dict: `termination`, `undetermined`, `rejected`, `history` and so on.
     #[getter]
     fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        to_python(py, &self.inner.outcome)
+        json_to_python(py, &parsed(&self.account.outcome)?)
     }
 
     /// What each factor costs at the estimate, in the order of the graph, shape (factors,).
     #[getter]
     fn costs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        to_array(py, &[self.inner.factors.len()], self.inner.factors.iter().map(|f| f.cost).collect())
+        let costs = self.inner.factors.iter().map(|f| f.cost).collect();
+        frozen(to_array(py, &[self.inner.factors.len()], costs)?)
     }
 
     /// How much each factor counts, by its loss, shape (factors,); 1 without a loss.
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        to_array(py, &[self.inner.factors.len()], self.inner.factors.iter().map(|f| f.weight).collect())
+        let weights = self.inner.factors.iter().map(|f| f.weight).collect();
+        frozen(to_array(py, &[self.inner.factors.len()], weights)?)
     }
 
     /// The residual of a factor at the estimate, not whitened, shape (rows,).
@@ -187,11 +194,9 @@ impl Solution {
         keys: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let keys = optional_keys("covariances", keys)?;
-        let marginals = {
-            let graph = self.graph.borrow(py);
-            let (graph, names): (_, Vec<&str>) = (&graph.0, keys.iter().map(Key::as_str).collect());
-            py.detach(|| self.inner.marginals(graph, &names).map_err(|error| error.to_string()))
-        };
+        let names: Vec<&str> = keys.iter().map(Key::as_str).collect();
+        let marginals =
+            detach(py, || self.inner.marginals(&self.graph, &names).map_err(|error| error.to_string()))?;
         let dict = PyDict::new(py);
         for marginal in marginals.map_err(errors::solve)? {
             let n = marginal.covariance.nrows();
@@ -210,45 +215,76 @@ impl Solution {
         keys: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let keys = crate::input::keys("joint_covariance", keys)?;
-        let joint = {
-            let graph = self.graph.borrow(py);
-            let (graph, names): (_, Vec<&str>) = (&graph.0, keys.iter().map(Key::as_str).collect());
-            py.detach(|| {
-                let mut problem = self.inner.problem(graph).map_err(|error| error.to_string())?;
-                problem.joint_covariance(&names).map_err(|error| error.to_string())
-            })
-        };
+        let names: Vec<&str> = keys.iter().map(Key::as_str).collect();
+        let joint = detach(py, || {
+            let mut problem = self.inner.problem(&self.graph).map_err(|error| error.to_string())?;
+            problem.joint_covariance(&names).map_err(|error| error.to_string())
+        })?;
         let joint = joint.map_err(errors::solve)?;
         to_array(py, &[joint.nrows(), joint.ncols()], joint.as_slice().to_vec())
     }
 
     /// What is worth a look: the factors that cost the most, the condition of the linear system, what nothing constrains.
     fn diagnosis<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let diagnosis = {
-            let graph = self.graph.borrow(py);
-            let graph = &graph.0;
-            py.detach(|| self.inner.diagnose(graph).map_err(|error| error.to_string()))
-        };
+        let diagnosis = detach(py, || self.inner.diagnose(&self.graph).map_err(|error| error.to_string()))?;
         let json = serde_json::to_value(diagnosis.map_err(errors::solve)?).map_err(errors::internal)?;
         json_to_python(py, &json)
     }
 
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    /// For `pickle`: its graph, its values, its account, and the states and weights of its factors.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (own, py) = (slf.get(), slf.py());
+        let states: Vec<State> = own.inner.factors.iter().cloned().map(Into::into).collect();
+        let account = own.account.clone();
+        let content = (own.graph(), own.values(), account, states, own.inner.weights.clone());
+        Ok((slf.get_type().getattr("_unpickle")?, content.into_pyobject(py)?))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_unpickle")]
+    fn unpickle(
+        py: Python<'_>,
+        graph: PyRef<'_, Graph>,
+        values: PyRef<'_, Values>,
+        account: Account,
+        states: Vec<State>,
+        weights: Vec<f64>,
+    ) -> PyResult<Self> {
+        let (mut graph, values) = (graph.0.snapshot(), values.0.snapshot());
+        let inner = detach(py, || restored(&graph, &values, states, weights))?.map_err(errors::graph)?;
+        if !inner.weights.is_empty() {
+            // the problem of `inner` knows no weights: a graph of another version has it compiled again with them
+            Arc::make_mut(&mut graph).factors_mut();
+        }
+        Ok(Self { inner, graph, values, account })
+    }
+
     fn _repr_html_(&self) -> String {
-        let outcome = &self.inner.outcome;
+        let account = &self.account;
+        let seconds = parsed(&account.times).ok().and_then(|times| times.get("total")?.as_f64());
         let rows = [
-            ["ended".to_owned(), outcome.termination.to_string()],
-            ["cost".to_owned(), format!("{:.6e} to {:.6e}", outcome.initial_cost, outcome.final_cost)],
-            ["iterations".to_owned(), outcome.iterations.to_string()],
-            ["factors".to_owned(), outcome.factors.to_string()],
-            ["seconds".to_owned(), format!("{:.3}", outcome.times.total)],
+            ["ended".to_owned(), account.termination.clone()],
+            ["cost".to_owned(), format!("{:.6e} to {:.6e}", account.initial_cost, account.final_cost)],
+            ["iterations".to_owned(), account.iterations.to_string()],
+            ["factors".to_owned(), self.inner.factors.len().to_string()],
+            ["seconds".to_owned(), format!("{:.3}", seconds.unwrap_or(f64::NAN))],
         ];
         html(&["solve", ""], rows)
     }
 
     fn __repr__(&self) -> String {
-        let outcome = &self.inner.outcome;
-        let (first, last, steps) = (outcome.initial_cost, outcome.final_cost, outcome.iterations);
-        format!("Solution({}; cost {first:.6e} to {last:.6e} in {steps} iterations)", outcome.termination)
+        let Account { termination, initial_cost, final_cost, iterations, .. } = &self.account;
+        format!(
+            "Solution({termination}; cost {initial_cost:.6e} to {final_cost:.6e} in {iterations} iterations)"
+        )
     }
 }
 

@@ -92,13 +92,7 @@ impl Experiment {
             ));
             return Ok(status);
         }
-        let summary = experiment::write(&sweep, &journal)?;
-        let trials = experiment::trials_table(&sweep, &journal);
-        let look = Look::default();
-        let pictures = experiment_pictures(&sweep, &summary, &trials, look.width());
-        look.write(&sweep.output, &pictures)?;
-        let page = experiment_page(&sweep, &summary, &trials, document.source().text());
-        write_whole(&sweep.output.join("report.html"), page)?;
+        let summary = write_experiment(&sweep, &journal, document.source().text())?;
         self.tell(&sweep, &summary);
         if let Some(page) = self.markdown.as_ref().filter(|_| summary.open == 0) {
             write_whole(page, self.put_into(page, &sweep.digest(), &summary.markdown())?)?;
@@ -134,6 +128,20 @@ impl Experiment {
             output::say(&format!("{open} still to be run: the same command goes on."));
         }
     }
+}
+
+/// Writes all files of an experiment: its tables, pictures and page. `text` is its document.
+///
+/// # Errors
+/// If one cannot be written; those before it are there.
+pub fn write_experiment(sweep: &Sweep, journal: &Journal, text: &str) -> Result<Summary, Failure> {
+    let summary = experiment::write(sweep, journal)?;
+    let trials = experiment::trials_table(sweep, journal);
+    let look = Look::default();
+    look.write(&sweep.output, &experiment_pictures(sweep, &summary, &trials, look.width()))?;
+    let page = experiment_page(sweep, &summary, &trials, text);
+    write_whole(&sweep.output.join("report.html"), page)?;
+    Ok(summary)
 }
 
 /// How far it is: a bar on a terminal, a line now and then in a file.

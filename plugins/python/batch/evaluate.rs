@@ -171,21 +171,16 @@ impl Function {
             if !derivatives {
                 return Ok((residuals, vec![]));
             }
-            let mut blocks = vec![];
-            for (size, jacobian) in sizes.iter().zip(jacobians.try_iter()?) {
-                blocks.push(read(&self.name, "the Jacobian", &jacobian?, &[n, self.rows, *size])?);
+            let jacobians = jacobians.try_iter()?.collect::<PyResult<Vec<_>>>()?;
+            if jacobians.len() != sizes.len() {
+                let (variables, found) = (sizes.len(), jacobians.len());
+                let message = format!("expected a Jacobian for each of {variables} variables, got {found}");
+                return Err(errors::argument(&self.name, "the Jacobian", message));
             }
-            match blocks.len() == sizes.len() {
-                true => Ok((residuals, blocks)),
-                false => {
-                    let message = format!(
-                        "expected a Jacobian for each of {} variables, got {}",
-                        sizes.len(),
-                        blocks.len()
-                    );
-                    Err(errors::argument(&self.name, "the Jacobian", message))
-                }
-            }
+            let block = |(size, jacobian): (&usize, &Bound<'_, PyAny>)| {
+                read(&self.name, "the Jacobian", jacobian, &[n, self.rows, *size])
+            };
+            Ok((residuals, sizes.iter().zip(&jacobians).map(block).collect::<PyResult<_>>()?))
         })
     }
 }

@@ -1,6 +1,7 @@
 //! Graphs in files: documents, and the formats of others.
 use super::{Graph, Values};
 use crate::errors;
+use crate::threads::detach;
 use manifactor::config::{Document, Format, read_graph, write_graph};
 use manifactor::formats::{FormatError, GraphFormat, Reading, Repair, read_text};
 use manifactor::graph::{Graph as InnerGraph, Values as InnerValues};
@@ -24,8 +25,13 @@ pub(crate) fn document(
             return Err(errors::argument("to_document", "format", message));
         }
     };
-    py.detach(|| write_graph(graph, values, format))
-        .map_err(|error| errors::argument("to_document", "graph", error))
+    // a document that no reader takes is of no use
+    let (found, written) = detach(py, || (graph.check(values), write_graph(graph, values, format)))?;
+    let text = written.map_err(|error| errors::argument("to_document", "graph", error))?;
+    match found.is_empty() {
+        true => Ok(text),
+        false => Err(errors::graph(found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))),
+    }
 }
 
 /// Reads a graph from a file: a literal graph in TOML, JSON or YAML, or one in another format that is linked. Returns the
@@ -49,17 +55,17 @@ fn read(
         }
     };
     if Format::of_path(&path).is_some() {
-        let read = py.detach(|| Document::open(&path).and_then(|document| read_graph(&document)));
+        let read = detach(py, || Document::open(&path).and_then(|document| read_graph(&document)))?;
         let (graph, values) = read.map_err(|error| errors::document(&error))?;
-        return Ok((Graph(graph), Values(values), vec![]));
+        return Ok((Graph(graph.into()), Values(values.into()), vec![]));
     }
-    let read = py.detach(|| {
+    let read = detach(py, || {
         let text = read_text(&path)?;
         let format = GraphFormat::of(&path, &text);
         format.map(|format| (format.parse)(&text, &path, Reading { repair, anchor, lenient })).transpose()
-    });
+    })?;
     match read.map_err(unreadable)? {
-        Some(read) => Ok((Graph(read.graph), Values(read.values), read.notes)),
+        Some(read) => Ok((Graph(read.graph.into()), Values(read.values.into()), read.notes)),
         None => {
             let message = format!(
                 "{}: neither its extension nor its first line tells a format of graphs",

@@ -43,7 +43,15 @@ impl Noise {
                 return Err(errors::argument("Noise", second, message));
             }
         };
-        Ok(Self(observed.map_or(noise.clone(), |rows| noise.observing(&rows))))
+        let Some(observed) = observed else { return Ok(Self(noise)) };
+        if !observed.contains(&true) {
+            let message = "expected a row that was measured: without any, leave the factor out";
+            return Err(errors::argument("Noise", "observed", message));
+        }
+        let noise = noise.observing(&observed);
+        // its own size, if it has any, is that of `observed`
+        noise.whitener(observed.len()).map_err(|error| errors::argument("Noise", "observed", error))?;
+        Ok(Self(noise))
     }
 
     /// The information matrix of a residual of so many rows, shape (rows, rows).
@@ -68,6 +76,26 @@ impl Noise {
         other.cast::<Self>().is_ok_and(|other| other.get().0 == self.0)
     }
 
+    fn __copy__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    /// For `pickle`: its content, to the last bit.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let text = serde_json::to_string(&slf.get().0).map_err(errors::internal)?;
+        Ok((slf.get_type().getattr("_unpickle")?, (text,)))
+    }
+
+    #[staticmethod]
+    #[pyo3(name = "_unpickle")]
+    fn unpickle(text: &str) -> PyResult<Self> {
+        serde_json::from_str(text).map(Self).map_err(|error| errors::argument("pickle", "noise", error))
+    }
+
     fn __hash__(&self) -> isize {
         0
     }
@@ -89,6 +117,9 @@ fn read(
     let shape: Vec<_> = rows.into_iter().map(Some).chain(std::iter::repeat_n(None, axes)).collect();
     let numbers = numbers(what, name, value, &shape)?;
     match numbers.shape.as_slice() {
+        [.., 0] if axes > 0 => {
+            Err(errors::argument(what, name, "expected a number for each row of the residual, got none"))
+        }
         [.., r, c] if axes == 2 && r != c => Err(errors::argument(
             what,
             name,

@@ -1,29 +1,34 @@
 //! Values of variables.
-use super::html;
+use super::{Reduced, Shared, html, pickled, unpickled};
 use crate::chosen::{What, known, variable};
 use crate::errors;
-use crate::input::{Columns, key_rows, to_array};
+use crate::input::{Columns, key, key_rows, to_array};
+use indexmap::IndexMap;
 use manifactor::graph::catalogue::find;
 use manifactor::graph::{Key, Values as Inner, Variable};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyBytes, PyDict, PyList};
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
 
 /// A value for each variable, by its key, in the order in which they were put in.
 #[pyclass(module = "manifactor", mapping)]
 #[derive(Default)]
-pub(crate) struct Values(pub Inner);
+pub(crate) struct Values(pub Shared<Inner>);
 
 #[pymethods]
 impl Values {
-    /// None, or those of a dict.
+    /// None, or those of a dict, or a copy of others.
     #[new]
     #[pyo3(signature = (values = None))]
-    fn new(values: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    fn new(values: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let Some(values) = values else { return Ok(Self::default()) };
+        if let Ok(values) = values.cast::<Self>() {
+            return Ok(values.borrow().__copy__());
+        }
         let mut made = Self::default();
-        for (key, value) in values.into_iter().flatten() {
+        for (key, value) in values.cast::<PyDict>()? {
             made.__setitem__(&key.extract::<String>()?, &value)?;
         }
         Ok(made)
@@ -37,13 +42,13 @@ impl Values {
     }
 
     fn __setitem__(&mut self, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
-        let value = variable("value", value)?;
-        self.0.insert_boxed(key.into(), value.erased().clone_box());
+        let (key, value) = (self::key("Values", key)?, variable("value", value)?);
+        self.0.change("values")?.insert_boxed(key, value.erased().clone_box());
         Ok(())
     }
 
     fn __delitem__(&mut self, key: &str) -> PyResult<()> {
-        match self.0.remove(key) {
+        match self.0.change("values")?.remove(key) {
             Some(_) => Ok(()),
             None => Err(PyKeyError::new_err(format!("there is no variable `{key}`"))),
         }
@@ -90,12 +95,17 @@ impl Values {
         known("variable", &name)?;
         let entry = find("variable", &name).ok_or_else(|| errors::internal(&name))?;
         let mut columns = Columns::new(&name, keys.len(), fields)?;
-        let mut made: Vec<(Key, Box<dyn Variable>)> = Vec::with_capacity(keys.len());
+        let mut made: IndexMap<Key, Box<dyn Variable>> = IndexMap::with_capacity(keys.len());
         for (row, key) in keys.into_iter().enumerate() {
+            if let Some(first) = made.get_index_of(&key) {
+                let message = format!("`{key}` is in rows {first} and {row}: expected each key once");
+                return Err(errors::argument("insert_many", "keys", message));
+            }
             let read = entry.read::<dyn Variable>(columns.row(row));
-            made.push((key, read.map_err(|error| errors::row(&name, row, &error, "fields"))?));
+            made.insert(key, read.map_err(|error| errors::row(&name, row, &error, "fields"))?);
         }
-        made.into_iter().for_each(|(key, value)| drop(self.0.insert_boxed(key, value)));
+        let values = self.0.change("values")?;
+        made.into_iter().for_each(|(key, value)| drop(values.insert_boxed(key, value)));
         Ok(())
     }
 
@@ -145,11 +155,25 @@ impl Values {
     }
 
     fn __copy__(&self) -> Self {
-        Self(self.0.clone())
+        Self(self.0.copy())
     }
 
     fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
-        Self(self.0.clone())
+        Self(self.0.copy())
+    }
+
+    /// For `pickle`: its content as bytes.
+    fn __getstate__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        pickled(py, &*self.0)
+    }
+
+    fn __setstate__(&mut self, state: &[u8]) -> PyResult<()> {
+        self.0 = unpickled("Values", state)?;
+        Ok(())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+        Ok((slf.get_type().into_any(), (), slf.borrow().__getstate__(slf.py())?))
     }
 
     fn __repr__(&self) -> String {

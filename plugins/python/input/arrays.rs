@@ -148,3 +148,9 @@ pub(crate) fn to_array<'py>(
     let array = ArrayD::from_shape_vec(IxDyn(shape), values).map_err(errors::internal)?;
     Ok(PyArrayDyn::from_owned_array(py, array))
 }
+
+/// An array for reading only.
+pub(crate) fn frozen<'py, T>(array: Bound<'py, T>) -> PyResult<Bound<'py, T>> {
+    array.as_any().call_method1("setflags", (false,))?;
+    Ok(array)
+}

@@ -7,18 +7,33 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 use std::collections::HashMap;
 
+/// A key, which has at least one character, as in documents.
+pub(crate) fn key(what: &str, text: &str) -> PyResult<Key> {
+    match text.is_empty() {
+        true => Err(errors::argument(what, "key", "a key needs at least one character, such as \"x0\"")),
+        false => Ok(text.into()),
+    }
+}
+
 /// The keys of one factor: one text, or several.
 pub(crate) fn keys(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Key>> {
     if let Ok(key) = value.cast::<PyString>() {
-        return Ok(vec![key.to_cow()?.as_ref().into()]);
+        return Ok(vec![self::key(what, &key.to_cow()?)?]);
     }
     let expected =
         || errors::argument(what, "keys", "expected a text, or several: \"x0\", or [\"x0\", \"x1\"]");
     let items = value.try_iter().map_err(|_| expected())?;
     let text = |item: PyResult<Bound<'_, PyAny>>| {
-        Ok(item?.cast::<PyString>().map_err(|_| expected())?.to_cow()?.as_ref().into())
+        key(what, &item?.cast::<PyString>().map_err(|_| expected())?.to_cow()?)
     };
     items.map(text).collect()
+}
+
+/// One text, or several, which may be empty: a number follows.
+fn prefixes_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<Key>> {
+    let texts =
+        value.extract::<String>().map(|text| vec![text]).or_else(|_| value.extract::<Vec<String>>())?;
+    Ok(texts.iter().map(|text| text.as_str().into()).collect())
 }
 
 /// The keys of many factors or values, by rows, and how many each row has. Texts by rows, or whole numbers, of which the key
@@ -75,7 +90,7 @@ pub(crate) fn key_rows(
     }
     let prefixes = match prefix {
         None => vec!["x".into()],
-        Some(prefix) => keys(what, prefix).map_err(|_| {
+        Some(prefix) => prefixes_of(prefix).map_err(|_| {
             errors::argument(what, "prefix", "expected a text, or one for each column of `keys`")
         })?,
     };

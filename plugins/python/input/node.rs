@@ -1,12 +1,12 @@
 //! Values of Python as nodes of a document, and back.
-use super::arrays::any_numbers;
+use super::arrays::{any_numbers, frozen};
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
 use manifactor::graph::Variable;
 use numpy::PyUntypedArray;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMappingProxy, PyString, PyTuple};
 use serde_json::Value as Json;
 use std::sync::Arc;
 
@@ -61,6 +61,9 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
     } else if let Ok(text) = value.cast::<PyString>() {
         let text = text.to_cow()?.into_owned();
         return Ok(Node::new(place(path, &text), Value::String(text)));
+    } else if let Ok(fields) = value.cast::<PyMappingProxy>() {
+        // fields of an object that does not change
+        return nested(what, path, &fields.call_method0("copy")?, depth);
     } else if let Ok(dict) = value.cast::<PyDict>() {
         let mut table = manifactor::config::Table::default();
         for (name, value) in dict {
@@ -127,6 +130,36 @@ pub(crate) fn array_node(place: &Place, shape: &[usize], values: &[f64], whole: 
 
 pub(crate) fn number(x: f64, whole: bool) -> Value {
     if whole { Value::Integer(x as i64) } else { Value::Float(x) }
+}
+
+/// A field of an object that does not change: a change would be lost, and is an error.
+pub(crate) fn unchangeable<'py>(py: Python<'py>, json: &Json) -> PyResult<Bound<'py, PyAny>> {
+    match json {
+        Json::Array(items) if is_numeric(items) => {
+            let made = py.import("numpy")?.call_method1("array", (json_to_python(py, json)?, "float64"))?;
+            frozen(made)
+        }
+        Json::Array(items) => {
+            let items = items.iter().map(|item| unchangeable(py, item)).collect::<PyResult<Vec<_>>>()?;
+            Ok(PyTuple::new(py, items)?.into_any())
+        }
+        Json::Object(fields) => {
+            let dict = PyDict::new(py);
+            for (name, value) in fields {
+                dict.set_item(name, unchangeable(py, value)?)?;
+            }
+            Ok(PyMappingProxy::new(py, dict.as_mapping()).into_any())
+        }
+        other => json_to_python(py, other),
+    }
+}
+
+fn is_numeric(items: &[Json]) -> bool {
+    !items.is_empty()
+        && items.iter().all(|item| match item {
+            Json::Array(inner) => is_numeric(inner),
+            other => other.is_number(),
+        })
 }
 
 /// What serde writes, as dicts, lists and numbers.

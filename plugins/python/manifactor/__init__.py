@@ -21,13 +21,13 @@ from ._native import FactorId, Graph, Noise, Session, Solution, Values, __versio
 from ._native import read as _read
 from .batched import BatchFactor, batch
 from .chosen import Factor, Loss, Solver, Start, Variable
-from .errors import ArgumentError, DocumentError, GraphError, ManifactorError, SolveError, TraceError
+from .errors import ArgumentError, DocumentError, ExistsError, GraphError, ManifactorError, SolveError, TraceError
 from .factors import *
 from .formula import require, where
 from .frames import poses, rotations, to_pandas
 from .logs import enable_logging
 from .losses import *
-from .report import Report, Summary, experiment, run
+from .report import Report, Summary, experiment, run, written
 from .solvers import auto, dogleg, gauss_newton, gnc, levenberg_marquardt
 from .traced import Check, TracedFactor, check_factor, factor
 from .variables import *
@@ -37,6 +37,7 @@ __all__ = [
     "BatchFactor",
     "Check",
     "DocumentError",
+    "ExistsError",
     "Factor",
     "FactorId",
     "Graph",
@@ -102,9 +103,11 @@ def load(
     return graph, values
 
 
-def save(path: str | os.PathLike[str], graph: Graph, values: Values) -> None:
-    """Writes a graph and its values as a document, by the extension of the file; `load` and `manifactor solve` read it."""
+def save(path: str | os.PathLike[str], graph: Graph, values: Values, *, force: bool = False) -> None:
+    """Writes a graph and its values as a document, by the extension of the file; `load` and `manifactor solve` read it.
+
+    A file that exists is replaced only with `force`. A graph that does not fit its values is refused.
+    """
     extension = os.path.splitext(os.fspath(path))[1].removeprefix(".")
     text = graph.to_document(values, {"yml": "yaml"}.get(extension, extension))
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text)
+    written(path, text, force)

@@ -30,7 +30,9 @@ class Chosen:
     def to_dict(self) -> dict[str, Any]:
         """Its fields with its `type`, as a document has them."""
     def __getattr__(self, name: str) -> Any:
-        """A field: numbers as an array."""
+        """A field, which does not change: numbers as an array for reading, fields within it as a mapping."""
+    def __copy__(self) -> Self: ...
+    def __deepcopy__(self, memo: Any) -> Self: ...
 
 @final
 class Noise:
@@ -71,7 +73,7 @@ class Graph:
 
         `keys` are the names of its variables, in the order of the residual's. `noise` defaults to a standard deviation of 1
         in every row (a number is a sigma for all rows), `loss` to none, `name`, which reports use, to that of the factor's
-        type."""
+        type. A number of keys that is not the factor's, a key twice, and a noise of another size are a `GraphError`."""
     def add_many(
         self,
         factor: str | Factor | Callable[..., Factor],
@@ -94,8 +96,8 @@ class Graph:
     def free(self, key: str) -> None:
         """Lets a variable move again."""
     @property
-    def fixed(self) -> dict[str, bool | list[str]]:
-        """The variables that are held: `True`, or names of directions, by key."""
+    def fixed(self) -> Mapping[str, bool | list[str]]:
+        """The variables that are held: `True`, or names of directions, by key. `fix` and `free` change them."""
     def check(self, values: Values) -> list[str]:
         """Everything that is wrong between the graph and these values; empty where it can be solved."""
     def factor(self, at: int) -> Factor:
@@ -105,7 +107,7 @@ class Graph:
     def to_document(self, values: Values, format: str = "toml") -> str:
         """The graph and its values as a document, in `toml`, `json` or `yaml`; `manifactor solve` reads it."""
     def __getitem__(self, at: int) -> dict[str, Any]:
-        """The factor at a place, from 0, as it stands in documents: `keys`, `factor`, `noise`, `loss`, `name`."""
+        """A copy of the factor at a place, from 0, as it stands in documents: `keys`, `factor`, `noise`, `loss`, `name`."""
     def __len__(self) -> int: ...
     def __copy__(self) -> Graph: ...
     def __deepcopy__(self, memo: Any) -> Graph: ...
@@ -115,7 +117,8 @@ class Graph:
 class Values:
     """A value for each variable, by its key, in the order in which they were put in."""
 
-    def __new__(cls, values: Mapping[str, Variable] | None = None) -> Self: ...
+    def __new__(cls, values: Mapping[str, Variable] | Values | None = None) -> Self:
+        """None, or those of a dict, or a copy of others."""
     def __getitem__(self, key: str) -> Variable: ...
     def __setitem__(self, key: str, value: Variable) -> None: ...
     def __delitem__(self, key: str) -> None: ...
@@ -132,7 +135,8 @@ class Values:
         *,
         prefix: str | None = None,
     ) -> None:
-        """Puts in many values of one type: arrays among the fields have a row for each. `keys` as for `Graph.add_many`."""
+        """Puts in many values of one type: arrays among the fields have a row for each. `keys` as for `Graph.add_many`, each
+        once. Values of the same keys from before are replaced."""
     def columns(self, type: str | type[Variable]) -> tuple[list[str], dict[str, _Array]]:
         """Keys and fields of all values of one type: each field an array with a row for each."""
     def types(self) -> dict[str, int]:
@@ -147,10 +151,11 @@ class Solution:
 
     @property
     def values(self) -> Values:
-        """The estimate: the best values found, however the solve ended."""
+        """The estimate: the best values found, however the solve ended. They do not change; `copy.copy` makes some that can be
+        changed."""
     @property
     def graph(self) -> Graph:
-        """The graph that was solved."""
+        """The graph that was solved, as it was then. It does not change; `copy.copy` makes one that can be changed."""
     @property
     def converged(self) -> bool:
         """Whether the values are a minimum, to a tolerance."""
@@ -219,7 +224,8 @@ class Session:
     def __len__(self) -> int: ...
     @property
     def values(self) -> Values:
-        """All estimates, in the order in which the variables came."""
+        """All estimates, in the order in which the variables came. They do not change; `copy.copy` makes some that can be
+        changed."""
     def cost(self) -> float:
         """½ Σ ρ at the estimate. It looks at every factor."""
     def covariance(self, keys: _Keys) -> _Array:
@@ -265,7 +271,8 @@ def solve(
     """Solves a graph from these values. Returns a solution however the solve ends: `solution.converged` tells.
 
     `solver` defaults to `auto`, `start` to the values as they are. `observer` is called with a dict after each step that was
-    tried, and ends the solve where it returns `False`. Other threads of Python run meanwhile, and Ctrl-C interrupts."""
+    tried, and ends the solve where it returns `False`. Other threads of Python run meanwhile, and Ctrl-C interrupts. A process
+    that was forked after a solve of its parent solves on one thread, with the same results, and warns of it once."""
 
 def read(
     path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True, lenient: bool = False
@@ -319,6 +326,7 @@ class Sweep:
         force: bool,
         is_driver: bool,
     ) -> Self: ...
+    def retry_failed(self) -> None: ...
     def open(self) -> list[int]: ...
     def run(self, number: int) -> str: ...
     def keep(self, line: str) -> None: ...

@@ -55,8 +55,16 @@ class UnreadableError(DocumentError, OSError):
     """A file that is not there, or cannot be read."""
 
 
+class ExistsError(ManifactorError, FileExistsError):
+    """A file that exists, and is replaced only with `force=True`."""
+
+
 class SolveError(ManifactorError, RuntimeError):
     """What could not be done with input that is right: a covariance of what nothing constrains, data that are not there."""
+
+
+class FileError(SolveError, OSError):
+    """A file or folder of results that cannot be written or read."""
 
 
 class TraceError(ManifactorError, TypeError):

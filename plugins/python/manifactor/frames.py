@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .chosen import Variable
+from .errors import ArgumentError, Mistake
 from ._native import Values
+from .variables import BY_TYPE
 
 Array = NDArray[np.float64]
 
@@ -25,10 +27,21 @@ def rotations(quaternions: Array) -> Array:
 
 
 def poses(values: Values, type: str | type[Variable] = "se3") -> tuple[list[str], Array]:
-    """Keys and homogeneous matrices of all poses: shape (n, 4, 4) for `se3` and objects, (n, 3, 3) for `se2`."""
+    """Keys and homogeneous matrices of all poses: shape (n, 4, 4) for `se3` and objects, (n, 3, 3) for `se2`.
+
+    Both are empty if there are no values of the type. A type that is no pose is an `ArgumentError`.
+    """
     keys, fields = values.columns(type)
+    name = type if isinstance(type, str) else type.TYPE
+    of = BY_TYPE.get(name, Variable)
+    size = 2 if hasattr(of, "angle") else 3
+    if not hasattr(of, "translation") or not hasattr(of, "angle" if size == 2 else "rotation"):
+        poses = [pose for pose, of in BY_TYPE.items() if hasattr(of, "translation")]
+        message = f"expected a type of poses, got `{name}`"
+        raise ArgumentError("poses", [Mistake("type", message, f"there are {', '.join(poses)}")])
+    if not keys:
+        return keys, np.empty((0, size + 1, size + 1))
     translation = fields["translation"]
-    size = translation.shape[1]
     matrices = np.tile(np.eye(size + 1), (len(keys), 1, 1))
     if size == 3:
         matrices[:, :3, :3] = rotations(fields["rotation"])

@@ -1,8 +1,8 @@
 """An experiment over Ray: `python -m manifactor.ray SWEEP`. Needs `manifactor[ray]`.
 
-The driver has the journal, and the workers run the trials, each on one processor. A worker that dies is a retry; where the driver
-dies, the same command goes on with what is left. The tables are those of `manifactor experiment`, byte for byte. Documents and data
-are read by each worker, from the same paths.
+The driver has the journal, and the workers run the trials, each on one processor. A trial is tried again if its worker dies. If the
+driver dies, the same command goes on with the remaining trials. The files are those of `manifactor experiment`, and the tables are the
+same byte for byte. Each worker reads the documents and data from the same paths.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _native
+from .errors import ManifactorError
 from .report import Config, Summary, data_folder, opened, overrides
 
 #: How often a trial is begun again whose worker has died.
@@ -46,21 +47,25 @@ def experiment(
     data: str | os.PathLike[str] | None = None,
     out: str | os.PathLike[str] | None = None,
     force: bool = False,
+    retry_failed: bool = False,
     address: str | None = None,
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Summary:
-    """Runs the trials of an experiment that are not done yet, on the workers of a cluster, and writes its tables.
+    """Runs the trials of an experiment that are not done yet, on the workers of a cluster, and writes its tables, pictures and
+    page.
 
-    `address` is that of a cluster; without it, one is started on this machine, with so many `workers`. Where Ray is connected
-    already, that is used. `progress` is called with the trials that are done in this call, and all that it has to do.
+    `address` is that of a cluster; without it, a cluster with this number of `workers` is started on this machine. A connection
+    of Ray that exists is used. `progress` is called with the trials that are done in this call, and all that it has to do.
     """
     import ray
 
     path, text = opened(config, "experiment")
     if text is None:
         path = os.path.abspath(path)
-    of = (path, text, tuple(overrides(set)), data_folder(data))
+    # a worker has a working directory of its own
+    folder = data_folder(data)
+    of = (path, text, tuple(overrides(set)), None if folder is None else os.path.abspath(folder))
     sweep = _native.Sweep(path, text, list(of[2]), of[3], None if out is None else os.fspath(out), force, True)
     own = not ray.is_initialized()
     if own and address is None:
@@ -69,6 +74,8 @@ def experiment(
     elif own:
         ray.init(address=address, log_to_driver=False)
     try:
+        if retry_failed:
+            sweep.retry_failed()
         waiting = sweep.open()
         trial = ray.remote(num_cpus=1, max_retries=RETRIES)(run_trial)
         running = {trial.remote(of, number): number for number in waiting}
@@ -96,6 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--data", metavar="DIR", help="the folder where public data sets lie; default: MANIFACTOR_DATA")
     parser.add_argument("--out", metavar="DIR", help="the folder for the results")
     parser.add_argument("--force", action="store_true", help="write into a folder that holds files of something else")
+    parser.add_argument("--retry-failed", action="store_true", help="run the trials again that failed before")
     parser.add_argument("--address", help="of a cluster; default: one on this machine")
     parser.add_argument("--workers", type=int, metavar="N", help="workers on this machine; default: one for each processor")
     options = vars(parser.parse_args(arguments))
@@ -103,11 +111,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def progress(done: int, of: int) -> None:
         print(f"{done} of {of} trials done", file=sys.stderr)
 
-    summary = experiment(options.pop("config"), progress=progress, **options)
+    try:
+        summary = experiment(options.pop("config"), progress=progress, **options)
+    except KeyboardInterrupt:
+        print("interrupted: the same command goes on with the remaining trials", file=sys.stderr)
+        return 130
+    except (ManifactorError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 3 if isinstance(error, OSError) else 2
     print((summary.folder / "summary.md").read_text(encoding="utf-8"))
     print(f"Written to {summary.folder}.")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    # workers import this module by its name, and find nothing of it in their own `__main__`
+    from manifactor.ray import main as command
+
+    sys.exit(command())

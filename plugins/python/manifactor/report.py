@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from .errors import ExistsError, Mistake
 
 #: A file, or what would stand in one.
 Config = str | os.PathLike[str] | Mapping[str, Any]
@@ -100,9 +101,9 @@ class Report:
     def _repr_html_(self) -> str:
         return f'<iframe srcdoc="{html.escape(self.html)}" style="width: 100%; height: 720px; border: 0"></iframe>'
 
-    def save_html(self, path: str | os.PathLike[str]) -> None:
-        """Writes the page."""
-        Path(path).write_text(self.html, encoding="utf-8")
+    def save_html(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
+        """Writes the page. A file that exists is replaced only with `force`."""
+        written(path, self.html, force)
 
     def to_pandas(self) -> Any:
         """The table of the run as a `pandas.DataFrame`, a row for each variant."""
@@ -115,6 +116,16 @@ class Report:
         from .rerun import show
 
         show(self, path, name)
+
+
+def written(path: str | os.PathLike[str], text: str, force: bool) -> None:
+    """Writes a file, or replaces one with `force`."""
+    try:
+        with open(path, "w" if force else "x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        mistake = Mistake(os.fspath(path), "the file exists already", "`force=True` replaces it")
+        raise ExistsError("", [mistake]) from None
 
 
 def overrides(values: Mapping[str, Any] | Sequence[str]) -> list[str]:
@@ -200,7 +211,7 @@ def experiment(
     shard: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Summary:
-    """Runs the trials of an experiment that are not done yet, and writes its tables.
+    """Runs the trials of an experiment that are not done yet, and writes its tables, pictures and page.
 
     Trials that are done are kept in `trials.jsonl` of its folder: after Ctrl-C, or a kill, the same call goes on. `progress`
     is called with the trials that are done, and all. `shard="2/8"` runs the second of eight parts, which has a folder of its own

@@ -89,7 +89,9 @@ def test_a_quaternion_that_is_none_is_named_with_its_row() -> None:
 @pytest.mark.parametrize(
     ("noise", "message"),
     [
-        ({"sigmas": np.ones((N, 3))}, None),
+        ({"sigmas": np.ones((N, 6))}, None),
+        ({"sigmas": np.ones((N, 0))}, "noise.sigmas: expected a number for each row of the residual, got none"),
+        ({"information": np.ones((N, 0, 0))}, "noise.information: expected a number for each row"),
         ({"sigmas": np.ones((N - 1, 6))}, "noise.sigmas: expected an array of 4 rows, one for each, got 3 rows"),
         ({"sigmas": np.zeros((N, 6))}, "noise.sigmas, row 0: .* above zero, got 0"),
         ({"sigmas": np.full((N, 6), np.nan)}, "noise.sigmas: expected finite numbers"),
@@ -103,7 +105,6 @@ def test_a_quaternion_that_is_none_is_named_with_its_row() -> None:
 )
 def test_noise(noise: Any, message: str | None) -> None:
     if message is None:
-        # its size is looked at where the graph meets its residuals
         assert len(add(noise=noise)) == N
     else:
         with pytest.raises(mf.ArgumentError, match=message):
