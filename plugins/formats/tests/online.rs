@@ -38,7 +38,7 @@ fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
         [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 600, 2e-3)]
     {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
-        let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
+        let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
         let (mut session, report) = replay(&graph, most);
         assert!(report.parked.is_empty() && report.undetermined.is_empty(), "{name}: {report:?}");
         let finished = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap();
@@ -53,7 +53,7 @@ fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
 #[test]
 fn a_covariance_from_the_fronts_is_that_of_a_batch() {
     let Some(path) = data("g2o/intel.g2o") else { return };
-    let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
+    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
     let (session, _) = replay(&graph, 300);
     let keys = ["x299", "x17"];
     let mut problem = Problem::compile(&session.graph().0, &session.estimates()).unwrap();
@@ -66,7 +66,7 @@ fn a_covariance_from_the_fronts_is_that_of_a_batch() {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let Some(path) = data("g2o/parking-garage.g2o") else { return };
-    let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
+    let graph = pose_graph::read(path, &Options::default()).unwrap().graph;
     let bits = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let session = pool.install(|| replay(&graph, 250).0);
