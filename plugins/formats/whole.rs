@@ -145,26 +145,27 @@ fn checksum(text: &[u8]) -> String {
     format!("{:0DIGITS$x}", hash.finish())
 }
 
-/// A line of a log with its checksum (FNV-1a of 64 bits, after a tab) and its end. A log that is read again after months is
-/// otherwise believed, whatever has become of a byte.
-pub fn checked_line(text: &str) -> String {
-    format!("{text}\t{}\n", checksum(text.as_bytes()))
+/// How a line with a checksum begins.
+pub const CHECKED: &str = r#"{"checksum":""#;
+
+/// A line of a log, with its end: a JSON object to which a checksum is added as the first field (FNV-1a of 64 bits, of the object
+/// without it). A log that is read again after months is otherwise believed, whatever has become of a byte.
+pub fn checked_line(object: &str) -> String {
+    format!("{CHECKED}{}\",{}\n", checksum(object.as_bytes()), object.get(1..).unwrap_or_default())
 }
 
-/// The text of such a line, which comes without its end.
+/// The object of such a line, which comes without its end.
 ///
 /// # Errors
 /// In words, if there is no checksum, or one of another text.
-pub fn read_checked_line(line: &[u8]) -> Result<&[u8], &'static str> {
-    let place = line.len().checked_sub(DIGITS + 1).filter(|place| line[*place] == b'\t');
-    let Some(place) = place else {
-        return Err("the line has no checksum: it is damaged, or of an earlier version");
-    };
-    let (text, sum) = (&line[..place], &line[place + 1..]);
-    if checksum(text).as_bytes() == sum {
-        Ok(text)
-    } else {
-        Err("the line is damaged: its checksum is that of another text")
+pub fn read_checked_line(line: &[u8]) -> Result<Vec<u8>, &'static str> {
+    let rest = line.strip_prefix(CHECKED.as_bytes()).and_then(|rest| rest.split_at_checked(DIGITS));
+    let parts = rest.and_then(|(sum, rest)| Some((sum, rest.strip_prefix(br#"","#)?)));
+    let (sum, rest) = parts.ok_or("the line has no checksum: it is damaged, or of an earlier version")?;
+    let object = [b"{", rest].concat();
+    match checksum(&object).as_bytes() == sum {
+        true => Ok(object),
+        false => Err("the line is damaged: its checksum is that of another text"),
     }
 }
 
@@ -280,7 +281,7 @@ mod tests {
     fn every_change_of_a_character_is_found() {
         let line = checked_line(r#"{"class":"wine glass"}"#);
         let line = line.trim_end_matches('\n').as_bytes();
-        assert_eq!(read_checked_line(line).unwrap(), br#"{"class":"wine glass"}"#);
+        assert_eq!(read_checked_line(line).unwrap(), br#"{"class":"wine glass"}"#.to_vec());
         for place in 0..line.len() {
             for bit in 0..8 {
                 let mut damaged = line.to_vec();

@@ -12,5 +12,6 @@ mod checked;
 mod covariance;
 mod endings;
 mod gnc;
+mod minima;
 mod solvers;
 mod toy;

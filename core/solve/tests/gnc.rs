@@ -123,3 +123,12 @@ fn it_solves_a_compiled_problem_as_well() {
     assert_eq!(outcome.rejected.len(), 3);
     assert_eq!(problem.weights().iter().filter(|w| **w == 0.0).count(), 3);
 }
+
+#[test]
+fn a_wrong_closure_between_neighbours_is_rejected_and_no_right_one() {
+    let (mut graph, values) = ladder(12, 0);
+    let wrong = graph.factors().len();
+    // odometry is the first factor between two neighbours, whichever way round the second is
+    graph.add(["p6", "p5"], Apart { by: [-9.0, 2.0] }).noise(Noise::sigma(0.1).unwrap());
+    assert_eq!(rejected(&run(&(graph, values), "")), [wrong]);
+}

@@ -7,7 +7,8 @@
 use super::shard::folders;
 use super::{Trial, TrialRecord};
 use crate::output::OutputFolder;
-use manifactor_formats::whole::{checked_line, open_regular, read_checked_line, read_regular};
+use manifactor_formats::whole::{CHECKED, checked_line, open_regular, read_checked_line, read_regular};
+use serde::de::IgnoredAny;
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// The log's name in an experiment's folder.
 const NAME: &str = "trials.jsonl";
 /// How each line begins.
-const BEGINNING: &[u8] = br#"{"labels":["#;
+const BEGINNING: &[u8] = CHECKED.as_bytes();
 
 /// Why trials cannot be logged.
 #[derive(Debug, thiserror::Error)]
@@ -141,7 +142,7 @@ fn read(bytes: &[u8], path: &Path) -> Result<(Records, usize), JournalError> {
         if !line.is_empty() {
             let text = read_checked_line(line).map_err(|fault| mistake(i + 1, fault.to_owned()))?;
             let record: TrialRecord =
-                serde_json::from_slice(text).map_err(|error| mistake(i + 1, error.to_string()))?;
+                serde_json::from_slice(&text).map_err(|error| mistake(i + 1, error.to_string()))?;
             records.insert((record.labels.clone(), record.fingerprint.clone()), record);
         }
     }
@@ -151,7 +152,7 @@ fn read(bytes: &[u8], path: &Path) -> Result<(Records, usize), JournalError> {
 /// Whether a line is one of ours, cut short.
 fn is_torn(line: &[u8]) -> bool {
     let begins = line.starts_with(BEGINNING) || BEGINNING.starts_with(line);
-    begins && serde_json::from_slice::<TrialRecord>(line).err().is_none_or(|error| error.is_eof())
+    begins && serde_json::from_slice::<IgnoredAny>(line).err().is_none_or(|error| error.is_eof())
 }
 
 #[cfg(test)]
@@ -178,7 +179,8 @@ mod tests {
         }
         drop(journal);
         let whole = std::fs::read(&path).unwrap();
-        let line = serde_json::to_vec(&record("ü", "torn")).unwrap();
+        let line = checked_line(&serde_json::to_string(&record("ü", "torn")).unwrap());
+        let line = line.trim_end().as_bytes();
         // wherever it was torn, within a character too
         for end in 0..=line.len() {
             std::fs::write(&path, [&whole[..], &line[..end]].concat()).unwrap();

@@ -107,7 +107,7 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
         bytes[..whole].split(|byte| *byte == b'\n').enumerate().skip(1).filter(|(_, line)| !line.is_empty());
     let frame = |(i, line): (usize, &[u8])| {
         let text = read_checked_line(line).map_err(str::to_owned);
-        let frame = text.and_then(parse);
+        let frame = text.and_then(|text| parse(&text));
         frame.map_err(|message| JournalError::Line { path: path.to_owned(), line: i + 1, message })
     };
     let before = lines.map(frame).collect::<Result<Vec<Observation>, _>>()?;

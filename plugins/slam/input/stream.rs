@@ -1,5 +1,5 @@
 //! Frames one at a time, as they come.
-mod confirmed;
+pub(crate) mod confirmed;
 
 use crate::input::journal::Lost;
 use crate::input::sequence::{Detection, Observation, Opening, Sequence};
@@ -31,12 +31,7 @@ impl Stream {
         opening: Opening,
         observations: impl Iterator<Item = Result<Observation, SourceError>> + Send + 'static,
     ) -> Self {
-        Self {
-            opening,
-            observations: Box::new(Confirmed::new(observations)),
-            past: f64::NEG_INFINITY,
-            lost: Lost::default(),
-        }
+        Self { opening, observations: Box::new(observations), past: f64::NEG_INFINITY, lost: Lost::default() }
     }
 
     /// Waits for the last frame, and keeps all of them.
@@ -45,7 +40,7 @@ impl Stream {
     /// The first thing that cannot be read.
     pub fn collect(self) -> Result<Sequence, SourceError> {
         let mut all = self.opening.into_sequence();
-        for observation in self.observations {
+        for observation in Confirmed::new(self.observations) {
             all.push(observation?);
         }
         Ok(all)

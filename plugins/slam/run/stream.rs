@@ -4,6 +4,7 @@ use super::association::ambiguities;
 use super::location::Search;
 use crate::estimate::Estimate;
 use crate::input::sequence::{Observation, Opening, Sequence};
+use crate::input::stream::confirmed::Confirmed;
 use crate::input::stream::{Awaited, Stream};
 use crate::mapping::Warning;
 use crate::online::{FrameError, FrameReport, Mapper};
@@ -31,7 +32,7 @@ pub fn online(
     let lost = stream.lost.clone();
     let mut taken = Taken::new(stream.opening, settings)?;
     let (mut progress, mut search, mut found) = (OnlineReport::default(), Search::new(settings), None);
-    let mut awaited = Awaited::new(stream.observations);
+    let mut awaited = Awaited::new(Box::new(Confirmed::new(stream.observations)));
     loop {
         let observation = match awaited.next(|| watch.quiet()) {
             ControlFlow::Continue(Some(observation)) => observation,

@@ -127,8 +127,12 @@ pub fn line(observation: &Observation) -> String {
 
 /// A frame of such a line.
 pub(crate) fn parse(line: &[u8]) -> Result<Observation, String> {
+    let read = serde_json::from_slice(line).or_else(|error| match without_infinities(line) {
+        Some(text) => serde_json::from_str(&text),
+        None => Err(error),
+    });
     let Line { timestamp, pose, boxes, accelerometer } =
-        serde_json::from_slice(line).map_err(|error| error.to_string())?;
+        read.map_err(|error: serde_json::Error| error.to_string())?;
     let (mut detections, mut unused) = (vec![], vec![]);
     for (place, value) in boxes.into_iter().enumerate() {
         match LineBox::read(value) {
@@ -143,6 +147,33 @@ pub(crate) fn parse(line: &[u8]) -> Result<Observation, String> {
         accelerometer: accelerometer.into_iter().map(of_reading).collect(),
         unused,
     })
+}
+
+/// A line with `null` for each number that is not finite: JSON has none, and other languages write them all the same. `None` if
+/// there is no such number. What needs the number refuses `null`, a box for itself.
+fn without_infinities(line: &[u8]) -> Option<String> {
+    let text = std::str::from_utf8(line).ok()?;
+    let (mut out, mut word, mut found) = (String::with_capacity(text.len()), String::new(), false);
+    let (mut is_text, mut is_escaped) = (false, false);
+    for c in text.chars().chain(['\n']) {
+        if !is_text && (c.is_ascii_alphanumeric() || ['+', '-', '.'].contains(&c)) {
+            word.push(c);
+            continue;
+        }
+        if !word.is_empty() {
+            let is_infinite = word.parse::<f64>().is_ok_and(|number| !number.is_finite());
+            found |= is_infinite;
+            out += if is_infinite { "null" } else { &word };
+            word.clear();
+        }
+        match c {
+            '"' if !is_escaped => is_text = !is_text,
+            _ => {}
+        }
+        is_escaped = is_text && c == '\\' && !is_escaped;
+        out.push(c);
+    }
+    found.then_some(out)
 }
 
 impl LineBox {
@@ -331,6 +362,9 @@ mod tests {
                 "the score of `cup` must be a number from 0 to 1",
             ),
             (r#"{"box": [1, 1, 5, 5], "class": "cup", "scores": {"cup": 0.7}}"#, "and not both: `cup`"),
+            (r#"{"box": [1, 1, 5, NaN], "class": "Infinity \\" NaN"}"#, "null"),
+            (r#"{"box": [1, -Infinity, 5, 5], "class": "cup"}"#, "null"),
+            (r#"{"box": [1, 1, 1e999, 5], "class": "cup"}"#, "null"),
         ];
         for (seen, words) in wrong {
             let good = r#"{"box": [1, 1, 5, 5], "class": "cup"}"#;

@@ -1,6 +1,7 @@
 //! Timestamps far ahead, which a second frame has to confirm.
 use crate::input::sequence::Observation;
 use crate::input::source::SourceError;
+use std::collections::VecDeque;
 
 /// A frame that is so many seconds ahead of the one before waits for the next one. A longer pause of a robot delays one frame.
 const AHEAD: f64 = 10.0;
@@ -9,30 +10,46 @@ const INTERVALS: f64 = 10.0;
 
 type Read = Result<Observation, SourceError>;
 
-/// Frames in their order. A frame whose timestamp jumps ahead is given on once the next one has a timestamp after it: a single
-/// wrong timestamp would make all later frames look old.
-pub(super) struct Confirmed<I> {
+/// Frames in their order. A frame whose timestamp jumps ahead is given on once a later one is close behind it, or two later
+/// ones go on from there: a single wrong timestamp would make all later frames look old.
+pub(crate) struct Confirmed<I> {
     frames: I,
     /// Timestamp of the last frame that was given on, in seconds.
     last: Option<f64>,
     /// Time between the last two of these, in seconds.
     interval: f64,
-    /// The frame after one that was confirmed, or refused.
-    next: Option<Read>,
+    /// What was read to confirm another frame.
+    ahead: VecDeque<Read>,
+}
+
+/// The timestamp of a frame that can be read, if it is a number.
+fn timestamp(read: &Read) -> Option<f64> {
+    let timestamp = read.as_ref().ok()?.frame.timestamp;
+    timestamp.is_finite().then_some(timestamp)
 }
 
 impl<I: Iterator<Item = Read>> Confirmed<I> {
-    pub(super) fn new(frames: I) -> Self {
-        Self { frames, last: None, interval: 0.0, next: None }
+    pub(crate) fn new(frames: I) -> Self {
+        Self { frames, last: None, interval: 0.0, ahead: VecDeque::new() }
     }
 
     fn give(&mut self, read: Read) -> Option<Read> {
-        if let Ok(observation) = &read {
-            let timestamp = observation.frame.timestamp;
+        if let Some(timestamp) = timestamp(&read) {
             self.interval = self.last.map_or(0.0, |last| timestamp - last);
             self.last = Some(timestamp);
         }
         Some(read)
+    }
+
+    /// The timestamp of a frame after the next one, from 0; `None` at the end.
+    fn later(&mut self, n: usize) -> Option<f64> {
+        loop {
+            if let Some(found) = self.ahead.iter().filter_map(timestamp).nth(n) {
+                return Some(found);
+            }
+            let read = self.frames.next()?;
+            self.ahead.push_back(read);
+        }
     }
 }
 
@@ -40,21 +57,22 @@ impl<I: Iterator<Item = Read>> Iterator for Confirmed<I> {
     type Item = Read;
 
     fn next(&mut self) -> Option<Read> {
-        let read = self.next.take().or_else(|| self.frames.next())?;
-        let (Ok(observation), Some(last)) = (&read, self.last) else { return self.give(read) };
-        let timestamp = observation.frame.timestamp;
-        let ahead = timestamp - last;
-        // also what is not a number is for others to refuse
-        if ahead.is_nan() || ahead <= AHEAD.max(INTERVALS * self.interval) {
+        let read = self.ahead.pop_front().or_else(|| self.frames.next())?;
+        let (Some(here), Some(last)) = (timestamp(&read), self.last) else { return self.give(read) };
+        let limit = AHEAD.max(INTERVALS * self.interval);
+        if here - last <= limit {
             return self.give(read);
         }
-        self.next = self.frames.next();
-        match &self.next {
-            Some(Ok(next)) if next.frame.timestamp <= timestamp => {
-                Some(Err(SourceError::Ahead { timestamp, ahead }))
-            }
+        let is_confirmed = match self.later(0) {
             // the last frame makes no other one look old
-            _ => self.give(read),
+            None => true,
+            Some(next) if next <= here => false,
+            Some(next) if next - here <= limit => true,
+            Some(next) => self.later(1).is_none_or(|third| third > next),
+        };
+        match is_confirmed {
+            true => self.give(read),
+            false => Some(Err(SourceError::Ahead { timestamp: here, ahead: here - last })),
         }
     }
 }
@@ -80,12 +98,15 @@ mod tests {
         assert_eq!(confirmed(&[0.0, 0.1, 1e12, 0.2, 0.3]), expected);
         // two wrong ones, apart from each other and in a row
         assert_eq!(confirmed(&[0.0, 500.0, 0.1, 700.0, 0.2]), [Some(0.0), None, Some(0.1), None, Some(0.2)]);
+        assert_eq!(confirmed(&[0.0, 0.1, 1e12, 2e12, 0.2, 0.3])[2..], [None, None, Some(0.2), Some(0.3)]);
     }
 
     #[test]
     fn a_pause_is_confirmed_by_the_next_frame() {
         let stamps = [0.0, 0.1, 1000.0, 1000.1, 1000.2];
         assert_eq!(confirmed(&stamps), stamps.map(Some));
+        // one that cannot be a time says nothing
+        assert_eq!(confirmed(&[0.0, 0.1, 1e12, f64::NAN, 0.2])[2], None);
         // one frame a minute
         let slow = [0.0, 60.0, 120.0, 180.0];
         assert_eq!(confirmed(&slow), slow.map(Some));
