@@ -68,10 +68,13 @@ impl Default for LevenbergMarquardt {
 const GAIN: f64 = 1e-4;
 /// Damping that changes a step by next to nothing: one that is refused with less calls for more than twice as much.
 const NEGLIGIBLE: f64 = 1e-3;
-/// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal; and the largest share of the slope
-/// along it that damping may take, since a diagonal with bounds may be far above that of H.
+/// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal.
 const TRUSTED: f64 = 1.0;
-const TRUSTED_SHARE: f64 = 0.5;
+/// Share of the slope along a step above which damping holds it back: a diagonal with bounds may be far above that of H.
+const HELD: f64 = 0.5;
+/// Share of the cost that a step without damping must promise for one that is held back to be no end. Less than that is gained
+/// along directions that next to nothing constrains, by steps without end.
+const MUCH: f64 = 1e-3;
 /// Damping up to which one small step means convergence; above, it takes two.
 const LIGHT: f64 = 1e-2;
 
@@ -148,7 +151,8 @@ impl LevenbergMarquardt {
                 damping.extend(descent.problem.system.diagonal().map(|d| *lambda * d.max(least).min(most)));
                 step.control = *lambda;
                 if descent.damped(&damping, &mut step) {
-                    let is_trusted = step.control <= TRUSTED && step.damped <= TRUSTED_SHARE;
+                    let is_trusted = step.control <= TRUSTED;
+                    let is_held = step.damped > HELD;
                     let tried = descent.attempt(&step);
                     let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
                     descent.record(&step, accepted);
@@ -159,6 +163,7 @@ impl LevenbergMarquardt {
                         // a step that damping has made small says little of the cost around
                         let small = ended.is_some() && is_trusted;
                         match ended {
+                            Some(_) if is_held && descent.promises(&mut step, MUCH) => small_before = false,
                             Some(termination) if small && (small_before || step.control <= LIGHT) => {
                                 return termination;
                             }

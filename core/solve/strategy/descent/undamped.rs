@@ -35,6 +35,11 @@ impl Descent<'_> {
         self.at.not_finite.is_none() && self.undamped(step) && self.is_small(step.predicted)
     }
 
+    /// Whether a step without damping promises more than this share of the cost. Leaves that step in `step`.
+    pub(crate) fn promises(&mut self, step: &mut Step, share: f64) -> bool {
+        self.at.not_finite.is_none() && self.undamped(step) && step.predicted > share * self.at.cost
+    }
+
     /// At the end of a solve by such steps: what is open at the estimate, where something was on the way.
     pub(crate) fn open_direction(&mut self) -> Option<Undetermined> {
         let looks = self.is_open && !self.interrupted && self.at.not_finite.is_none();

@@ -27,6 +27,12 @@ pub(super) fn a_tenth() -> f64 {
     0.1
 }
 
+/// The default is not written: fingerprints of settings stay.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+pub(super) fn is_a_tenth(share: &f64) -> bool {
+    *share == a_tenth()
+}
+
 /// Reads odometry and detections; each detection goes to the frame nearest in time, if it is near enough. Others are
 /// left out.
 ///

@@ -1,4 +1,4 @@
-use super::assemble::{Matching, a_tenth, read_ground_truth, read_matched, read_objects};
+use super::assemble::{Matching, a_tenth, is_a_tenth, read_ground_truth, read_matched, read_objects};
 use super::camera::CameraChoice;
 use super::distortion::{Distortion, straighten};
 use super::{Folders, Source, SourceError};
@@ -49,7 +49,7 @@ pub struct Recorded {
     #[schemars(extend("minimum" = 0))]
     pub max_time_difference: f64,
     /// Largest expected share of detections without a pose at their time, from 0 to 1. With more, the run ends with exit code 1.
-    #[serde(default = "a_tenth", deserialize_with = "within::<0, 1, _>")]
+    #[serde(default = "a_tenth", deserialize_with = "within::<0, 1, _>", skip_serializing_if = "is_a_tenth")]
     #[schemars(range(min = 0, max = 1))]
     pub max_without_pose: f64,
 }
