@@ -201,13 +201,13 @@ mod tests {
 
     #[test]
     fn every_malformed_row_is_told_with_its_place() {
-        let text = errors("1,cup,0.5,1,2\n1,cup,x,1,2,3,4,1\n\n1,cup,1.5,1,2,3,4,1\n1,cup,1,3,2,3,4,1\n");
+        let text = errors("1,cup,0.5,1,2\n1,cup,x,1,2,3,4,1\n\n1,cup,1.5,1,2,3,4,1\n1,cup,1,4,2,3,4,1\n");
         assert_eq!(
             text,
             "d.csv:2: expected 8 fields as in the header, got 5\n\
              d.csv:3: column `score`, the 3. of the row: invalid float literal\n\
              d.csv:5: expected a score from 0 to 1, got 1.5\n\
-             d.csv:6: expected a box with xmin ≤ xmax and ymin ≤ ymax, got [3.0, 2.0, 3.0, 4.0]"
+             d.csv:6: expected a box with xmin ≤ xmax and ymin ≤ ymax, got [4.0, 2.0, 3.0, 4.0]"
         );
     }
 

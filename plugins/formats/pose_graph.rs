@@ -190,7 +190,7 @@ pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, Form
 pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, FormatError> {
     let mut problems = Problems::of(path.as_ref(), text);
     let mut unknown = BTreeMap::<String, usize>::new();
-    let mut records: Vec<(usize, Record)> = vec![];
+    let (mut records, mut first_unknown): (Vec<(usize, Record)>, Option<usize>) = (vec![], None);
     for (line, text) in lines(text) {
         let (tag, fields) = tag_of(text);
         match parser(tag) {
@@ -198,7 +198,10 @@ pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<Po
                 let record = problems.ok(line, parse(fields.trim_start()));
                 records.extend(record.map(|record| (line, record)));
             }
-            None => *unknown.entry(tag.to_owned()).or_default() += 1,
+            None => {
+                first_unknown.get_or_insert(line);
+                *unknown.entry(tag.to_owned()).or_default() += 1;
+            }
         }
     }
     if records.is_empty() && problems.is_empty() {
@@ -207,7 +210,10 @@ pub fn parse(text: &str, path: impl AsRef<Path>, options: &Options) -> Result<Po
     }
     if !options.lenient && !records.is_empty() && !unknown.is_empty() {
         let tags = unknown.keys().take(SHOWN_TAGS).map(|tag| shown(tag)).collect();
-        problems.push(0, Mistake::UnknownTags { lines: unknown.values().sum(), tags });
+        problems.push(
+            first_unknown.unwrap_or_default(),
+            Mistake::UnknownTags { lines: unknown.values().sum(), tags },
+        );
     }
     let built = build::build(&records, options, &mut problems);
     problems.finish()?;

@@ -2,7 +2,8 @@
 use manifactor_formats::pose_graph::{Options, PoseGraph, Repair, parse};
 use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3, Tree};
 use manifactor_graph::{Factor, Fixed, Key};
-use nalgebra::{DMatrix, Vector3, dmatrix};
+use manifactor_solve::Problem;
+use nalgebra::{DMatrix, Vector3, Vector6, dmatrix};
 use std::any::Any;
 
 const EDGE: &str = "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n";
@@ -94,17 +95,82 @@ fn a_file_of_something_else_is_an_error_that_names_its_tags() {
     let text = errors("VERTEX_CAM 0 1 2\nPOSE 1\nPOSE 2\n");
     assert_eq!(
         text,
-        "g.g2o: expected vertices or edges of a g2o or TORO file, found none; unknown tags: POSE, VERTEX_CAM"
+        "g.g2o: expected vertices or edges of a g2o or TORO file, found none; unknown tags: `POSE`, `VERTEX_CAM`"
     );
     assert!(errors("").contains("found none"));
 }
 
 #[test]
 fn unknown_tags_are_named_once_and_counted() {
-    let loaded = read(&format!("{EDGE}EDGE_PRIOR 0 1\nEDGE_PRIOR 1 2 3\nedge_se2 1 2\n"));
+    let text = format!("{EDGE}EDGE_PRIOR 0 1\nEDGE_PRIOR 1 2 3\nedge_se2 1 2\n");
+    let expected = "g.g2o:2: unknown tags, on 3 lines: `EDGE_PRIOR`, `edge_se2`; check their spelling, or leave these lines out with \
+                    --lenient";
+    assert_eq!(errors(&text), expected);
+    let loaded = parse(&text, "g", &Options { lenient: true, ..Options::default() }).unwrap();
     let unknown: Vec<_> = loaded.report.unknown.iter().map(|(tag, n)| (tag.as_str(), *n)).collect();
     assert_eq!(unknown, [("EDGE_PRIOR", 2), ("edge_se2", 1)]);
     assert_eq!(loaded.graph.factors().len(), 1);
+}
+
+#[test]
+fn many_unknown_tags_are_counted_and_ten_are_named() {
+    let tags: String = (0..500).map(|i| format!("TAG_{i}_{} 1\n", "X".repeat(300))).collect();
+    let error = errors(&format!("{EDGE}{tags}"));
+    assert!(error.contains("on 500 lines") && error.len() < 1000, "{error}");
+    let options = Options { lenient: true, ..Options::default() };
+    let notes = parse(format!("{EDGE}{tags}").as_str(), "g", &options).unwrap().report.notes();
+    assert!(notes.iter().any(|note| note == "490 more unknown tags: 490 lines left out"), "{notes:?}");
+}
+
+/// The cost of a graph at its initial values.
+fn cost(text: &str) -> f64 {
+    let loaded = read(text);
+    Problem::compile(&loaded.graph, &loaded.values).unwrap().cost().cost
+}
+
+#[test]
+fn absolute_measurements_are_read_and_hold_the_graph() {
+    let text = "VERTEX_SE2 0 1 2 0.5\nEDGE_PRIOR_SE2 0 1 2 0.4 1 0 0 1 0 100\n";
+    assert!((cost(text) - 0.5).abs() < 1e-12);
+    let text = "VERTEX_SE2 0 1 2 0.5\nEDGE_PRIOR_SE2_XY 0 1.5 2 4 0 9\n";
+    assert!((cost(text) - 0.5).abs() < 1e-12);
+    assert!(read(text).report.anchored.is_empty());
+    // the point is at 45 degrees, measured at 0.1 rad more
+    let angle = std::f64::consts::FRAC_PI_4 + 0.1;
+    let text = format!("VERTEX_SE2 0 0 0 0\nVERTEX_XY 1 3 3\nFIX 0\nEDGE_BEARING_SE2_XY 0 1 {angle} 100\n");
+    assert!((cost(&text) - 0.5).abs() < 1e-9, "{}", cost(&text));
+}
+
+#[test]
+fn the_prior_of_a_pose_is_that_of_its_sensor() {
+    let pose = |x: &Se3| {
+        let (t, q) = (x.translation, x.rotation.quaternion().coords);
+        format!("{} {} {} {} {} {} {}", t.x, t.y, t.z, q.x, q.y, q.z, q.w)
+    };
+    let exp = |w: [f64; 6]| Se3::exp(&Vector6::from(w));
+    let (x, offset) = (exp([0.3, -0.2, 0.5, 1.0, 2.0, 3.0]), exp([1.0, 0.4, -0.3, 0.2, -0.1, 0.4]));
+    // ours is rotation first, the file's information translation first
+    let error = [0.01, -0.02, 0.03, 0.1, 0.2, -0.1];
+    let measured = x.compose(&offset).compose(&exp(error));
+    let information = [1.0, 2.0, 3.0, 10.0, 20.0, 30.0];
+    let triangle: Vec<String> = (0..6)
+        .flat_map(|r| (r..6).map(move |c| if r == c { information[r] } else { 0.0 }))
+        .map(|x| x.to_string())
+        .collect();
+    let text = format!(
+        "VERTEX_SE3:QUAT 4 {}\nPARAMS_SE3OFFSET 7 {}\nEDGE_SE3_PRIOR 4 7 {} {}\n",
+        pose(&x),
+        pose(&offset),
+        pose(&measured),
+        triangle.join(" ")
+    );
+    let expected: f64 = (0..6).map(|i| 0.5 * information[(i + 3) % 6] * error[i] * error[i]).sum();
+    assert!((cost(&text) - expected).abs() < 1e-12, "{} for {expected}", cost(&text));
+    let twice = text.replace("EDGE_SE3_PRIOR", "PARAMS_SE3OFFSET 7 0 0 0 0 0 0 1\nEDGE_SE3_PRIOR");
+    assert_eq!(
+        errors(&twice),
+        "g.g2o:3: PARAMS_SE3OFFSET 7 is defined twice, first in line 2; remove one of the two"
+    );
 }
 
 #[test]

@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1e-8;
 /// Share of the test's step for differences of gradients.
 const DIFFERENCE: f64 = 1e-2;
 /// Most products with the Hessian.
-const PRODUCTS: usize = 8;
+const PRODUCTS: usize = 12;
 /// Curvature, as a share of JᵀJ's, above which a minimum is not in doubt.
 const SOUND: f64 = 0.5;
 /// Directions without a slope that are tried one by one.
@@ -151,6 +151,7 @@ impl Descent<'_> {
         let mut next: Vec<f64> =
             steps.iter().zip(bent).map(|(x, bent)| if *bent { *x } else { 0.0 }).collect();
         let (mut basis, mut products): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (vec![], vec![]);
+        let mut found = None;
         while basis.len() < PRODUCTS.min(steps.len()) {
             // twice is enough (Parlett)
             for vector in basis.iter().chain(&basis) {
@@ -162,7 +163,7 @@ impl Descent<'_> {
                 break;
             }
             next.iter_mut().for_each(|x| *x /= length);
-            let product = self.hessian_product(&next, steps, &gradient)?;
+            let Some(product) = self.hessian_product(&next, steps, &gradient) else { break };
             basis.push(next);
             next = product.clone();
             products.push(product);
@@ -172,18 +173,21 @@ impl Descent<'_> {
             let eigen = projected.symmetric_eigen();
             let least = eigen.eigenvalues.imin();
             if eigen.eigenvalues[least] < 0.0 {
+                // the better the direction, the longer the way down along it
                 let mut direction = vec![0.0; steps.len()];
                 for (vector, share) in basis.iter().zip(eigen.eigenvectors.column(least).iter()) {
                     direction.iter_mut().zip(vector).for_each(|(d, v)| *d += share * v);
                 }
-                return Some(direction);
-            }
-            if basis.len() > 2 && eigen.eigenvalues[least] > SOUND {
+                found = Some(direction);
+            } else if basis.len() > 2 && eigen.eigenvalues[least] > SOUND {
                 break;
             }
-            self.problem.system.cholesky()?.solve(&mut next);
+            match self.problem.system.cholesky() {
+                Some(cholesky) => cholesky.solve(&mut next),
+                None => break,
+            }
         }
-        None
+        found
     }
 
     /// The Hessian of the cost times a direction, by a difference of gradients; `None` where that is not finite.
