@@ -119,9 +119,16 @@ impl Model {
         self.born
     }
 
-    /// The same by column.
-    pub(crate) fn ordinals(&self) -> &[u64] {
-        &self.ordinals
+    /// The same by type, in the order in which types first appear among the variables. A type that a failed update has brought
+    /// has a column and no variable: a session that is loaded knows nothing of it.
+    pub(crate) fn ordinals(&self) -> Vec<u64> {
+        let mut columns: Vec<u32> = vec![];
+        for place in &self.places {
+            if !columns.contains(&place.column) {
+                columns.push(place.column);
+            }
+        }
+        columns.into_iter().map(|column| self.ordinals[column as usize]).collect()
     }
 
     /// The numbers of variables that are gone, those of one type in the order in which they were last used.

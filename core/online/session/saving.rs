@@ -38,7 +38,7 @@ impl Session {
             factors: factors.collect(),
             fronts: self.tree.save(),
             born: self.model.born(),
-            ordinals: self.model.ordinals().to_vec(),
+            ordinals: self.model.ordinals(),
             unused: self.model.unused(),
             priors: self.model.priors().filter_map(|f| self.save_prior(f)).collect(),
             gone: self.gone.clone(),
