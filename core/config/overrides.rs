@@ -26,7 +26,7 @@ pub(crate) fn apply(root: &mut Node, text: &str, errors: &Errors) {
             }
         }
         Err((at, message)) => {
-            let help = "write it as `solver.max_iterations=50` or `factors[2].noise.sigma=0.1`";
+            let help = "write it as `solver.stop.max_iterations=50` or `factors[2].noise.sigma=0.1`";
             errors.report(source.place(at..at), Fault::with_help(message, help));
         }
     }

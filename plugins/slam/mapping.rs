@@ -242,8 +242,11 @@ fn unused(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
     let (mut boxes, mut first) = (0, None);
     for unused in &sequence.unused {
         match unused {
+            UnusedDetection::WithoutPose(without) if without.is_too_many() => {
+                warnings.push(Warning::TooManyUnused { what: without.to_string(), allowed: without.allowed });
+            }
             UnusedDetection::WithoutPose(without) => {
-                warnings.push(Warning::Unused { what: without.to_string() })
+                warnings.push(Warning::Unused { what: without.to_string() });
             }
             UnusedDetection::Box { timestamp, place, fault } => {
                 boxes += 1;

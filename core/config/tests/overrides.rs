@@ -68,7 +68,7 @@ fn errors_point_at_the_override() {
 
 #[test]
 fn overrides_without_a_place_are_refused_all_at_once() {
-    let how = "(write it as `solver.max_iterations=50` or `factors[2].noise.sigma=0.1`)";
+    let how = "(write it as `solver.stop.max_iterations=50` or `factors[2].noise.sigma=0.1`)";
     assert_eq!(
         refused(&[
             "solver",

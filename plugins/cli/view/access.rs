@@ -76,7 +76,11 @@ fn host<T>(request: &Request<T>) -> Option<&str> {
 /// Whether a host, with its port or without, is this machine by its nature: no name server is asked about these.
 fn is_local(host: &str) -> bool {
     let port = |rest: &str| {
-        rest.is_empty() || rest.strip_prefix(':').is_some_and(|port| port.parse::<u16>().is_ok())
+        // RFC 3986: a port is digits, and there may be none after the colon
+        let is_port = |port: &str| {
+            port.is_empty() || (port.bytes().all(|b| b.is_ascii_digit()) && port.parse::<u16>().is_ok())
+        };
+        rest.is_empty() || rest.strip_prefix(':').is_some_and(is_port)
     };
     let (name, rest) = match host.strip_prefix('[').and_then(|inner| inner.split_once(']')) {
         Some(parts) => parts,
@@ -92,9 +96,16 @@ mod tests {
 
     #[test]
     fn hosts_of_this_machine_are_local() {
-        for host in
-            ["localhost", "LocalHost:80", "127.0.0.1", "127.0.0.1:8080", "127.1.2.3:1", "[::1]", "[::1]:80"]
-        {
+        for host in [
+            "localhost",
+            "LocalHost:80",
+            "127.0.0.1",
+            "127.0.0.1:8080",
+            "127.1.2.3:1",
+            "[::1]",
+            "[::1]:80",
+            "localhost:",
+        ] {
             assert!(is_local(host), "{host}");
         }
     }
@@ -113,6 +124,8 @@ mod tests {
             "192.168.0.1",
             "[::2]:80",
             "user@127.0.0.1",
+            "localhost:+80",
+            "localhost:65536",
         ] {
             assert!(!is_local(host), "{host}");
         }

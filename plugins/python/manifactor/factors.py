@@ -885,10 +885,10 @@ def position_se3(*, position: Numbers, lever_arm: Numbers | None = None) -> Fact
 
 
 def prior_plane(*, value: variables.Plane | Fields) -> Factor:
-    """A plane is known beforehand: r = (n × n₀, offset - offset₀), in radians and metres.
+    """A plane is known beforehand: r = (n - n₀, offset - offset₀), in radians and metres.
 
-    Four rows: the sine of the angle between the normals, and the distance. Turning the normal over by half a turn is a
-    maximum, where the derivative of the cost vanishes. Defined everywhere.
+    Four rows: the difference of the unit normals, of length 2 sin(θ/2) for an angle θ, and the distance. The plane turned over
+    is another plane: its cost is the maximum, and the derivative vanishes there. Smooth and defined everywhere.
 
     ```toml
     [[factors]]

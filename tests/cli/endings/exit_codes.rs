@@ -33,6 +33,10 @@ fn files() -> TempDir {
             "elsewhere.toml",
             "source = { type = 'recorded', folder = 'nowhere', camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }\n",
         ),
+        (
+            "late.toml",
+            "source = { type = 'recorded', folder = 'sim', camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }\n",
+        ),
         ("unread.toml", "base = 'nowhere.toml'\n"),
     ])
 }
@@ -71,6 +75,32 @@ fn codes(ending: &str) -> Vec<i32> {
         "a residual is not finite" => codes(&["solve @root.toml"]),
         "objects were detected, and none is mapped" => {
             codes(&["run @seen.toml --out @out --set objects.min_views=1000"])
+        }
+        "more detections than the source expects have no pose at their time" => {
+            code("simulate @seen.toml --out @sim");
+            let file = folder.path().join("sim/detections.csv");
+            let text = std::fs::read_to_string(&file).unwrap();
+            // every other frame 4 ms late
+            let late = |line: &str| {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                if let Ok(timestamp) = cells[1].parse::<f64>() {
+                    cells[1] = (timestamp
+                        + if cells[0].ends_with(['0', '2', '4', '6', '8']) { 0.004 } else { 0.0 })
+                    .to_string();
+                }
+                cells.join(",") + "\n"
+            };
+            std::fs::write(&file, text.lines().map(late).collect::<String>()).unwrap();
+            let run = "run @late.toml --out @out --force --set objects.min_views=1";
+            assert_eq!(code(&format!("{run} --set source.max_without_pose=1.0")), 0);
+            codes(&[run])
+        }
+        "a journal cannot be kept" => {
+            let online = "online @seen.toml --out @out --force --set objects.min_views=1 --journal";
+            assert_eq!(code(&format!("{online} @frames.jsonl")), 0);
+            // among the results, where they would be written over it
+            assert_eq!(code(&format!("{online} @out/report.json")), 2);
+            codes(&[&format!("{online} @nowhere/frames.jsonl"), &format!("{online} /proc/frames.jsonl")])
         }
         "a factor breaks a law" => codes(&["check-factor --config @root.toml"]),
         "the command line is wrong" => {

@@ -5,12 +5,22 @@ use std::fmt::Write;
 
 /// Control characters (C0 but for line breaks, DEL, C1) as escapes: `\u{1b}`.
 pub(crate) fn printable(text: &str) -> Cow<'_, str> {
-    escaped(text, |c| c.is_control() && c != '\n')
+    escaped(text, |c| is_obeyed(c) && c != '\n')
 }
 
 /// The same on one line, for names in tables and sentences: line breaks are escaped too.
 pub(crate) fn on_one_line(text: &str) -> Cow<'_, str> {
-    escaped(text, char::is_control)
+    escaped(text, is_obeyed)
+}
+
+/// Whether a terminal obeys a character: control characters, and those that change the direction of the text around them, so
+/// that it reads as something else (Boucher and Anderson, *Trojan Source*, 2021).
+fn is_obeyed(c: char) -> bool {
+    const DIRECTIONS: [char; 12] = [
+        '\u{61c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}',
+        '\u{2066}', '\u{2067}', '\u{2068}', '\u{2069}',
+    ];
+    c.is_control() || DIRECTIONS.contains(&c)
 }
 
 /// The same, and not without end: for messages that quote what they found.
@@ -41,7 +51,7 @@ pub(crate) fn same_length(text: &str) -> String {
     let mut rest = text.chars().peekable();
     while let Some(c) = rest.next() {
         let ends_line = c == '\n' || (c == '\r' && rest.peek() == Some(&'\n'));
-        if c.is_control() && !ends_line && c != '\t' {
+        if is_obeyed(c) && !ends_line && c != '\t' {
             out.extend(std::iter::repeat_n('?', c.len_utf8()));
         } else {
             out.push(c);
@@ -72,6 +82,7 @@ mod tests {
     fn no_control_character_reaches_a_terminal() {
         assert_eq!(printable(NASTY), "a\\u{1b}[2J\\u{9b}2J\\u{7}\\u{7f}\\rb\nc");
         assert_eq!(on_one_line(NASTY), "a\\u{1b}[2J\\u{9b}2J\\u{7}\\u{7f}\\rb\\nc");
+        assert_eq!(on_one_line("cup\u{202e}gum"), "cup\\u{202e}gum");
         assert!(matches!(printable("Tasse α\n"), Cow::Borrowed(_)));
     }
 
