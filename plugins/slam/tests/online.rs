@@ -316,3 +316,43 @@ fn a_desk_of_real_boxes_is_mapped_as_they_come() {
         assert!(live < 0.025, "{name}: {live}");
     }
 }
+
+fn root() -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The document that `docs/association.md` recommends for streams.
+fn recommended() -> Settings {
+    let page = std::fs::read_to_string(root().join("docs/association.md")).unwrap();
+    let mut blocks = page.split("```toml\n").skip(1).filter_map(|block| block.split("```").next());
+    let block = blocks.find(|block| block.contains("json_lines")).unwrap();
+    run_of(block, &[]).variants.remove(0).settings
+}
+
+#[test]
+fn no_object_collapses_or_runs_away_while_a_stream_comes() {
+    let desk = std::fs::read_to_string(root().join("examples/desk/desk.toml")).unwrap();
+    let (_, sequence) = scene(&desk);
+    let sequence = Sequence {
+        // names are not given
+        detections: sequence.detections.iter().map(|d| Detection { object: None, ..d.clone() }).collect(),
+        ..sequence
+    };
+    let mut mapper = Mapper::new(sequence.opening(), &recommended()).unwrap();
+    let mut most = 0;
+    for observation in sequence.observations() {
+        let report = mapper.take(&observation).unwrap();
+        for (measured, quadric) in mapper.objects() {
+            let (least, largest) = (quadric.semi_axes.min(), quadric.semi_axes.max());
+            assert!(
+                least > 0.005 && largest < 2.0,
+                "frame {}, {}: {}",
+                report.frame,
+                measured.id,
+                quadric.semi_axes
+            );
+        }
+        most = most.max(mapper.mapped());
+    }
+    assert!(most >= 15, "{most} objects of 18");
+}
