@@ -51,7 +51,7 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
     assert!(done >= 3);
     // the line that a kill would have torn
     let mut file = std::fs::OpenOptions::new().append(true).open(&log).unwrap();
-    file.write_all(b"{\"labels\":[\"[2.0, 2.0]\",\"2\"").unwrap();
+    file.write_all(b"{\"checksum\":\"0123456789abcdef\",\"labels\":[\"[2.0, 2.0]\",\"2\"").unwrap();
     drop(file);
 
     let ran = sweep(&folder, &killed, 1).ended(0);
