@@ -47,7 +47,10 @@ pub fn main_with(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) if error.use_stderr() => {
-            output::say(error.render().to_string().trim_end());
+            // it quotes arguments, however long they are
+            let text = error.render().to_string();
+            let lines: Vec<String> = text.trim_end().lines().map(output::text::shortened).collect();
+            output::say(&lines.join("\n"));
             return Failure::usage();
         }
         Err(help) => {

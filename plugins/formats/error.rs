@@ -100,7 +100,8 @@ pub enum Mistake {
     },
     /// Tags that no reader knows.
     #[error(
-        "unknown tags, on {lines} lines: {}; check their spelling, or leave these lines out with --lenient", tags.join(", ")
+        "unknown tags, {}: {}; check their spelling, or leave these lines out with --lenient",
+        crate::words::count(*lines, "line"), tags.join(", ")
     )]
     UnknownTags {
         /// How many lines have one.

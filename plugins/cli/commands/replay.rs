@@ -23,8 +23,8 @@ use std::time::Instant;
 
 /// Replay a pose graph (.g2o, TORO, or a literal graph) pose by pose through an incremental smoother.
 ///
-/// Poses are the variables x0, x1, …, in that order; each starts where odometry leads from the estimate of the pose before it, never
-/// from the file. At the end all is solved as one batch.
+/// Poses are the variables x0, x1, …, in that order; each starts where odometry leads from the estimate of the pose before it. Held
+/// variables, and those that odometry does not reach, start at the file's values. At the end all is solved as one batch.
 #[derive(Debug, Args)]
 pub(crate) struct Replay {
     /// The graph.

@@ -10,8 +10,9 @@ use manifactor_geometry::{
     spanning_tree,
 };
 use manifactor_graph::checked::Positive;
+use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{Factor, FactorEntry, Graph, Key, Noise, ValueError, Values};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
@@ -173,6 +174,7 @@ impl<'a> Builder<'a> {
             line,
             FactorEntry { keys: vec![key], name: None, factor, noise: Noise::unit(), loss: None },
             Some(information),
+            Ok,
         )
     }
 
@@ -185,18 +187,11 @@ impl<'a> Builder<'a> {
         let (measurement, information) = self.in_vehicle_frame(edge)?;
         let (a, b) = measurement.ends();
         let keys = [self.use_as(line, from, a)?, self.use_as(line, to, b)?];
-        let mut entry = entry(keys, measurement)?;
+        let entry = entry(keys, measurement)?;
         self.measured.push(entry.clone());
         self.linked.insert((from.min(to), from.max(to)));
-        if let (Measurement::Bearing2(_), Some(information)) = (measurement, &information) {
-            // the factor has a range as well, which was not measured
-            let [bearing, range] = [information[(0, 0)], 1.0];
-            let both = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![bearing, range]));
-            entry.noise = Noise::information(both)?.observing(&[true, false]);
-            self.graph.push(entry);
-            return Ok(());
-        }
-        self.with_noise(line, entry, information)
+        let is_bearing = matches!(measurement, Measurement::Bearing2(_));
+        self.with_noise(line, entry, information, if is_bearing { of_bearing } else { Ok })
     }
 
     /// Adds a factor with the information of its line, or leaves it out.
@@ -205,13 +200,14 @@ impl<'a> Builder<'a> {
         line: usize,
         mut entry: FactorEntry,
         information: Option<DMatrix<f64>>,
+        of_factor: fn(Noise) -> Result<Noise, NoiseError>,
     ) -> Result<(), Mistake> {
         match information.map(|m| noise(&m, self.options.repair)).transpose()? {
             None => {}
-            Some(Outcome::AsWritten(noise)) => entry.noise = noise,
+            Some(Outcome::AsWritten(noise)) => entry.noise = of_factor(noise)?,
             Some(Outcome::Clamped(noise)) => {
                 self.report.clamped.push(line);
-                entry.noise = noise;
+                entry.noise = of_factor(noise)?;
             }
             Some(Outcome::Rejected) => {
                 self.report.rejected.push(line);
@@ -316,6 +312,13 @@ impl<'a> Builder<'a> {
         }
         Ok(PoseGraph { graph: self.graph, values: self.values, report: self.report })
     }
+}
+
+/// The noise of a bearing for a factor that has a range as well, which was not measured.
+fn of_bearing(noise: Noise) -> Result<Noise, NoiseError> {
+    let bearing = noise.information_matrix(1)?[(0, 0)];
+    let both = DMatrix::from_diagonal(&DVector::from_vec(vec![bearing, 1.0]));
+    Ok(Noise::information(both)?.observing(&[true, false]))
 }
 
 /// Whether these are two poses, one right after the other.

@@ -103,7 +103,7 @@ fn a_file_of_something_else_is_an_error_that_names_its_tags() {
 #[test]
 fn unknown_tags_are_named_once_and_counted() {
     let text = format!("{EDGE}EDGE_PRIOR 0 1\nEDGE_PRIOR 1 2 3\nedge_se2 1 2\n");
-    let expected = "g.g2o:2: unknown tags, on 3 lines: `EDGE_PRIOR`, `edge_se2`; check their spelling, or leave these lines out with \
+    let expected = "g.g2o:2: unknown tags, 3 lines: `EDGE_PRIOR`, `edge_se2`; check their spelling, or leave these lines out with \
                     --lenient";
     assert_eq!(errors(&text), expected);
     let loaded = parse(&text, "g", &Options { lenient: true, ..Options::default() }).unwrap();
@@ -116,7 +116,7 @@ fn unknown_tags_are_named_once_and_counted() {
 fn many_unknown_tags_are_counted_and_ten_are_named() {
     let tags: String = (0..500).map(|i| format!("TAG_{i}_{} 1\n", "X".repeat(300))).collect();
     let error = errors(&format!("{EDGE}{tags}"));
-    assert!(error.contains("on 500 lines") && error.len() < 1000, "{error}");
+    assert!(error.contains("500 lines") && error.len() < 1000, "{error}");
     let options = Options { lenient: true, ..Options::default() };
     let notes = parse(format!("{EDGE}{tags}").as_str(), "g", &options).unwrap().report.notes();
     assert!(notes.iter().any(|note| note == "490 more unknown tags: 490 lines left out"), "{notes:?}");
@@ -139,6 +139,20 @@ fn absolute_measurements_are_read_and_hold_the_graph() {
     let angle = std::f64::consts::FRAC_PI_4 + 0.1;
     let text = format!("VERTEX_SE2 0 0 0 0\nVERTEX_XY 1 3 3\nFIX 0\nEDGE_BEARING_SE2_XY 0 1 {angle} 100\n");
     assert!((cost(&text) - 0.5).abs() < 1e-9, "{}", cost(&text));
+}
+
+#[test]
+fn absolute_measurements_are_written_and_read_back() {
+    let text = "VERTEX_SE2 0 1 2 0.5\nVERTEX_XY 1 3 3\nVERTEX_SE3:QUAT 2 1 2 3 0 0 0 1\nPARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n\
+                EDGE_PRIOR_SE2 0 1 2 0.4 1 0 0 1 0 100\nEDGE_PRIOR_SE2_XY 0 1.5 2 4 0 9\nEDGE_BEARING_SE2_XY 0 1 0.3 100\n\
+                EDGE_SE3_PRIOR 2 0 1 2 4 0 0 0 1 1 0 0 0 0 0 2 0 0 0 0 3 0 0 0 4 0 0 5 0 6\n";
+    let loaded = read(text);
+    let (written, omitted) = manifactor_formats::g2o::format(&loaded.graph, &loaded.values);
+    assert!(omitted.factors.is_empty(), "{:?}", omitted.factors);
+    assert!((cost(&written) - cost(text)).abs() < 1e-12 * cost(text), "{written}");
+    let none = text.replace("0.3 100", "0.3 0");
+    let repaired = parse(&none, "g", &Options { repair: Repair::Reject, ..Options::default() }).unwrap();
+    assert_eq!((repaired.graph.factors().len(), repaired.report.rejected.len()), (3, 1));
 }
 
 #[test]

@@ -89,15 +89,16 @@ fn what_g2o_has_no_word_for_is_counted() {
     values.insert("second", Se2::identity());
     values.insert("attitude", So3::identity());
     graph.add(["first"], Prior { value: Se2::identity() });
+    graph.add(["attitude"], Prior { value: So3::identity() });
     graph.add(["first", "second"], Between { relative: Se2::identity() }).loss(Huber::default());
     graph.add(["second", "first"], Between { relative: Se2::identity() }).noise =
         Noise::unit().observing(&[true, true, false]);
     graph.fix_directions("second", &["theta"]);
     let (text, omitted) = g2o::format(&graph, &values);
-    assert_eq!(omitted.factors.into_iter().collect::<Vec<_>>(), [("between_se2", 1), ("prior_se2", 1)]);
+    assert_eq!(omitted.factors.into_iter().collect::<Vec<_>>(), [("between_se2", 1), ("prior_so3", 1)]);
     assert_eq!(omitted.variables.into_iter().collect::<Vec<_>>(), [("so3", 1)]);
     assert_eq!((omitted.losses, omitted.partly_fixed), (1, vec![Key::from("second")]));
     let renamed = [("first", 0), ("second", 1), ("attitude", 2)].map(|(k, n)| (Key::from(k), n));
     assert_eq!(omitted.renamed, renamed);
-    assert_eq!(parse(&text).graph.factors().len(), 1);
+    assert_eq!(parse(&text).graph.factors().len(), 2);
 }

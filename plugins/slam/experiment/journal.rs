@@ -8,7 +8,6 @@ use super::shard::folders;
 use super::{Trial, TrialRecord};
 use crate::output::OutputFolder;
 use manifactor_formats::whole::{CHECKED, checked_line, open_regular, read_checked_line, read_regular};
-use serde::de::IgnoredAny;
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -152,7 +151,7 @@ fn read(bytes: &[u8], path: &Path) -> Result<(Records, usize), JournalError> {
 /// Whether a line is one of ours, cut short.
 fn is_torn(line: &[u8]) -> bool {
     let begins = line.starts_with(BEGINNING) || BEGINNING.starts_with(line);
-    begins && serde_json::from_slice::<IgnoredAny>(line).err().is_none_or(|error| error.is_eof())
+    begins && serde_json::from_slice::<serde_json::Value>(line).err().is_none_or(|error| error.is_eof())
 }
 
 #[cfg(test)]

@@ -38,7 +38,7 @@ pub(crate) fn json(text: &str) -> String {
     for c in text.chars() {
         match c {
             // writing to a text cannot fail
-            '\u{7f}'..='\u{9f}' => _ = write!(out, "\\u{:04x}", u32::from(c)),
+            c if is_obeyed(c) && u32::from(c) >= 0x7f => _ = write!(out, "\\u{:04x}", u32::from(c)),
             c => out.push(c),
         }
     }

@@ -3,7 +3,7 @@ use crate::error::FormatError;
 use crate::pose_graph::record::exchange_halves;
 use crate::text::write_text;
 use crate::words::{count, omitted};
-use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3};
+use manifactor_geometry::{BearingRange2, Between, Landmark, Point2, Point3, Position, Prior, Se2, Se3};
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Manifold, Values, Variable};
 use nalgebra::DMatrix;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -12,7 +12,7 @@ use std::path::Path;
 /// What g2o cannot express, and was left out.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Omitted {
-    /// Factors, by the name of their type: priors, and whatever is no edge between two vertices.
+    /// Factors, by the name of their type, for which g2o has no line.
     pub factors: BTreeMap<&'static str, usize>,
     /// Variables, by the name of their type: what is neither a pose nor a point.
     pub variables: BTreeMap<&'static str, usize>,
@@ -56,12 +56,14 @@ pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
     for (key, fixed) in graph.fixed() {
         writer.fix(key, fixed);
     }
-    let seen_from_poses = |entry: &FactorEntry| downcast::<Landmark<3>>(entry).is_some();
-    if graph.factors().iter().any(seen_from_poses) {
+    let has_sensor = |entry: &FactorEntry| {
+        downcast::<Landmark<3>>(entry).is_some() || downcast::<Prior<Se3>>(entry).is_some()
+    };
+    if graph.factors().iter().any(has_sensor) {
         writer.text += "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n";
     }
     for entry in graph.factors() {
-        if writer.edge(entry).is_none() {
+        if writer.edge(entry).or_else(|| writer.absolute(entry)).is_none() {
             *writer.omitted.factors.entry(entry.factor.typetag_name()).or_default() += 1;
         }
     }
@@ -164,6 +166,37 @@ impl Writer {
         } else if let Some(f) = downcast::<Landmark<3>>(entry) {
             let numbers = [f.position.as_slice(), &upper_triangle(&information(entry, 3)?)].concat();
             self.line("EDGE_SE3_TRACKXYZ", &[ids[0], ids[1], 0], &numbers);
+        } else if let Some(f) = downcast::<BearingRange2>(entry) {
+            // a range that was measured as well has no line
+            let bearing = (entry.noise.observed()? == [true, false]).then(|| f.measured())?;
+            let information = entry.noise.information_matrix(2).ok()?[(0, 0)];
+            self.line("EDGE_BEARING_SE2_XY", &ids, &[bearing.y.atan2(bearing.x), information]);
+        } else {
+            return None;
+        }
+        self.omitted.losses += usize::from(entry.loss.is_some());
+        Some(())
+    }
+
+    /// A measurement in the frame of the world; `None` where g2o has no such line.
+    fn absolute(&mut self, entry: &FactorEntry) -> Option<()> {
+        let [key] = entry.keys.as_slice() else { return None };
+        let id = *self.ids.get(key)?;
+        if let Some(f) = downcast::<Prior<Se2>>(entry) {
+            let numbers = [&se2(&f.value)[..], &upper_triangle(&information(entry, 3)?)].concat();
+            self.line("EDGE_PRIOR_SE2", &[id], &numbers);
+        } else if let Some(f) = downcast::<Prior<Se3>>(entry) {
+            let information = exchange_halves(&information(entry, 6)?);
+            let numbers = [&se3(&f.value)[..], &upper_triangle(&information)].concat();
+            self.line("EDGE_SE3_PRIOR", &[id, 0], &numbers);
+        } else if let Some(f) = downcast::<Position<2>>(entry) {
+            let is_origin = f.lever_arm.iter().all(|x| *x == 0.0);
+            let information = is_origin.then(|| information(entry, 2)).flatten()?;
+            self.line(
+                "EDGE_PRIOR_SE2_XY",
+                &[id],
+                &[f.position.as_slice(), &upper_triangle(&information)].concat(),
+            );
         } else {
             return None;
         }
