@@ -315,8 +315,9 @@ impl<'a> Builder<'a> {
 }
 
 /// The noise of a bearing for a factor that has a range as well, which was not measured.
+#[allow(clippy::needless_pass_by_value, reason = "one of several functions of this type")]
 fn of_bearing(noise: Noise) -> Result<Noise, NoiseError> {
-    let bearing = noise.information_matrix(1)?[(0, 0)];
+    let bearing = noise.information_matrix(1)?.trace();
     let both = DMatrix::from_diagonal(&DVector::from_vec(vec![bearing, 1.0]));
     Ok(Noise::information(both)?.observing(&[true, false]))
 }

@@ -169,7 +169,7 @@ impl Writer {
         } else if let Some(f) = downcast::<BearingRange2>(entry) {
             // a range that was measured as well has no line
             let bearing = (entry.noise.observed()? == [true, false]).then(|| f.measured())?;
-            let information = entry.noise.information_matrix(2).ok()?[(0, 0)];
+            let information = entry.noise.information_matrix(2).ok()?.get((0, 0)).copied()?;
             self.line("EDGE_BEARING_SE2_XY", &ids, &[bearing.y.atan2(bearing.x), information]);
         } else {
             return None;
