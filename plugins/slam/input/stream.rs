@@ -62,8 +62,13 @@ impl Awaited {
     ) -> Self {
         let (sender, frames) = sync_channel(0);
         // it ends with the frames, or with the first that nobody takes
-        let read =
-            move || observations.map(|frame| sender.send(frame)).take_while(Result::is_ok).for_each(drop);
+        let read = move || {
+            for frame in observations {
+                if sender.send(frame).is_err() {
+                    break;
+                }
+            }
+        };
         Self { frames, reader: Some(std::thread::spawn(read)) }
     }
 
