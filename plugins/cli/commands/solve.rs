@@ -69,6 +69,10 @@ impl Solve {
         let marginals = marginals.transpose().map_err(Failure::input)?;
         if self.json {
             let mut json = self.as_json(&input, &solution, start);
+            // a solve without a step does not look for it
+            if json["undetermined"].is_null() {
+                json["undetermined"] = json!(diagnosis.undetermined);
+            }
             json["diagnosis"] = json!(diagnosis);
             if let Some(marginals) = marginals {
                 json["covariances"] = json!(marginals);
