@@ -100,8 +100,8 @@ pub enum Mistake {
     },
     /// Tags that no reader knows.
     #[error(
-        "unknown tags, {}: {}; check their spelling, or leave these lines out with --lenient",
-        crate::words::count(*lines, "line"), tags.join(", ")
+        "unknown tags, {lines} {}: {}; check their spelling, or leave these lines out with --lenient",
+        if *lines == 1 { "line" } else { "lines" }, tags.join(", ")
     )]
     UnknownTags {
         /// How many lines have one.
