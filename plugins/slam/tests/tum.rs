@@ -32,10 +32,10 @@ fn run(data: &Path, document: &RunDocument, variant: &str) -> (Estimate, Variant
     Run::new(document, Some(data.to_owned())).variant(variant, &mut Silent).unwrap()
 }
 
-/// Objects and boxes of a config's first variant.
+/// Objects and boxes of a config's variant `Q`.
 fn counts(data: &Path, config: &str, odometry: &str) -> (usize, usize) {
     let run = document(config, &[&format!("source.odometry = 'trajectories/{odometry}.txt'")]);
-    let variant = &run.variants[0];
+    let variant = run.variants.iter().find(|variant| variant.name == "Q").unwrap();
     let sequence = Run::new(&run, Some(data.to_owned())).sequence(variant).unwrap();
     let mapping = Mapping::new(&sequence, &variant.settings).unwrap();
     (mapping.mapped().count(), mapping.mapped().map(|object| object.boxes).sum())
@@ -233,8 +233,9 @@ fn the_accelerometer_feels_the_ground_truths_up() {
     let accelerometer = "gravity = { type = 'accelerometer', camera_from_sensor = [0.0, 0.0, 1.0, 0.0] }";
     let up = |sets: &[&str]| {
         let document = document("fr1_desk.toml", sets);
-        let settings = &document.variants[0].settings;
-        let sequence = Run::new(&document, Some(data.clone())).sequence(&document.variants[0]).unwrap();
+        let variant = document.variants.iter().find(|variant| variant.name == "Q").unwrap();
+        let settings = &variant.settings;
+        let sequence = Run::new(&document, Some(data.clone())).sequence(variant).unwrap();
         let map = settings.gravity.locate(&sequence).unwrap();
         map.map_from_odometry.inverse().rotation.act(&map.up.unwrap())
     };
