@@ -113,7 +113,7 @@ def gnc(
     for the weighted graph, and the better of the two goes on. At the end the same is tried with fewer and with more
     factors than those that fit, as long as that lowers the robust cost.
 
-    Candidates are loop closures: factors that couple variables, except the first one between variables that follow one another. A factor's own loss stays; its cost is
+    Candidates are loop closures: factors that couple variables, except the only one between variables that follow one another. A factor's own loss stays; its cost is
     what counts as ‖r‖². The outcome lists the factors that are rejected. Its costs are those of the weighted problem:
     the first with all factors, the last with what is kept.
 

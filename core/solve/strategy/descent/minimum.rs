@@ -150,21 +150,25 @@ impl Descent<'_> {
         };
         let mut next: Vec<f64> =
             steps.iter().zip(bent).map(|(x, bent)| if *bent { *x } else { 0.0 }).collect();
-        let (mut basis, mut products): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (vec![], vec![]);
+        // basis vectors, and their products with the metric and with the Hessian
+        let (mut basis, mut images): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (vec![], vec![]);
+        let mut products: Vec<Vec<f64>> = vec![];
         let mut found = None;
         while basis.len() < PRODUCTS.min(steps.len()) {
             // twice is enough (Parlett)
-            for vector in basis.iter().chain(&basis) {
-                let along = dot(&weighed(&self.problem.system, &next), vector);
+            for (vector, image) in basis.iter().zip(&images).chain(basis.iter().zip(&images)) {
+                let along = dot(&next, image);
                 next.iter_mut().zip(vector).for_each(|(x, v)| *x -= along * v);
             }
-            let length = dot(&weighed(&self.problem.system, &next), &next).sqrt();
+            let mut image = weighed(&self.problem.system, &next);
+            let length = dot(&image, &next).sqrt();
             if !(length > 0.0 && length.is_finite()) {
                 break;
             }
-            next.iter_mut().for_each(|x| *x /= length);
+            next.iter_mut().chain(&mut image).for_each(|x| *x /= length);
             let Some(product) = self.hessian_product(&next, steps, &gradient) else { break };
             basis.push(next);
+            images.push(image);
             next = product.clone();
             products.push(product);
             let projected = DMatrix::from_fn(basis.len(), basis.len(), |i, j| {

@@ -4,15 +4,15 @@ use manifactor_graph::{VariableIndices, catalogue};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 /// The factors that may be outliers. All others are trusted, and keep their full weight.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Candidates {
-    /// Factors that couple variables, except odometry: the first factor between variables of one type that follow one another
-    /// in the order of the values. Further factors between the same variables are candidates. Priors and other factors of a
-    /// single variable are trusted.
+    /// Factors that couple variables, except odometry: the only factor between variables of one type that follow one another in
+    /// the order of the values. If there are several between the same variables, all of them are candidates, since any may be a
+    /// wrong loop closure. Priors and other factors of a single variable are trusted.
     #[default]
     LoopClosures,
     /// Every factor.
@@ -56,23 +56,25 @@ impl FactorType {
 impl Candidates {
     /// By factor: whether it is a candidate.
     pub(crate) fn of(self, problem: &Problem) -> Vec<bool> {
-        let mut connected = HashSet::new();
-        let mut may = |factor: &FactorPlace| match self {
+        let mut connections: HashMap<VariableIndices, usize> = HashMap::new();
+        for factor in problem.model.factors.iter().filter(|factor| factor.variables.len() > 1) {
+            *connections.entry(sorted(&factor.variables)).or_default() += 1;
+        }
+        let may = |factor: &FactorPlace| match self {
             Self::All => true,
             Self::LoopClosures => {
                 let place = |variable: &u32| &problem.model.variables[*variable as usize];
                 let places =
                     factor.variables.iter().map(place).map(|place| (place.column, place.index as u64));
-                factor.variables.len() > 1
-                    && !(is_sequential(places) && connected.insert(sorted(&factor.variables)))
+                let is_alone = || connections.get(&sorted(&factor.variables)) == Some(&1);
+                factor.variables.len() > 1 && !(is_sequential(places) && is_alone())
             }
         };
-        problem.model.factors.iter().map(&mut may).collect()
+        problem.model.factors.iter().map(may).collect()
     }
 }
 
-/// Whether variables are of one type and follow one another, as those of odometry do. Of several factors between the same
-/// variables only the first is odometry: a wrong loop closure between neighbours would be trusted otherwise.
+/// Whether variables are of one type and follow one another, as those of odometry do.
 ///
 /// A variable is given by its column, one for each type, and its position among the variables of that type.
 pub fn is_sequential(variables: impl IntoIterator<Item = (usize, u64)>) -> bool {
