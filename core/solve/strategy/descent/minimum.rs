@@ -56,6 +56,7 @@ impl Descent<'_> {
             self.move_by(&steps);
             return self.at.not_finite.is_none();
         }
+        tracing::debug!(bent = probe.bent.iter().filter(|bent| **bent).count(), "probed the ending");
         let flat: Vec<usize> = self.flat_unknowns().take(FLAT).collect();
         if flat.is_empty() && !probe.bent.contains(&true) {
             return false;
@@ -135,6 +136,7 @@ impl Descent<'_> {
             shift.into_iter().find(|shift| self.problem.system.factorize_directly(Some(shift)).is_ok())?;
         self.is_refactorized = true;
         let found = self.lanczos(steps, bent, &shift);
+        tracing::debug!(is_found = found.is_some(), "looked for negative curvature");
         self.at = self.problem.linearize();
         found
     }
@@ -176,6 +178,7 @@ impl Descent<'_> {
             });
             let eigen = projected.symmetric_eigen();
             let least = eigen.eigenvalues.imin();
+            tracing::debug!(products = products.len(), least = eigen.eigenvalues[least], "curvature");
             if eigen.eigenvalues[least] < 0.0 {
                 // the better the direction, the longer the way down along it
                 let mut direction = vec![0.0; steps.len()];
