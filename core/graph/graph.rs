@@ -5,8 +5,10 @@ use crate::factor::{Factor, FactorEntry};
 use crate::noise::{Noise, NoiseError, Whitener};
 use crate::variable::Key;
 use crate::variable::Values;
+use crate::variable::Variable;
 use crate::variable::manifold_name;
 use indexmap::IndexMap;
+use nalgebra::DVector;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -296,6 +298,18 @@ pub struct Resolved {
 }
 
 impl FactorEntry {
+    /// ‖r‖² in standard deviations where `point` has its variables, without its loss. `None` where a variable is missing or of
+    /// another type, or the factor is not defined there.
+    pub fn squared(&self, point: impl Fn(&Key) -> Option<Box<dyn Variable>>) -> Option<f64> {
+        let points: Vec<Box<dyn Variable>> = self.keys.iter().map(point).collect::<Option<_>>()?;
+        let points: Vec<&dyn Variable> = points.iter().map(|point| &**point).collect();
+        let residual = self.factor.erased();
+        residual.is_defined(&points).filter(|is_defined| *is_defined)?;
+        let r = residual.residual(&points)?;
+        let whitener = self.noise.whitener(r.len()).ok()?.matrix(r.len());
+        Some((whitener * DVector::from_vec(r)).norm_squared())
+    }
+
     /// Looks up the variables, and checks that they fit: `find` gives the place and the type of a key. `factor` is the
     /// place in the graph that errors name. `None` where something is wrong, which is added to `errors`.
     pub fn resolve(

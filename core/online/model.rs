@@ -123,6 +123,8 @@ pub(crate) struct Model {
     pub blocks: Blocks,
     /// By batch, factors that are about to be evaluated.
     listed: Vec<Vec<u32>>,
+    /// How many factors have a loss.
+    robust: usize,
 }
 
 impl Couplings for Model {
@@ -214,6 +216,7 @@ impl Model {
             whitener: &resolved.whitener,
             loss: residual.loss.as_deref(),
         });
+        self.robust += usize::from(residual.loss.is_some());
         let index = to.len() - 1;
         if weight != 1.0 {
             to.set_weight(index, weight);
@@ -256,6 +259,7 @@ impl Model {
             factor.members.iter().for_each(|(v, _)| self.places[*v as usize].sealed -= 1);
             return Some(factor);
         }
+        self.robust -= usize::from(factor.is_robust());
         let batch = &mut self.batches.as_mut_slice()[factor.batch as usize];
         if let Some(moved) = batch.remove(factor.index as usize)
             && let Some(moved) = self.factors.get_mut(moved as u32)
@@ -273,6 +277,10 @@ impl Place {
 }
 
 impl Factor {
+    /// Whether it has a loss.
+    pub(super) fn is_robust(&self) -> bool {
+        self.entry.as_ref().is_some_and(|entry| entry.loss.is_some())
+    }
     /// Where a variable begins among the factor's scalars.
     fn at(&self, variable: u32) -> u32 {
         self.members.iter().find(|(v, _)| *v == variable).map_or(0, |(_, at)| *at)

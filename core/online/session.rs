@@ -49,7 +49,9 @@ pub struct Session {
     changed: Vec<u64>,
     pass: u64,
     updates: usize,
-    /// Variables that have left the region of their linearization.
+    /// Whether the update has no changes to make.
+    is_idle: bool,
+    /// Variables whose linearization is to be looked at: they have left its region, or moved where there are losses.
     waiting: Vec<u32>,
     /// How many of them the budget has put off.
     postponed: usize,
@@ -105,6 +107,7 @@ impl Session {
             changed: vec![],
             pass: 0,
             updates: 0,
+            is_idle: false,
             waiting: vec![],
             postponed: 0,
             is_waiting: vec![],

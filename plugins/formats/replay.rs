@@ -30,6 +30,25 @@ pub struct Step {
     pub values: Values,
 }
 
+/// Of several factors between the same variables, puts the one first that fits the initial values best: another may be a wrong
+/// closure.
+fn best_first(factors: &mut [FactorEntry], initial: &Values) {
+    let misfit = |entry: &FactorEntry| {
+        let point = |key: &Key| Some(initial.variable(key.as_str())?.erased().clone_box());
+        entry.squared(point).unwrap_or(f64::INFINITY)
+    };
+    let mut first: HashMap<Vec<Key>, usize> = HashMap::new();
+    for i in 0..factors.len() {
+        let Some(entry) = factors.get(i).filter(|entry| entry.keys.len() > 1) else { continue };
+        let mut keys = entry.keys.clone();
+        keys.sort_unstable();
+        let before = *first.entry(keys).or_insert(i);
+        if before != i && factors.get(before).is_some_and(|other| misfit(entry) < misfit(other)) {
+            factors.swap(before, i);
+        }
+    }
+}
+
 /// The number of a pose's key.
 fn number(key: &Key) -> Option<u64> {
     key.as_str().strip_prefix('x')?.parse().ok()
@@ -51,6 +70,7 @@ impl Replay {
         // the odometry first: a pose starts from the one before it
         for factors in steps.values_mut() {
             factors.sort_by_key(|entry| Reverse(poses(entry).into_iter().min()));
+            best_first(factors, initial);
         }
         let mut fixed = Graph::new();
         graph.fixed().iter().for_each(|(key, held)| fixed.set_fixed(key, held.clone()));

@@ -141,6 +141,9 @@ pub trait Batch: Send + Sync {
     ) -> Evaluation;
     /// As [`cost`](Self::cost), of the factors at these places in the batch, ascending.
     fn cost_at(&self, indices: &[u32], columns: &Columns) -> Evaluation;
+    /// Appends the weights that the loss gives the factors at these places in the batch, ascending: 1 without a loss, 0 where
+    /// a factor is not defined.
+    fn robust_weights_at(&self, indices: &[u32], columns: &Columns, to: &mut Vec<f64>);
     /// Makes one factor count as often as its weight says, by its place in the batch.
     fn set_weight(&mut self, index: usize, weight: f64);
     /// Sets what is held of a factor's variables, by its place in the batch: see [`Member::starts`] and
@@ -384,6 +387,19 @@ impl<F: Kernel> Batch for BatchOf<F> {
         pass::runs(indices)
             .map(|(first, len)| self.chunk_cost(columns, first, len))
             .fold(Evaluation::default(), Evaluation::and)
+    }
+
+    fn robust_weights_at(&self, indices: &[u32], columns: &Columns, to: &mut Vec<f64>) {
+        let columns = F::columns(columns);
+        to.extend(indices.iter().map(|i| {
+            let i = *i as usize;
+            let mut weight = [0.0];
+            if let Some(squared) = self.squared(columns, i) {
+                weight = [squared];
+                self.robust(i, &mut weight);
+            }
+            weight[0]
+        }));
     }
 
     fn set_weight(&mut self, index: usize, weight: f64) {

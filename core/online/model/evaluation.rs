@@ -3,6 +3,7 @@ use super::{Factor, Model};
 use manifactor_graph::Variable;
 use manifactor_graph::batch::Evaluation;
 use smallvec::SmallVec;
+use std::collections::BTreeMap;
 
 impl Model {
     /// Linearizes factors at the trial points, batch by batch. What they had is gone; at the same points, they have the same
@@ -53,6 +54,67 @@ impl Model {
             false => self.prior_cost(factor, delta),
         };
         factors.map(one).fold(Evaluation::default(), Evaluation::and)
+    }
+
+    /// Whether any factor has a loss.
+    pub(crate) fn has_losses(&self) -> bool {
+        self.robust > 0
+    }
+
+    /// What the weights of losses at the trial points make of these variables' gradients, as their own scalars have it: the
+    /// linearization has the weights of its own points. It is infinite where a factor had no weight there and has one now.
+    /// Variables ascend, as do the results.
+    pub(crate) fn reweighed(&self, variables: &[u32], delta: &[f64]) -> Vec<SmallVec<[f64; 9]>> {
+        let mut changes: Vec<SmallVec<[f64; 9]>> =
+            variables.iter().map(|v| SmallVec::from_elem(0.0, self.blocks.dim(*v))).collect();
+        let mut by_batch: BTreeMap<u32, Vec<(u32, u32)>> = BTreeMap::new();
+        for f in self.factors_of(variables) {
+            let Some(factor) = self.factor(f).filter(|factor| factor.is_robust()) else { continue };
+            if self.is_whole(f) && self.takes_part(f) {
+                by_batch.entry(factor.batch).or_default().push((factor.index, f));
+            }
+        }
+        let mut by_factor = vec![];
+        for (batch, mut members) in by_batch {
+            members.sort_unstable();
+            let indices: Vec<u32> = members.iter().map(|(index, _)| *index).collect();
+            let (mut before, mut now) = (vec![], vec![]);
+            let batch = &self.batches.as_slice()[batch as usize];
+            batch.robust_weights_at(&indices, &self.points, &mut before);
+            batch.robust_weights_at(&indices, &self.trial, &mut now);
+            let weights = before.into_iter().zip(now);
+            by_factor.extend(members.into_iter().zip(weights).map(|((_, f), weights)| (f, weights)));
+        }
+        by_factor.sort_unstable_by_key(|(f, _)| *f);
+        for (f, (before, now)) in by_factor.into_iter().filter(|(_, (before, now))| before != now) {
+            let Some(factor) = self.factor(f) else { continue };
+            for (scalar, gradient) in self.gradient_of(factor, delta).into_iter().enumerate() {
+                let member = factor.members.iter().rev().find(|(_, at)| *at as usize <= scalar);
+                let Some((v, at)) = member else { continue };
+                let Ok(place) = variables.binary_search(v) else { continue };
+                let change = if before == 0.0 { f64::INFINITY } else { gradient * (now / before - 1.0) };
+                changes[place][scalar - *at as usize] += change;
+            }
+        }
+        changes
+    }
+
+    /// g + Hδ of a factor's own part, over its scalars.
+    fn gradient_of(&self, factor: &Factor, delta: &[f64]) -> SmallVec<[f64; 18]> {
+        let region = self.regions[factor.region];
+        let n = region.scalars as usize;
+        let of_variables = factor.members.iter().flat_map(|(v, _)| &delta[self.blocks.range(*v)]);
+        let step: SmallVec<[f64; 18]> = of_variables.copied().collect();
+        let mut g: SmallVec<[f64; 18]> = SmallVec::from_slice(&self.regions.g[region.g..region.g + n]);
+        for c in 0..n {
+            let column = &self.regions.h[region.column(c)..][..n - c];
+            g[c] += column[0] * step[c];
+            for r in c + 1..n {
+                g[r] += column[r - c] * step[c];
+                g[c] += column[r - c] * step[r];
+            }
+        }
+        g
     }
 
     /// Makes the sums anew that a changed factor is part of.

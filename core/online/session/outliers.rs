@@ -18,7 +18,7 @@ use crate::report::{Rejection, Report};
 use crate::saved::Suspect;
 use manifactor_graph::{FactorEntry, Resolved};
 use manifactor_solve::is_sequential;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Factors that may go out after one update, as they do not fit any more.
 const DROPS: usize = 4;
@@ -34,13 +34,42 @@ impl Session {
         rejected.into_iter().filter_map(one).collect()
     }
 
+    /// Of the factors that come in an update, by their variables, the one that fits these best as they are: where there are
+    /// several, it is taken for odometry, wherever it stands among them.
+    pub(super) fn best_between(&self, changes: &[Change]) -> BTreeMap<Vec<u32>, u32> {
+        let mut all: BTreeMap<Vec<u32>, Vec<(u32, &FactorEntry)>> = BTreeMap::new();
+        if self.settings.outliers.is_some() {
+            for change in changes {
+                let Change::Insert { number, entry, resolved, .. } = change else { continue };
+                all.entry(ascending(&resolved.variables)).or_default().push((*number, entry));
+            }
+        }
+        let misfit =
+            |entry: &FactorEntry| entry.squared(|key| self.estimate(key.as_str())).unwrap_or(f64::INFINITY);
+        all.retain(|variables, factors| variables.len() > 1 && factors.len() > 1);
+        let best = all.into_iter().filter_map(|(variables, factors)| {
+            let misfits = factors.into_iter().map(|(number, entry)| (misfit(entry), number));
+            let best = misfits.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
+            Some((variables, best.1))
+        });
+        best.collect()
+    }
+
     /// What a new factor has to keep to, where it may be wrong.
-    pub(super) fn suspect(&self, entry: &FactorEntry, resolved: &Resolved) -> Option<Suspect> {
+    pub(super) fn suspect(
+        &self,
+        entry: &FactorEntry,
+        resolved: &Resolved,
+        number: u32,
+        best: &BTreeMap<Vec<u32>, u32>,
+    ) -> Option<Suspect> {
         let outliers = self.settings.outliers.as_ref()?;
         let name = entry.factor.typetag_name();
         let is_named = outliers.types.is_empty() || outliers.types.iter().any(|t| t.as_str() == name);
         let variables = &resolved.variables;
-        let couples = variables.len() > 1 && !self.is_odometry(variables);
+        let couples = variables.len() > 1
+            && (best.get(&ascending(variables)).is_some_and(|best| *best != number)
+                || !self.is_odometry(variables));
         let rows = entry.factor.erased().signature().rows.filter(|rows| *rows > 0)?;
         let (bound, gain) = (outliers.probability.chi_squared(rows), outliers.gain * rows as f64);
         (is_named && couples).then_some(Suspect { bound, gain, since: Some(self.updates + 1) })
@@ -53,8 +82,7 @@ impl Session {
         if !is_sequential(places.map(|place| (place.column as usize, place.ordinal))) {
             return false;
         }
-        let mut sorted = variables.to_vec();
-        sorted.sort_unstable();
+        let sorted = ascending(variables);
         let is_trusted = |f: &u32| {
             let factor = self.model.factor(*f).filter(|factor| factor.entry.is_some() && !factor.rejected);
             !self.suspects.contains_key(f) && factor.is_some_and(|f| f.variables().eq(sorted.iter().copied()))
@@ -63,17 +91,13 @@ impl Session {
     }
 
     /// Notes new factors that may be wrong, and forgets those that are gone; returns which of the new are still there.
-    pub(super) fn enter(&mut self, new: &[(u32, Suspect)], removed: &[u32]) -> Vec<u32> {
+    pub(super) fn enter(&mut self, mut new: BTreeMap<u32, Suspect>, removed: &[u32]) -> Vec<u32> {
         removed.iter().for_each(|f| self.forget_suspect(*f));
-        for (f, suspect) in new.iter().filter(|(f, _)| self.model.factor(*f).is_some()) {
-            self.suspects.insert(*f, *suspect);
-            self.rejected.insert(*f);
-        }
-        let mut new: Vec<u32> =
-            new.iter().map(|(f, _)| *f).filter(|f| self.suspects.contains_key(f)).collect();
-        new.sort_unstable();
-        new.dedup();
-        new
+        new.retain(|f, _| self.model.factor(*f).is_some());
+        self.rejected.extend(new.keys());
+        let numbers = new.keys().copied().collect();
+        self.suspects.extend(new);
+        numbers
     }
 
     /// Tests the factors that are new, and those whose variables have moved.
@@ -218,6 +242,12 @@ impl Session {
         self.take_back(undo);
         Err(Failed)
     }
+}
+
+fn ascending(variables: &[u32]) -> Vec<u32> {
+    let mut sorted = variables.to_vec();
+    sorted.sort_unstable();
+    sorted
 }
 
 /// A pass that did not come to an end.

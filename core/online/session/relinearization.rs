@@ -3,8 +3,11 @@
 //! The error of a linearization grows with the square of the step, so what a step may be is the root of what the error may
 //! be: |δᵢ| ≤ √(bend · σᵢ) with σᵢ = 1/√Hᵢᵢ, the precision of the factors around. Thresholds in radians and metres would
 //! be too coarse for precise data and too fine for coarse data, and need one number for each type of variable.
+//!
+//! A robust loss makes an error of another kind: the weights are those of the linearization points. They change the gradient
+//! by Σ (w/w₀ − 1) wJᵀr, and |Δgᵢ| · σᵢ ≤ bend is asked of that, however short the step is.
 use super::Session;
-use crate::tree::{Affected, NONE};
+use crate::tree::{Affected, Couplings, NONE};
 use smallvec::SmallVec;
 
 /// Variables at new points.
@@ -14,17 +17,36 @@ pub(super) struct Relinearized {
     pub(super) factors: Vec<u32>,
 }
 
+/// Variables to relinearize, and at a turn all that are out of their regions, both ascending.
+#[derive(Debug)]
+pub(super) struct Choice {
+    pub(super) chosen: Vec<u32>,
+    pub(super) waiting: Option<Vec<u32>>,
+}
+
+/// What an update without changes leaves of the errors that others may leave.
+const FINE: f64 = 1e-6;
 /// Halvings of a step that leads out of the domain of a factor; then the variable stays.
 const HALVINGS: u32 = 4;
 /// Rounds of such halvings, each of some variables, before all of them stay.
 const ROUNDS: usize = 16;
 
 impl Session {
-    /// The square of how many times its threshold the largest component of a variable's step is.
+    /// The error of a variable's linearization in σ's, as a share of what it may be.
     pub(super) fn excess(&self, variable: u32) -> f64 {
         let blocks = &self.model.blocks;
         let steps = self.delta[blocks.range(variable)].iter().zip(blocks.precision(variable));
         steps.map(|(step, precision)| step * step * precision / self.settings.bend).fold(0.0, f64::max)
+    }
+
+    /// What that share may be: an update that has nothing else to do goes on until far less is left.
+    fn most(&self) -> f64 {
+        if self.is_idle { FINE } else { 1.0 }
+    }
+
+    /// Changes of steps that are not passed on, in σ's.
+    pub(super) fn deviation(&self) -> f64 {
+        if self.is_idle { FINE * self.settings.deviation } else { self.settings.deviation }
     }
 
     /// Whether something cannot wait for the next turn: after a large loop closure, a step is no estimate of anything.
@@ -38,37 +60,93 @@ impl Session {
         !self.urgent.is_empty()
     }
 
-    /// The variables to relinearize: those that are due, and in turn those that wait, as far as the budget goes. `spent` are the
-    /// operations of the update so far.
+    /// The variables to relinearize: those that are due, and in turn those that are out of their regions, as far as the budget
+    /// goes. `spent` are the operations of the update so far.
     pub(super) fn choose(
         &mut self,
         mut chosen: Vec<u32>,
         is_turn: bool,
         affected: &mut Affected,
         spent: f64,
-    ) -> Vec<u32> {
+    ) -> Choice {
+        let mut out = vec![];
         if is_turn {
-            let mut out: Vec<u32> = self.waiting.iter().copied().filter(|v| self.is_out(*v)).collect();
+            out = self.out();
             if let Some(budget) = self.settings.budget {
-                out.extend(self.damped_now());
-                out.sort_unstable();
-                out.dedup();
-                self.postponed = out.len();
-                self.afford(&mut out, budget - spent, spent == 0.0 && chosen.is_empty(), affected);
-                self.postponed -= out.len();
+                let mut wanted = out.clone();
+                wanted.extend(self.damped_now().map(|v| (self.excess(v), v)));
+                wanted.sort_unstable_by(|(a, v), (b, u)| v.cmp(u).then(b.total_cmp(a)));
+                wanted.dedup_by_key(|(_, v)| *v);
+                self.postponed = wanted.len();
+                let taken = self.afford(wanted, budget - spent, spent == 0.0 && chosen.is_empty(), affected);
+                self.postponed -= taken.len();
+                chosen.extend(taken);
+            } else {
+                chosen.extend(out.iter().map(|(_, v)| *v));
             }
-            chosen.append(&mut out);
         }
         chosen.retain(|v| self.model.place(*v).sealed == 0);
         chosen.sort_unstable();
         chosen.dedup();
-        chosen
+        Choice { chosen, waiting: is_turn.then(|| out.into_iter().map(|(_, v)| v).collect()) }
+    }
+
+    /// The variables that are out of the regions of their linearizations, ascending, with their excesses: by the length of their
+    /// steps, or by what the losses' weights have become.
+    fn out(&mut self) -> Vec<(f64, u32)> {
+        let mut moved: Vec<u32> = match self.is_idle {
+            true => (0..self.model.variables() as u32).filter(|v| self.has_step(*v)).collect(),
+            false => self.waiting.clone(),
+        };
+        moved.retain(|v| self.may_move(*v));
+        moved.sort_unstable();
+        moved.dedup();
+        let mut out: Vec<(f64, u32)> = moved.iter().map(|v| (self.excess(*v), *v)).collect();
+        if self.model.has_losses() {
+            for ((excess, _), by_weight) in out.iter_mut().zip(self.excesses_by_weight(&moved)) {
+                *excess = excess.max(by_weight);
+            }
+        }
+        out.retain(|(excess, _)| *excess > self.most());
+        out
+    }
+
+    fn has_step(&self, variable: u32) -> bool {
+        self.model.place(variable).is_there
+            && self.delta[self.model.blocks.range(variable)].iter().any(|step| *step != 0.0)
+    }
+
+    /// The errors of variables' gradients by weights that losses have changed, in σ's, as shares of what they may be. A step may
+    /// be short and its weights quite other ones, where a robust loss turns.
+    fn excesses_by_weight(&mut self, variables: &[u32]) -> Vec<f64> {
+        let around = self.model.factors_of(variables);
+        let mut tried: Vec<u32> =
+            around.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables()).collect();
+        tried.sort_unstable();
+        tried.dedup();
+        for v in &tried {
+            self.model.try_step(*v, &self.delta[self.model.blocks.range(*v)]);
+        }
+        let changes = self.model.reweighed(variables, &self.delta);
+        tried.iter().for_each(|v| self.model.reset_trial(*v));
+        let share = |(v, change): (&u32, SmallVec<[f64; 9]>)| {
+            let precision = self.model.blocks.precision(*v);
+            let shares = change.iter().zip(precision).map(|(g, p)| g.abs() / (p * self.settings.bend));
+            shares.fold(0.0, f64::max)
+        };
+        variables.iter().zip(changes).map(share).collect()
     }
 
     /// Keeps those variables that the budget allows for, the furthest out first. What a relinearization costs is what the
     /// fronts above the variable cost as they are; those that are `affected` anyway come first.
-    fn afford(&mut self, variables: &mut Vec<u32>, budget: f64, is_alone: bool, affected: &mut Affected) {
-        let mut by_excess: Vec<(f64, u32)> = variables.iter().map(|v| (self.excess(*v), *v)).collect();
+    fn afford(
+        &mut self,
+        mut by_excess: Vec<(f64, u32)>,
+        budget: f64,
+        is_alone: bool,
+        affected: &mut Affected,
+    ) -> Vec<u32> {
+        let mut variables = vec![];
         by_excess.sort_unstable_by(|(a, v), (b, u)| b.total_cmp(a).then(v.cmp(u)));
         let first = affected.0.len();
         let cost = |session: &Self, from: usize, affected: &Affected| -> f64 {
@@ -76,7 +154,6 @@ impl Session {
         };
         let mut left = budget - cost(self, 0, affected);
         let mut must_take = is_alone && first == 0;
-        variables.clear();
         for (_, v) in by_excess {
             let before = affected.0.len();
             self.touch_around(v, affected);
@@ -90,11 +167,12 @@ impl Session {
             }
         }
         self.tree.untouch(affected, first);
+        variables
     }
 
     /// Whether a variable is out of the region of its linearization, and solved for.
     pub(super) fn is_out(&self, variable: u32) -> bool {
-        self.excess(variable) > 1.0 && self.may_move(variable)
+        self.excess(variable) > self.most() && self.may_move(variable)
     }
 
     /// Variables whose steps are damped: such a step is none to the minimum, however short, and another has to follow.
@@ -175,28 +253,30 @@ impl Session {
         self.note_activities(&relinearized.factors);
     }
 
-    /// Makes the new points those of the session. After a turn, nothing waits that is not out any more.
-    pub(super) fn accept_points(&mut self, relinearized: &Relinearized, is_turn: bool) {
+    /// Makes the new points those of the session. After a turn, those of `waiting` still wait that have not been linearized anew.
+    pub(super) fn accept_points(&mut self, relinearized: &Relinearized, waiting: Option<&[u32]>) {
         for v in &relinearized.variables {
             self.model.accept(*v);
             self.delta[self.model.blocks.range(*v)].fill(0.0);
             self.is_waiting[*v as usize] = false;
         }
-        if is_turn || !relinearized.variables.is_empty() {
-            let mut waiting = std::mem::take(&mut self.waiting);
-            waiting.retain(|v| {
-                let stays = self.is_waiting[*v as usize] && (!is_turn || self.is_out(*v));
-                self.is_waiting[*v as usize] = stays;
+        if waiting.is_some() || !relinearized.variables.is_empty() {
+            let stays = |v: &u32| waiting.is_none_or(|waiting| waiting.binary_search(v).is_ok());
+            let is_waiting = &mut self.is_waiting;
+            self.waiting.retain(|v| {
+                let stays = is_waiting[*v as usize] && stays(v);
+                is_waiting[*v as usize] = stays;
                 stays
             });
-            self.waiting = waiting;
         }
     }
 
-    /// Notes that a variable is to be relinearized when its turn comes, where its step is too long for its linearization.
+    /// Notes that a variable is to be looked at when its turn comes: its step is too long for its linearization, or may have
+    /// changed the weights of losses.
     pub(super) fn note_excess(&mut self, variable: u32) {
         let excess = self.excess(variable);
-        if excess > 1.0 && !std::mem::replace(&mut self.is_waiting[variable as usize], true) {
+        let is_out = excess > self.most() || self.model.has_losses();
+        if is_out && !std::mem::replace(&mut self.is_waiting[variable as usize], true) {
             self.waiting.push(variable);
         }
         if excess > self.settings.urgent.powi(2) {

@@ -30,12 +30,20 @@ const WEAKER: f64 = 0.1;
 const WEAK: f64 = 1e-5;
 /// A rise of the cost by less than this share of it is rounding, or what was not passed on.
 const RISE: f64 = 1e-3;
+/// A rise by less than this share is rounding.
+const ROUNDING: f64 = 1e-12;
 
 impl Session {
     /// Looks whether long steps have raised the cost of the factors around; only where a step is far out of the region of its
-    /// linearization, as others cannot do harm.
+    /// linearization, as others cannot do harm at once. Repeated, they can: Gauss-Newton may go round a minimum for ever. An
+    /// update that has nothing else to do looks at all steps.
     pub(super) fn control_step(&mut self, report: &mut Report) {
-        if !self.steady(report) {
+        if self.is_idle {
+            let (_, before, after) = self.last_step();
+            if after.left > before.left || after.cost > before.cost * (1.0 + ROUNDING) {
+                report.solved_batch |= self.settle(report);
+            }
+        } else if !self.steady(report) {
             report.solved_batch = self.settle(report);
         }
     }
@@ -122,13 +130,7 @@ impl Session {
 
     /// Halves the last step until it lowers the cost of the factors around; whether it had to be.
     fn shorten(&mut self, report: &mut Report) -> bool {
-        let moved: Vec<u32> = self.moved.iter().map(|(v, _)| *v).collect();
-        let mut factors = self.model.factors_of(&moved);
-        factors.retain(|f| self.model.is_whole(*f));
-        let after = self.cost_of(&factors);
-        self.exchange_steps();
-        let before = self.cost_of(&factors);
-        self.exchange_steps();
+        let (factors, before, after) = self.last_step();
         if !rises(&before, &after) {
             return false;
         }
@@ -145,6 +147,18 @@ impl Session {
             }
         }
         true
+    }
+
+    /// The factors around the variables that the last pass has moved, and their cost before and after it.
+    fn last_step(&mut self) -> (Vec<u32>, Evaluation, Evaluation) {
+        let moved: Vec<u32> = self.moved.iter().map(|(v, _)| *v).collect();
+        let mut factors = self.model.factors_of(&moved);
+        factors.retain(|f| self.model.is_whole(*f));
+        let after = self.cost_of(&factors);
+        self.exchange_steps();
+        let before = self.cost_of(&factors);
+        self.exchange_steps();
+        (factors, before, after)
     }
 
     /// Exchanges the steps of the last pass and those before it.

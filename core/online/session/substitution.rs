@@ -3,19 +3,22 @@ use super::Session;
 use crate::tree::Redone;
 
 impl Session {
-    /// Back-substitutes through the new fronts, and through those below whose rows have changed; returns the number of
-    /// variables.
+    /// Back-substitutes through the new fronts, and through those below whose rows have changed; through all of them where the
+    /// update has nothing else to do. Returns the number of variables.
     pub(super) fn solve(&mut self, redone: &Redone) -> usize {
         self.moved.clear();
         self.before.clear();
         let mut solved = 0;
-        for f in redone.new.iter().rev() {
-            solved += self.solve_front(*f);
+        let mut open: Vec<u32> = vec![];
+        if self.is_idle {
+            open.extend(self.tree.roots());
+        } else {
+            solved += redone.new.iter().rev().map(|f| self.solve_front(*f)).sum::<usize>();
+            open.extend(redone.kept.iter().map(|(kept, _)| *kept));
         }
-        let mut open: Vec<u32> = redone.kept.iter().map(|(kept, _)| *kept).collect();
         while let Some(f) = open.pop() {
             let front = &self.tree.fronts[f as usize];
-            if front.rows.iter().any(|row| self.changed[*row as usize] == self.pass) {
+            if self.is_idle || front.rows.iter().any(|row| self.changed[*row as usize] == self.pass) {
                 open.extend_from_slice(&front.children);
                 solved += self.solve_front(f);
             }
@@ -24,7 +27,8 @@ impl Session {
     }
 
     fn solve_front(&mut self, f: u32) -> usize {
-        let Self { tree, fronts, model, delta, settings, changed, moved, before, .. } = self;
+        let deviation = self.deviation();
+        let Self { tree, fronts, model, delta, changed, moved, before, .. } = self;
         let front = &tree.fronts[f as usize];
         let mut x = fronts.solve(front, f, &model.blocks, delta);
         let first = moved.len();
@@ -36,7 +40,7 @@ impl Session {
             let old = &mut delta[range];
             let precision = model.blocks.precision(*v);
             let mut changes = step.iter().zip(&*old).zip(precision);
-            if changes.any(|((new, old), precision)| (new - old).abs() * precision > settings.deviation) {
+            if changes.any(|((new, old), precision)| (new - old).abs() * precision > deviation) {
                 moved.push((*v, before.len()));
                 before.extend_from_slice(old);
                 old.copy_from_slice(step);

@@ -2,6 +2,7 @@
 use super::Session;
 use super::changes::{Change, NewVariable, Touched};
 use super::parking::Moves;
+use super::relinearization::Choice;
 use crate::error::UpdateError;
 use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
@@ -9,6 +10,7 @@ use crate::model::NewNumber;
 use crate::report::Report;
 use crate::tree::{Affected, Couplings, Redone};
 use std::cmp::Reverse;
+use std::collections::BTreeMap;
 
 /// What takes changes back.
 #[derive(Default)]
@@ -24,12 +26,15 @@ const NEWEST: usize = 8;
 
 impl Session {
     /// Makes the changes since the last update, and brings the estimate up to date. Then those variables leave that are to.
+    /// Without changes, it is a turn to relinearize, by a hundredth of [`bend`](crate::Settings::bend) and
+    /// [`deviation`](crate::Settings::deviation): repeated, it leads to the minimum.
     ///
     /// # Errors
     /// Where a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last
     /// update are taken back then, and the session is as that left it; ids of the pushed factors are void.
     pub fn update(&mut self) -> Result<Report, UpdateError> {
         let pending = std::mem::take(&mut self.pending);
+        self.is_idle = pending.is_empty();
         let mut report = Report::default();
         let mut touched = Touched { steps: true, ..Touched::default() };
         let mut undo = Undo::default();
@@ -42,13 +47,16 @@ impl Session {
         }
         touched.doubtful.extend(&self.doubtful);
         self.resize();
-        let mut suspects = vec![];
+        let mut suspects = BTreeMap::new();
+        let best = self.best_between(&pending.changes);
         for mut change in pending.changes {
-            if let Change::Insert { number, entry, resolved, rejected, .. } = &mut change
-                && let Some(suspect) = self.suspect(entry, resolved)
-            {
-                *rejected = true;
-                suspects.push((*number, suspect));
+            if let Change::Insert { number, entry, resolved, rejected, .. } = &mut change {
+                // one that replaces another has its number
+                suspects.remove(number);
+                if let Some(suspect) = self.suspect(entry, resolved, *number, &best) {
+                    *rejected = true;
+                    suspects.insert(*number, suspect);
+                }
             }
             undo.changes.extend(change.apply(&mut self.model, &mut touched));
         }
@@ -62,8 +70,9 @@ impl Session {
         }
         self.doubt_inactive(&mut touched);
         undo.moves = self.park(&mut touched);
-        let is_turn =
-            self.postponed > 0 || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
+        let is_turn = self.is_idle
+            || self.postponed > 0
+            || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
         let moves = std::mem::take(&mut undo.moves);
         if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);
@@ -73,7 +82,7 @@ impl Session {
         }
         self.updates += 1;
         self.follow_up(&mut report);
-        let new = self.enter(&suspects, &touched.removed);
+        let new = self.enter(suspects, &touched.removed);
         self.test_outliers(&new, &mut report);
         self.time = pending.time.or(self.time);
         came.into_iter().for_each(|(variable, time)| self.note_age(variable, time));
@@ -188,7 +197,7 @@ impl Session {
         if touched.steps && self.settings.budget.is_none() {
             due.extend(self.damped_now());
         }
-        let chosen = self.choose(due, is_turn, &mut affected, report.operations);
+        let Choice { chosen, waiting } = self.choose(due, is_turn, &mut affected, report.operations);
         let relinearized = self.relinearize(chosen, &touched.held);
         for v in &relinearized.variables {
             self.touch_around(*v, &mut affected);
@@ -212,7 +221,7 @@ impl Session {
         self.exchange(&affected, &redone, moves);
         self.doubt_parked(&relinearized.factors);
         report.relinearized += relinearized.variables.len();
-        self.accept_points(&relinearized, is_turn);
+        self.accept_points(&relinearized, waiting.as_deref());
         for f in &redone.new {
             let front = &self.tree.fronts[*f as usize];
             report.operations += front.operations;

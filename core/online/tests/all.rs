@@ -4,6 +4,7 @@ mod clocks;
 mod errors;
 mod failures;
 mod history;
+mod idle;
 mod landmarks;
 mod outliers;
 mod parking;

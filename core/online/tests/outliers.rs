@@ -147,3 +147,59 @@ fn a_closure_that_says_much_waits_for_another_that_bears_it_out() {
     let (report, _) = step(&mut session, 23, &[(3, [-20.2, 0.0])]);
     assert!(report.rejected.is_empty() && report.trials == 0, "{report:?}");
 }
+
+/// A step of 1 m to the next plane, with another factor between the same two, before or after it.
+fn twice(session: &mut Session, i: usize, wrong_first: bool) -> [FactorId; 2] {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert(format!("p{i}"), Plane { x: i as f64, y: 0.0 });
+    let mut by = [([1.0, 0.0], 0.1), ([1.0, 4.0], 0.05)];
+    if wrong_first {
+        by.reverse();
+    }
+    for (by, sigma) in by {
+        let keys = [format!("p{}", i - 1), format!("p{i}")];
+        graph.add(keys, Apart { by }).noise(Noise::sigma(sigma).unwrap());
+    }
+    let ids = session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    let right = usize::from(wrong_first);
+    [ids[right], ids[1 - right]]
+}
+
+#[test]
+fn of_two_factors_between_neighbours_none_is_trusted_for_its_place() {
+    for wrong_first in [false, true] {
+        let mut session = with(Outliers::default());
+        (0..5).for_each(|i| _ = step(&mut session, i, &[]));
+        let [right, wrong] = twice(&mut session, 5, wrong_first);
+        let mut closures = vec![];
+        for (i, to) in [(6, 1), (7, 2), (8, 0), (9, 3)] {
+            closures.extend(step(&mut session, i, &[(to, [to as f64 - i as f64, 0.0])]).1);
+        }
+        session.update().unwrap();
+        let rejected: Vec<FactorId> = session.rejections().iter().map(|one| one.factor).collect();
+        assert_eq!(rejected, [wrong], "right: {right:?}, closures: {closures:?}, {wrong_first}");
+    }
+}
+
+#[test]
+fn a_factor_that_replaces_a_candidate_at_once_is_judged_anew() {
+    let mut session = with(Outliers::default());
+    (0..3).for_each(|i| _ = step(&mut session, i, &[]));
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p3", Plane { x: 3.0, y: 0.0 });
+    graph.add(["p2", "p3"], Apart { by: [1.0, 0.0] });
+    let first = session.push(&graph, &values).unwrap();
+    let mut second = Graph::new();
+    second.add(["p2", "p3"], Apart { by: [1.5, 0.0] });
+    let replaced = session.push(&second, &Values::new()).unwrap();
+    session.remove(&first).unwrap();
+    let entry = second.factors()[0].clone();
+    session.replace(replaced[0], entry).unwrap();
+    session.update().unwrap();
+    assert!((session.get::<Plane>("p3").unwrap().x - 3.5).abs() < 1e-9);
+    // counted once, wherever it is linearized
+    (0..5).for_each(|_| _ = session.update().unwrap());
+    assert!((session.get::<Plane>("p3").unwrap().x - 3.5).abs() < 1e-9);
+    assert!(session.rejections().is_empty());
+}

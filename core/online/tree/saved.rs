@@ -22,7 +22,7 @@ impl Tree {
         order.iter().map(one).collect()
     }
 
-    fn roots(&self) -> Vec<u32> {
+    pub(crate) fn roots(&self) -> Vec<u32> {
         let roots = self.front_of.iter().copied().filter(|f| *f != NONE);
         let mut roots: Vec<u32> = roots.filter(|f| self.fronts[*f as usize].parent == NONE).collect();
         roots.sort_unstable_by_key(|f| self.fronts[*f as usize].lowest);

@@ -147,6 +147,10 @@ impl Batch for Whole {
         self.compute(Some(indices), columns, false);
         self.inner.cost_at(indices, columns)
     }
+    fn robust_weights_at(&self, indices: &[u32], columns: &Columns, to: &mut Vec<f64>) {
+        self.compute(Some(indices), columns, false);
+        self.inner.robust_weights_at(indices, columns, to);
+    }
     fn set_weight(&mut self, index: usize, weight: f64) {
         self.inner.set_weight(index, weight);
     }
