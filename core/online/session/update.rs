@@ -26,7 +26,7 @@ const NEWEST: usize = 8;
 
 impl Session {
     /// Makes the changes since the last update, and brings the estimate up to date. Then those variables leave that are to.
-    /// Without changes, it is a turn to relinearize, by a hundredth of [`bend`](crate::Settings::bend) and
+    /// Without changes, it is a turn to relinearize, by a millionth of [`bend`](crate::Settings::bend) and
     /// [`deviation`](crate::Settings::deviation): repeated, it leads to the minimum.
     ///
     /// # Errors

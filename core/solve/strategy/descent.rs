@@ -255,6 +255,21 @@ impl<'a> Descent<'a> {
         self.problem.system.g.iter().zip(self.problem.system.diagonal()).map(cosine).fold(0.0, f64::max)
     }
 
+    /// Whether one unknown alone could lower the cost by more than so much: by g²/2H = cos² · cost, as the model has it. A short
+    /// step and a small fall are then no sign of a minimum, but of damping, or of a plateau: a landmark at infinity, say.
+    pub(crate) fn is_steep(&self) -> bool {
+        const SHARE: f64 = 1e-3;
+        self.largest_cosine().powi(2) > SHARE
+    }
+
+    /// Whether the diagonal of H spans so many digits that no damping fits all of it: of a point at infinity, steps along the ray
+    /// are damped to nothing by what hardly damps those across.
+    pub(crate) fn is_spread(&self) -> bool {
+        const SHARE: f64 = 1e-10;
+        let diagonal = self.problem.system.diagonal();
+        diagonal.into_iter().any(|d| *d > 0.0 && *d < SHARE * self.problem.system.largest())
+    }
+
     fn largest_gradient(&self) -> f64 {
         // `f64::max` would drop what is not a number
         self.problem.system.g.iter().fold(0.0, |m, g| if m.is_nan() || g.abs() <= m { m } else { g.abs() })
@@ -273,7 +288,7 @@ impl<'a> Descent<'a> {
 
     /// Whether the last trial and its model both say that there is nothing left to gain.
     pub(crate) fn settled(&self, step: &Step) -> bool {
-        self.is_small(self.at.cost - self.trial.cost) && self.is_small(step.predicted)
+        self.is_small(self.at.cost - self.trial.cost) && self.is_small(step.predicted) && !self.is_steep()
     }
 
     /// Whether a change of the cost is within the tolerance.
@@ -322,13 +337,14 @@ impl<'a> Descent<'a> {
         if self.at.inactive != inactive {
             return None;
         }
-        if (before - after).abs() <= self.stop.relative_cost * before.abs() {
-            Some(Termination::Converged { reason: Tolerance::RelativeCost })
+        let reason = if (before - after).abs() <= self.stop.relative_cost * before.abs() {
+            Tolerance::RelativeCost
         } else if step.norm <= self.stop.step {
-            Some(Termination::Converged { reason: Tolerance::Step })
+            Tolerance::Step
         } else {
-            None
-        }
+            return None;
+        };
+        (!self.is_steep()).then_some(Termination::Converged { reason })
     }
 }
 

@@ -156,7 +156,7 @@ impl Dogleg {
                     return Termination::Converged { reason: Tolerance::RelativeCost };
                 }
                 if step.norm <= descent.stop.step {
-                    return match is_cut {
+                    return match is_cut || descent.is_steep() {
                         true => descent.stalled_by(Stall::TrustRegion),
                         false => Termination::Converged { reason: Tolerance::Step },
                     };

@@ -163,7 +163,11 @@ impl LevenbergMarquardt {
                         // a step that damping has made small says little of the cost around
                         let small = ended.is_some() && is_trusted;
                         match ended {
-                            Some(_) if is_held && descent.promises(&mut step, MUCH) => small_before = false,
+                            Some(_)
+                                if (is_held || descent.is_spread()) && descent.promises(&mut step, MUCH) =>
+                            {
+                                small_before = false;
+                            }
                             Some(termination) if small && (small_before || step.control <= LIGHT) => {
                                 return termination;
                             }
@@ -177,7 +181,7 @@ impl LevenbergMarquardt {
                     if !matches!(tried, Tried::Undefined) && is_trusted && descent.settled(&step) {
                         return Termination::Converged { reason: Tolerance::RelativeCost };
                     }
-                    if is_trusted && step.norm <= descent.stop.step {
+                    if is_trusted && step.norm <= descent.stop.step && !descent.is_steep() {
                         return Termination::Converged { reason: Tolerance::Step };
                     }
                 }

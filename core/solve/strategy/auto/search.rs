@@ -5,6 +5,8 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::Termination;
 use crate::problem::Problem;
+use crate::strategy::dogleg::Dogleg;
+use crate::strategy::optimizer::Optimizer;
 use crate::strategy::start::{Given, Start};
 use manifactor_graph::catalogue::{self, Kind};
 use manifactor_graph::{Graph, Values};
@@ -95,6 +97,18 @@ impl Auto {
             if watch.stopped || is_settled {
                 break;
             }
+        }
+        if !watch.stopped && !is_minimum(&outcome.termination) {
+            // steps within a trust region have no damping that is the same for all directions
+            problem.model.put(values);
+            let dogleg = Dogleg { stop: self.stop.clone(), linear: self.linear.clone(), ..Dogleg::default() };
+            let next = dogleg.descend(problem, watch);
+            let better = is_minimum(&next.termination)
+                && (next.inactive, next.final_cost) <= (outcome.inactive, outcome.final_cost);
+            if better {
+                best = problem.values();
+            }
+            outcome = outcome.then(next, better);
         }
         problem.model.put(&best);
         problem.linearize();

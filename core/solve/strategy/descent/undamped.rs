@@ -32,7 +32,10 @@ impl Descent<'_> {
     /// Whether a step without damping promises next to nothing: then it is not the damping that makes steps small.
     /// Leaves that step in `step`.
     pub(crate) fn is_at_rest(&mut self, step: &mut Step) -> bool {
-        self.at.not_finite.is_none() && self.undamped(step) && self.is_small(step.predicted)
+        self.at.not_finite.is_none()
+            && !self.is_steep()
+            && self.undamped(step)
+            && self.is_small(step.predicted)
     }
 
     /// Whether a step without damping promises more than this share of the cost. Leaves that step in `step`.

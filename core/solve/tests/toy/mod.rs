@@ -187,3 +187,21 @@ impl Residual for Cliff {
     }
 }
 register_factor!("toy_cliff", Cliff);
+
+/// r = 500 (x − from) / y − pixel: a camera on the x axis that looks along y, nothing behind it.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub struct View {
+    pub from: f64,
+    pub pixel: f64,
+}
+impl Residual for View {
+    type Variables = (Plane,);
+    type Dim = U1;
+    fn residual<T: Scalar>(&self, (p,): Lifted<Self::Variables, T>) -> Vector1<T> {
+        Vector1::new((p.x - T::from(self.from)) * 500.0 / p.y - T::from(self.pixel))
+    }
+    fn is_defined(&self, (p,): Refs<'_, Self::Variables>) -> bool {
+        p.y > 0.0
+    }
+}
+register_factor!("toy_view", View);
