@@ -77,6 +77,13 @@ impl Session {
             if !(damping >= 0.0 && damping.is_finite()) {
                 return Err(LoadError::Inconsistent("what steps are damped by"));
             }
+            let estimate = session.model.point(v as u32).and_then(|point| {
+                point.erased().retract(&session.delta[session.model.blocks.range(v as u32)])
+            });
+            // the sum of a finite point and a finite step may be infinite
+            if !estimate.is_some_and(|estimate| estimate.erased().is_finite()) {
+                return Err(LoadError::Inconsistent("a variable's key, point or step"));
+            }
             session.model.blocks.damp(v as u32, damping);
             session.damped.extend(takes_steps.then_some(v as u32));
         }

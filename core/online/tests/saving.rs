@@ -108,6 +108,19 @@ fn counters_that_would_wrap_around_are_refused() {
 }
 
 #[test]
+fn steps_that_lead_to_no_finite_estimate_are_refused() {
+    let text = session(None).save().unwrap();
+    let json = text.split_once('\n').unwrap().1.trim_end();
+    let (before, after) = json.split_once("\"step\":[").unwrap();
+    let after = after.split_once(',').unwrap().1;
+    for step in [f64::NAN, f64::INFINITY] {
+        let other = format!("{before}\"step\":[{},{after}", step.to_bits());
+        let error = Session::load(&resealed(&other)).unwrap_err();
+        assert_eq!(error, LoadError::Inconsistent("a variable's key, point or step"));
+    }
+}
+
+#[test]
 fn a_session_that_is_damped_goes_on_with_the_same_bits() {
     let mut session = Session::new(Settings::default()).unwrap();
     let (mut graph, mut values) = (Graph::new(), Values::new());
