@@ -64,7 +64,9 @@ impl Landmarks {
         let number = |key: &Key| key.as_str().strip_prefix(&prefix)?.parse::<usize>().ok();
         let numbers: Option<Vec<usize>> = known.iter().map(|landmark| number(&landmark.key)).collect();
         let fits = |numbers: &Vec<usize>| {
-            numbers.is_sorted_by(|a, b| a < b) && numbers.last().is_none_or(|last| *last < born)
+            // a counter that goes on from there must not wrap around
+            let is_young = (born as u64) < 1 << 62;
+            numbers.is_sorted_by(|a, b| a < b) && numbers.last().is_none_or(|last| *last < born) && is_young
         };
         numbers.filter(fits).ok_or(LoadError::Landmarks("their names"))?;
         landmarks.born = born;

@@ -216,6 +216,7 @@ fn landmarks_of_something_else_are_refused_with_a_reason() {
     let cases = [
         ("\"key\":\"l1\"", "\"key\":\"l0\"", "their names"),
         ("\"key\":\"l1\"", "\"key\":\"x0\"", "their names"),
+        ("\"born\":2", "\"born\":18446744073709551615", "their names"),
         ("\"poses\":[\"x0\"]", "\"poses\":[]", "its factors are not their sightings"),
         ("\"covariance\":null", "\"covariance\":[0]", "a covariance"),
     ];
