@@ -29,6 +29,12 @@ pub enum CovarianceError {
         /// How: name of the tangent direction.
         direction: &'static str,
     },
+    /// A covariance that is too large for a number.
+    #[error("the covariance of `{key}` overflows; scale the noise of its factors")]
+    Overflow {
+        /// The variable.
+        key: Key,
+    },
 }
 
 impl Session {
@@ -36,7 +42,7 @@ impl Session {
     /// noise; what is held has zeros. It is that of the last linearization points, robust weights included.
     ///
     /// # Errors
-    /// Where a variable is not there or parked, or something that it hangs on is undetermined.
+    /// Where a variable is not there or parked, or something that it hangs on is undetermined; if a covariance is too large for a number.
     pub fn covariance(&self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
         let mut variables = vec![];
         for key in keys {
@@ -59,7 +65,16 @@ impl Session {
                 return Err(CovarianceError::Undetermined { key: self.key(*v), direction });
             }
         }
-        Ok(self.along(&path, variables))
+        let covariance = self.along(&path, variables);
+        let mut ends = variables.iter().scan(0, |end, v| {
+            *end += self.dim(*v);
+            Some((*v, *end))
+        });
+        let bad = covariance.column_iter().position(|column| column.iter().any(|x| !x.is_finite()));
+        match bad.and_then(|bad| ends.find(|(_, end)| bad < *end)) {
+            Some((v, _)) => Err(CovarianceError::Overflow { key: self.key(v) }),
+            None => Ok(covariance),
+        }
     }
 
     /// The same of variables by their numbers, where directions that nothing constrains are held: a gauge, as a rule.

@@ -1,7 +1,7 @@
 //! Variables that nothing determines.
 use crate::toy::{At, Distance, Logarithm, Plane};
 use crate::world::Ahead;
-use manifactor_graph::{Graph, Key, Values};
+use manifactor_graph::{Graph, Key, Noise, Values};
 use manifactor_online::{CovarianceError, Session, Settings};
 
 fn session(priors: &[&str]) -> Session {
@@ -37,6 +37,24 @@ fn a_point_that_ranges_do_not_determine_waits_for_another() {
     assert!(session.covariance(&["point", "a"]).is_ok());
     session.remove(&ids).unwrap();
     assert_eq!(session.update().unwrap().parked[..], [Key::from("point")]);
+}
+
+#[test]
+fn a_covariance_that_is_too_large_for_a_number_is_an_error() {
+    let mut session = session(&["a"]);
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    for i in 0..6 {
+        let (key, before) =
+            (Key::indexed("p", i), i.checked_sub(1).map_or("a".into(), |i| Key::indexed("p", i)));
+        values.insert(key.clone(), Plane { x: 0.0, y: 0.0 });
+        // information just above the least number with all its digits
+        graph.add([before, key], crate::toy::Apart { by: [0.0, 0.0] }).noise(Noise::sigma(6.5e153).unwrap());
+    }
+    session.push(&graph, &values).unwrap();
+    assert!(session.update().unwrap().parked.is_empty());
+    assert!(session.covariance(&["a", "p1"]).is_ok());
+    let error = session.covariance(&["a", "p5"]).unwrap_err();
+    assert_eq!(error, CovarianceError::Overflow { key: "p5".into() });
 }
 
 #[test]
