@@ -1,4 +1,5 @@
 //! Outlines of ellipsoids, seen from far away.
+use crate::drawing::scale::FAR;
 use crate::drawing::viewpoint::Plane;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Vector3};
 
@@ -15,8 +16,8 @@ pub(crate) struct Shape {
 const CORNERS: usize = 48;
 
 impl Shape {
-    /// The closed outline of its shadow, the ellipse of Σ a_k a_kᵀ, a_k the projected semi-axes. None, where there is
-    /// nothing finite to draw.
+    /// The closed outline of its shadow, the ellipse of Σ a_k a_kᵀ, a_k the projected semi-axes. `None` if
+    /// there is nothing to draw that is finite and within the reach of an axis.
     pub(crate) fn outline(&self, plane: &Plane) -> Option<Vec<Point2<f64>>> {
         let projected = self.axes.column_iter().map(|a| plane.project(&a.into_owned()).coords);
         let projected = Matrix2x3::from_columns(&projected.collect::<Vec<_>>());
@@ -24,8 +25,8 @@ impl Shape {
     }
 }
 
-/// The closed polygon of an ellipse: centre + L (cos φ, sin φ) with L Lᵀ = Σ, its first point repeated at the end. None,
-/// where there is nothing finite to draw.
+/// The closed polygon of an ellipse: centre + L (cos φ, sin φ) with L Lᵀ = Σ, its first point repeated at the end. `None` if
+/// there is nothing to draw that is finite and within the reach of an axis.
 pub(crate) fn ellipse(centre: &Point2<f64>, shape: &Matrix2<f64>) -> Option<Vec<Point2<f64>>> {
     // Cholesky by hand: it has to take flat ones too
     let a = shape.m11.sqrt();
@@ -35,8 +36,8 @@ pub(crate) fn ellipse(centre: &Point2<f64>, shape: &Matrix2<f64>) -> Option<Vec<
         let (sin, cos) = (std::f64::consts::TAU * (k % CORNERS) as f64 / CORNERS as f64).sin_cos();
         Point2::new(centre.x + a * cos, centre.y + b * cos + c * sin)
     };
-    let is_finite = |p: &Point2<f64>| p.iter().all(|x| x.is_finite());
-    (0..=CORNERS).map(point).map(|p| is_finite(&p).then_some(p)).collect()
+    let is_drawable = |p: &Point2<f64>| p.iter().all(|x| x.abs() <= FAR);
+    (0..=CORNERS).map(point).map(|p| is_drawable(&p).then_some(p)).collect()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! An axis: which numbers it spans, and which of them are written.
 
-/// The farthest from zero that an axis reaches.
-const FAR: f64 = 1e300;
+/// The farthest from zero that an axis reaches: margins and ratios of larger numbers would overflow.
+pub(crate) const FAR: f64 = 1e300;
 
 /// What an axis spans, from where the data begin to where they end.
 #[derive(Debug, Clone, Copy, PartialEq)]

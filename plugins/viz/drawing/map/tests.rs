@@ -112,6 +112,18 @@ fn what_is_not_finite_is_left_out() {
 }
 
 #[test]
+fn coordinates_whose_margins_overflow_are_left_out() {
+    let mut scene = desk();
+    scene.tracks[0].positions[3] = Some(Vector3::new(1e308, 0.0, 0.0));
+    scene.tracks[2].positions[3] = Some(Vector3::new(-1e308, 0.0, 0.0));
+    scene.objects[1].estimate = Some(ellipsoid([0.0, 1e308, 0.0], [1e307; 3], 0.0));
+    for view in [Viewpoint::Top, Viewpoint::Side] {
+        let svg = svg(&scene, view);
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    }
+}
+
+#[test]
 fn an_empty_scene_is_an_empty_picture() {
     for tracks in [
         vec![],
