@@ -181,14 +181,14 @@ impl fmt::Display for ObjectId {
     }
 }
 
-/// A detector's scores by class, each from 0 to 1; classes that are not listed score 0.
+/// A detector's scores by class, each from 0 to 1; classes that are not listed score 0. A class with another score is not listed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ClassScores(Vec<(String, f64)>);
 
 impl ClassScores {
     /// All that is known is the best class and its score.
     pub fn single(class: impl Into<String>, score: f64) -> Self {
-        Self(vec![(class.into(), score)])
+        std::iter::once((class.into(), score)).collect()
     }
     /// The classes and their scores, in the order given.
     pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
@@ -202,7 +202,7 @@ impl ClassScores {
 
 impl FromIterator<(String, f64)> for ClassScores {
     fn from_iter<I: IntoIterator<Item = (String, f64)>>(scores: I) -> Self {
-        Self(scores.into_iter().collect())
+        Self(scores.into_iter().filter(|(_, score)| (0.0..=1.0).contains(score)).collect())
     }
 }
 
@@ -238,4 +238,17 @@ pub struct TrueObject {
     pub half_extents: Vector3<f64>,
     /// The axis-aligned box around the solid itself, in the world's frame.
     pub bounding_box: Box3,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_class_has_a_score_from_0_to_1_or_is_not_listed() {
+        let scores = [("cup", 0.5), ("bowl", f64::NAN), ("vase", 1e308), ("book", -1.0), ("chair", 1.0)];
+        let scores: ClassScores = scores.iter().map(|(class, score)| ((*class).to_owned(), *score)).collect();
+        assert_eq!(scores.iter().collect::<Vec<_>>(), [("cup", 0.5), ("chair", 1.0)]);
+        assert_eq!(ClassScores::single("cup", f64::INFINITY), ClassScores::default());
+    }
 }
