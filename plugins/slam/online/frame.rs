@@ -127,8 +127,30 @@ impl Mapper {
         if let Some(before) = self.last.as_ref().map(|last| last.timestamp).filter(|t| *t >= timestamp) {
             return Err(FrameError::Time { timestamp, before });
         }
+        let up = self.up.unsettled();
         let up_moved = self.up.look(observation, &self.settings)?;
+        let taken = self.take_located(observation, up_moved, report);
+        if taken.is_err()
+            && let Some(up) = up
+        {
+            self.up = up;
+        }
+        taken
+    }
+
+    /// The same, once the frame has said which way is up.
+    fn take_located(
+        &mut self,
+        observation: &Observation,
+        up_moved: bool,
+        report: &mut FrameReport,
+    ) -> Result<Seen, FrameError> {
+        let (frame, timestamp) = (&observation.frame, observation.frame.timestamp);
         let (graph, values) = self.tied(frame, report)?;
+        // nothing may be pending in the session when a frame is refused
+        if !report.pose.is_finite() {
+            return Err(FrameError::NotFinite { timestamp });
+        }
         report.refused.extend(observation.unused.iter().filter_map(|unused| match unused {
             UnusedDetection::Box { place, fault, .. } => Some(format!("box {place} is left out: {fault}")),
             UnusedDetection::WithoutPose(_) => None,

@@ -7,7 +7,7 @@ use crate::settings::Settings;
 const MOVED: f64 = 0.01;
 
 /// What the way up is found from: the first frames, until it is settled.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Up {
     /// What came until now, as far as it is looked at.
     seen: Sequence,
@@ -23,6 +23,11 @@ impl Up {
     /// The frame of the map; `None` before the first frame.
     pub(super) fn frame(&self) -> Option<MapFrame> {
         self.found
+    }
+
+    /// As it is now, to go back if the next frame is refused; `None` once it is settled.
+    pub(super) fn unsettled(&self) -> Option<Self> {
+        (!self.is_settled).then(|| self.clone())
     }
 
     /// Looks at the next frame; whether up is another now, so that factors that know it have to be made again.

@@ -8,7 +8,9 @@ use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::{Run, Watch};
 use manifactor_slam::run_document::{RunDocument, Variant};
-use manifactor_slam::sequence::{ClassScores, Detection, ObjectId, Observation, Sequence};
+use manifactor_slam::sequence::{
+    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Sequence,
+};
 use manifactor_slam::settings::{CutSides, Settings};
 use manifactor_slam::source::Folders;
 use manifactor_solve::Silent;
@@ -282,6 +284,50 @@ fn a_pose_that_cannot_be_taken_is_an_error_and_the_stream_goes_on() {
         .take(&Observation { frame: next, detections: vec![], accelerometer: vec![], unused: vec![] })
         .unwrap();
     assert_eq!((taken.frame, taken.refused.len()), (80, 0));
+}
+
+#[test]
+fn a_pose_that_overflows_leaves_nothing_behind_in_the_session() {
+    let (settings, sequence) = scene(DESK);
+    let mut mapper = take_all(&settings, &sequence);
+    let mut frame = sequence.frames.last().unwrap().clone();
+    let start = frame.timestamp;
+    frame.world_from_camera.translation = nalgebra::Vector3::repeat(f64::MAX);
+    let observation = |frame: &Frame, seconds: f64| Observation {
+        frame: Frame { timestamp: start + seconds, ..frame.clone() },
+        detections: vec![],
+        accelerometer: vec![],
+        unused: vec![],
+    };
+    let taken = mapper.take(&observation(&frame, 2.0));
+    assert!(matches!(taken, Err(FrameError::NotFinite { .. })), "{taken:?}");
+    mapper.session().save().unwrap();
+    // its timestamp counts for nothing
+    mapper.take(&observation(sequence.frames.last().unwrap(), 1.0)).unwrap();
+}
+
+#[test]
+fn a_frame_that_is_refused_does_not_say_which_way_is_up() {
+    let text = format!("{DESK}\n[gravity]\ntype = \"accelerometer\"\n");
+    let (settings, sequence) = scene(&text);
+    let (up, sideways) = (nalgebra::Vector3::new(0.0, -9.8, 0.0), nalgebra::Vector3::new(9.8, 0.0, 0.0));
+    let mut pushed = sequence.opening().into_sequence();
+    for mut observation in sequence.observations() {
+        let timestamp = observation.frame.timestamp;
+        observation.accelerometer = vec![Acceleration { timestamp, acceleration: up }];
+        pushed.push(observation);
+    }
+    let mut expected = take_all(&settings, &pushed);
+    let mut mapper = Mapper::new(pushed.opening(), &settings).unwrap();
+    for observation in pushed.observations() {
+        mapper.take(&observation).unwrap();
+        let mut bad = observation.clone();
+        bad.frame.timestamp += 1e-3;
+        bad.frame.world_from_camera.translation = nalgebra::Vector3::repeat(1e200);
+        bad.accelerometer = vec![Acceleration { timestamp: bad.frame.timestamp, acceleration: sideways }];
+        mapper.take(&bad).unwrap_err();
+    }
+    assert_eq!(mapped(&mut mapper), mapped(&mut expected));
 }
 
 #[test]
