@@ -30,6 +30,12 @@ pub use commands::experiment::write_experiment;
 pub use failure::Failure;
 pub use status::Status;
 
+/// Parts that the fuzz targets call (`tests/fuzz`).
+#[doc(hidden)]
+pub mod __private {
+    pub use crate::view::{address, answer};
+}
+
 use clap::Parser;
 use std::ffi::OsString;
 use std::io::Write;

@@ -5,9 +5,11 @@
 mod access;
 mod address;
 mod answers;
+mod in_memory;
 mod server;
 
-pub(crate) use address::address;
+pub use address::address;
+pub use in_memory::answer;
 
 use crate::failure::Failure;
 use crate::output;

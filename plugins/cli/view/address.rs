@@ -3,7 +3,10 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 /// `HOST:PORT`, a host or a port alone. The host is an address, or `localhost`: 127.0.0.1, which is also the default. Port 0, the
 /// default, is one that is free.
-pub(crate) fn address(text: &str) -> Result<SocketAddr, String> {
+///
+/// # Errors
+/// If the text is no such address, with examples of the expected form.
+pub fn address(text: &str) -> Result<SocketAddr, String> {
     const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let named = match text.strip_prefix("localhost").filter(|rest| rest.is_empty() || rest.starts_with(':')) {
         Some(rest) => format!("{LOCAL}{rest}"),

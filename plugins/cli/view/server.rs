@@ -65,9 +65,15 @@ async fn serve(listener: TcpListener, access: Access, mut states: States) {
     let _ = timeout(FAREWELL, connections.shutdown()).await;
 }
 
-async fn accept(listener: &TcpListener, answers: &Arc<Answers>, connections: &GracefulShutdown) {
+/// One request for each connection, with limits on its head.
+pub(super) fn http() -> http1::Builder {
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(LONGEST).keep_alive(false);
+    http
+}
+
+async fn accept(listener: &TcpListener, answers: &Arc<Answers>, connections: &GracefulShutdown) {
+    let http = http();
     let places = Arc::new(Semaphore::new(MOST));
     loop {
         let Ok((stream, _)) = listener.accept().await else {
