@@ -1,16 +1,15 @@
-//! The fuzz targets, on what is kept of their corpora and on quick random changes of it.
+//! The fuzz targets, on their corpora and on quick random changes of these.
 //!
-//! Fuzzers that look for new paths need a nightly compiler: `README.md` says how to run them.
+//! Fuzzers that look for new paths need a nightly compiler (`README.md`).
 #![allow(unreachable_pub)]
 mod targets;
 
 use rand::{RngExt, SeedableRng, rngs::StdRng};
+use std::ops::Range;
 use std::path::Path;
-use targets::{TARGETS, Target};
+use targets::TARGETS;
 
-/// Changed inputs for each target; `MANIFACTOR_FUZZ` asks for more.
-const CHANGES: usize = 2000;
-/// What may be put in anywhere.
+/// Words that may come in anywhere.
 const WORDS: [&[u8]; 16] = [
     b"nan",
     b"inf",
@@ -30,43 +29,71 @@ const WORDS: [&[u8]; 16] = [
     b"\xc3\xa9",
 ];
 
+/// Numbers that may come in the place of others.
+const NUMBERS: [&str; 16] = [
+    "0",
+    "-0.0",
+    "1",
+    "-1",
+    "2",
+    "7",
+    "0.5",
+    "1e-320",
+    "1e-9",
+    "1e9",
+    "1e154",
+    "1e308",
+    "-1e308",
+    "nan",
+    "4294967295",
+    "18446744073709551615",
+];
+
+/// `MANIFACTOR_FUZZ` is the number of changed inputs for each target, `MANIFACTOR_FUZZ_TARGET` the name of a single one.
 #[test]
 fn no_target_panics() {
-    let asked = std::env::var("MANIFACTOR_FUZZ").map(|n| n.parse().unwrap());
-    let changes = asked.unwrap_or(CHANGES);
+    let asked = std::env::var("MANIFACTOR_FUZZ").map(|n| n.parse().unwrap()).ok();
+    let only = std::env::var("MANIFACTOR_FUZZ_TARGET").ok();
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
-    for (name, target) in TARGETS {
+    for (name, target, changes) in TARGETS {
+        if only.as_ref().is_some_and(|only| only != name) {
+            continue;
+        }
         let files = std::fs::read_dir(corpus.join(name)).unwrap();
         let mut inputs: Vec<_> = files.map(|file| std::fs::read(file.unwrap().path()).unwrap()).collect();
         inputs.sort();
         assert!(!inputs.is_empty(), "no corpus of {name}");
-        inputs.iter().for_each(|input| run((name, target), input));
+        inputs.iter().for_each(|input| run(name, target, input));
         let mut rng = StdRng::seed_from_u64(7);
-        for _ in 0..changes {
+        for _ in 0..asked.unwrap_or(changes) {
             let [input, other] = [0, 1].map(|_| &inputs[rng.random_range(0..inputs.len())]);
-            run((name, target), &changed(input, other, &mut rng));
+            run(name, target, &changed(input, other, &mut rng));
         }
     }
 }
 
-/// With the input in the message, should it panic.
-fn run((name, target): Target, input: &[u8]) {
+/// Runs a target, and has the input in the message if that panics.
+fn run(name: &str, target: fn(&[u8]), input: &[u8]) {
     let ran = std::panic::catch_unwind(|| target(input));
     assert!(ran.is_ok(), "{name} panics at:\n{}", String::from_utf8_lossy(input));
 }
 
-/// A few bytes changed, lost, doubled, or taken from another input.
+/// Changes, drops, or doubles a few bytes, takes some from `other`, or replaces a number.
 fn changed(input: &[u8], other: &[u8], rng: &mut StdRng) -> Vec<u8> {
     let mut bytes = input.to_vec();
     for _ in 0..rng.random_range(1..4) {
         let at = rng.random_range(0..=bytes.len());
         let end = (at + rng.random_range(0..20)).min(bytes.len());
-        match rng.random_range(0..6) {
+        match rng.random_range(0..8) {
             0 => bytes.truncate(at),
             1 => drop(bytes.drain(at..end)),
             2 => drop(bytes.splice(at..end, WORDS[rng.random_range(0..WORDS.len())].iter().copied())),
             3 => bytes[at..end].iter_mut().for_each(|b| *b ^= 1 << rng.random_range(0..8)),
-            4 => drop(bytes.splice(at..at, bytes[at..end].to_vec())),
+            6 => drop(bytes.splice(at..at, bytes[at..end].to_vec())),
+            4 | 5 => {
+                let number = number(&bytes, at);
+                drop(bytes.splice(number, NUMBERS[rng.random_range(0..NUMBERS.len())].bytes()));
+            }
             _ => {
                 let from = rng.random_range(0..=other.len());
                 drop(bytes.splice(at..end, other[from..(from + 40).min(other.len())].iter().copied()));
@@ -74,4 +101,12 @@ fn changed(input: &[u8], other: &[u8], rng: &mut StdRng) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// The first number from here on; an empty place at the end if there is none.
+fn number(bytes: &[u8], from: usize) -> Range<usize> {
+    let is_part = |b: &u8| b.is_ascii_digit() || b"+-.eE".contains(b);
+    let start = bytes[from..].iter().position(u8::is_ascii_digit).map_or(bytes.len(), |place| from + place);
+    let end = bytes[start..].iter().position(|b| !is_part(b)).map_or(bytes.len(), |place| start + place);
+    start..end
 }

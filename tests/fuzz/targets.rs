@@ -1,4 +1,31 @@
-//! What strangers' bytes go through: nothing here may panic, hang, or leave a value that is not finite.
+//! Functions that take bytes of strangers: none may panic, hang, or leave a value that is not finite.
+// the root of a package of its own for cargo-fuzz, and a module of the tests
+#[path = "targets/experiments.rs"]
+mod experiments;
+#[path = "targets/files.rs"]
+mod files;
+#[path = "targets/history.rs"]
+mod history;
+#[path = "targets/mapper.rs"]
+mod mapper;
+#[path = "targets/replay.rs"]
+mod replay;
+#[path = "targets/smoother.rs"]
+mod smoother;
+#[path = "targets/stream.rs"]
+mod stream;
+#[path = "targets/view.rs"]
+mod view;
+
+pub use experiments::{experiment, trials};
+pub use files::{prior_map, record};
+pub use history::history;
+pub use mapper::mapper;
+pub use replay::replay;
+pub use smoother::{landmarks, session};
+pub use stream::{frame_journal, json_lines};
+pub use view::view;
+
 use manifactor::config::{Document, Errors, Format, read_graph, read_graph_section, to_json, write_graph};
 use manifactor::formats::pose_graph::{self, Options, Repair};
 use manifactor::formats::{accelerometer, bal, detections, timestamps, tum};
@@ -12,20 +39,32 @@ use std::num::NonZero;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 
-/// A target by name.
-pub type Target = (&'static str, fn(&[u8]));
+/// A target: its name, its function, and the number of changed inputs in a test run, fewer for those that take longer.
+pub type Target = (&'static str, fn(&[u8]), usize);
 
-/// All of them.
-pub const TARGETS: [Target; 9] = [
-    ("pose_graph", pose_graph),
-    ("bundle", bundle),
-    ("trajectory", trajectory),
-    ("detections", detections),
-    ("toml", toml),
-    ("json", json),
-    ("yaml", yaml),
-    ("expression", expression),
-    ("run", run),
+/// All targets.
+pub const TARGETS: [Target; 21] = [
+    ("pose_graph", pose_graph, 2000),
+    ("bundle", bundle, 2000),
+    ("trajectory", trajectory, 2000),
+    ("detections", detections, 2000),
+    ("toml", toml, 2000),
+    ("json", json, 2000),
+    ("yaml", yaml, 2000),
+    ("expression", expression, 2000),
+    ("run", run, 2000),
+    ("json_lines", json_lines, 500),
+    ("frame_journal", frame_journal, 300),
+    ("prior_map", prior_map, 500),
+    ("record", record, 300),
+    ("session", session, 500),
+    ("landmarks", landmarks, 500),
+    ("mapper", mapper, 100),
+    ("replay", replay, 500),
+    ("experiment", experiment, 200),
+    ("trials", trials, 200),
+    ("view", view, 500),
+    ("history", history, 300),
 ];
 
 /// Graphs of more are read, but not solved: fuzzers are there for many small inputs.
@@ -49,7 +88,7 @@ pub fn bundle(data: &[u8]) {
     }
 }
 
-/// TUM's trajectories, and lists of times and accelerations: what is read is read back from what is written.
+/// Reads TUM's trajectories, and lists of times and accelerations. Trajectories are written and read back.
 pub fn trajectory(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     let _ = (accelerometer::parse(&text, "accelerometer.txt"), timestamps::parse(&text, "rgb.txt"));
@@ -115,9 +154,7 @@ pub fn run(data: &[u8]) {
         let Ok((found, report)) = estimate("fuzzed", SEQUENCE.clone(), &settings, &mut third()) else {
             continue;
         };
-        for (key, value) in found.solution.values.iter() {
-            assert!(value.erased().is_finite(), "{key} is not finite: {:?}", report.solve.termination);
-        }
+        is_finite(&found.solution.values);
         let _ = to_json(&report);
     }
 }
@@ -163,9 +200,38 @@ fn three_steps(graph: &Graph, values: &Values, solver: &dyn Optimizer) {
         return;
     }
     let Ok(solution) = solve(graph, values, solver, &mut third()) else { return };
-    for (key, value) in solution.values.iter() {
-        assert!(value.erased().is_finite(), "{key} is not finite: {:?}", solution.outcome.termination);
-    }
-    // a diagnosis may find that nothing can be said, but has to end
+    is_finite(&solution.values);
+    // a diagnosis may be empty, but has to end
     let _ = solution.diagnose(graph);
+}
+
+/// Fails if a value is not finite.
+fn is_finite(values: &Values) {
+    for (key, value) in values.iter() {
+        assert!(value.erased().is_finite(), "{key} is not finite");
+    }
+}
+
+/// A folder for one input, removed at the end.
+fn temporary() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Relative difference that the normalization of a rotation may leave.
+const ROUNDING: f64 = 1e-12;
+
+/// Fails if two documents differ by more than rounding.
+fn assert_alike(a: &serde_json::Value, b: &serde_json::Value) {
+    use serde_json::Value::{Array, Number, Object};
+    match (a, b) {
+        (Number(x), Number(y)) => {
+            let [x, y] = [x, y].map(|n| n.as_f64().unwrap_or_default());
+            assert!((x - y).abs() <= ROUNDING * x.abs().max(1.0), "{x} and {y}");
+        }
+        (Array(a), Array(b)) if a.len() == b.len() => a.iter().zip(b).for_each(|(a, b)| assert_alike(a, b)),
+        (Object(a), Object(b)) if a.keys().eq(b.keys()) => {
+            a.values().zip(b.values()).for_each(|(a, b)| assert_alike(a, b));
+        }
+        _ => assert_eq!(a, b),
+    }
 }

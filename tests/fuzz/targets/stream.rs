@@ -1,0 +1,136 @@
+//! Streams of frames: lines of JSON, and the journal that keeps them.
+use super::{assert_alike, temporary};
+use manifactor::formats::whole::{checked_line, read_checked_line};
+use manifactor::geometry::Se3;
+use manifactor::quadric::Camera;
+use manifactor::slam::journal::journaled;
+use manifactor::slam::sequence::{Frame, Observation, Opening};
+use manifactor::slam::source::{CameraChoice, Folders, JsonLines, Source, SourceError, line};
+use manifactor::slam::stream::Stream;
+use std::collections::HashSet;
+use std::path::Path;
+
+/// Reads lines of JSON. Each line is a frame or an error with its number, and frames that are written are read back.
+pub fn json_lines(data: &[u8]) {
+    let folder = temporary();
+    let read = lines(folder.path(), data);
+    let written = data.split(|byte| *byte == b'\n').count();
+    assert!(read.len() <= written, "{} frames in {written} lines", read.len());
+    let mut last = 0;
+    let mut frames = vec![];
+    for frame in read {
+        match frame {
+            Ok(frame) => frames.push(frame),
+            Err(SourceError::Line { line, .. }) => {
+                assert!(last < line && line <= written, "line {line} of {written}");
+                last = line;
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    let text: String = frames.iter().map(|frame| line(frame) + "\n").collect();
+    let again = lines(folder.path(), text.as_bytes());
+    assert_eq!(again.len(), frames.len());
+    for (frame, again) in frames.iter().zip(again) {
+        let again = again.unwrap_or_else(|e| panic!("{e}"));
+        same_frame(frame, &again);
+        // rounding of a rotation ends
+        assert_alike(&json(&line(frame)), &json(&line(&again)));
+    }
+}
+
+/// Reads journals of frames, unchanged and with checksums that fit.
+pub fn frame_journal(data: &[u8]) {
+    kept(data);
+    kept(&sealed(data));
+}
+
+/// A journal that is refused is not touched. One that is read keeps new frames, and gives all of them again.
+fn kept(bytes: &[u8]) {
+    let folder = temporary();
+    let path = folder.path().join("frames.jsonl");
+    std::fs::write(&path, bytes).unwrap_or_else(|e| panic!("{e}"));
+    let read = |new: &[Observation]| {
+        let new: Vec<_> = new.iter().cloned().map(Ok).collect();
+        let stream = journaled(Stream::new(Opening::new(camera()), new.into_iter()), &path, FINGERPRINT)?;
+        let frames = stream.observations.map(|frame| frame.unwrap_or_else(|e| panic!("{e}")));
+        Ok::<_, manifactor::slam::journal::JournalError>(frames.collect::<Vec<_>>())
+    };
+    let Ok(before) = read(&[]) else {
+        assert_eq!(std::fs::read(&path).unwrap_or_default(), bytes, "a refused journal has changed");
+        return;
+    };
+    let whole = std::fs::read(&path).unwrap_or_default();
+    assert!(bytes.starts_with(&whole) || whole.starts_with(bytes), "a journal has other lines");
+    let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
+    let new = [1.0, 1e300, f64::NAN, 2.0].map(|timestamp| Observation {
+        frame: Frame { timestamp, world_from_camera: Se3::identity() },
+        detections: before.first().map_or(vec![], |frame| frame.detections.clone()),
+        accelerometer: vec![],
+        unused: vec![],
+    });
+    let all = read(&new).unwrap_or_else(|e| panic!("{e}"));
+    let is_new = |frame: &&Observation| !had.contains(&frame.frame.timestamp.to_bits());
+    assert_eq!(all.len(), before.len() + new.iter().filter(is_new).count());
+    let again = read(&[]).unwrap_or_else(|e| panic!("{e}"));
+    let kept: Vec<&Observation> = all.iter().filter(|frame| frame.frame.timestamp.is_finite()).collect();
+    assert_eq!(again.iter().collect::<Vec<_>>(), kept);
+}
+
+/// Settings that the journals of the corpus are for.
+const FINGERPRINT: &str = "7";
+
+/// Adds checksums that fit to all lines but the first.
+pub(super) fn sealed(data: &[u8]) -> Vec<u8> {
+    let (first, rest) = data.split_at(data.iter().position(|byte| *byte == b'\n').map_or(0, |end| end + 1));
+    let mut bytes = first.to_vec();
+    bytes.extend(sealed_lines(rest));
+    bytes
+}
+
+/// Adds checksums that fit. A last line without an end stays unchanged.
+pub(super) fn sealed_lines(data: &[u8]) -> Vec<u8> {
+    let seal = |line: &[u8]| {
+        let text = String::from_utf8_lossy(line);
+        let object = match (read_checked_line(line), text.strip_suffix('\n')) {
+            (_, None) | (Ok(_), _) => return line.to_vec(),
+            // a checksum that does not fit
+            (_, Some(text)) => match text.split_once("\",").filter(|_| text.starts_with("{\"checksum\"")) {
+                Some((_, rest)) => format!("{{{rest}"),
+                None => text.to_owned(),
+            },
+        };
+        checked_line(&object).into_bytes()
+    };
+    data.split_inclusive(|byte| *byte == b'\n').flat_map(seal).collect()
+}
+
+fn lines(folder: &Path, bytes: &[u8]) -> Vec<Result<Observation, SourceError>> {
+    let file = "frames.jsonl";
+    std::fs::write(folder.join(file), bytes).unwrap_or_else(|e| panic!("{e}"));
+    let source = JsonLines {
+        camera: CameraChoice::Camera(camera()),
+        file: Some(file.into()),
+        ground_truth: None,
+        up: None,
+    };
+    let folders = Folders { data: None, document: folder.into() };
+    let stream = source.open(&folders).unwrap_or_else(|e| panic!("{e}"));
+    stream.map_or(vec![], |stream| stream.observations.collect())
+}
+
+/// Compares two frames, but for unused boxes and the last digits of a rotation.
+fn same_frame(frame: &Observation, again: &Observation) {
+    assert_eq!(frame.frame.timestamp.to_bits(), again.frame.timestamp.to_bits());
+    assert_eq!(frame.frame.world_from_camera.translation, again.frame.world_from_camera.translation);
+    assert_eq!((&frame.detections, &frame.accelerometer), (&again.detections, &again.accelerometer));
+    assert!(again.unused.is_empty());
+}
+
+fn json(text: &str) -> serde_json::Value {
+    serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+pub(super) fn camera() -> Camera {
+    Camera::new([320.0, 320.0, 320.0, 240.0], 640, 480).unwrap_or_else(|e| panic!("{e}"))
+}
