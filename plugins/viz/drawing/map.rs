@@ -4,12 +4,12 @@ use super::labels::{Label, place};
 use super::legend::{Entry, legend};
 use super::outline::Shape;
 use super::picture::Picture;
-use super::scale::Scale;
+use super::scale::{FAR, Scale};
 use super::scene::{Object, Palette, Scene, Track};
 use super::series::{spaced, stretches};
 use super::viewpoint::Viewpoint;
 use crate::canvas::{Ink, Sheet, Stroke};
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Vector2, Vector3};
 
 /// Classes in the legend.
 const CLASSES: usize = 60;
@@ -23,10 +23,11 @@ type Outline<'a> = (&'a str, Vec<Point2<f64>>);
 ///
 /// What is true is dashed, what is estimated solid and filled; objects have the colour of their class. The picture shows
 /// all trajectories and true objects whole; an estimate far away from them is left outside, and the title says how many
-/// are. Coordinates that are not finite are left out.
+/// are. Coordinates that are not finite, or beyond the reach of an axis, are left out.
 pub(crate) fn map(scene: &Scene, view: Viewpoint, palette: &Palette, width: f64) -> Picture {
     let plane = view.plane(&scene.up);
-    let stretches = |track: &Track| stretches(track.positions.iter().map(|p| Some(plane.project(&(*p)?))));
+    let point = |p: Vector3<f64>| Some(plane.project(&p)).filter(|p| p.iter().all(|x| x.abs() <= FAR));
+    let stretches = |track: &Track| stretches(track.positions.iter().map(|p| p.and_then(point)));
     let tracks: Vec<Vec<Vec<Point2<f64>>>> = scene.tracks.iter().map(stretches).collect();
     let outlines = |of: fn(&Object) -> Option<&Shape>| -> Vec<Outline<'_>> {
         let outline = |o| of(o).and_then(|shape| shape.outline(&plane));

@@ -1,6 +1,5 @@
 //! What there is to see of a variant.
 use super::outline::Shape;
-use super::scale::FAR;
 use crate::canvas::{Ink, Stroke};
 use manifactor_graph::Direction;
 use manifactor_quadric::DualQuadric;
@@ -89,7 +88,7 @@ impl Scene {
         let tracks = TRACKS.iter().zip(positions).map(|((name, stroke), of)| Track {
             name: (*name).to_owned(),
             stroke: *stroke,
-            positions: variant.frames.iter().map(of).map(|p| p.filter(is_drawable)).collect(),
+            positions: variant.frames.iter().map(of).map(|p| p.filter(is_finite)).collect(),
         });
         let object = |object: &ObjectRecord| Object {
             class: object.class.clone(),
@@ -105,8 +104,8 @@ impl Scene {
     }
 }
 
-fn is_drawable(position: &Vector3<f64>) -> bool {
-    position.iter().all(|x| x.abs() <= FAR)
+fn is_finite(position: &Vector3<f64>) -> bool {
+    position.iter().all(|x| x.is_finite())
 }
 
 fn ellipsoid(quadric: &DualQuadric) -> Shape {
