@@ -43,7 +43,7 @@ fn a_point_that_ranges_do_not_determine_waits_for_another() {
 fn a_covariance_that_is_too_large_for_a_number_is_an_error() {
     let mut session = session(&["a"]);
     let (mut graph, mut values) = (Graph::new(), Values::new());
-    for i in 0..6 {
+    for i in 0..6usize {
         let (key, before) =
             (Key::indexed("p", i), i.checked_sub(1).map_or("a".into(), |i| Key::indexed("p", i)));
         values.insert(key.clone(), Plane { x: 0.0, y: 0.0 });
