@@ -1,4 +1,5 @@
 //! A sheet of lines, shapes and words, before it is a file: what SVG and PNG are made of.
+mod clip;
 mod font;
 mod ink;
 mod raster;

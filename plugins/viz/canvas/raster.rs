@@ -21,14 +21,14 @@ impl Sheet {
         let mut pixels = pixels.ok_or_else(|| "there is no room for its pixels".to_owned())?;
         pixels.fill(color(Ink::Paper, theme, 1.0));
         let transform = Transform::from_scale(scale as f32, scale as f32);
-        for item in &self.items {
+        for item in self.drawable() {
             match item {
                 Item::Path { points, closed, stroke, fill } => {
-                    let Some(path) = polygon(points, *closed) else { continue };
+                    let Some(path) = polygon(&points, closed) else { continue };
                     if let Some((ink, opacity)) = fill {
                         pixels.fill_path(
                             &path,
-                            &paint(*ink, theme, *opacity),
+                            &paint(ink, theme, opacity),
                             FillRule::Winding,
                             transform,
                             None,
@@ -43,13 +43,13 @@ impl Sheet {
                     }
                 }
                 Item::Dot { at, radius, ink } => {
-                    let [x, y, r] = [at[0], at[1], *radius].map(|x| x as f32);
+                    let [x, y, r] = [at[0], at[1], radius].map(|x| x as f32);
                     if let Some(path) = PathBuilder::from_circle(x, y, r) {
-                        pixels.fill_path(&path, &paint(*ink, theme, 1.0), FillRule::Winding, transform, None);
+                        pixels.fill_path(&path, &paint(ink, theme, 1.0), FillRule::Winding, transform, None);
                     }
                 }
                 Item::Text(text) => {
-                    if let Some(path) = letters(text) {
+                    if let Some(path) = letters(&text) {
                         pixels.fill_path(
                             &path,
                             &paint(text.ink, theme, 1.0),

@@ -37,21 +37,21 @@ impl Sheet {
         if let Colors::Of(_) = colors {
             svg += &format!("<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n", colors.of(Ink::Paper));
         }
-        for item in &self.items {
+        for item in self.drawable() {
             match item {
                 Item::Path { points, closed, stroke, fill } => {
-                    path(&mut svg, points, *closed, *stroke, *fill, colors);
+                    path(&mut svg, &points, closed, stroke, fill, colors);
                 }
                 Item::Dot { at: [x, y], radius, ink } => {
-                    let (x, y, r) = (number(*x), number(*y), number(*radius));
+                    let (x, y, r) = (number(x), number(y), number(radius));
                     // writing to a String does not fail
                     let _ = writeln!(
                         svg,
                         "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{}\"/>",
-                        colors.of(*ink)
+                        colors.of(ink)
                     );
                 }
-                Item::Text(text) => words(&mut svg, text, colors),
+                Item::Text(text) => words(&mut svg, &text, colors),
             }
         }
         svg + "</svg>\n"

@@ -88,7 +88,8 @@ impl FiveNumbers {
         let quartile = |share: f64| {
             let place = share * (sorted.len() - 1) as f64;
             let at = |place: f64| sorted.get(place as usize).copied().unwrap_or(last);
-            at(place.floor()) + (at(place.ceil()) - at(place.floor())) * place.fract()
+            // not by the difference, which overflows between -1e308 and 1e308
+            at(place.floor()) * (1.0 - place.fract()) + at(place.ceil()) * place.fract()
         };
         let quartiles = [quartile(0.25), quartile(0.5), quartile(0.75)];
         let reach = 1.5 * (quartiles[2] - quartiles[0]);
@@ -142,9 +143,10 @@ impl FiveNumbers {
 /// How many values lie outside, and how far the farthest is.
 fn far(list: &[f64]) -> String {
     let farthest = list.iter().copied().fold(0.0, |far: f64, x| if x.abs() > far.abs() { x } else { far });
+    let farthest = if farthest.abs() < 1e9 { format!("{farthest:.3}") } else { format!("{farthest:.3e}") };
     match list.len() {
-        1 => format!("{farthest:.3}"),
-        n => format!("{n}, to {farthest:.3}"),
+        1 => farthest,
+        n => format!("{n}, to {farthest}"),
     }
 }
 
@@ -183,5 +185,21 @@ mod tests {
         assert!(svg.contains(">Q<") && svg.contains(">Q+O<") && svg.contains(">2, to 200000.000<"));
         assert!(!svg.contains("inf") && !svg.contains("none<"));
         assert!(Distribution::default().sheet(600.0).is_none());
+    }
+
+    #[test]
+    fn values_at_the_ends_of_all_numbers_are_drawn() {
+        let ends = vec![-1e308, 1e308, f64::NAN, 1e30, -1e30, f64::MAX, f64::MIN];
+        let mut outliers: Vec<f64> = (0..40).map(f64::from).collect();
+        outliers.extend([-1e308, -1e308, 1e30, f64::NAN]);
+        for groups in [vec![ends.clone()], vec![vec![-1e308]], vec![outliers.clone()], vec![ends, outliers]] {
+            let groups = groups.into_iter().map(|values| ("residual".to_owned(), values)).collect();
+            let sheet = Distribution { groups, ..Distribution::default() }.sheet(600.0).unwrap();
+            assert_eq!(sheet.png(Theme::Light).unwrap().get(..4), Some(&b"\x89PNG"[..]));
+            let svg = sheet.svg("", Colors::Of(Theme::Light));
+            for wrong in ["NaN", "inf", &"0".repeat(30)] {
+                assert!(!svg.contains(wrong), "{wrong} in {svg}");
+            }
+        }
     }
 }

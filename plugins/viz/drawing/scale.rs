@@ -58,8 +58,9 @@ impl Scale {
         Self { low: if low == 0.0 { 0.0 } else { low - margin }, high: high + margin, log }
     }
 
-    /// From 0 at its lower end to 1 at its upper.
+    /// From 0 at its lower end to 1 at its upper. A number farther from zero than [`FAR`] has the place of `FAR`.
     pub(crate) fn place(&self, x: f64) -> f64 {
+        let x = x.clamp(-FAR, FAR);
         if self.log {
             (x / self.low).ln() / (self.high / self.low).ln()
         } else {

@@ -11,6 +11,9 @@ pub(crate) enum Viewpoint {
     Side,
 }
 
+/// The farthest from zero that a coordinate is drawn: its square is finite, so that outlines and margins are.
+const FAR: f64 = 1e150;
+
 /// The plane of a picture: two unit vectors at a right angle.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Plane {
@@ -39,9 +42,9 @@ impl Viewpoint {
 }
 
 impl Plane {
-    /// The point that is drawn for `p`.
+    /// The point that is drawn for `p`. Coordinates are limited to ±[`FAR`].
     pub(crate) fn project(&self, p: &Vector3<f64>) -> Point2<f64> {
-        Point2::new(self.right.dot(p), self.upward.dot(p))
+        Point2::new(self.right.dot(p), self.upward.dot(p)).map(|x| x.clamp(-FAR, FAR))
     }
 }
 
