@@ -48,7 +48,7 @@ impl Side {
         self.sign * p[self.axis] <= self.sign * self.bound
     }
 
-    /// Where a segment that crosses the bound does so. Halves, as the difference of two finite numbers may overflow.
+    /// The point at which a segment crosses the bound. Computed with halves, as the difference of two finite numbers may overflow.
     fn crossing(&self, a: Point, b: Point) -> Point {
         let from = 0.5 * a[self.axis];
         let share = (0.5 * self.bound - from) / (0.5 * b[self.axis] - from);
@@ -58,7 +58,7 @@ impl Side {
     }
 }
 
-/// What of a filled polygon lies inside (Sutherland and Hodgman, 1974).
+/// The part of a filled polygon that lies inside (Sutherland and Hodgman, 1974).
 fn polygon(points: &[Point], sides: &[Side]) -> Vec<Point> {
     sides.iter().fold(points.to_vec(), |points, side| {
         let ends = points.iter().cycle().skip(1);
