@@ -7,6 +7,7 @@ mod associate;
 mod bootstrap;
 mod error;
 mod identity;
+mod matching;
 mod statistics;
 #[cfg(test)]
 mod tests;

@@ -4,7 +4,7 @@
 //! many are together (recall), and of all pairs that are together, how many should be (precision). Homogeneity and
 //! completeness are those of Rosenberg and Hirschberg, V-Measure, 2007; switches and the identity F1 are those of
 //! multiple object tracking (Bernardin and Stiefelhagen, 2008; Ristani et al., 2016).
-use pathfinding::prelude::{Matrix, kuhn_munkres};
+use super::matching::largest_weight;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -99,23 +99,21 @@ where
     }
 }
 
-/// Boxes in the right object, with objects matched one to one so that they are the most; `None` is an object for each true one.
+/// Returns how many boxes are in the right object if objects are matched one to one so that these are the most; `None` is an
+/// object of its own for each true one.
 fn best_match<T: Copy + Ord, P: Copy + Ord>(
     shared: &BTreeMap<(T, Option<P>), usize>,
     truths: &BTreeMap<T, usize>,
 ) -> usize {
-    let rows: BTreeMap<T, usize> = truths.keys().copied().zip(0..).collect();
+    let numbers: BTreeMap<T, usize> = truths.keys().copied().zip(0..).collect();
     let found: BTreeSet<P> = shared.keys().filter_map(|(_, put)| *put).collect();
-    let columns: BTreeMap<P, usize> = found.into_iter().zip(rows.len()..).collect();
-    if rows.is_empty() {
-        return 0;
-    }
-    let mut together = Matrix::new(rows.len(), rows.len() + columns.len(), 0_i64);
+    let columns: BTreeMap<P, usize> = found.into_iter().zip(numbers.len()..).collect();
+    let mut rows = vec![vec![]; numbers.len()];
     for ((truth, put), n) in shared {
-        let row = rows[truth];
-        together[(row, put.map_or(row, |put| columns[&put]))] = *n as i64;
+        let row = numbers[truth];
+        rows[row].push((put.map_or(row, |put| columns[&put]), *n as i64));
     }
-    usize::try_from(kuhn_munkres(&together).0).unwrap_or(0)
+    usize::try_from(largest_weight(&rows, numbers.len() + columns.len())).unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -158,5 +156,11 @@ mod tests {
         let none = scores(&[1, 1, 1], &[0, 0, 0]);
         assert_eq!((none.precision, none.recall, none.f1, none.objects), (1.0, 0.0, 0.0, 0));
         assert_eq!(scores(&[], &[]).f1, 1.0);
+    }
+
+    #[test]
+    fn many_objects_need_no_matrix() {
+        let boxes = (0..60_000_u32).map(|i| (i % 20_000, Some(20_000 - i % 20_000)));
+        assert_eq!(identity(boxes).identity_f1, 1.0);
     }
 }

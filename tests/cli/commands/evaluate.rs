@@ -55,3 +55,27 @@ fn boxes_that_do_not_meet_are_an_error() {
         .complains("are time stamps and sides written alike?");
     manifactor(&format!("evaluate --boxes {one} {one} --delta 3")).ended(2).complains("cannot be used with");
 }
+
+#[test]
+fn the_order_of_rows_does_not_change_the_scores_of_boxes() {
+    // in each frame the same box has two objects; the third object tells which is which nowhere
+    let row = |time: usize, side: usize, object: usize| format!("{time},cup,0.5,{side},1,50,50,{object}\n");
+    let frame = |time: usize| [row(time, 1, 7), row(time, 1, 3), row(time, 1, 0), row(time, 2, 5 + time % 2)];
+    let mut rows: Vec<String> = (0..40).flat_map(frame).collect();
+    rows.push(row(50, 3, 7));
+    let header = "timestamp,class_name,score,xmin,ymin,xmax,ymax,object_key\n";
+    let file = |rows: &[String]| format!("{header}{}", rows.concat());
+    let one = file(&rows);
+    // a fixed shuffle: 53 shares no factor with the 161 rows
+    let shuffled: Vec<String> = (0..rows.len()).map(|i| rows[i * 53 % rows.len()].clone()).collect();
+    rows.reverse();
+    let folder = folder(&[("one.csv", &one), ("two.csv", &file(&rows)), ("three.csv", &file(&shuffled))]);
+    let [one, two, three] = ["one.csv", "two.csv", "three.csv"].map(|name| path(&folder, name));
+    let scores =
+        |a, b| manifactor(&format!("evaluate --boxes {a} {b} --json")).ended(0).json()["scores"].clone();
+    let whole = scores(&one, &one);
+    assert_eq!((&whole["f1"], &whole["identity_f1"]), (&1.0.into(), &1.0.into()));
+    for (a, b) in [(&one, &two), (&two, &one), (&three, &two), (&one, &three)] {
+        assert_eq!(scores(a, b), whole);
+    }
+}
