@@ -20,8 +20,10 @@ use tokio::sync::{Semaphore, watch};
 use tokio::time::{sleep, timeout};
 use tokio_io_timeout::TimeoutStream;
 
-/// Connections at once; more are closed.
+/// Connections at once; more wait. A page takes two.
 const MOST: usize = 32;
+/// Of the files that may be open, connections take one in so many: the rest is for the results.
+const SHARE: u64 = 4;
 /// Bytes of a request's head at most, and about as many as wait for a browser before its next state is made.
 const LONGEST: usize = 16 * 1024;
 /// How long a head may take to come; a browser that takes nothing for so long has gone.
@@ -72,16 +74,35 @@ pub(super) fn http() -> http1::Builder {
     http
 }
 
+/// How many connections leave enough files for the rest of the program, if this many may be open.
+fn most_connections(open_files: Option<u64>) -> usize {
+    let share = open_files.map_or(u64::MAX, |files| files / SHARE);
+    usize::try_from(share).unwrap_or(MOST).clamp(1, MOST)
+}
+
+/// How many files may be open (`ulimit -n`); `None` if there is no limit.
+#[cfg(unix)]
+fn open_files() -> Option<u64> {
+    rustix::process::getrlimit(rustix::process::Resource::Nofile).current
+}
+
+/// No limit is known on this system.
+#[cfg(not(unix))]
+fn open_files() -> Option<u64> {
+    None
+}
+
 async fn accept(listener: &TcpListener, answers: &Arc<Answers>, connections: &GracefulShutdown) {
     let http = http();
-    let places = Arc::new(Semaphore::new(MOST));
+    let places = Arc::new(Semaphore::new(most_connections(open_files())));
     loop {
+        // before the connection, which would take a file even if it is closed at once
+        let Ok(place) = places.clone().acquire_owned().await else { return };
         let Ok((stream, _)) = listener.accept().await else {
             // too many files are open, say: that may pass
             sleep(PAUSE).await;
             continue;
         };
-        let Ok(place) = places.clone().try_acquire_owned() else { continue };
         // without it, small answers come later
         let _ = stream.set_nodelay(true);
         let mut stream = TimeoutStream::new(stream);
@@ -283,18 +304,30 @@ mod tests {
     }
 
     #[test]
+    fn connections_leave_files_for_the_results() {
+        let most = [None, Some(1024), Some(40), Some(20), Some(0)].map(most_connections);
+        assert_eq!(most, [32, 32, 10, 5, 1]);
+    }
+
+    #[test]
     fn there_is_an_end_to_how_many_look() {
-        let (address, _feed, _) = served(Access::Local);
+        let (address, feed, _) = served(Access::Local);
         let looks = || asked(address, "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n");
         let heard = |stream: TcpStream| {
             let mut first = String::new();
             let mut reader = BufReader::new(stream);
-            // one that is turned away may find the connection closed before it has read why
-            let _ = reader.read_line(&mut first);
+            reader.read_line(&mut first).unwrap();
             (first, reader)
         };
-        let all: Vec<_> = (0..MOST).map(|_| heard(looks())).collect();
+        let mut all: Vec<_> = (0..most_connections(open_files())).map(|_| heard(looks())).collect();
         assert!(all.iter().all(|(first, _)| first.contains("200")));
-        assert_eq!(heard(looks()).0, "");
+        // one more waits until another has gone
+        let waiting = looks();
+        waiting.set_read_timeout(Some(PAUSE)).unwrap();
+        assert!((&waiting).read(&mut [0]).is_err());
+        all.pop();
+        change(&feed, |map| *map = LiveMap::new("next", "only"));
+        waiting.set_read_timeout(None).unwrap();
+        assert!(heard(waiting).0.contains("200"));
     }
 }
