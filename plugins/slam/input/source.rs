@@ -153,6 +153,21 @@ pub enum SourceError {
         /// What is wrong with it.
         message: String,
     },
+    /// A stream of lines that has no frames any more.
+    #[error(
+        "{}, line {line}: {count} lines in a row are no frames, so that the rest is not read; a frame is an object with          `timestamp` and `pose`: check `source.file`, or the program that writes to standard input. The last line: {message}",
+        file.display()
+    )]
+    NoFrames {
+        /// The file.
+        file: PathBuf,
+        /// The last of them, from 1.
+        line: usize,
+        /// How many there are.
+        count: usize,
+        /// The fault of the last one.
+        message: String,
+    },
     /// A stream that is there once, and was read.
     #[error("{} can be read once, and another variant has read it: run one variant, or give `file`", file.display())]
     ReadBefore {

@@ -210,6 +210,9 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 const LONGEST: u64 = 1 << 26;
 /// After so many bytes more without an end of the line, the file is given up.
 const ENDLESS: u64 = 1 << 30;
+/// After so many lines in a row that are no frames, the file is given up: half a minute of a camera at 30 Hz. A device such
+/// as `/dev/urandom`, or a recording of something else, has no frame at all and perhaps no end.
+const UNREADABLE: usize = 1000;
 
 #[typetag::serialize(name = "json_lines")]
 impl Source for JsonLines {
@@ -240,7 +243,7 @@ impl JsonLines {
             }
             None => (STDIN.into(), Box::new(BufReader::new(stdin()))),
         };
-        let lines = Lines { file, reader, line: 0, text: vec![] };
+        let lines = Lines { file, reader, line: 0, text: vec![], unreadable: 0 };
         Ok(Stream::new(opening, lines.fuse()))
     }
 }
@@ -251,6 +254,8 @@ struct Lines {
     reader: Box<dyn BufRead + Send>,
     line: usize,
     text: Vec<u8>,
+    /// Lines before the next that are no frames, in a row.
+    unreadable: usize,
 }
 
 impl Lines {
@@ -272,6 +277,25 @@ impl Lines {
         Ok(read)
     }
 
+    /// No more is read.
+    fn give_up(&mut self) {
+        self.reader = Box::new(std::io::empty());
+    }
+
+    /// The frame of the line that was read last.
+    fn frame(&mut self) -> Result<Observation, SourceError> {
+        let read = self.parse();
+        self.unreadable = if read.is_ok() { 0 } else { self.unreadable + 1 };
+        let (file, line) = (self.file.clone(), self.line);
+        read.map_err(|message| match self.unreadable {
+            UNREADABLE => {
+                self.give_up();
+                SourceError::NoFrames { file, line, count: UNREADABLE, message }
+            }
+            _ => SourceError::Line { file, line, message },
+        })
+    }
+
     fn parse(&self) -> Result<Observation, String> {
         if self.text.len() as u64 == LONGEST {
             return Err(format!("the line is longer than {LONGEST} bytes"));
@@ -288,13 +312,9 @@ impl Iterator for Lines {
             match self.read() {
                 Ok(0) => return None,
                 Ok(_) if self.text.trim_ascii().is_empty() => {}
-                Ok(_) => {
-                    let (file, line) = (self.file.clone(), self.line);
-                    return Some(self.parse().map_err(|message| SourceError::Line { file, line, message }));
-                }
+                Ok(_) => return Some(self.frame()),
                 Err(source) => {
-                    // what cannot be read once is not tried again
-                    self.reader = Box::new(std::io::empty());
+                    self.give_up();
                     return Some(Err(FormatError::Io { path: self.file.clone(), source }.into()));
                 }
             }
@@ -346,6 +366,26 @@ mod tests {
         assert!(*place == 1 && fault.contains("expected [xmin, ymin, xmax, ymax]"), "{fault}");
         let error = source.load(&folders).unwrap_err().to_string();
         assert!(error.contains("line 2"), "{error}");
+    }
+
+    #[test]
+    fn a_file_without_frames_is_given_up() {
+        let good = r#"{"timestamp": 1.0, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}"#;
+        let bad = "\u{1}{?\n".repeat(UNREADABLE - 1);
+        let folder = tempfile::tempdir().unwrap();
+        let folders = Folders { data: None, document: folder.path().into() };
+        let read = |text: &str| -> Vec<_> {
+            let stream = source(folder.path(), text).open(&folders).unwrap().unwrap();
+            stream.observations.collect()
+        };
+        // a frame in between begins the count again
+        let sound = read(&format!("{bad}{good}\n{bad}{good}\n"));
+        assert_eq!((sound.len(), sound.iter().filter(|read| read.is_ok()).count()), (2 * UNREADABLE, 2));
+        let given_up = read(&format!("{good}\n{bad}{bad}{good}\n"));
+        assert_eq!(given_up.len(), 1 + UNREADABLE);
+        let error = given_up.last().unwrap().as_ref().unwrap_err().to_string();
+        let place = format!("line {}: {UNREADABLE} lines in a row are no frames", UNREADABLE + 1);
+        assert!(error.contains(&place) && error.contains("check `source.file`"), "{error}");
     }
 
     #[test]
