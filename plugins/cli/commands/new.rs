@@ -121,6 +121,15 @@ impl Names {
                 "use words of small letters and digits, joined by `_` or `-`, such as `on_the_shelf`; no keyword of Rust",
             ));
         }
+        // Cargo writes the one as the other
+        if CRATES.contains(&name.replace('-', "_").as_str()) {
+            return Err(Failure::with_help(
+                format!(
+                    "`{name}` is the name of a crate of Rust or of Manifactor, and cannot be that of a plugin"
+                ),
+                "choose another name, such as `on_the_shelf`",
+            ));
+        }
         let capital = |w: &&str| w[..1].to_ascii_uppercase() + &w[1..];
         Ok(Self {
             of_crate: name.to_owned(),
@@ -136,50 +145,41 @@ const TAKEN: [&str; 15] = [
     "virtual", "yield", "main", "lib",
 ];
 
-/// Words that cannot be the name of a module, and crates that a plugin depends on.
-const KEYWORDS: [&str; 42] = [
-    "as",
-    "async",
-    "await",
-    "break",
-    "const",
-    "continue",
-    "crate",
-    "dyn",
-    "else",
-    "enum",
-    "extern",
-    "false",
-    "fn",
-    "for",
-    "gen",
-    "if",
-    "impl",
-    "in",
-    "let",
-    "loop",
-    "match",
-    "mod",
-    "move",
-    "mut",
-    "pub",
-    "ref",
-    "return",
-    "self",
-    "static",
-    "struct",
-    "super",
-    "trait",
-    "true",
-    "type",
-    "unsafe",
-    "use",
-    "where",
-    "while",
+/// Crates that a plugin could not be told from: those of Rust, of the workspace and of a plugin's manifest, and the build script.
+const CRATES: [&str; 25] = [
+    "alloc",
+    "build",
+    "core",
+    "proc_macro",
+    "std",
     "test",
-    "manifactor",
-    "serde",
     "schemars",
+    "serde",
+    "manifactor",
+    "manifactor_cli",
+    "manifactor_config",
+    "manifactor_expression",
+    "manifactor_formats",
+    "manifactor_fuzz",
+    "manifactor_geometry",
+    "manifactor_graph",
+    "manifactor_online",
+    "manifactor_python",
+    "manifactor_quadric",
+    "manifactor_semantic",
+    "manifactor_slam",
+    "manifactor_solve",
+    "manifactor_testing",
+    "manifactor_tree",
+    "manifactor_viz",
+];
+
+/// Words that cannot be the name of a module.
+const KEYWORDS: [&str; 38] = [
+    "as", "async", "await", "break", "const", "continue", "crate", "dyn", "else", "enum", "extern", "false",
+    "fn", "for", "gen", "if", "impl", "in", "let", "loop", "match", "mod", "move", "mut", "pub", "ref",
+    "return", "self", "static", "struct", "super", "trait", "true", "type", "unsafe", "use", "where",
+    "while",
 ];
 
 #[cfg(test)]
@@ -206,5 +206,27 @@ mod tests {
         ] {
             assert!(Names::of(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn crates_of_rust_and_of_the_workspace_are_refused() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let manifest = std::fs::read_to_string(root.join("Cargo.toml")).unwrap();
+        let members = manifest.lines().find_map(|line| line.strip_prefix("members = ")).unwrap();
+        let members: Vec<String> = serde_json::from_str(members).unwrap();
+        let name = |member: String| {
+            let manifest = std::fs::read_to_string(root.join(member).join("Cargo.toml")).unwrap();
+            let name = manifest.lines().find_map(|line| line.strip_prefix("name = ")).unwrap().to_owned();
+            name.trim_matches('"').to_owned()
+        };
+        let packages: Vec<String> = members.into_iter().map(name).collect();
+        assert!(packages.iter().any(|package| package == "manifactor-cli"));
+        let of_rust =
+            ["build", "std", "core", "alloc", "test", "proc_macro", "proc-macro", "manifactor_cli", "serde"];
+        for taken in packages.iter().map(String::as_str).chain(of_rust) {
+            let error = Names::of(taken).err().unwrap().to_string();
+            assert!(error.contains("is the name of a crate"), "{taken}: {error}");
+        }
+        assert!(Names::of("manifactor-shelf").is_ok() && Names::of("cores").is_ok());
     }
 }
