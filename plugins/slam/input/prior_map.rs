@@ -11,6 +11,7 @@ use manifactor_graph::{Direction, Noise};
 use manifactor_quadric::DualQuadric;
 use nalgebra::{DMatrix, SMatrix};
 use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -92,7 +93,8 @@ impl PriorMap {
         let errors = Errors::new();
         let map = document.root().read::<Self>(&errors).map(|map| {
             let places = document.root().items("objects");
-            for (i, (object, node)) in map.objects.iter().zip(places).enumerate() {
+            let mut ids = HashSet::new();
+            for (object, node) in map.objects.iter().zip(places) {
                 if let Err(error) = object.noise() {
                     let place = node.field("covariance").unwrap_or(node).place.clone();
                     errors.report(place, Fault::invalid(error.to_string()));
@@ -103,7 +105,7 @@ impl PriorMap {
                         format!("an object's number is below {}, so that new ones have room", u32::MAX);
                     errors.report(place, Fault::invalid(told));
                 }
-                if map.objects[..i].iter().any(|other| other.id == object.id) {
+                if !ids.insert(object.id) {
                     let place = node.field("id").unwrap_or(node).place.clone();
                     errors.report(place, Fault::invalid(format!("object {} is there twice", object.id)));
                 }

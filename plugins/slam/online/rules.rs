@@ -7,7 +7,7 @@ use crate::settings::Settings;
 use manifactor_graph::{Direction, FactorEntry, Key};
 use manifactor_online::FactorId;
 use manifactor_quadric::DualQuadric;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// All semantic factors that count.
 #[derive(Debug, Clone, Default)]
@@ -44,9 +44,10 @@ impl Ledger {
         let before = self.factors.len();
         let connected = std::mem::take(&mut self.connected);
         let mut judge = Judge::new(&settings.semantics, &settings.aliases, up, all.to_vec(), connected);
+        let by_key: HashMap<&Key, &Candidate> =
+            all.iter().map(|candidate| (&candidate.key, candidate)).collect();
         for owner in about {
-            let key = object_key(*owner);
-            let Some(candidate) = all.iter().find(|candidate| candidate.key == key) else { continue };
+            let Some(candidate) = by_key.get(&object_key(*owner)) else { continue };
             let Verdict { entries, applied, left_out } = judge.judge(candidate)?;
             self.left_out.insert(*owner, left_out);
             for (entry, applied) in entries.into_iter().zip(applied) {

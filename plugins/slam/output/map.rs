@@ -6,11 +6,11 @@ use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::Measured;
 use crate::mapping::object_key;
 use crate::settings::Settings;
-use manifactor_graph::{FactorEntry, Graph, Noise};
+use manifactor_graph::{FactorEntry, Graph, Key, Noise};
 use manifactor_quadric::QuadricPrior;
 use manifactor_solve::{CompileError, CovarianceError, Problem, WeightError};
 use nalgebra::DMatrix;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Why there is no map.
@@ -96,11 +96,12 @@ fn is_gone(measured: &Measured, looked: Looked, settings: &Settings) -> bool {
 fn as_written(graph: &mut Graph, estimate: &Estimate) {
     let weights: HashMap<usize, f64> =
         estimate.solution.factors.iter().map(|f| (f.entry, f.weight)).collect();
+    let priors = estimate.mapping.measurements.objects.iter().filter_map(|object| object.prior.as_ref());
+    let priors: HashMap<Key, _> = priors.map(|prior| (object_key(prior.id), prior)).collect();
     let known = |entry: &FactorEntry| {
         let held = entry.factor.erased().as_any().downcast_ref::<QuadricPrior>()?;
-        let priors = estimate.mapping.measurements.objects.iter().filter_map(|object| object.prior.as_ref());
-        let mut priors = priors.filter(|prior| entry.keys == [object_key(prior.id)]);
-        priors.next().filter(|prior| prior.quadric == held.value)
+        let prior = priors.get(entry.keys.first()?)?;
+        (entry.keys.len() == 1 && prior.quadric == held.value).then_some(*prior)
     };
     for (place, entry) in graph.factors_mut().iter_mut().enumerate() {
         let Some(prior) = known(entry) else { continue };
@@ -115,7 +116,7 @@ fn as_written(graph: &mut Graph, estimate: &Estimate) {
 /// The covariance of each object, by its key. Directions that nothing determines are known as badly as can be.
 fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, MapError> {
     let (mut graph, values) = (estimate.mapping.graph.clone(), &estimate.solution.values);
-    let keys: Vec<&str> = estimate.mapping.mapped().map(|object| object.key.as_str()).collect();
+    let keys: HashSet<&str> = estimate.mapping.mapped().map(|object| object.key.as_str()).collect();
     if keys.is_empty() {
         return Ok(HashMap::new());
     }

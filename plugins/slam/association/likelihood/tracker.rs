@@ -32,6 +32,7 @@ pub(super) struct Tracker {
     pub settings: Likelihood,
     pub camera: Camera,
     pub aliases: Aliases,
+    /// Those of an earlier map come first, by number.
     pub tracks: Vec<Track>,
     pub next: u32,
     /// When objects of an earlier map were seen last, as it were, in seconds.
@@ -117,9 +118,23 @@ impl Tracker {
         aliases: Aliases,
         known: &[Arc<PriorObject>],
     ) -> Self {
-        let tracks: Vec<Track> = known.iter().map(|object| Track::known(object)).collect();
+        let mut tracks: Vec<Track> = known.iter().map(|object| Track::known(object)).collect();
+        tracks.sort_by_key(|track| track.id);
         let next = tracks.iter().map(|track| track.id.0.saturating_add(1)).max().unwrap_or(1);
         Self { settings, camera, aliases, tracks, next, began: None, past: VecDeque::new() }
+    }
+
+    /// How many objects are those of an earlier map.
+    pub(super) fn known(&self) -> usize {
+        self.tracks.partition_point(Track::is_known)
+    }
+
+    /// The place of an object, if it is there.
+    pub(super) fn place(&self, id: ObjectId) -> Option<usize> {
+        // an earlier map may have very many
+        let (known, own) = self.tracks.split_at(self.known());
+        let of_map = known.binary_search_by_key(&id, |track| track.id).ok();
+        of_map.or_else(|| Some(known.len() + own.iter().position(|track| track.id == id)?))
     }
 
     /// The known objects of boxes.
@@ -201,8 +216,7 @@ impl Tracker {
 
     /// The place of an object, which may begin with this sighting.
     fn track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
-        let known = self.tracks.iter().position(|track| track.id == id);
-        known.or_else(|| {
+        self.place(id).or_else(|| {
             // how well a measured depth is known is said by the sighting
             let depth = first.depth.unwrap_or(depth);
             let belief = Belief::new(first, &self.camera, depth, self.settings.depth_spread);

@@ -58,7 +58,7 @@ impl Tracker {
     /// Makes one of an object and the one that it goes with best, if there is any.
     fn merge_one(&mut self, id: ObjectId) -> Option<Merge> {
         // it may be gone by now
-        let own = self.tracks.iter().position(|track| track.id == id)?;
+        let own = self.place(id)?;
         let unions = self.neighbours(own).into_iter().filter_map(|other| {
             let (one, two) = (&self.tracks[own], &self.tracks[other]);
             Some((other, of(one, two, &self.camera, &self.settings)?))
@@ -75,7 +75,9 @@ impl Tracker {
 
     /// The objects that may be the same as this one, the nearest first.
     fn neighbours(&self, own: usize) -> Vec<usize> {
-        let others = (0..self.tracks.len()).filter(|other| *other != own);
+        // two objects of an earlier map are two: only those that it does not have are compared with one of it
+        let first = if self.tracks[own].is_known() { self.known() } else { 0 };
+        let others = (first..self.tracks.len()).filter(|other| *other != own);
         let near = others.filter_map(|other| Some((other, gap(&self.tracks[own], &self.tracks[other])?)));
         let mut near: Vec<(usize, f64)> = near.collect();
         near.sort_by(|(_, a), (_, b)| a.total_cmp(b));
@@ -84,13 +86,10 @@ impl Tracker {
 }
 
 /// How far apart two are that may be one, as a part of their sizes and of how well they are known; `None`, where they are too far apart,
-/// were seen side by side, or an earlier map has both.
+/// or were seen side by side.
 fn gap(one: &Track, two: &Track) -> Option<f64> {
     let apart = (one.fitted.quadric.centroid() - two.fitted.quadric.centroid()).norm();
     let gap = apart / (one.sizes(two) + APART * one.spread(two));
-    if one.is_known() && two.is_known() {
-        return None;
-    }
     let together = || common(&one.boxes, &two.boxes) as f64;
     (gap <= 1.0 && together() <= TOGETHER * one.boxes.len().min(two.boxes.len()) as f64).then_some(gap)
 }
