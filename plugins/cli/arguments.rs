@@ -4,6 +4,7 @@ use crate::commands::{
     Plot, Replay, Run, Schema, ShowGraph, Simulate, Solve,
 };
 use crate::failure::Failure;
+use crate::output::text::count;
 use crate::output::watch;
 use crate::status::Status;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
@@ -61,11 +62,12 @@ impl Cli {
         watch::log(self.verbose);
         // this thread is one of them: what it has in its caches stays there
         let pool = rayon::ThreadPoolBuilder::new().use_current_thread();
-        let pool = pool.num_threads(self.threads()?).build_global();
+        let threads = self.threads()?;
+        let pool = pool.num_threads(threads).build_global();
         if self.threads.is_some() {
             pool.map_err(Failure::input)?;
         }
-        check_limit()?;
+        check_limit(memory_limit(), self.least_memory(threads), threads)?;
         check_names(&all()).map_err(Failure::input)?;
         match &self.command {
             Command::Run(command) => command.run(self.verbose),
@@ -87,6 +89,17 @@ impl Cli {
             Command::Completions(command) => Ok(command.run(Self::command())),
             Command::Man(command) => command.run(Self::command()),
         }
+    }
+
+    /// The least limit of memory at which a command ends with an error, if it has too little, and not by the allocator. Measured
+    /// with 1 to 8 threads: each reserves addresses for its allocator, and that of an experiment for its trials as well.
+    fn least_memory(&self, threads: usize) -> u64 {
+        let of_thread: u64 = match &self.command {
+            Command::Run(_) | Command::Online(_) => 64 << 20,
+            Command::Experiment(_) => 160 << 20,
+            _ => 0,
+        };
+        PROGRAM + of_thread * threads as u64
     }
 
     /// How many threads to compute with.
@@ -142,14 +155,20 @@ fn asked_of_rayon(variable: Option<&str>) -> Result<Option<usize>, Failure> {
     }
 }
 
-/// Refuses to begin where not even the program itself is sure to have room.
-fn check_limit() -> Result<(), Failure> {
-    /// For code, stacks and the buffers of two threads.
-    const LEAST: u64 = 256 << 20;
-    match memory_limit() {
-        Some(limit) if limit < LEAST => Err(Failure::with_help(
-            format!("the limit of memory is {}, and the program alone takes {}", Bytes(limit), Bytes(LEAST)),
-            "allow more (ulimit -v)",
+/// Bytes for code, stacks and the buffers of two threads.
+const PROGRAM: u64 = 256 << 20;
+
+/// Refuses to begin if not even the program itself is sure to have room.
+fn check_limit(limit: Option<u64>, least: u64, threads: usize) -> Result<(), Failure> {
+    match limit {
+        Some(limit) if limit < least => Err(Failure::with_help(
+            format!(
+                "the limit of memory is {}, and the program alone takes {} with {}",
+                Bytes(limit),
+                Bytes(least),
+                count(threads, "thread")
+            ),
+            "allow more (ulimit -v), or take fewer threads (--threads)",
         )),
         _ => Ok(()),
     }
@@ -162,6 +181,19 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn commands_with_many_threads_need_more_memory() {
+        let least = |line: &str| Cli::parse_from(line.split(' ')).least_memory(4) >> 20;
+        assert_eq!((least("manifactor list"), least("manifactor solve g.toml")), (256, 256));
+        assert_eq!((least("manifactor run r.toml"), least("manifactor online r.toml")), (512, 512));
+        assert_eq!(least("manifactor experiment e.toml"), 896);
+        assert!(
+            check_limit(None, 512 << 20, 4).is_ok() && check_limit(Some(512 << 20), 512 << 20, 4).is_ok()
+        );
+        let refused = check_limit(Some(300 << 20), 512 << 20, 4).unwrap_err().to_string();
+        assert!(refused.contains("300.0 MiB") && refused.contains("512.0 MiB with 4 threads"), "{refused}");
     }
 
     #[test]

@@ -155,7 +155,8 @@ pub enum SourceError {
     },
     /// A stream of lines that has no frames any more.
     #[error(
-        "{}, line {line}: {count} lines in a row are no frames, so that the rest is not read; a frame is an object with          `timestamp` and `pose`: check `source.file`, or the program that writes to standard input. The last line: {message}",
+        "{}, line {line}: {count} lines in a row are no frames, so that the rest is not read; a frame is an object with \
+         `timestamp` and `pose`: check `source.file`, or the program that writes to standard input. The last line: {message}",
         file.display()
     )]
     NoFrames {

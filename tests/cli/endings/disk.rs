@@ -1,4 +1,4 @@
-//! Disks that are full, files that may not grow, folders for reading only, and streams without a reader.
+//! Disks that are full, files that may not grow, folders for reading only, streams without a reader, and too little memory.
 use crate::commands::experiment::tables;
 use crate::{folder, manifactor, path, root};
 use std::io::Read;
@@ -209,4 +209,19 @@ fn a_place_under_a_file_is_told_before_the_solve() {
         after("true", &format!("run {} --out {}/out -vv", path(&folder, "run.toml"), path(&folder, "file")));
     refused(&ran, &["Not a directory"]);
     assert!(!String::from_utf8_lossy(&ran.stderr).contains("compiled"));
+}
+
+#[test]
+fn a_limit_of_memory_without_room_for_the_threads_is_refused() {
+    let folder = folder(&[("run.toml", RUN), ("sweep.toml", SWEEP)]);
+    let (run, sweep, out) = (path(&folder, "run.toml"), path(&folder, "sweep.toml"), path(&folder, "out"));
+    for command in [format!("run {run}"), format!("online {run}"), format!("experiment {sweep}")] {
+        let ended = after("ulimit -v 300000", &format!("{command} --out {out} --threads 2"));
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(2), "{command}: {said}");
+        for words in ["the limit of memory is", "--threads"] {
+            assert!(said.contains(words), "{command}: {said}");
+        }
+    }
+    assert_eq!(names(folder.path()), ["run.toml", "sweep.toml"]);
 }
