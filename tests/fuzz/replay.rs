@@ -29,7 +29,7 @@ const WORDS: [&[u8]; 16] = [
     b"\xc3\xa9",
 ];
 
-/// Numbers that may come in the place of others.
+/// Numbers that may replace a number.
 const NUMBERS: [&str; 16] = [
     "0",
     "-0.0",

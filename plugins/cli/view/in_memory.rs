@@ -1,4 +1,4 @@
-//! The server without sockets and without a clock, for fuzz targets.
+//! The view server without sockets and without a clock, for fuzz targets.
 use super::access::Access;
 use super::answers::Answers;
 use super::server::http;

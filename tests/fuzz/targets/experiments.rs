@@ -49,7 +49,7 @@ pub fn experiment(data: &[u8]) {
     let again = read(folder.path(), &written.to_string(), &base, Format::Json)
         .unwrap_or_else(|| panic!("an experiment cannot be repeated: {written} {base}"));
     assert_eq!(again.columns, experiment.columns);
-    // a label is a number as it is written: 1e-1 in the document is 0.1 in that of the results
+    // a label has the digits of its document: 1e-1 becomes 0.1 in the results
     let fingerprints = |trials: &[Trial]| -> Vec<_> { trials.iter().map(Trial::fingerprint).collect() };
     assert_eq!(fingerprints(&again.trials), fingerprints(&experiment.trials));
 }

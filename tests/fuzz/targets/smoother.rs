@@ -80,7 +80,7 @@ fn save(session: &Session) -> String {
     session.save().unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Replaces the checksum by that of the document.
+/// Writes the checksum of the document into the first line.
 fn resealed(text: &str) -> String {
     let Some((head, json)) = text.split_once('\n') else { return text.to_owned() };
     let json = json.trim_end();

@@ -1,7 +1,7 @@
 //! The live view: its address, and requests to its server.
 use manifactor_cli::__private::{address, answer};
 
-/// A token as long as those of the server.
+/// A token of the length that the server uses.
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 /// Statuses of the server and of its library.
 const STATUSES: [&str; 8] = ["200", "400", "403", "404", "405", "414", "431", "505"];

@@ -1,3 +1,3 @@
-//! See `targets.rs`.
+//! See `../../targets.rs`.
 #![no_main]
 libfuzzer_sys::fuzz_target!(|data: &[u8]| manifactor_fuzz::frame_journal(data));
