@@ -78,6 +78,8 @@ pub enum LoadError {
 pub(crate) struct Saved {
     pub settings: Settings,
     pub updates: usize,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_quiet: bool,
     pub next_factor: u32,
     pub postponed: usize,
     /// By number.

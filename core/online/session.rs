@@ -49,7 +49,8 @@ pub struct Session {
     changed: Vec<u64>,
     pass: u64,
     updates: usize,
-    /// Whether the update has no changes to make.
+    /// Whether the last update had no changes to make; and whether the one before it had none either.
+    is_quiet: bool,
     is_idle: bool,
     /// Variables whose linearization is to be looked at: they have left its region, or moved where there are losses.
     waiting: Vec<u32>,
@@ -107,6 +108,7 @@ impl Session {
             changed: vec![],
             pass: 0,
             updates: 0,
+            is_quiet: false,
             is_idle: false,
             waiting: vec![],
             postponed: 0,

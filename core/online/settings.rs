@@ -18,7 +18,7 @@ pub struct Settings {
     pub relinearize_every: usize,
     /// Error that a linearization may have, in standard deviations of the factors around. A variable is linearized anew
     /// where a component of its step δ is larger than √(bend · σ), with σ = 1/√Hᵢᵢ, or where new weights of robust losses change
-    /// its gradient by more than bend / σ. 0 relinearizes all that moves. Default: 0.1.
+    /// its gradient by more than 1/σ. 0 relinearizes all that moves. Default: 0.1.
     #[serde(deserialize_with = "not_negative")]
     pub bend: f64,
     /// Changes of a step δ that are not passed on to other variables, in standard deviations σ = 1/√Hᵢᵢ of the factors around. 0 passes on

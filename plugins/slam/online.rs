@@ -110,11 +110,12 @@ pub enum FinishError {
 }
 
 impl Mapper {
-    /// A map of nothing; where the settings have a prior map, and where the run begins in it, of what is in there.
+    /// A map of nothing, by the settings [for streams](Settings::for_stream); where the settings have a prior map, and where the run begins in it, of what is in there.
     ///
     /// # Errors
     /// Where a setting of the session is outside its domain.
     pub fn new(opening: Opening, settings: &Settings) -> Result<Self, SettingError> {
+        let settings = settings.clone().for_stream();
         let mut online = settings.online.clone();
         if let Some(window) = &mut online.window {
             // poses leave, and nothing else
@@ -128,10 +129,10 @@ impl Mapper {
         let objects =
             measurements.objects.iter().filter_map(|measured| Some((measured.id, Tracked::known(measured)?)));
         Ok(Self {
-            settings: Arc::new(settings.clone()),
             camera: opening.camera,
             session: Session::new(online)?,
             associator: settings.association.begin(opening.camera, &settings.aliases, &known),
+            settings: Arc::new(settings),
             names: Names::default(),
             pending: vec![],
             up: Up::new(opening),

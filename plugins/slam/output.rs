@@ -26,6 +26,7 @@ mod map;
 mod own_map;
 pub mod record;
 pub mod report;
+mod shapes;
 
 pub use folder::{FolderError, OutputFolder};
 pub use map::MapError;

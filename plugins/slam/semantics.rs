@@ -43,6 +43,9 @@ pub use rule_factor::{RuleError, RuleFactor};
 /// The paper's Table I.
 pub(crate) const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 
+/// What a stream says of the shape of all objects.
+const WEAK_SHAPE: &str = include_str!("semantics/weak_shape.toml");
+
 /// Stands for all classes.
 const ANY: &str = "*";
 /// A class with a smaller share of an object's scores is no alternative.
@@ -158,6 +161,16 @@ pub(crate) const SHIPPED: [&str; 1] = ["table_one"];
 /// Where the factors that it names are not linked.
 pub fn table_one() -> Result<Vec<Rule>, manifactor_config::Diagnostics> {
     read::shipped_rules("table_one", TABLE_ONE)
+}
+
+/// Adds the weak `shape_prior` of streams, unless there is a rule with one.
+pub(crate) fn add_weak_shape(rules: &mut Vec<Rule>) {
+    // the crate links its factor
+    let weak = read::shipped_rules("weak_shape", WEAK_SHAPE).unwrap_or_default();
+    let is_there = weak.iter().any(|weak| rules.iter().any(|rule| rule.factor.name() == weak.factor.name()));
+    if !is_there {
+        rules.extend(weak);
+    }
 }
 
 /// Classes that a rule names and the data do not have, each once.

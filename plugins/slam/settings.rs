@@ -3,7 +3,7 @@ use crate::association::{Association, Given};
 use crate::gravity::{FromSource, Gravity};
 use crate::input::class::Aliases;
 use crate::input::source::Source;
-use crate::semantics::{Rule, read_semantics};
+use crate::semantics::{Rule, add_weak_shape, read_semantics};
 use manifactor_config::{Diagnostics, Errors, Node, Section};
 use manifactor_solve::{LevenbergMarquardt, Optimizer};
 use schemars::JsonSchema;
@@ -125,6 +125,14 @@ impl Settings {
             Some(settings)
         });
         errors.finish(settings)
+    }
+
+    /// These settings with what a stream adds: a weak `shape_prior` for all objects, unless a rule has one. While few boxes show an
+    /// object, a semi-axis would otherwise shrink to nothing or grow without limit.
+    #[must_use]
+    pub fn for_stream(mut self) -> Self {
+        add_weak_shape(&mut self.semantics);
+        self
     }
 
     /// Tells these settings from others, and this program's version from others; the same on all machines.

@@ -5,7 +5,7 @@
 //! be too coarse for precise data and too fine for coarse data, and need one number for each type of variable.
 //!
 //! A robust loss makes an error of another kind: the weights are those of the linearization points. They change the gradient
-//! by Σ (w/w₀ − 1) wJᵀr, and |Δgᵢ| · σᵢ ≤ bend is asked of that, however short the step is.
+//! by Δg = Σ (w/w₀ − 1) w₀Jᵀr, which leaves ½ (Δgᵢ σᵢ)² nats to gain: no more than ½ nat is left, however short the step is.
 use super::Session;
 use crate::tree::{Affected, Couplings, NONE};
 use smallvec::SmallVec;
@@ -25,14 +25,14 @@ pub(super) struct Choice {
 }
 
 /// What an update without changes leaves of the errors that others may leave.
-const FINE: f64 = 1e-6;
+const FINE: f64 = 1e-8;
 /// Halvings of a step that leads out of the domain of a factor; then the variable stays.
 const HALVINGS: u32 = 4;
 /// Rounds of such halvings, each of some variables, before all of them stay.
 const ROUNDS: usize = 16;
 
 impl Session {
-    /// The error of a variable's linearization in σ's, as a share of what it may be.
+    /// The error of a variable's linearization by the length of its step, in σ's, as a share of what it may be.
     pub(super) fn excess(&self, variable: u32) -> f64 {
         let blocks = &self.model.blocks;
         let steps = self.delta[blocks.range(variable)].iter().zip(blocks.precision(variable));
@@ -116,8 +116,8 @@ impl Session {
             && self.delta[self.model.blocks.range(variable)].iter().any(|step| *step != 0.0)
     }
 
-    /// The errors of variables' gradients by weights that losses have changed, in σ's, as shares of what they may be. A step may
-    /// be short and its weights quite other ones, where a robust loss turns.
+    /// What weights that losses have changed leave to gain at each variable, as shares of ½ nat. A step may be short and
+    /// its weights quite other ones, where a robust loss turns.
     fn excesses_by_weight(&mut self, variables: &[u32]) -> Vec<f64> {
         let around = self.model.factors_of(variables);
         let mut tried: Vec<u32> =
@@ -131,7 +131,7 @@ impl Session {
         tried.iter().for_each(|v| self.model.reset_trial(*v));
         let share = |(v, change): (&u32, SmallVec<[f64; 9]>)| {
             let precision = self.model.blocks.precision(*v);
-            let shares = change.iter().zip(precision).map(|(g, p)| g.abs() / (p * self.settings.bend));
+            let shares = change.iter().zip(precision).map(|(g, p)| (g / p).powi(2));
             shares.fold(0.0, f64::max)
         };
         variables.iter().zip(changes).map(share).collect()

@@ -32,6 +32,7 @@ impl Session {
         let saved = Saved {
             settings: self.settings.clone(),
             updates: self.updates,
+            is_quiet: self.is_quiet,
             postponed: self.postponed,
             next_factor: self.model.next_factor(),
             variables,
@@ -62,6 +63,7 @@ impl Session {
         let saved = Saved::read(text)?;
         let mut session = Session::new(saved.settings).map_err(|e| LoadError::Read(e.to_string()))?;
         (session.updates, session.postponed) = (saved.updates, saved.postponed);
+        session.is_quiet = saved.is_quiet;
         for variable in &saved.variables {
             insert(&mut session.model, variable)?;
         }

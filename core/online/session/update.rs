@@ -26,7 +26,7 @@ const NEWEST: usize = 8;
 
 impl Session {
     /// Makes the changes since the last update, and brings the estimate up to date. Then those variables leave that are to.
-    /// Without changes, it is a turn to relinearize, by a millionth of [`bend`](crate::Settings::bend) and
+    /// The second of several without changes, and those after it, relinearize by 1e-8 of [`bend`](crate::Settings::bend) and
     /// [`deviation`](crate::Settings::deviation): repeated, it leads to the minimum.
     ///
     /// # Errors
@@ -34,7 +34,8 @@ impl Session {
     /// update are taken back then, and the session is as that left it; ids of the pushed factors are void.
     pub fn update(&mut self) -> Result<Report, UpdateError> {
         let pending = std::mem::take(&mut self.pending);
-        self.is_idle = pending.is_empty();
+        let is_quiet = pending.is_empty();
+        self.is_idle = is_quiet && self.is_quiet;
         let mut report = Report::default();
         let mut touched = Touched { steps: true, ..Touched::default() };
         let mut undo = Undo::default();
@@ -81,6 +82,7 @@ impl Session {
             return Err(UpdateError::Overflow { key });
         }
         self.updates += 1;
+        self.is_quiet = is_quiet;
         self.follow_up(&mut report);
         let new = self.enter(suspects, &touched.removed);
         self.test_outliers(&new, &mut report);

@@ -41,6 +41,11 @@ pub enum Warning {
         /// The setting to change.
         remedy: &'static str,
     },
+    /// Objects that no box limits in some direction.
+    RunAway {
+        /// Their keys and semi-axes.
+        objects: Vec<String>,
+    },
     /// A map without objects.
     NoObjects {
         /// Objects that were detected.
@@ -123,6 +128,12 @@ impl fmt::Display for Warning {
             Self::NoObjects { detected } => {
                 write!(f, "none of {detected} detected objects is mapped; see why in objects.json")
             }
+            Self::RunAway { objects } => write!(
+                f,
+                "boxes do not limit the shape of {}: {}; the factor `shape_prior` keeps the semi-axes of an object alike",
+                if objects.len() == 1 { "an object" } else { "objects" },
+                objects.join(", ")
+            ),
             Self::NotRobust => f.write_str(
                 "boxes without names are put to wrong objects now and then, and count in full; \
                  `detections.loss = { type = \"cauchy\", scale = 1.0 }` takes weight from them",

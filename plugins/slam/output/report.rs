@@ -179,6 +179,7 @@ impl VariantReport {
         let after = landmarks::in_truth_frame(estimate, estimate.landmarks());
         let before = landmarks::in_truth_frame(estimate, estimate.initial_landmarks());
         let objects = objects(estimate, &after);
+        warnings.extend(super::shapes::run_away(estimate));
         let landmarks = LandmarkReport::new(&before, &after);
         Self {
             name: name.to_owned(),

@@ -217,8 +217,12 @@ fn found_out(merges: bool) -> usize {
     assert_eq!(there(&mapper), there(&expected));
     let factors = |mapper: &mut Mapper| mapper.session().graph().0.factors().len();
     assert_eq!(factors(&mut mapper), factors(&mut expected));
-    let (cost, least) = (mapper.session().cost(), expected.session().cost());
-    assert!((cost - least).abs() < 0.05 * least, "{cost} {least}");
+    // updates without changes lead to the minimum
+    let [cost, least] = [mapper, expected].map(|mut mapper| {
+        (0..20).for_each(|_| _ = mapper.session().update().unwrap());
+        mapper.session().cost()
+    });
+    assert!((cost - least).abs() < 0.01 * least, "{cost} {least}");
     most
 }
 

@@ -93,7 +93,9 @@ fn run_of(text: &str, sets: &[&str]) -> RunDocument {
 fn both(run: &RunDocument, variant: &Variant, data: Option<PathBuf>) -> (VariantReport, VariantReport, Kept) {
     let (mut kept, mut run) = (Kept::default(), Run::new(run, data));
     let (_, online) = run.variant_online(variant, &mut kept, &mut Silent).unwrap();
-    let (_, batch) = run.variant(variant, &mut Silent).unwrap();
+    // a stream says a little of the shape of all objects
+    let batch = Variant { settings: variant.settings.clone().for_stream(), ..variant.clone() };
+    let (_, batch) = run.variant(&batch, &mut Silent).unwrap();
     (online, batch, kept)
 }
 
@@ -214,7 +216,7 @@ fn an_object_whose_class_changes_gets_the_factors_of_the_other() {
     let key = format!("q{}", id.unwrap());
     let rules = graph.factors().iter().filter(|f| f.keys.len() == 1 && f.keys[0].as_str() == key);
     let rules: Vec<&str> = rules.map(|f| f.factor.typetag_name()).collect();
-    assert_eq!(rules, ["horizontal_orientation"]);
+    assert_eq!(rules, ["horizontal_orientation", "shape_prior"]);
 }
 
 #[test]
@@ -377,6 +379,15 @@ fn recommended() -> Settings {
 
 #[test]
 fn no_object_collapses_or_runs_away_while_a_stream_comes() {
+    let settings = recommended();
+    let mut without = settings.clone();
+    without.semantics.retain(|rule| rule.factor.name() != "shape_prior");
+    assert_eq!(without.semantics.len() + 1, settings.semantics.len());
+    // a weak one is the default
+    [settings, without.for_stream()].iter().for_each(keeps_shapes);
+}
+
+fn keeps_shapes(settings: &Settings) {
     let desk = std::fs::read_to_string(root().join("examples/desk/desk.toml")).unwrap();
     let (_, sequence) = scene(&desk);
     let sequence = Sequence {
@@ -384,7 +395,7 @@ fn no_object_collapses_or_runs_away_while_a_stream_comes() {
         detections: sequence.detections.iter().map(|d| Detection { object: None, ..d.clone() }).collect(),
         ..sequence
     };
-    let mut mapper = Mapper::new(sequence.opening(), &recommended()).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
     let mut most = 0;
     for observation in sequence.observations() {
         let report = mapper.take(&observation).unwrap();

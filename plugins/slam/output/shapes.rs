@@ -1,0 +1,22 @@
+//! Ellipsoids whose shape no box constrains: a plate, or one that reaches further than any camera was away.
+use crate::estimate::Estimate;
+use crate::mapping::Warning;
+
+/// How many times longer the longest semi-axis may be than the shortest. A sheet of paper on a desk has about 100.
+const PLATE: f64 = 200.0;
+
+/// The objects with such shapes, if there are any.
+pub(super) fn run_away(estimate: &Estimate) -> Option<Warning> {
+    let poses = estimate.trajectory();
+    let mut objects = vec![];
+    for landmark in estimate.landmarks() {
+        let (axes, centre) = (landmark.quadric.semi_axes, landmark.quadric.pose.translation);
+        let distances = poses.iter().map(|stamped| (stamped.pose.translation - centre).norm());
+        let farthest = distances.fold(0.0, f64::max);
+        if axes.max() > PLATE * axes.min() || axes.max() > farthest {
+            objects
+                .push(format!("{} ({:.3} × {:.3} × {:.3} m)", landmark.object.key, axes.x, axes.y, axes.z));
+        }
+    }
+    (!objects.is_empty()).then_some(Warning::RunAway { objects })
+}
