@@ -72,7 +72,7 @@ impl Cli {
         match &self.command {
             Command::Run(command) => command.run(self.verbose),
             Command::Online(command) => command.run(self.verbose),
-            Command::Plot(command) => command.run(),
+            Command::Plot(command) => command.run(self.verbose),
             Command::Experiment(command) => command.run(),
             Command::Solve(command) => command.run(self.verbose),
             Command::Replay(command) => command.run(),

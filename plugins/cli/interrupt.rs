@@ -12,7 +12,7 @@ pub(crate) fn on_ctrl_c() -> Interrupt {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        output::say("interrupted: ending with the best values so far; once more to quit at once");
+        output::say("interrupted: ending with what there is so far; once more to quit at once");
     };
     if let Err(error) = ctrlc::set_handler(handler) {
         output::say(&format!("Ctrl-C will end the program at once: {error}"));

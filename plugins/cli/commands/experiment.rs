@@ -12,8 +12,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use manifactor::slam::experiment::{self, Experiment as Sweep, Journal, Progress, Shard, Summary};
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::slam::source::Folders;
+use manifactor::solve::{Interrupt, Observer};
 use manifactor::viz::{experiment_page, experiment_pictures};
 use std::io::IsTerminal;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -78,22 +80,36 @@ impl Experiment {
         if self.retry_failed {
             journal.retry_failed();
         }
-        let interrupt = interrupt::on_ctrl_c();
+        let mut interrupt = interrupt::on_ctrl_c();
         let bar = Bar::new(&sweep.title);
         let threads = rayon::current_num_threads();
         let show = |progress| bar.show(progress);
         let complete = experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show)?;
-        drop(bar);
-        let status = if complete { Status::Done } else { Status::Interrupted };
+        let mut status = if complete { Status::Done } else { Status::Interrupted };
         if self.shard.is_some() {
+            drop(bar);
             let (trials, folder) = (count(sweep.trials.len(), "trial"), sweep.output.display());
             output::say(&format!(
                 "This part has {trials}: {folder}. The same command without --shard makes the tables."
             ));
             return Ok(status);
         }
-        let summary = write_experiment(&sweep, &journal, document.source().text())?;
+        // one that has ended the trials does not end the drawing as well
+        if !complete {
+            interrupt = Interrupt::default();
+        }
+        let (summary, is_drawn) = write_until(&sweep, &journal, document.source().text(), |file| {
+            bar.show_drawing(file);
+            interrupt.poll()
+        })?;
+        drop(bar);
         self.tell(&sweep, &summary);
+        if !is_drawn {
+            status = Status::Interrupted;
+            output::say(
+                "interrupted: pictures are missing, or those of an earlier run; the same command draws them",
+            );
+        }
         if let Some(page) = self.markdown.as_ref().filter(|_| summary.open == 0) {
             write_whole(page, self.put_into(page, &sweep.digest(), &summary.markdown())?)?;
         }
@@ -135,13 +151,25 @@ impl Experiment {
 /// # Errors
 /// If one cannot be written; those before it are there.
 pub fn write_experiment(sweep: &Sweep, journal: &Journal, text: &str) -> Result<Summary, Failure> {
+    write_until(sweep, journal, text, |_| ControlFlow::Continue(())).map(|(summary, _)| summary)
+}
+
+/// Writes all files of an experiment, the pictures last. `goes_on` can end the drawing before each file; returns also
+/// whether all pictures are written.
+fn write_until(
+    sweep: &Sweep,
+    journal: &Journal,
+    text: &str,
+    goes_on: impl FnMut(&str) -> ControlFlow<()>,
+) -> Result<(Summary, bool), Failure> {
     let summary = experiment::write(sweep, journal)?;
     let trials = experiment::trials_table(sweep, journal);
-    let look = Look::default();
-    look.write(&sweep.output, &experiment_pictures(sweep, &summary, &trials, look.width()))?;
     let page = experiment_page(sweep, &summary, &trials, text);
     write_whole(&sweep.output.join("report.html"), page)?;
-    Ok(summary)
+    let look = Look::default();
+    let pictures = experiment_pictures(sweep, &summary, &trials, look.width());
+    let is_drawn = look.write(&sweep.output, &pictures, goes_on)?;
+    Ok((summary, is_drawn))
 }
 
 /// How far it is: a bar on a terminal, a line now and then in a file.
@@ -184,6 +212,13 @@ impl Bar {
                 output::say(&format!("{done} of {} done, {kept} of them before", count(trials, "trial")));
             }
             Self::Lines => {}
+        }
+    }
+
+    /// Names the picture that is drawn, once all trials are done.
+    fn show_drawing(&self, file: &str) {
+        if let Self::Terminal(bar) = self {
+            bar.set_message(format!("drawing {file}"));
         }
     }
 }

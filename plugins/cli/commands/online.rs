@@ -53,9 +53,9 @@ fn faster(text: &str) -> Result<f64, String> {
 impl Online {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         let mut interrupt = interrupt::on_ctrl_c();
-        let flag = interrupt.0.clone();
+        let for_results = interrupt.clone();
         let mut view = self.view.map(View::open).transpose()?;
-        let report = self.options.run_as("online", &flag, |run, variant| {
+        let report = self.options.run_as("online", verbose, for_results, |run, variant| {
             if let Some(view) = &mut view {
                 view.begin(&run.document.title, &variant.name, self.options.json);
             }

@@ -1,13 +1,15 @@
 //! `manifactor plot`: the pictures of a run, made again.
 use crate::failure::Failure;
 use crate::input::pictures::Look;
+use crate::interrupt;
 use crate::output;
 use crate::output::text::count;
+use crate::output::watch::Watch;
 use crate::status::Status;
 use clap::Args;
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::slam::record::{RecordError, RunRecord};
-use manifactor::viz::{ply, run_pictures};
+use manifactor::viz::ply;
 use std::path::PathBuf;
 
 /// Make the pictures of a run again, from its folder: at another size, with another theme.
@@ -28,21 +30,24 @@ pub(crate) struct Plot {
 }
 
 impl Plot {
-    pub(crate) fn run(&self) -> Result<Status, Failure> {
+    pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
+        let mut interrupt = interrupt::on_ctrl_c();
         let record = RunRecord::read(&self.folder)?;
         let out = self.out.as_ref().unwrap_or(&self.folder);
         // the run's own pictures are made again; another folder has to be ours
         let claim = |out| OutputFolder::claim(out, "plot", &self.folder, self.force);
         let _claimed = self.out.as_deref().map(claim).transpose()?;
-        let mut written = 0;
         for variant in &record.variants {
-            let pictures = run_pictures(&record, variant, self.look.width());
-            let folder = out.join(&variant.folder);
-            self.look.write(&folder, &pictures)?;
-            write_whole(&folder.join("map.ply"), ply(&record, variant))?;
-            written += pictures.len();
+            write_whole(&out.join(&variant.folder).join("map.ply"), ply(&record, variant))?;
         }
-        output::print(&format!("{} written to {}.\n", count(written, "picture"), out.display()));
+        let mut watch = Watch::new(verbose, &record.title);
+        let drawn = self.look.draw_run(out, &record, &mut watch, &mut interrupt)?;
+        drop(watch);
+        if let Some(missing) = drawn.message(&self.folder) {
+            output::say(&missing);
+            return Ok(Status::Interrupted);
+        }
+        output::print(&format!("{} written to {}.\n", count(drawn.pictures, "picture"), out.display()));
         Ok(Status::Done)
     }
 }

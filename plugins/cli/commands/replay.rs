@@ -17,6 +17,7 @@ use manifactor::solve::{All, Interrupt, Silent};
 use manifactor::viz::latencies;
 use serde_json::json;
 use std::collections::HashSet;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -108,7 +109,7 @@ impl Replay {
             let title = format!("{}: latency of each update", self.graph.display());
             let look = Look::default();
             let picture = latencies(&title, &replayed.times, look.width());
-            look.write(folder, picture.as_slice())?;
+            look.write(folder, picture.as_slice(), |_| ControlFlow::Continue(()))?;
         }
         self.tell(&mut replayed, cost, finished.as_ref(), batch);
         Ok(match finished {

@@ -13,10 +13,10 @@ use manifactor::slam::record::{RunRecord, VariantRecord};
 use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::slam::run::{Run as Running, RunError};
 use manifactor::slam::run_document::Variant;
-use manifactor::solve::All;
-use manifactor::viz::{latencies, ply, run_page, run_pictures};
+use manifactor::solve::{All, Interrupt, Observer};
+use manifactor::viz::{latencies, ply, run_page};
+use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Build, solve, evaluate and write what a document describes.
 ///
@@ -30,7 +30,7 @@ pub(crate) struct Run {
     pub(crate) options: RunOptions,
 }
 
-/// What commands take that write the results of a run.
+/// Options of the commands that write the results of a run.
 #[derive(Debug, Args)]
 pub(crate) struct RunOptions {
     #[command(flatten)]
@@ -49,8 +49,7 @@ pub(crate) struct RunOptions {
 impl Run {
     pub(crate) fn run(&self, verbose: u8) -> Result<Status, Failure> {
         let mut interrupt = interrupt::on_ctrl_c();
-        let flag = interrupt.0.clone();
-        let report = self.options.run_as("run", &flag, |run, variant| {
+        let report = self.options.run_as("run", verbose, interrupt.clone(), |run, variant| {
             let mut watch = Watch::new(verbose, &variant.name);
             run.variant(variant, &mut All(vec![&mut watch, &mut interrupt]))
         })?;
@@ -62,11 +61,13 @@ impl Run {
 }
 
 impl RunOptions {
-    /// Estimates each variant, until `interrupted`, writes all that there is to write, and prints the table, unless JSON is asked for.
+    /// Estimates each variant until an interrupt, writes all results, and prints the table unless JSON is asked for. An interrupt
+    /// that comes after the solves ends the drawing of pictures, and the report says that the run is not complete.
     pub(super) fn run_as(
         &self,
         command: &str,
-        interrupted: &AtomicBool,
+        verbose: u8,
+        mut interrupt: Interrupt,
         mut estimate: impl FnMut(&mut Running<'_>, &Variant) -> Result<(Estimate, VariantReport), RunError>,
     ) -> Result<RunReport, Failure> {
         let mut document = self.run.open()?;
@@ -82,31 +83,49 @@ impl RunOptions {
         for variant in &document.variants {
             tracing::info!("variant {}", variant.name);
             let (estimate, report) = estimate(&mut run, variant)?;
+            let mut watch = Watch::new(verbose, &variant.name);
+            watch.show("writing the results");
             let record = VariantRecord::new(variant, &estimate);
             let folder = write_variant(&document, variant, &estimate, &report, &record)?;
             if let Some(online) = &report.online {
                 let title = format!("{}: latency of each frame", variant.name);
-                look.write(&folder, latencies(&title, &online.seconds, look.width()).as_slice())?;
+                let picture = latencies(&title, &online.seconds, look.width());
+                look.write(&folder, picture.as_slice(), |_| ControlFlow::Continue(()))?;
             }
             configs.push(std::fs::read_to_string(folder.join("config.toml")).map_err(Failure::at(&folder))?);
             records.push(record);
-            if interrupted.load(Ordering::Relaxed) {
+            if interrupt.poll().is_break() {
                 break;
             }
         }
-        let report = run.finish();
+        let mut watch = Watch::new(verbose, &document.title);
+        watch.show("writing the report");
+        let mut report = run.finish();
         let record = RunRecord::new(&document.title, records);
         write_report(&document.output, &report, &record)?;
         write_whole(&document.output.join("report.html"), run_page(&report, &record, &configs))?;
         for variant in &record.variants {
             let folder = document.output.join(&variant.folder);
-            look.write(&folder, &run_pictures(&record, variant, look.width()))?;
             write_whole(&folder.join("map.ply"), ply(&record, variant))?;
         }
+        // one that has ended a stream or a solve does not end the drawing as well
+        if !report.complete {
+            interrupt = Interrupt::default();
+        }
+        let drawn = look.draw_run(&document.output, &record, &mut watch, &mut interrupt)?;
+        let missing = drawn.message(&document.output);
+        if missing.is_some() {
+            report.complete = false;
+            write_report(&document.output, &report, &record)?;
+        }
+        drop(watch);
         if !self.json {
             output::print(&table::of_run(&report));
             let out = document.output.display();
             output::print(&format!("\nWritten to {out}; open {out}/report.html in a browser.\n"));
+        }
+        if let Some(missing) = missing {
+            output::say(&missing);
         }
         Ok(report)
     }

@@ -1,8 +1,13 @@
 //! Pictures, which go to files.
 use crate::failure::Failure;
+use crate::output::text::on_one_line;
+use crate::output::watch::Watch;
 use clap::{Args, ValueEnum};
 use manifactor::slam::output::write_whole;
-use manifactor::viz::{Picture, Theme};
+use manifactor::slam::record::RunRecord;
+use manifactor::solve::{Interrupt, Observer};
+use manifactor::viz::{Picture, Theme, run_pictures};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// How pictures look.
@@ -37,17 +42,118 @@ impl Look {
         self.size.into()
     }
 
-    /// Writes pictures into a folder, each as SVG and as PNG.
-    pub(crate) fn write(self, folder: &Path, pictures: &[Picture]) -> Result<(), Failure> {
+    /// Writes pictures into a folder, each as SVG and as PNG. `goes_on` gets the name of each file before it is drawn, and
+    /// `Break` ends the drawing there: the files before it stay. Returns whether all files are written.
+    pub(crate) fn write(
+        self,
+        folder: &Path,
+        pictures: &[Picture],
+        mut goes_on: impl FnMut(&str) -> ControlFlow<()>,
+    ) -> Result<bool, Failure> {
         let theme = match self.theme {
             Shade::Light => Theme::Light,
             Shade::Dark => Theme::Dark,
         };
         for picture in pictures {
-            write_whole(&folder.join(format!("{}.svg", picture.name)), picture.svg(theme))?;
-            let png = picture.png(theme).map_err(Failure::input)?;
-            write_whole(&folder.join(format!("{}.png", picture.name)), png)?;
+            let [svg, png] = ["svg", "png"].map(|ending| format!("{}.{ending}", picture.name));
+            if goes_on(&svg).is_break() {
+                return Ok(false);
+            }
+            write_whole(&folder.join(&svg), picture.svg(theme))?;
+            if goes_on(&png).is_break() {
+                return Ok(false);
+            }
+            let content = picture.png(theme).map_err(Failure::input)?;
+            write_whole(&folder.join(&png), content)?;
         }
-        Ok(())
+        Ok(true)
+    }
+
+    /// Draws the pictures of all variants of a run into their folders in `out`, until an interrupt. `watch` shows the files.
+    pub(crate) fn draw_run(
+        self,
+        out: &Path,
+        record: &RunRecord,
+        watch: &mut Watch,
+        interrupt: &mut Interrupt,
+    ) -> Result<Drawn, Failure> {
+        let mut drawn = Drawn { pictures: 0, missing: vec![] };
+        for variant in &record.variants {
+            tracing::info!("pictures of {}", variant.name);
+            let is_complete = interrupt.poll().is_continue() && {
+                watch.show(&format!("drawing the pictures of {}", variant.name));
+                let pictures = run_pictures(record, variant, self.width());
+                drawn.pictures += pictures.len();
+                self.write(&out.join(&variant.folder), &pictures, |file| {
+                    watch.show(&format!("drawing {}/{file}", variant.folder));
+                    interrupt.poll()
+                })?
+            };
+            if !is_complete {
+                drawn.missing.push(variant.name.clone());
+            }
+        }
+        tracing::info!("all pictures are drawn");
+        Ok(drawn)
+    }
+}
+
+/// The pictures of a run, as far as they were drawn.
+pub(crate) struct Drawn {
+    /// Number of pictures, if none is missing.
+    pub(crate) pictures: usize,
+    /// Variants of which an interrupt left out a picture.
+    pub(crate) missing: Vec<String>,
+}
+
+impl Drawn {
+    /// Returns the missing pictures in a sentence, and the command that draws them; `None` if there are all.
+    pub(crate) fn message(&self, out: &Path) -> Option<String> {
+        let variants: Vec<_> = self.missing.iter().map(|name| on_one_line(name)).collect();
+        let out = out.display();
+        (!variants.is_empty()).then(|| {
+            format!(
+                "interrupted: pictures of {} are missing, or those of an earlier run; `manifactor plot {out}` draws them",
+                variants.join(", ")
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor::viz::latencies;
+
+    #[test]
+    fn an_interrupt_ends_the_drawing_before_the_next_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = latencies("latency", &[0.1, 0.2], 300.0).unwrap();
+        let mut other = picture.clone();
+        other.name = "other".to_owned();
+        let mut interrupt = Interrupt::default();
+        let flag = interrupt.0.clone();
+        // raised while the first picture is drawn
+        let goes_on = |file: &str| {
+            let flow = interrupt.poll();
+            flag.store(file == "latency.png", std::sync::atomic::Ordering::Relaxed);
+            flow
+        };
+        assert!(!Look::default().write(folder.path(), &[picture, other], goes_on).unwrap());
+        let files = std::fs::read_dir(folder.path()).unwrap();
+        let mut files: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
+        files.sort_unstable();
+        assert_eq!(files, ["latency.png", "latency.svg"]);
+    }
+
+    #[test]
+    fn variants_without_all_pictures_are_named() {
+        let out = Path::new("out");
+        assert_eq!(Drawn { pictures: 8, missing: vec![] }.message(out), None);
+        let text = Drawn { pictures: 8, missing: vec!["a".to_owned(), "b".to_owned()] }.message(out).unwrap();
+        assert!(
+            text.contains("pictures of a, b are missing") && text.contains("`manifactor plot out`"),
+            "{text}"
+        );
     }
 }

@@ -36,6 +36,13 @@ impl Watch {
         bar.enable_steady_tick(Duration::from_millis(100));
         Self::Bar(bar)
     }
+
+    /// Shows the work after the solve on the bar. With `-v` the log shows it.
+    pub(crate) fn show(&mut self, work: &str) {
+        if let Self::Bar(bar) = self {
+            bar.set_message(on_one_line(work).into_owned());
+        }
+    }
 }
 
 /// Shows what all parts log: nothing but warnings, without `-v`; what was done with one; how, with two.

@@ -63,7 +63,7 @@ fn codes(ending: &str) -> Vec<i32> {
         ]),
         "interrupted, when all was done" => {
             let work = AtWork::begin(&format!("run {} --out {}", at("run.toml"), at("out")));
-            vec![work.until("converged", 0).ended_by("-INT").code]
+            vec![work.until("all pictures are drawn", 0).ended_by("-INT").code]
         }
         "a sweep is complete, though trials of it failed" => codes(&["experiment @sweep.toml --out @out"]),
         "stalled" => codes(&["solve @rising.toml --solver gauss_newton"]),

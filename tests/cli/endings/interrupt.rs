@@ -1,7 +1,7 @@
 //! Ctrl-C and SIGTERM while a solve is under way: at what the program says of its work, not after a time.
 use crate::{Ran, folder, manifactor, path, root};
 use serde_json::Value;
-use std::io::{BufRead, BufReader, Lines, Read};
+use std::io::{BufRead, BufReader, Lines, Read, Write};
 use std::process::{Child, ChildStderr, Command, Stdio};
 
 /// Gauss-Newton on x² + 1, which has no root: x jumps about without end, and no step is the last. (The cost rises where
@@ -57,9 +57,18 @@ impl AtWork {
         self
     }
 
-    /// Sends a signal, unless it has ended meanwhile, and waits for the end.
-    pub(crate) fn ended_by(mut self, signal: &str) -> Ran {
+    /// Sends a signal, unless it has ended meanwhile.
+    fn signal(self, signal: &str) -> Self {
         let _ = Command::new("kill").args([signal, &self.child.id().to_string()]).output().unwrap();
+        self
+    }
+
+    /// Sends a signal, unless it has ended meanwhile, and waits for the end.
+    pub(crate) fn ended_by(self, signal: &str) -> Ran {
+        self.signal(signal).end()
+    }
+
+    fn end(mut self) -> Ran {
         self.stderr.for_each(|line| self.said += &(line.unwrap() + "\n"));
         let mut stdout = String::new();
         self.child.stdout.take().unwrap().read_to_string(&mut stdout).unwrap();
@@ -80,7 +89,7 @@ fn a_signal_ends_a_solve_with_the_best_values_written() {
         let out = path(&folder, &format!("solved{signal}.json"));
         let solve = AtWork::begin(&format!("solve {} --out {out}", path(&folder, "graph.toml")));
         let ran = solve.until("iteration", 20).ended_by(signal).ended(130);
-        assert!(ran.stderr.contains("interrupted: ending with the best values"), "{}", ran.stderr);
+        assert!(ran.stderr.contains("interrupted: ending with what there is"), "{}", ran.stderr);
         assert!(ran.stdout.contains("interrupted"), "{}", ran.stdout);
         // whole, and no worse than where it began
         let x = read(&out)["variables"][0]["value"]["position"][0].as_f64().unwrap();
@@ -124,10 +133,36 @@ fn a_signal_at_any_time_leaves_a_folder_that_says_it_is_partial() {
 
 #[test]
 #[cfg(unix)]
-fn a_signal_after_the_last_solve_interrupts_nothing() {
+fn a_signal_after_the_last_picture_interrupts_nothing() {
     let folder = folder(&[("run.toml", RUN)]);
     let (config, out) = (path(&folder, "run.toml"), path(&folder, "out"));
-    AtWork::begin(&format!("run {config} --out {out}")).until("converged", 0).ended_by("-INT").ended(0);
+    AtWork::begin(&format!("run {config} --out {out}"))
+        .until("all pictures are drawn", 0)
+        .ended_by("-INT")
+        .ended(0);
     assert_eq!(read(&format!("{out}/report.json"))["complete"], true);
     manifactor(&format!("check {out}/estimate/config.toml")).ended(0);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_ends_the_drawing_of_pictures() {
+    let folder = folder(&[("run.toml", RUN)]);
+    let (config, out, plots) = (path(&folder, "run.toml"), path(&folder, "out"), path(&folder, "plots"));
+    manifactor(&format!("run {config} --out {out}")).ended(0);
+    // a pipe in place of the record: the command waits for it with its handler of signals in place
+    let record = std::fs::read(format!("{out}/record.json")).unwrap();
+    let pipe = path(&folder, "run/record.json");
+    std::fs::create_dir(path(&folder, "run")).unwrap();
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let plot = AtWork::begin(&format!("plot {} --out {plots}", path(&folder, "run")));
+    let mut writer = std::fs::File::options().write(true).open(&pipe).unwrap();
+    let plot = plot.signal("-INT").until("interrupted: ending", 0);
+    writer.write_all(&record).unwrap();
+    drop(writer);
+    let ran = plot.end().ended(130);
+    ran.complains("pictures of estimate are missing");
+    let files = std::fs::read_dir(format!("{plots}/estimate")).unwrap();
+    let files: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
+    assert_eq!(files, ["map.ply"]);
 }
