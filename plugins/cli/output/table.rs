@@ -1,7 +1,7 @@
 //! The table that a run prints.
 use crate::output::text::{self, Table, on_one_line, seconds};
 use manifactor::slam::mapping::object_key;
-use manifactor::slam::report::{Mean, Prediction, RunReport, VariantReport};
+use manifactor::slam::report::{Mean, Prediction, RunReport, TrajectoryReport, VariantReport};
 use manifactor::slam::sequence::ObjectId;
 use manifactor::slam::variance::{BoxComponent, LastingComponent, MotionComponent, Score};
 
@@ -18,7 +18,11 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     }
     let mut out = format!("{}\n{}\n", on_one_line(&report.title), table.text());
     if let Some(alignment) = report.variants.iter().find_map(|v| v.row().alignment) {
-        out += &format!("ATE: RMSE of the camera's positions, aligned by {alignment}.\n");
+        let line = format!(
+            "ATE: RMSE of the camera's positions, aligned by {alignment}, over {}.",
+            poses_covered(&report.variants)
+        );
+        out += &(text::wrap(&line) + "\n");
     }
     if report.variants.iter().any(|v| v.landmarks.is_some()) {
         out += &(text::wrap(LANDMARKS) + "\n");
@@ -52,7 +56,23 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     out
 }
 
-/// What the columns about objects mean.
+/// The poses that the trajectory errors cover: once if all variants agree, else by variant.
+fn poses_covered(variants: &[VariantReport]) -> String {
+    let covered = |v: &VariantReport| Some((on_one_line(&v.name).into_owned(), over(v.trajectory.first()?)));
+    let covered: Vec<(String, String)> = variants.iter().filter_map(covered).collect();
+    match covered.first() {
+        Some((_, first)) if covered.iter().all(|(_, other)| other == first) => first.clone(),
+        _ => covered.iter().map(|(name, over)| format!("{over} in {name}")).collect::<Vec<_>>().join(", "),
+    }
+}
+
+/// The poses that one trajectory error covers.
+fn over(trajectory: &TrajectoryReport) -> String {
+    let [covered, poses] = trajectory.covered;
+    format!("{covered} of {} (truth: {})", text::count(poses, "pose"), trajectory.truth_poses)
+}
+
+/// The columns about objects.
 const LANDMARKS: &str = "Position, shape, quality of the objects against the truth: RMSE of the centres; mean Jaccard distance \
                          of the boxes around them, centred and where they stand: 0 is perfect, 1 is no overlap.";
 
@@ -72,7 +92,8 @@ fn stream(variant: &VariantReport) -> String {
         online.cost
     );
     if let Some(trajectory) = online.trajectory.first() {
-        text += &format!(", ATE of poses as their frames came {} m", metres(trajectory.estimate.ate.rmse));
+        let ate = metres(trajectory.estimate.ate.rmse);
+        text += &format!(", ATE of poses as their frames came {ate} m over {}", over(trajectory));
     }
     if online.refusals > 0 {
         text += &format!(", {} refused", text::count(online.refusals, "frame or change"));

@@ -23,7 +23,9 @@ fn the_table_names_its_units() {
     let file = path(&folder, "truth.txt");
     let text = manifactor(&format!("evaluate {file} {file}")).ended(0).stdout;
     assert!(
-        text.contains("4 matched poses") && text.contains("ATE, m") && text.contains("RPE rotation, rad"),
+        text.contains("4 matched poses (4 in the estimate, 4 in the truth)")
+            && text.contains("ATE, m")
+            && text.contains("RPE rotation, rad"),
         "{text}"
     );
 }

@@ -15,6 +15,8 @@ pub struct TrajectoryReport {
     pub alignment: Alignment,
     /// Poses of the estimate for which there is a true one, and all of its poses.
     pub covered: [usize; 2],
+    /// Number of true poses.
+    pub truth_poses: usize,
     /// By odometry alone.
     pub odometry: TrajectoryError,
     /// As it is estimated.
@@ -54,6 +56,7 @@ pub(super) fn compare(
         Ok(TrajectoryReport {
             alignment,
             covered,
+            truth_poses: truth.trajectory.len(),
             odometry: error(&before)?,
             estimate: error(&after)?,
             change,
@@ -66,7 +69,7 @@ pub(super) fn compare(
             Err(error) => warnings.push(Warning::NotEvaluated { reason: error.to_string() }),
         }
     }
-    warnings.extend(reports.first().and_then(|report| few(report, truth.trajectory.len(), settings)));
+    warnings.extend(reports.first().and_then(|report| few(report, settings)));
     warnings.extend(reports.first().and_then(worse));
     reports
 }
@@ -91,8 +94,9 @@ fn aligned(
 }
 
 /// A figure over less than half of the poses says little of the rest.
-fn few(report: &TrajectoryReport, truth: usize, settings: &EvaluationSettings) -> Option<Warning> {
+fn few(report: &TrajectoryReport, settings: &EvaluationSettings) -> Option<Warning> {
     let [covered, poses] = report.covered;
+    let truth = report.truth_poses;
     let within = settings.max_time_difference;
     (2 * covered < poses.min(truth)).then_some(Warning::FewPoses { covered, poses, truth, within })
 }
