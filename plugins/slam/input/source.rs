@@ -143,6 +143,17 @@ pub enum SourceError {
         /// By how much, in seconds.
         ahead: f64,
     },
+    /// A first timestamp that comes after those of the next two frames.
+    #[error(
+        "the first timestamp {timestamp} s comes after those of the next two frames, {} s and {} s: the frame is left out; \
+         check the clock of the source", next[0], next[1]
+    )]
+    FirstAhead {
+        /// In seconds.
+        timestamp: f64,
+        /// In seconds.
+        next: [f64; 2],
+    },
     /// A line that is no frame.
     #[error("{}, line {line}: {message}", file.display())]
     Line {
