@@ -34,7 +34,10 @@ pub struct Report {
     pub undetermined: Vec<(Key, &'static str)>,
     /// Variables that have left: their factors are part of a linear prior now.
     pub sealed: Vec<Key>,
-    /// Factors that were dropped with them, as they took no part.
+    /// Variables that were to leave and stay, as their linear prior or the sums with it overflow. A window tries them again with
+    /// the next update. Remedy: scale the noise of their factors.
+    pub stayed: Vec<Key>,
+    /// Factors that were dropped with those that have left, as they took no part.
     pub dropped: Vec<FactorId>,
     /// Factors that this update has rejected as outliers.
     pub rejected: Vec<FactorId>,

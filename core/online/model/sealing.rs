@@ -3,6 +3,7 @@
 //! With the quadratic ½ δᵀHδ + gᵀδ + c of the factors of a variable, split into its own part L and the others' part B,
 //! eliminating it leaves the Schur complement H_BB − H_BL H_LL⁻¹ H_LB, and g and c in the same way.
 use super::{Factor, Model};
+use crate::fronts::Overflow;
 use manifactor_graph::batch::Evaluation;
 use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
@@ -31,8 +32,11 @@ struct Dense {
 }
 
 impl Model {
-    /// What is left of these factors without a variable; `None` where that is nothing, or not finite.
-    pub(crate) fn without(&self, variable: u32, factors: &[u32]) -> Option<Prior> {
+    /// Eliminates a variable from these factors. Returns the linear prior of the others; `None` if they have no information.
+    ///
+    /// # Errors
+    /// If the prior is not finite, or too large for sums with other factors.
+    pub(crate) fn without(&self, variable: u32, factors: &[u32]) -> Result<Option<Prior>, Overflow> {
         let of_factors = factors.iter().filter_map(|f| self.factor(*f)).flat_map(|f| f.variables());
         let mut others: Vec<u32> =
             of_factors.filter(|v| *v != variable && !self.place(*v).is_held()).collect();
@@ -58,7 +62,10 @@ impl Model {
         // their sums with other factors have to be finite too
         let is_small = h.iter().chain(&g).chain([&constant]).all(|x| x.abs() < 1e150);
         let says_something = h.iter().any(|x| *x != 0.0);
-        (is_small && says_something).then_some(Prior { variables: others, h, g, constant })
+        match is_small {
+            true => Ok(says_something.then_some(Prior { variables: others, h, g, constant })),
+            false => Err(Overflow(variable)),
+        }
     }
 
     /// The sum of factors over these variables, in their order; others are left out.

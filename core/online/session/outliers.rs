@@ -205,18 +205,12 @@ impl Session {
         factors.iter().map(share).max_by(|(f, a), (g, b)| a.total_cmp(b).then(g.cmp(f)))
     }
 
-    /// Drops the rejected factors of a variable that leaves.
-    pub(super) fn drop_rejected(&mut self, variable: u32, report: &mut Report) {
+    /// Returns the rejected factors of a variable.
+    pub(super) fn rejected_of(&self, variable: u32) -> Vec<u32> {
         let is_of = |f: &u32| {
             self.model.factor(*f).is_some_and(|f| f.rejected && f.variables().any(|v| v == variable))
         };
-        let rejected: Vec<u32> = self.rejected.iter().copied().filter(is_of).collect();
-        for f in rejected {
-            self.model.remove(f);
-            self.forget_suspect(f);
-            self.gone_factors.insert(u64::from(f));
-            report.dropped.push(FactorId(f));
-        }
+        self.rejected.iter().copied().filter(is_of).collect()
     }
 
     /// Makes changes of what counts, and redoes what they touch; what takes them back. Where that fails, all is as it was.

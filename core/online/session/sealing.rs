@@ -5,20 +5,42 @@
 //! another would tell the estimate of directions that nothing has measured (first estimates; Huang, Mourikis and Roumeliotis,
 //! 2008).
 use super::Session;
-use super::changes::Touched;
+use super::changes::{Change, Touched};
 use super::parking::Moves;
 use crate::error::ChangeError;
 use crate::factor_id::FactorId;
 use crate::fronts::Overflow;
+use crate::model::Prior;
 use crate::report::Report;
 use crate::tree::Couplings;
 use manifactor_graph::Key;
+
+/// What sealing has changed in the model, to take it back; and the factors that are gone once it succeeds.
+#[derive(Default)]
+struct Sealing {
+    steps: Vec<Step>,
+    gone: Vec<u32>,
+    dropped: Vec<u32>,
+}
+
+/// A step that takes one change of the model back.
+enum Step {
+    /// Inserts a factor again, with the share of its weight.
+    Factor(Change, u32, f64),
+    /// Inserts a linear prior again.
+    Prior(u32, Prior),
+    /// Removes a new linear prior.
+    Remove(u32),
+    /// Restores whether a variable was parked.
+    Parked(u32, bool),
+}
 
 impl Session {
     /// Has variables leave, at the end of the next [`update`](Self::update): what their factors say of others stays, as a linear
     /// prior, and those others keep their linearization points until they leave as well. Estimates and covariances of what
     /// stays are what they were. Factors that do not count where they are left, as they are not defined there or hang
-    /// on something that is parked, are dropped, and the report names them. One that has no factors then leaves nothing behind: another may have
+    /// on something that is parked, are dropped, and the report names them. If a prior overflows, all of these variables stay, and the
+    /// report names them as well. One that has no factors then leaves nothing behind: another may have
     /// its key.
     ///
     /// # Errors
@@ -49,7 +71,8 @@ impl Session {
         }
     }
 
-    /// Seals what these variables leave behind, one after the other, and solves again.
+    /// Seals what these variables leave behind, one after the other, and solves again. If that fails, all of them stay, with their
+    /// factors.
     pub(super) fn seal(&mut self, leaving: &[u32], report: &mut Report) -> Result<(), Overflow> {
         if leaving.is_empty() {
             return Ok(());
@@ -62,14 +85,29 @@ impl Session {
         let mut touched = Touched::default();
         let is_bare = |v: &u32| self.model.factors_of(&[*v]).is_empty();
         let bare: Vec<u32> = leaving.iter().copied().filter(is_bare).collect();
+        let mut sealing = Sealing::default();
         for v in leaving {
-            self.seal_one(*v, &mut touched, report);
+            if let Err(overflow) = self.seal_one(*v, &mut touched, &mut sealing) {
+                self.take_back_sealing(sealing);
+                return Err(overflow);
+            }
         }
         // those that leave one after the other are each other's neighbours
         let is_there = |session: &Self, v: u32| !leaving.contains(&v) && session.model.place(v).is_there;
         touched.doubtful.retain(|v| is_there(self, *v));
         let moves = self.park(&mut touched);
-        let passed = self.pass(&touched, &moves, false, report);
+        if let Err(overflow) = self.pass(&touched, &moves, false, report) {
+            self.unpark(&moves);
+            self.take_back_sealing(sealing);
+            return Err(overflow);
+        }
+        for f in sealing.gone {
+            // the numbers of priors too: no one holds them, and the runs have no gaps
+            self.gone_factors.insert(u64::from(f));
+            self.inactive.remove(&f);
+            self.forget_suspect(f);
+        }
+        report.dropped.extend(sealing.dropped.into_iter().map(FactorId));
         for v in leaving {
             let key = self.key(*v);
             self.gone.insert(key.as_str(), !bare.contains(v));
@@ -77,39 +115,95 @@ impl Session {
             self.forget(*v);
         }
         self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
-        passed
+        Ok(())
+    }
+
+    /// Takes a sealing back that failed, the last step first.
+    fn take_back_sealing(&mut self, sealing: Sealing) {
+        let (mut touched, mut factors) = (Touched::default(), vec![]);
+        for step in sealing.steps.into_iter().rev() {
+            match step {
+                Step::Factor(change, number, share) => {
+                    change.apply(&mut self.model, &mut touched);
+                    if share != 1.0 {
+                        self.model.attenuate(number, share);
+                    }
+                    factors.push(number);
+                }
+                Step::Prior(number, prior) => {
+                    self.model.insert_prior(number, &prior);
+                    factors.push(number);
+                }
+                Step::Remove(number) => {
+                    self.model.remove(number);
+                    self.gone_factors.insert(u64::from(number));
+                }
+                Step::Parked(variable, parked) => self.model.place_mut(variable).parked = parked,
+            }
+        }
+        self.sort(&mut factors);
+        // at the same points, they have the same bits
+        self.model.linearize(&factors);
+        for f in factors {
+            self.model.count(f, self.model.is_whole(f));
+        }
+        self.model.sum_up();
     }
 
     /// Puts a prior in the place of a variable's factors. It is in the tree until the next pass.
-    fn seal_one(&mut self, variable: u32, touched: &mut Touched, report: &mut Report) {
+    fn seal_one(
+        &mut self,
+        variable: u32,
+        touched: &mut Touched,
+        sealing: &mut Sealing,
+    ) -> Result<(), Overflow> {
         let mut factors = self.model.factors_of(&[variable]);
         let counts = |f: &u32| self.model.is_whole(*f) && self.model.takes_part(*f);
         let (mut sealed, dropped): (Vec<u32>, Vec<u32>) = factors.iter().partition(|f| counts(f));
         sealed.extend(self.covered(&sealed, variable));
         sealed.sort_unstable();
-        let prior = self.model.without(variable, &sealed);
+        let prior = self.model.without(variable, &sealed)?;
         factors.extend(&sealed);
         factors.sort_unstable();
         factors.dedup();
+        let rejected = self.rejected_of(variable);
         for f in factors {
-            let Some(factor) = self.model.remove(f) else { continue };
-            touched.variables.extend(factor.variables());
-            // the numbers of priors too: no one holds them, and the runs have no gaps
-            self.gone_factors.insert(u64::from(f));
-            self.inactive.remove(&f);
-            self.forget_suspect(f);
+            touched.variables.extend(self.model.factor(f).into_iter().flat_map(|f| f.variables()));
+            self.remove_sealed(f, sealing);
         }
         touched.variables.push(variable);
-        for f in dropped {
-            report.dropped.push(FactorId(f));
+        for f in &rejected {
+            self.remove_sealed(*f, sealing);
         }
-        self.drop_rejected(variable, report);
+        sealing.dropped.extend(dropped.into_iter().chain(rejected));
         if let Some(prior) = prior {
-            self.model.insert_prior(self.model.next_factor(), &prior);
+            let number = self.model.next_factor();
+            self.model.insert_prior(number, &prior);
+            sealing.steps.push(Step::Remove(number));
         }
         touched.doubtful.extend(&touched.variables);
         // out of the tree
-        self.model.place_mut(variable).parked = true;
+        let parked = std::mem::replace(&mut self.model.place_mut(variable).parked, true);
+        sealing.steps.push(Step::Parked(variable, parked));
+        Ok(())
+    }
+
+    /// Removes a factor or a linear prior, and notes the step that takes that back.
+    fn remove_sealed(&mut self, number: u32, sealing: &mut Sealing) {
+        let Some(factor) = self.model.factor(number) else { return };
+        let share = factor.share;
+        let step = match self.model.prior(number) {
+            Some(prior) => {
+                self.model.remove(number);
+                Some(Step::Prior(number, prior))
+            }
+            None => {
+                let change = Change::Remove { number }.apply(&mut self.model, &mut Touched::default());
+                change.map(|change| Step::Factor(change, number, share))
+            }
+        };
+        sealing.steps.extend(step);
+        sealing.gone.push(number);
     }
 
     /// Priors of some of the others: they become part of the new one, so that there are no more of them than have to be.

@@ -25,7 +25,8 @@ const MANY: usize = 32;
 const NEWEST: usize = 8;
 
 impl Session {
-    /// Makes the changes since the last update, and brings the estimate up to date. Then those variables leave that are to.
+    /// Makes the changes since the last update, and brings the estimate up to date. Then variables leave
+    /// that are to; those whose linear prior overflows stay, and the report names them in [`stayed`](Report::stayed).
     /// The second of several without changes, and those after it, relinearize by 1e-8 of [`bend`](crate::Settings::bend) and
     /// [`deviation`](crate::Settings::deviation): repeated, it leads to the minimum.
     ///
@@ -88,9 +89,11 @@ impl Session {
         self.test_outliers(&new, &mut report);
         self.time = pending.time.or(self.time);
         came.into_iter().for_each(|(variable, time)| self.note_age(variable, time));
+        let ages = self.ages.clone();
         let leaving = self.leaving(&pending.leaving);
-        if let Err(Overflow(variable)) = self.seal(&leaving, &mut report) {
-            return Err(UpdateError::Overflow { key: self.key(variable) });
+        if self.seal(&leaving, &mut report).is_err() {
+            self.ages = ages;
+            report.stayed = leaving.iter().map(|v| self.key(*v)).collect();
         }
         self.tell(&mut report);
         Ok(report)

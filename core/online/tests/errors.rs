@@ -1,7 +1,7 @@
 //! A session that refuses something is as it was.
 use crate::toy::{Apart, At, Careless, Plane};
 use manifactor_graph::{Fixed, Graph, Noise, Values};
-use manifactor_online::{ChangeError, Session, Settings, UpdateError};
+use manifactor_online::{ChangeError, FactorId, Session, Settings, Span, UpdateError, Window};
 
 fn chain(n: usize) -> Session {
     let mut session = Session::new(Settings::default()).unwrap();
@@ -93,4 +93,102 @@ fn sums_that_overflow_are_refused_and_taken_back() {
 fn settings_outside_their_domain_are_named() {
     let error = Session::new(Settings { bend: f64::NAN, ..Settings::default() }).unwrap_err().to_string();
     assert!(error.contains("`bend`") && error.contains("0 or more"), "{error}");
+}
+
+/// Two variables whose numbers are close to the largest, and fit only as long as both are there.
+fn close_to_overflow() -> (Session, Vec<FactorId>) {
+    let (mut session, ids) = pushed_close_to_overflow(never_linearized_anew());
+    session.update().unwrap();
+    (session, ids)
+}
+
+fn never_linearized_anew() -> Settings {
+    Settings { relinearize_every: usize::MAX, bend: 1e300, deviation: 0.0, passes: 0, ..Settings::default() }
+}
+
+/// The same before the first update.
+fn pushed_close_to_overflow(settings: Settings) -> (Session, Vec<FactorId>) {
+    let mut session = Session::new(settings).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    // H is 5e307 for each factor
+    let strong = || Noise::sigma(2.0_f64.sqrt() * 1e-154).unwrap();
+    values.insert("a", Plane { x: 0.0, y: 0.0 });
+    values.insert("b", Plane { x: 0.0, y: 0.0 });
+    values.insert("c", Plane { x: 0.0, y: 0.0 });
+    graph.add(["a"], At { at: [0.0, 0.0] }).noise(strong());
+    graph.add(["b"], At { at: [-1.8, 0.0] }).noise(strong());
+    graph.add(["a", "b"], Apart { by: [1.8, 0.0] }).noise(strong());
+    graph.add(["b"], At { at: [-1.8, 0.0] }).noise(strong());
+    graph.add(["c"], At { at: [1.0, 0.0] });
+    graph.add(["a", "c"], Apart { by: [1.0, 0.0] });
+    let ids = session.push(&graph, &values).unwrap();
+    (session, ids)
+}
+
+#[test]
+fn variables_stay_if_their_linear_prior_overflows() {
+    let (mut session, ids) = close_to_overflow();
+    let (before, cost) = (bits(&session), session.cost());
+    let saved = |session: &Session| Session::load(&session.save().unwrap()).unwrap();
+    session.marginalize(&["c", "a"]).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!(report.stayed[..], ["c".into(), "a".into()]);
+    assert!(report.sealed.is_empty() && report.dropped.is_empty());
+    assert!(ids.iter().all(|id| session.entry(*id).is_some()));
+    assert_eq!((bits(&session), session.cost().to_bits()), (before, cost.to_bits()));
+    assert_eq!(bits(&saved(&session)), bits(&session));
+    // and goes on as if they had not been asked to leave
+    let mut graph = Graph::new();
+    graph.add(["c"], At { at: [3.0, 0.0] });
+    let (mut other, _) = close_to_overflow();
+    for session in [&mut session, &mut other] {
+        session.update().unwrap();
+        session.push(&graph, &Values::new()).unwrap();
+        session.update().unwrap();
+    }
+    assert_eq!(bits(&session), bits(&other));
+    // c alone is small enough to leave
+    session.marginalize(&["c"]).unwrap();
+    assert_eq!(session.update().unwrap().sealed[..], ["c".into()]);
+}
+
+#[test]
+fn a_window_tries_again_what_could_not_leave() {
+    let window = Some(Window { span: Span::Poses(1), keep: vec![] });
+    let (mut session, ids) = pushed_close_to_overflow(Settings { window, ..never_linearized_anew() });
+    assert_eq!(session.update().unwrap().stayed[..], ["a".into(), "b".into()]);
+    assert!(session.update().unwrap().sealed.is_empty());
+    // without the strong factors
+    session.remove(&ids[..4]).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!((report.sealed.len(), report.stayed.len()), (2, 0), "{report:?}");
+}
+
+#[test]
+fn variables_stay_if_the_sums_without_them_overflow() {
+    let mut session = Session::new(never_linearized_anew()).unwrap();
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    let strong = || Noise::sigma(2.0_f64.sqrt() * 1e-154).unwrap();
+    values.insert("a", Plane { x: 0.0, y: 0.0 });
+    values.insert("b", Plane { x: 0.0, y: 0.0 });
+    // the gradient of b is finite as long as that of `a` is part of the sum; nothing else holds `a`, so that no prior remains
+    graph.add(["b"], At { at: [-1.8, 0.0] }).noise(strong());
+    graph.add(["a", "b"], Apart { by: [1.8, 0.0] }).noise(strong());
+    graph.add(["b"], At { at: [-1.8, 0.0] }).noise(strong());
+    // many neighbours, so that `a` is eliminated after b
+    for key in ["d", "e", "f", "g"] {
+        values.insert(key, Plane { x: 0.0, y: 0.0 });
+        graph.add(["a", key], Apart { by: [1.0, 0.0] });
+        graph.add([key], At { at: [1.0, 0.0] });
+    }
+    let ids = session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    let (before, cost) = (bits(&session), session.cost());
+    session.marginalize(&["a"]).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!(report.stayed[..], ["a".into()], "{report:?}");
+    assert!(ids.iter().all(|id| session.entry(*id).is_some()));
+    assert_eq!((bits(&session), session.cost().to_bits()), (before, cost.to_bits()));
+    let loaded = Session::load(&session.save().unwrap()).unwrap();
+    assert_eq!(bits(&loaded), bits(&session));
 }
