@@ -262,14 +262,6 @@ impl<'a> Descent<'a> {
         self.largest_cosine().powi(2) > SHARE
     }
 
-    /// Whether the diagonal of H spans so many digits that no damping fits all of it: of a point at infinity, steps along the ray
-    /// are damped to nothing by what hardly damps those across.
-    pub(crate) fn is_spread(&self) -> bool {
-        const SHARE: f64 = 1e-10;
-        let diagonal = self.problem.system.diagonal();
-        diagonal.into_iter().any(|d| *d > 0.0 && *d < SHARE * self.problem.system.largest())
-    }
-
     fn largest_gradient(&self) -> f64 {
         // `f64::max` would drop what is not a number
         self.problem.system.g.iter().fold(0.0, |m, g| if m.is_nan() || g.abs() <= m { m } else { g.abs() })

@@ -70,8 +70,8 @@ const GAIN: f64 = 1e-4;
 const NEGLIGIBLE: f64 = 1e-3;
 /// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal.
 const TRUSTED: f64 = 1.0;
-/// Share of the slope along a step above which damping holds it back: a diagonal with bounds may be far above that of H.
-const HELD: f64 = 0.5;
+/// Share of the slope along a step above which damping may hold it back: a diagonal with bounds may be far above that of H.
+const HELD: f64 = 1e-6;
 /// Share of the cost that a step without damping must promise for one that is held back to be no end. Less than that is gained
 /// along directions that next to nothing constrains, by steps without end.
 const MUCH: f64 = 1e-3;
@@ -163,11 +163,7 @@ impl LevenbergMarquardt {
                         // a step that damping has made small says little of the cost around
                         let small = ended.is_some() && is_trusted;
                         match ended {
-                            Some(_)
-                                if (is_held || descent.is_spread()) && descent.promises(&mut step, MUCH) =>
-                            {
-                                small_before = false;
-                            }
+                            Some(_) if is_held && descent.promises(&mut step, MUCH) => small_before = false,
                             Some(termination) if small && (small_before || step.control <= LIGHT) => {
                                 return termination;
                             }
@@ -178,11 +174,17 @@ impl LevenbergMarquardt {
                         }
                         continue 'linearized;
                     }
-                    if !matches!(tried, Tried::Undefined) && is_trusted && descent.settled(&step) {
-                        return Termination::Converged { reason: Tolerance::RelativeCost };
-                    }
-                    if is_trusted && step.norm <= descent.stop.step && !descent.is_steep() {
-                        return Termination::Converged { reason: Tolerance::Step };
+                    let reason = if !matches!(tried, Tried::Undefined) && descent.settled(&step) {
+                        Some(Tolerance::RelativeCost)
+                    } else if step.norm <= descent.stop.step && !descent.is_steep() {
+                        Some(Tolerance::Step)
+                    } else {
+                        None
+                    };
+                    if let Some(reason) = reason.filter(|_| is_trusted)
+                        && !(is_held && descent.promises(&mut step, MUCH))
+                    {
+                        return Termination::Converged { reason };
                     }
                 }
                 if descent.interrupted() {

@@ -160,13 +160,13 @@ fn a_local_minimum_to_rounding_is_converged() {
 #[test]
 fn a_point_that_starts_very_far_off_is_found() {
     // farther off, the depth is lost in the digits of a number, and the diagnosis says that nothing constrains it
-    for far in [1e2, 1e4, 1e5, 1e6, 1e7] {
+    for (far, aside) in [1e2, 1e4, 1e5, 1e6, 1e7].into_iter().flat_map(|far| [(far, 0.3), (far, 1.5)]) {
         let (mut graph, values) = point(0.3, far);
         for from in [0.0, 1.0, -0.5] {
-            graph.add(["p"], View { from, pixel: 100.0 * (0.3 - from) });
+            graph.add(["p"], View { from, pixel: 100.0 * (aside - from) });
         }
         for (name, Solution { outcome, .. }) in solutions(&graph, &values) {
-            assert!(outcome.final_cost < 1e-9, "{name} from {far} m: {outcome:?}");
+            assert!(outcome.final_cost < 1e-9, "{name} from {far} m, {aside} m: {outcome:?}");
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Steps without damping, for solvers that take none: with next to none where something is open.
 use super::{Descent, Step};
 use crate::inspect::null_space::undetermined;
+use crate::linear::system::dot;
 use crate::outcome::Undetermined;
 
 /// What is added to the diagonal of H where it cannot be factorized, as shares of it: the least that will do.
@@ -38,9 +39,12 @@ impl Descent<'_> {
             && self.is_small(step.predicted)
     }
 
-    /// Whether a step without damping promises more than this share of the cost. Leaves that step in `step`.
+    /// Whether a step without any damping promises more than this share of the cost. Leaves that step in `step`.
     pub(crate) fn promises(&mut self, step: &mut Step, share: f64) -> bool {
-        self.at.not_finite.is_none() && self.undamped(step) && step.predicted > share * self.at.cost
+        let can_step =
+            self.at.not_finite.is_none() && self.factorize(None) && self.newton_step(&mut step.delta);
+        step.predicted = -0.5 * dot(&step.delta, &self.problem.system.g);
+        can_step && step.predicted > share * self.at.cost
     }
 
     /// At the end of a solve by such steps: what is open at the estimate, where something was on the way.
