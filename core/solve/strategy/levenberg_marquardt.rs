@@ -70,11 +70,15 @@ const GAIN: f64 = 1e-4;
 const NEGLIGIBLE: f64 = 1e-3;
 /// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal.
 const TRUSTED: f64 = 1.0;
-/// Share of the slope along a step above which damping may hold it back: a diagonal with bounds may be far above that of H.
-const HELD: f64 = 1e-6;
+/// Share of the slope along a step above which damping holds it back: a diagonal with bounds may be far above that of H.
+const HELD: f64 = 0.5;
 /// Share of the cost that a step without damping must promise for one that is held back to be no end. Less than that is gained
 /// along directions that next to nothing constrains, by steps without end.
 const MUCH: f64 = 1e-3;
+/// The same for a step of which damping takes more than this share of the slope: it may be held back in one direction of many, such
+/// as a landmark's along the ray. The step may run off in others, so that only a promise of half of the cost counts.
+const TOUCHED: f64 = 1e-6;
+const MOST: f64 = 0.5;
 /// Damping up to which one small step means convergence; above, it takes two.
 const LIGHT: f64 = 1e-2;
 
@@ -152,7 +156,11 @@ impl LevenbergMarquardt {
                 step.control = *lambda;
                 if descent.damped(&damping, &mut step) {
                     let is_trusted = step.control <= TRUSTED;
-                    let is_held = step.damped > HELD;
+                    let doubt = match step.damped {
+                        damped if damped > HELD => Some(MUCH),
+                        damped if damped > TOUCHED => Some(MOST),
+                        _ => None,
+                    };
                     let tried = descent.attempt(&step);
                     let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
                     descent.record(&step, accepted);
@@ -163,7 +171,9 @@ impl LevenbergMarquardt {
                         // a step that damping has made small says little of the cost around
                         let small = ended.is_some() && is_trusted;
                         match ended {
-                            Some(_) if is_held && descent.promises(&mut step, MUCH) => small_before = false,
+                            Some(_) if doubt.is_some_and(|share| descent.promises(&mut step, share)) => {
+                                small_before = false;
+                            }
                             Some(termination) if small && (small_before || step.control <= LIGHT) => {
                                 return termination;
                             }
@@ -182,7 +192,7 @@ impl LevenbergMarquardt {
                         None
                     };
                     if let Some(reason) = reason.filter(|_| is_trusted)
-                        && !(is_held && descent.promises(&mut step, MUCH))
+                        && !doubt.is_some_and(|share| descent.promises(&mut step, share))
                     {
                         return Termination::Converged { reason };
                     }
