@@ -15,7 +15,7 @@ use crate::report::Report;
 use crate::tree::Couplings;
 use manifactor_graph::Key;
 
-/// What sealing has changed in the model, to take it back; and the factors that are gone once it succeeds.
+/// Changes of the model by a sealing, so that they can be taken back. Factors are gone once it succeeds.
 #[derive(Default)]
 struct Sealing {
     steps: Vec<Step>,
