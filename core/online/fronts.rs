@@ -7,7 +7,7 @@ mod elimination;
 mod pool;
 mod substitution;
 
-use crate::model::Blocks;
+use crate::model::{Blocks, Overflow};
 use crate::tree::{Affected, Front, Tree};
 use assembly::Run;
 use elimination::Build;
@@ -43,10 +43,6 @@ pub(crate) struct Fronts {
     scratch: Scratch,
     arch: Arch,
 }
-
-/// A sum that is not finite, though its terms are: at this variable.
-#[derive(Debug)]
-pub(crate) struct Overflow(pub u32);
 
 /// Widest front that needs less room of the dense kernels than any wider one.
 const WIDEST: usize = 1 << 10;

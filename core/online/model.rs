@@ -22,6 +22,10 @@ use smallvec::SmallVec;
 use std::any::TypeId;
 use std::collections::HashMap;
 
+/// A sum that is not finite, though its terms are: at this variable.
+#[derive(Debug)]
+pub(crate) struct Overflow(pub u32);
+
 /// A variable of a session.
 #[derive(Debug, Clone)]
 pub(crate) struct Place {

@@ -1,7 +1,8 @@
 //! How a front comes about: what factors say, what its children hand up, and the elimination of its columns.
 use super::assembly::{Open, Run, assemble};
-use super::{Fronts, Numbers, Overflow, Scalar};
+use super::{Fronts, Numbers, Scalar};
 use crate::model::Blocks;
+use crate::model::Overflow;
 use crate::tree::{Front, Tree};
 use manifactor_solve::front::eliminate;
 use pulp::{Simd, WithSimd};

@@ -2,8 +2,7 @@
 //!
 //! With the quadratic ½ δᵀHδ + gᵀδ + c of the factors of a variable, split into its own part L and the others' part B,
 //! eliminating it leaves the Schur complement H_BB − H_BL H_LL⁻¹ H_LB, and g and c in the same way.
-use super::{Factor, Model};
-use crate::fronts::Overflow;
+use super::{Factor, Model, Overflow};
 use manifactor_graph::batch::Evaluation;
 use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;

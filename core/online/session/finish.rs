@@ -5,7 +5,7 @@ use super::Session;
 use super::changes::Touched;
 use super::parking::Moves;
 use crate::factor_id::FactorId;
-use crate::fronts::Overflow;
+use crate::model::Overflow;
 use crate::report::Report;
 use crate::tree::NONE;
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Noise, Values};
