@@ -298,8 +298,8 @@ pub struct Resolved {
 }
 
 impl FactorEntry {
-    /// ‖r‖² in standard deviations where `point` has its variables, without its loss. `None` where a variable is missing or of
-    /// another type, or the factor is not defined there.
+    /// Returns the squared norm of the whitened residual at the values that `point` gives, without the loss. `None` if a variable is
+    /// missing or has a wrong type, or if the factor is not defined there.
     pub fn squared(&self, point: impl Fn(&Key) -> Option<Box<dyn Variable>>) -> Option<f64> {
         let points: Vec<Box<dyn Variable>> = self.keys.iter().map(point).collect::<Option<_>>()?;
         let points: Vec<&dyn Variable> = points.iter().map(|point| &**point).collect();

@@ -49,10 +49,11 @@ pub struct Session {
     changed: Vec<u64>,
     pass: u64,
     updates: usize,
-    /// Whether the last update had no changes to make; and whether the one before it had none either.
+    /// Whether the last update had no changes.
     is_quiet: bool,
+    /// Whether the current update and the one before it have no changes.
     is_idle: bool,
-    /// Variables whose linearization is to be looked at: they have left its region, or moved where there are losses.
+    /// Variables to examine at the next turn: they have left the region of their linearization, or moved in a graph with losses.
     waiting: Vec<u32>,
     /// How many of them the budget has put off.
     postponed: usize,

@@ -16,9 +16,9 @@ pub struct Settings {
     #[serde(deserialize_with = "at_least_one")]
     #[schemars(range(min = 1))]
     pub relinearize_every: usize,
-    /// Error that a linearization may have, in standard deviations of the factors around. A variable is linearized anew
-    /// where a component of its step δ is larger than √(bend · σ), with σ = 1/√Hᵢᵢ, or where new weights of robust losses change
-    /// its gradient by more than 1/σ. 0 relinearizes all that moves. Default: 0.1.
+    /// Largest error of a linearization, in standard deviations of the factors around. A variable is linearized anew if a component
+    /// of its step δ is larger than √(bend · σ), with σ = 1/√Hᵢᵢ, or if new weights of robust losses change its gradient by more
+    /// than 1/σ. 0 relinearizes every variable that moves. Default: 0.1.
     #[serde(deserialize_with = "not_negative")]
     pub bend: f64,
     /// Changes of a step δ that are not passed on to other variables, in standard deviations σ = 1/√Hᵢᵢ of the factors around. 0 passes on
@@ -46,8 +46,8 @@ pub struct Settings {
 
 /// The test that a factor has to pass: what it costs on top of what is known must be below the χ² quantile for its rows.
 ///
-/// Candidates are factors that couple variables, except odometry: the first factor between two variables of one type that came one
-/// after the other. Of several that come in one update it is the one that fits the variables' values best.
+/// Candidates are all factors that couple variables, except odometry. Odometry is the first factor between two variables of one type
+/// that came one after the other; if an update brings several, it is the factor that fits the values of the variables best.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Outliers {

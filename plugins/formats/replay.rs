@@ -30,8 +30,8 @@ pub struct Step {
     pub values: Values,
 }
 
-/// Of several factors between the same variables, puts the one first that fits the initial values best: another may be a wrong
-/// closure.
+/// If several factors connect the same variables, puts the one first that fits the initial values best: the others may be wrong
+/// closures.
 fn best_first(factors: &mut [FactorEntry], initial: &Values) {
     let misfit = |entry: &FactorEntry| {
         let point = |key: &Key| Some(initial.variable(key.as_str())?.erased().clone_box());

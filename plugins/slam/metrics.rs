@@ -8,6 +8,7 @@ mod bootstrap;
 mod error;
 mod identity;
 mod matching;
+mod pairing;
 mod statistics;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ pub use bootstrap::{Interval, bootstrap, change_of_error};
 pub(crate) use error::relative_errors;
 pub use error::{Pairing, RelativeError, absolute_error, relative_error};
 pub use identity::{ENOUGH, IdentityScores, identity};
+pub use pairing::pair_boxes;
 pub use statistics::Statistics;
 
 /// Why an error could not be measured.

@@ -110,7 +110,8 @@ pub enum FinishError {
 }
 
 impl Mapper {
-    /// A map of nothing, by the settings [for streams](Settings::for_stream); where the settings have a prior map, and where the run begins in it, of what is in there.
+    /// An empty map, by the settings [for streams](Settings::for_stream). If the settings have a prior map and the start in it, the
+    /// map begins with its objects.
     ///
     /// # Errors
     /// Where a setting of the session is outside its domain.

@@ -43,7 +43,7 @@ pub use rule_factor::{RuleError, RuleFactor};
 /// The paper's Table I.
 pub(crate) const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 
-/// What a stream says of the shape of all objects.
+/// The rule of streams for the shapes of objects.
 const WEAK_SHAPE: &str = include_str!("semantics/weak_shape.toml");
 
 /// Stands for all classes.

@@ -141,8 +141,8 @@ pub trait Batch: Send + Sync {
     ) -> Evaluation;
     /// As [`cost`](Self::cost), of the factors at these places in the batch, ascending.
     fn cost_at(&self, indices: &[u32], columns: &Columns) -> Evaluation;
-    /// Appends the weights that the loss gives the factors at these places in the batch, ascending: 1 without a loss, 0 where
-    /// a factor is not defined.
+    /// Appends the robust weights of the factors at these places in the batch, ascending: 1 without a loss, 0 for a factor that is
+    /// not defined.
     fn robust_weights_at(&self, indices: &[u32], columns: &Columns, to: &mut Vec<f64>);
     /// Makes one factor count as often as its weight says, by its place in the batch.
     fn set_weight(&mut self, index: usize, weight: f64);

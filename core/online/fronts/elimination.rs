@@ -1,8 +1,7 @@
 //! How a front comes about: what factors say, what its children hand up, and the elimination of its columns.
 use super::assembly::{Open, Run, assemble};
 use super::{Fronts, Numbers, Scalar};
-use crate::model::Blocks;
-use crate::model::Overflow;
+use crate::model::{Blocks, Overflow};
 use crate::tree::{Front, Tree};
 use manifactor_solve::front::eliminate;
 use pulp::{Simd, WithSimd};

@@ -61,9 +61,8 @@ impl Model {
         self.robust > 0
     }
 
-    /// What the weights of losses at the trial points make of these variables' gradients, as their own scalars have it: the
-    /// linearization has the weights of its own points. It is infinite where a factor had no weight there and has one now.
-    /// Variables ascend, as do the results.
+    /// Returns the change of each variable's gradient if robust weights are those of the trial points, not of the linearization
+    /// points. It is infinite if a factor had weight zero and has one above zero now. `variables` ascend, and so do the results.
     pub(crate) fn reweighed(&self, variables: &[u32], delta: &[f64]) -> Vec<SmallVec<[f64; 9]>> {
         let mut changes: Vec<SmallVec<[f64; 9]>> =
             variables.iter().map(|v| SmallVec::from_elem(0.0, self.blocks.dim(*v))).collect();

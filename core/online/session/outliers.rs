@@ -34,8 +34,8 @@ impl Session {
         rejected.into_iter().filter_map(one).collect()
     }
 
-    /// Of the factors that come in an update, by their variables, the one that fits these best as they are: where there are
-    /// several, it is taken for odometry, wherever it stands among them.
+    /// If an update brings several factors between the same variables, returns the number of the one that fits the current values
+    /// best. It counts as odometry if the variables are neighbours; the order of the factors does not matter.
     pub(super) fn best_between(&self, changes: &[Change]) -> BTreeMap<Vec<u32>, u32> {
         let mut all: BTreeMap<Vec<u32>, Vec<(u32, &FactorEntry)>> = BTreeMap::new();
         if self.settings.outliers.is_some() {

@@ -4,8 +4,8 @@
 //! be: |δᵢ| ≤ √(bend · σᵢ) with σᵢ = 1/√Hᵢᵢ, the precision of the factors around. Thresholds in radians and metres would
 //! be too coarse for precise data and too fine for coarse data, and need one number for each type of variable.
 //!
-//! A robust loss makes an error of another kind: the weights are those of the linearization points. They change the gradient
-//! by Δg = Σ (w/w₀ − 1) w₀Jᵀr, which leaves ½ (Δgᵢ σᵢ)² nats to gain: no more than ½ nat is left, however short the step is.
+//! A robust loss adds a second error: its weights are those of the linearization points. New weights change the gradient by
+//! Δg = Σ (w/w₀ − 1) w₀Jᵀr. About ½ (Δgᵢ σᵢ)² nats could be gained with them, and at most ½ nat is left, however short the step is.
 use super::Session;
 use crate::tree::{Affected, Couplings, NONE};
 use smallvec::SmallVec;
@@ -17,14 +17,14 @@ pub(super) struct Relinearized {
     pub(super) factors: Vec<u32>,
 }
 
-/// Variables to relinearize, and at a turn all that are out of their regions, both ascending.
+/// The variables to relinearize, and at a turn all variables outside of their regions. Both lists ascend.
 #[derive(Debug)]
 pub(super) struct Choice {
     pub(super) chosen: Vec<u32>,
     pub(super) waiting: Option<Vec<u32>>,
 }
 
-/// What an update without changes leaves of the errors that others may leave.
+/// Limits of an idle update, as shares of the limits of other updates.
 const FINE: f64 = 1e-8;
 /// Halvings of a step that leads out of the domain of a factor; then the variable stays.
 const HALVINGS: u32 = 4;
@@ -32,19 +32,19 @@ const HALVINGS: u32 = 4;
 const ROUNDS: usize = 16;
 
 impl Session {
-    /// The error of a variable's linearization by the length of its step, in σ's, as a share of what it may be.
+    /// The error of a variable's linearization by the length of its step, as a share of its limit.
     pub(super) fn excess(&self, variable: u32) -> f64 {
         let blocks = &self.model.blocks;
         let steps = self.delta[blocks.range(variable)].iter().zip(blocks.precision(variable));
         steps.map(|(step, precision)| step * step * precision / self.settings.bend).fold(0.0, f64::max)
     }
 
-    /// What that share may be: an update that has nothing else to do goes on until far less is left.
+    /// The largest share that is left: an idle update leaves far less.
     fn most(&self) -> f64 {
         if self.is_idle { FINE } else { 1.0 }
     }
 
-    /// Changes of steps that are not passed on, in σ's.
+    /// The largest change of a step that is not passed on, in σ.
     pub(super) fn deviation(&self) -> f64 {
         if self.is_idle { FINE * self.settings.deviation } else { self.settings.deviation }
     }
@@ -60,8 +60,8 @@ impl Session {
         !self.urgent.is_empty()
     }
 
-    /// The variables to relinearize: those that are due, and in turn those that are out of their regions, as far as the budget
-    /// goes. `spent` are the operations of the update so far.
+    /// Chooses the variables to relinearize: `chosen`, and at a turn those outside of their regions, within the budget. `spent` is
+    /// the number of operations of the update so far.
     pub(super) fn choose(
         &mut self,
         mut chosen: Vec<u32>,
@@ -91,8 +91,8 @@ impl Session {
         Choice { chosen, waiting: is_turn.then(|| out.into_iter().map(|(_, v)| v).collect()) }
     }
 
-    /// The variables that are out of the regions of their linearizations, ascending, with their excesses: by the length of their
-    /// steps, or by what the losses' weights have become.
+    /// The variables outside of the regions of their linearizations, ascending, each with its excess: by the length of its step,
+    /// or by new weights of losses.
     fn out(&mut self) -> Vec<(f64, u32)> {
         let mut moved: Vec<u32> = match self.is_idle {
             true => (0..self.model.variables() as u32).filter(|v| self.has_step(*v)).collect(),
@@ -116,19 +116,11 @@ impl Session {
             && self.delta[self.model.blocks.range(variable)].iter().any(|step| *step != 0.0)
     }
 
-    /// What weights that losses have changed leave to gain at each variable, as shares of ½ nat. A step may be short and
-    /// its weights quite other ones, where a robust loss turns.
+    /// The gain in cost that new weights of losses promise at each variable, as a share of ½ nat. A short step can change the
+    /// weights of a robust loss much.
     fn excesses_by_weight(&mut self, variables: &[u32]) -> Vec<f64> {
         let around = self.model.factors_of(variables);
-        let mut tried: Vec<u32> =
-            around.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables()).collect();
-        tried.sort_unstable();
-        tried.dedup();
-        for v in &tried {
-            self.model.try_step(*v, &self.delta[self.model.blocks.range(*v)]);
-        }
-        let changes = self.model.reweighed(variables, &self.delta);
-        tried.iter().for_each(|v| self.model.reset_trial(*v));
+        let changes = self.at_estimate(&around, |model, delta| model.reweighed(variables, delta));
         let share = |(v, change): (&u32, SmallVec<[f64; 9]>)| {
             let precision = self.model.blocks.precision(*v);
             let shares = change.iter().zip(precision).map(|(g, p)| (g / p).powi(2));
@@ -253,7 +245,7 @@ impl Session {
         self.note_activities(&relinearized.factors);
     }
 
-    /// Makes the new points those of the session. After a turn, those of `waiting` still wait that have not been linearized anew.
+    /// Makes the new points those of the session. After a turn, the variables of `waiting` that keep their points still wait.
     pub(super) fn accept_points(&mut self, relinearized: &Relinearized, waiting: Option<&[u32]>) {
         for v in &relinearized.variables {
             self.model.accept(*v);
@@ -271,8 +263,7 @@ impl Session {
         }
     }
 
-    /// Notes that a variable is to be looked at when its turn comes: its step is too long for its linearization, or may have
-    /// changed the weights of losses.
+    /// Notes a variable for the next turn if its step is too long for its linearization, or may have changed weights of losses.
     pub(super) fn note_excess(&mut self, variable: u32) {
         let excess = self.excess(variable);
         let is_out = excess > self.most() || self.model.has_losses();

@@ -7,6 +7,7 @@
 use super::Session;
 use super::changes::Touched;
 use super::parking::Moves;
+use crate::model::Model;
 use crate::report::Report;
 use manifactor_graph::batch::Evaluation;
 use manifactor_solve::{LevenbergMarquardt, Silent};
@@ -34,9 +35,9 @@ const RISE: f64 = 1e-3;
 const ROUNDING: f64 = 1e-12;
 
 impl Session {
-    /// Looks whether long steps have raised the cost of the factors around; only where a step is far out of the region of its
-    /// linearization, as others cannot do harm at once. Repeated, they can: Gauss-Newton may go round a minimum for ever. An
-    /// update that has nothing else to do looks at all steps.
+    /// Shortens steps that have raised the cost of the factors around. It examines only steps far outside of the region of their
+    /// linearization, as one shorter step does little harm. Many of them can: Gauss-Newton may circle around a minimum for ever.
+    /// An idle update therefore examines all steps, and solves a batch if the cost has risen.
     pub(super) fn control_step(&mut self, report: &mut Report) {
         if self.is_idle {
             let (_, before, after) = self.last_step();
@@ -172,6 +173,15 @@ impl Session {
 
     /// The cost of factors at the estimate.
     pub(super) fn cost_of(&mut self, factors: &[u32]) -> Evaluation {
+        self.at_estimate(factors, |model, delta| model.cost(factors, Some(delta)))
+    }
+
+    /// Evaluates the model while the trial points of these factors' variables are at the estimate.
+    pub(super) fn at_estimate<T>(
+        &mut self,
+        factors: &[u32],
+        evaluate: impl FnOnce(&Model, &[f64]) -> T,
+    ) -> T {
         let mut variables: Vec<u32> =
             factors.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables()).collect();
         variables.sort_unstable();
@@ -179,9 +189,9 @@ impl Session {
         for v in &variables {
             self.model.try_step(*v, &self.delta[self.model.blocks.range(*v)]);
         }
-        let cost = self.model.cost(factors, Some(&self.delta));
+        let result = evaluate(&self.model, &self.delta);
         variables.iter().for_each(|v| self.model.reset_trial(*v));
-        cost
+        result
     }
 
     /// Damps less those variables that are linearized anew; what they were damped by.

@@ -3,8 +3,8 @@ use super::Session;
 use crate::tree::Redone;
 
 impl Session {
-    /// Back-substitutes through the new fronts, and through those below whose rows have changed; through all of them where the
-    /// update has nothing else to do. Returns the number of variables.
+    /// Back-substitutes through the new fronts and the fronts below them whose rows have changed; in an idle update, through all
+    /// fronts. Returns the number of variables.
     pub(super) fn solve(&mut self, redone: &Redone) -> usize {
         self.moved.clear();
         self.before.clear();

@@ -26,8 +26,9 @@ const NEWEST: usize = 8;
 impl Session {
     /// Makes the changes since the last update, and brings the estimate up to date. Then variables leave
     /// that are to; those whose linear prior overflows stay, and the report names them in [`stayed`](Report::stayed).
-    /// The second of several without changes, and those after it, relinearize by 1e-8 of [`bend`](crate::Settings::bend) and
-    /// [`deviation`](crate::Settings::deviation): repeated, it leads to the minimum.
+    ///
+    /// From the second update without changes on, updates are *idle*: their limits are 1e-8 of [`bend`](crate::Settings::bend) and
+    /// [`deviation`](crate::Settings::deviation), so that repeated updates lead to the minimum.
     ///
     /// # Errors
     /// Where a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last

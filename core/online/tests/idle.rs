@@ -10,8 +10,8 @@ use std::sync::Arc;
 /// Nats that may be left.
 const LEFT: f64 = 1e-3;
 
-/// What the session costs above what so many iterations of a batch solver lead to from its estimate. They end by their number:
-/// the solver leaves no saddle.
+/// The cost of the session above the cost that a batch solver reaches from its estimate with this number of iterations. It ends by
+/// that number, and so does not leave a saddle.
 fn left(session: &mut Session, iterations: usize) -> f64 {
     let stop = Stopping {
         max_iterations: iterations,
@@ -105,7 +105,7 @@ proptest! {
         for _ in 0..300 {
             session.update().unwrap();
         }
-        // where there are several minima, an iteration says whether the estimate is at one of them
+        // with several minima, one iteration shows whether the estimate is at one of them
         let left = left(&mut session, if is_convex { 100 } else { 1 });
         // reweighting approaches the kinks of L1 ever more slowly
         let most = if is_l1 { 10.0 * LEFT } else { LEFT };

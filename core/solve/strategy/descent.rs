@@ -255,8 +255,8 @@ impl<'a> Descent<'a> {
         self.problem.system.g.iter().zip(self.problem.system.diagonal()).map(cosine).fold(0.0, f64::max)
     }
 
-    /// Whether one unknown alone could lower the cost by more than so much: by g²/2H = cos² · cost, as the model has it. A short
-    /// step and a small fall are then no sign of a minimum, but of damping, or of a plateau: a landmark at infinity, say.
+    /// Whether one unknown alone could lower the cost by more than a thousandth: by g²/2H = cos² · cost, by the quadratic model. A
+    /// short step and a small fall are then a sign of damping, or of a plateau, as for a landmark that is very far away.
     pub(crate) fn is_steep(&self) -> bool {
         const SHARE: f64 = 1e-3;
         self.largest_cosine().powi(2) > SHARE

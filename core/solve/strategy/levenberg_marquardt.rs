@@ -75,8 +75,8 @@ const HELD: f64 = 0.5;
 /// Share of the cost that a step without damping must promise for one that is held back to be no end. Less than that is gained
 /// along directions that next to nothing constrains, by steps without end.
 const MUCH: f64 = 1e-3;
-/// The same for a step of which damping takes more than this share of the slope: it may be held back in one direction of many, such
-/// as a landmark's along the ray. The step may run off in others, so that only a promise of half of the cost counts.
+/// Share of the slope above which damping may hold a step back in one direction of many, such as a landmark's along its ray.
+/// A step without damping may run off in other directions, so that only a promise of half of the cost counts.
 const TOUCHED: f64 = 1e-6;
 const MOST: f64 = 0.5;
 /// Damping up to which one small step means convergence; above, it takes two.

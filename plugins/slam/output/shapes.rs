@@ -1,4 +1,4 @@
-//! Ellipsoids whose shape no box constrains: a plate, or one that reaches further than any camera was away.
+//! Ellipsoids with a shape that boxes do not limit: plates, and those that reach beyond the farthest camera.
 use crate::estimate::Estimate;
 use crate::mapping::Warning;
 
