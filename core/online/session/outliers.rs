@@ -1,12 +1,12 @@
-//! Factors that may be wrong, loop closures above all: they are tested before they count.
+//! Factors that may be wrong, mostly loop closures: they are tested before they count.
 //!
-//! A candidate comes in rejected. Once the other factors have been taken in, it is asked what it would cost on top of them:
-//! min ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ over its own variables, with their joint covariance Σ. That is the squared Mahalanobis distance of
-//! its innovation, and has the χ² distribution where the factor is right. What is above the quantile stays out; it comes back
-//! as soon as it fits the estimate. What counts and does not fit any more goes out, the worst first.
+//! A candidate is rejected at first. After the other factors of the update, its cost on top of them is computed:
+//! min ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ over its own variables, with their joint covariance Σ. This is the squared Mahalanobis distance of
+//! its innovation, and has the χ² distribution if the factor is right. A candidate above the quantile stays out, and counts as soon
+//! as it fits the estimate. A candidate that no longer fits is rejected again, the worst first.
 //!
-//! This trusts what came first. Where a rejected factor is borne out by others that were rejected, or fails by little, a
-//! [`trial`] asks whether they are right and what counts is wrong.
+//! This rule trusts the factors that came first. If other rejected factors confirm a candidate, or if it fails by little, a
+//! [`trial`] decides whether they are right and the factors that count are wrong.
 mod fit;
 mod trial;
 
@@ -20,7 +20,7 @@ use manifactor_graph::{FactorEntry, Resolved};
 use manifactor_solve::is_sequential;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Factors that may go out after one update, as they do not fit any more.
+/// Most factors that one update rejects because they no longer fit.
 const DROPS: usize = 4;
 
 impl Session {
@@ -55,7 +55,7 @@ impl Session {
         best.collect()
     }
 
-    /// What a new factor has to keep to, where it may be wrong.
+    /// Returns the bounds of a new factor if it is a candidate.
     pub(super) fn suspect(
         &self,
         entry: &FactorEntry,
@@ -75,8 +75,7 @@ impl Session {
         (is_named && couples).then_some(Suspect { bound, gain, since: Some(self.updates + 1) })
     }
 
-    /// Whether a new factor between these variables is odometry: they follow one another, and no other factor between the
-    /// same variables is trusted already.
+    /// Whether a new factor between these variables is odometry: they are neighbours, and no trusted factor connects them yet.
     fn is_odometry(&self, variables: &[u32]) -> bool {
         let places = variables.iter().map(|v| self.model.place(*v));
         if !is_sequential(places.map(|place| (place.column as usize, place.ordinal))) {
@@ -90,7 +89,7 @@ impl Session {
         !self.model.factors_of(variables).iter().any(is_trusted)
     }
 
-    /// Notes new factors that may be wrong, and forgets those that are gone; returns which of the new are still there.
+    /// Adds new candidates as rejected, and forgets removed ones. Returns the new candidates that are in the model.
     pub(super) fn enter(&mut self, mut new: BTreeMap<u32, Suspect>, removed: &[u32]) -> Vec<u32> {
         removed.iter().for_each(|f| self.forget_suspect(*f));
         new.retain(|f, _| self.model.factor(*f).is_some());
@@ -100,12 +99,12 @@ impl Session {
         numbers
     }
 
-    /// Tests the factors that are new, and those whose variables have moved.
+    /// Tests new candidates, and candidates with variables that have moved.
     pub(super) fn test_outliers(&mut self, new: &[u32], report: &mut Report) {
         if self.suspects.is_empty() {
             return;
         }
-        // the fewer were wrong so far, the more is believed of one alone: by Bayes' rule, odds are nats as gain is
+        // a single candidate is trusted more if few were wrong so far: by Bayes' rule, the odds in nats add to the gain
         let out = self.rejected.len() - new.len();
         let counted = self.suspects.len() - self.rejected.len();
         let odds = ((counted + 1) as f64 / (out + 1) as f64).ln();
@@ -116,7 +115,7 @@ impl Session {
                 Some(surprise) if surprise.square > bound || surprise.gain > gain + odds => {
                     failing.push((*f, surprise));
                 }
-                // what nothing is known of, or what is not defined, contradicts nothing
+                // an undetermined or undefined candidate contradicts no other factor
                 _ => fitting.push(*f),
             }
         }
@@ -134,7 +133,7 @@ impl Session {
         self.try_rejected(&failing, report);
     }
 
-    /// Lets rejected factors count; whether they do. Where the linear system overflows with them, they stay out.
+    /// Lets rejected factors count, and returns whether they do. If the linear system overflows with them, they stay out.
     fn admit(&mut self, factors: &[u32], report: &mut Report) -> bool {
         let changes = factors.iter().map(|f| Change::Readmit { number: *f }).collect();
         if factors.is_empty() {
@@ -148,7 +147,7 @@ impl Session {
         true
     }
 
-    /// Notes when factors were rejected, or that they count.
+    /// Stores the update that rejected these factors; `None` if they count.
     fn note(&mut self, factors: &[u32], since: Option<usize>) {
         for f in factors {
             let Some(suspect) = self.suspects.get_mut(f) else { continue };
@@ -165,8 +164,8 @@ impl Session {
         self.rejected.remove(&factor);
     }
 
-    /// Rejected factors that fit the estimate itself, where their variables have moved. That Σ allows for it is not enough: who
-    /// asks often enough is let in by chance.
+    /// Returns rejected factors with moved variables that fit the estimate itself. A fit within Σ is not enough: after many tests
+    /// a wrong factor would pass one by chance.
     fn returning(&mut self, new: &[u32], moved: &BTreeSet<u32>) -> Vec<u32> {
         let old = self.rejected.iter().copied().filter(|f| !new.contains(f));
         let has_moved = |f: u32| {
@@ -181,7 +180,7 @@ impl Session {
         old
     }
 
-    /// Rejects what counts and does not fit any more, the worst first.
+    /// Rejects candidates that count and no longer fit, the worst first.
     fn drop_unfit(&mut self, moved: &BTreeSet<u32>, admitted: &[u32], report: &mut Report) {
         let mut around = self.model.factors_of(&moved.iter().copied().collect::<Vec<_>>());
         around.extend(admitted);
@@ -199,7 +198,7 @@ impl Session {
         }
     }
 
-    /// Of factors that count, the one with the largest share of its bound at the estimate.
+    /// Returns the factor with the largest share of its bound at the estimate, and that share.
     fn worst(&mut self, factors: &[u32]) -> Option<(u32, f64)> {
         let share = |f: &u32| (*f, 2.0 * self.cost_of(&[*f]).cost / self.suspects[f].bound);
         factors.iter().map(share).max_by(|(f, a), (g, b)| a.total_cmp(b).then(g.cmp(f)))
@@ -213,7 +212,7 @@ impl Session {
         self.rejected.iter().copied().filter(is_of).collect()
     }
 
-    /// Makes changes of what counts, and redoes what they touch; what takes them back. Where that fails, all is as it was.
+    /// Applies changes, solves again, and returns the changes that undo them. If that fails, everything is as before.
     fn turn_over(
         &mut self,
         changes: Vec<Change>,
@@ -244,6 +243,6 @@ fn ascending(variables: &[u32]) -> Vec<u32> {
     sorted
 }
 
-/// A pass that did not come to an end.
+/// A pass that failed.
 #[derive(Debug)]
 struct Failed;

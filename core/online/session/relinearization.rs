@@ -1,7 +1,6 @@
 //! Variables that have moved out of the region where their linearization holds.
 //!
-//! The error of a linearization grows with the square of the step, so what a step may be is the root of what the error may
-//! be: |δᵢ| ≤ √(bend · σᵢ) with σᵢ = 1/√Hᵢᵢ, the precision of the factors around. Thresholds in radians and metres would
+//! The error of a linearization grows with the square of the step, so that the largest step is the root of the largest error: |δᵢ| ≤ √(bend · σᵢ) with σᵢ = 1/√Hᵢᵢ, the precision of the factors around. Thresholds in radians and metres would
 //! be too coarse for precise data and too fine for coarse data, and need one number for each type of variable.
 //!
 //! A robust loss adds a second error: its weights are those of the linearization points. New weights change the gradient by
@@ -26,7 +25,7 @@ pub(super) struct Choice {
 
 /// Limits of an idle update, as shares of the limits of other updates.
 const FINE: f64 = 1e-8;
-/// Halvings of a step that leads out of the domain of a factor; then the variable stays.
+/// Most halvings of a step that leaves the domain of a factor; after them the variable keeps its point.
 const HALVINGS: u32 = 4;
 /// Rounds of such halvings, each of some variables, before all of them stay.
 const ROUNDS: usize = 16;
