@@ -26,7 +26,7 @@ def auto(*, stop: types.Stopping | None = None, linear: types.LinearSolver | Non
     Begins at the given values. Where a full step raises the cost and the next is not much shorter, where the cost has not
     settled after ten steps, or where a registered start doubts the minimum, every registered start that applies to the
     graph is tried, those of the lowest cost first, until one leads to a minimum. The best minimum found is the estimate.
-    Where none leads to a minimum, a dogleg from the given values is the last attempt.
+    If no start leads to a minimum, a dogleg from the given values is the last attempt.
     None of this depends on the unit of the noise: covariances that are too small by a factor change nothing. Where no
     start applies, it is Levenberg-Marquardt with next to no damping. Starts need the graph, and those of a plugin are there
     once it is linked: so a compiled problem alone (`descend`) is moved by damped steps from where it is.
