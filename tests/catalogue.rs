@@ -6,6 +6,7 @@ use manifactor::graph::{Factor, Noise, Variable};
 use manifactor::quadric::initialise::Initialiser;
 use manifactor::slam::association::Association;
 use manifactor::slam::gravity::Gravity;
+use manifactor::slam::motion::MotionModel;
 use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::schema::run_root;
 use manifactor::slam::source::Source;
@@ -156,6 +157,7 @@ macro_rules! for_kind {
             k if k == <dyn Source as Kind>::NAME => $call::<Box<dyn Source>>($($argument),*),
             k if k == <dyn Association as Kind>::NAME => $call::<Box<dyn Association>>($($argument),*),
             k if k == <dyn Gravity as Kind>::NAME => $call::<Box<dyn Gravity>>($($argument),*),
+            k if k == <dyn MotionModel as Kind>::NAME => $call::<Box<dyn MotionModel>>($($argument),*),
             k if k == <dyn Initialiser as Kind>::NAME => $call::<Box<dyn Initialiser>>($($argument),*),
             other => panic!("the kind `{other}` is new: add it to this test"),
         }

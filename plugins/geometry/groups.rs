@@ -8,6 +8,7 @@ mod se3;
 mod small_angle;
 mod so2;
 mod so3;
+mod twist;
 
 pub use coordinates::{Coordinates, NoCoordinates};
 pub use lie_group::LieGroup;
@@ -16,6 +17,7 @@ pub use se2::Se2;
 pub use se3::Se3;
 pub use so2::{NotAnAngle, So2, atan2, wrap};
 pub use so3::{NotARotation, So3};
+pub use twist::Twist;
 
 pub(crate) use se2::quarter;
 pub(crate) use so2::Angle;

@@ -16,11 +16,12 @@ pub mod testing;
 pub use bundle::{BalCamera, Camera, NotACamera, Projection, ProjectionBal};
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{
-    BearingRange2, BearingRange3, Between, ChordalBetween, Landmark, Located, Position, Prior, Range,
+    BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Landmark, Located, Position,
+    Prior, Range,
 };
 pub use groups::{
     Coordinates, LieGroup, NoCoordinates, NotARotation, NotAnAngle, Point1, Point2, Point3, Point4, Rn, Se2,
-    Se3, So2, So3, atan2, wrap,
+    Se3, So2, So3, Twist, atan2, wrap,
 };
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
 pub use procrustes::{NearestRotation, nearest_rotation};

@@ -1,5 +1,5 @@
 //! Strategies for rotations, poses and points, with the places where formulas tend to break.
-use crate::{BalCamera, Point2, Point3, Rn, Se2, Se3, So2, So3};
+use crate::{BalCamera, Point2, Point3, Rn, Se2, Se3, So2, So3, Twist};
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
 use nalgebra::{Vector1, Vector2, Vector3, Vector4, Vector6};
@@ -18,6 +18,7 @@ register_points!(Rn<1>, any_point::<1>(), [Rn::<1>(Vector1::zeros())]);
 register_points!(Point2, any_point2(), [Rn::<2>(Vector2::zeros())]);
 register_points!(Point3, any_point3(), [Rn::<3>(Vector3::zeros())]);
 register_points!(Rn<4>, any_point::<4>(), [Rn::<4>(Vector4::zeros())]);
+register_points!(Twist, any_twist(), [Twist::zero()]);
 register_points!(BalCamera, any_bal_camera(), []);
 
 /// The rotation by π about an axis that is none of the coordinates'.
@@ -28,6 +29,11 @@ fn half_a_turn() -> So3 {
 /// Points with coordinates up to 10 m; now and then the origin, or next to it.
 pub fn any_point<const N: usize>() -> impl Strategy<Value = Rn<N>> + Clone {
     vector(SIZE).prop_map(Rn)
+}
+
+/// Velocities of a body, up to 10 rad/s and 10 m/s.
+pub fn any_twist() -> impl Strategy<Value = Twist> + Clone {
+    vector(SIZE).prop_map(Twist)
 }
 
 /// Points in the plane.

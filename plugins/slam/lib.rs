@@ -10,6 +10,7 @@ pub mod gravity;
 mod input;
 pub mod mapping;
 pub mod metrics;
+pub mod motion;
 pub mod online;
 pub mod output;
 pub mod run;

@@ -7,25 +7,27 @@ use crate::association::Ambiguity;
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::fusion::FusedClass;
 use crate::input::prior_map::PriorObject;
-use crate::input::sequence::{ObjectId, Sequence, UnusedDetection};
+use crate::input::sequence::{Frame, ObjectId, Sequence, UnusedDetection};
 use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
+use crate::motion::{MotionError, RelativePose, Step};
 use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, Verdict, unmatched};
 use crate::settings::{DetectionSettings, OdometrySettings, Settings};
 use manifactor_formats::plausible;
 use manifactor_formats::tum::StampedPose;
-use manifactor_geometry::{Between, Prior, Se3};
+use manifactor_geometry::{Prior, Se3};
 use manifactor_graph::checked::Positive;
-use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values};
+use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values, Variable};
 use manifactor_quadric::{BoundingBoxFactor, Camera, CentroidDepth, DualQuadric, QuadricPrior};
 use serde::Serialize;
 use std::collections::HashSet;
 use std::sync::Arc;
 
 pub mod measurements;
-mod motion;
+mod moving_objects;
 pub(crate) mod rejection;
 mod warning;
 
+pub(crate) use crate::motion::pose_key;
 pub use rejection::Rejection;
 pub use warning::Warning;
 
@@ -84,11 +86,9 @@ pub enum MappingError {
     /// A semantic rule that cannot be applied.
     #[error(transparent)]
     Rule(#[from] RuleError),
-}
-
-/// The key of a pose.
-pub(crate) fn pose_key(frame: usize) -> Key {
-    Key::indexed("x", frame)
+    /// A step that the motion model has no factor for.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
 }
 
 /// The key of an object.
@@ -169,10 +169,18 @@ impl Mapping {
         }
         let first = self.frame.map_from_odometry.compose(&first.world_from_camera);
         self.graph.push(prior_entry(first, settings));
-        let pairs = sequence.frames.iter().zip(sequence.frames.iter().skip(1));
-        for (i, (here, next)) in pairs.enumerate() {
-            let relative = here.world_from_camera.between(&next.world_from_camera);
-            self.graph.push(odometry_entry([i, i + 1], relative, &settings.odometry));
+        for (i, pair) in sequence.frames.windows(2).enumerate() {
+            let [from, to] = pair else { continue };
+            let estimates = |key: &str| self.values.variable(key).map(|value| value.erased().clone_box());
+            let step = step([i, i + 1], [from, to], &settings.odometry, &estimates);
+            let factors = settings.motion.factors(&step)?;
+            if let (Ok(a), Ok(b)) = (self.values.get(&pose_key(i)), self.values.get(&pose_key(i + 1))) {
+                let variables = settings.motion.variables(&step, [a, b]);
+                for (key, value) in variables.iter() {
+                    self.values.insert_boxed(key.clone(), value.erased().clone_box());
+                }
+            }
+            self.graph.factors_mut().extend(factors);
         }
         Ok(())
     }
@@ -339,15 +347,16 @@ pub(crate) fn known_entry(object: &PriorObject, settings: &Settings) -> FactorEn
     }
 }
 
-/// A factor of odometry between two frames.
-pub(crate) fn odometry_entry(frames: [usize; 2], relative: Se3, settings: &OdometrySettings) -> FactorEntry {
-    FactorEntry {
-        keys: frames.map(pose_key).to_vec(),
-        name: None,
-        factor: Arc::new(Between { relative }),
-        noise: settings.noise.clone(),
-        loss: settings.loss.clone(),
-    }
+/// The step between two frames, as a motion model sees it.
+pub(crate) fn step<'a>(
+    frames: [usize; 2],
+    [from, to]: [&Frame; 2],
+    settings: &'a OdometrySettings,
+    estimates: &'a dyn Fn(&str) -> Option<Box<dyn Variable>>,
+) -> Step<'a> {
+    let pose = from.world_from_camera.between(&to.world_from_camera);
+    let odometry = RelativePose { pose, noise: &settings.noise, loss: settings.loss.as_ref() };
+    Step { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
 }
 
 /// The factors of a box: its own, and that of its depth, where it has one.

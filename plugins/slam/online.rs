@@ -18,6 +18,7 @@ use crate::gravity::GravityError;
 use crate::input::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
 use crate::mapping::measurements::{Measured, Measurements};
 use crate::mapping::{Mapping, MappingError, object_key, pose_key, rejection};
+use crate::motion::MotionError;
 use crate::semantics::RuleError;
 use crate::settings::Settings;
 use association::Known;
@@ -89,6 +90,9 @@ pub enum FrameError {
     /// A semantic rule that cannot be applied.
     #[error(transparent)]
     Rule(#[from] RuleError),
+    /// A step that the motion model has no factor for.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
     /// Factors that do not fit.
     #[error(transparent)]
     Change(#[from] ChangeError),

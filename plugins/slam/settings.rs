@@ -3,8 +3,9 @@ use crate::association::{Association, Given};
 use crate::gravity::{FromSource, Gravity};
 use crate::input::class::Aliases;
 use crate::input::source::Source;
+use crate::motion::{MotionModel, Odometry};
 use crate::semantics::{Rule, add_weak_shape, read_semantics};
-use manifactor_config::{Diagnostics, Errors, Node, Section};
+use manifactor_config::{Diagnostics, Errors, Fault, Node, Section};
 use manifactor_solve::{LevenbergMarquardt, Optimizer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,7 +43,10 @@ pub use variance::{BoxGroups, VarianceSettings};
 pub struct Settings {
     /// Where the sequence comes from.
     pub source: Arc<dyn Source>,
-    /// Factors between consecutive poses.
+    /// What ties consecutive frames. Default: their odometry.
+    #[serde(default = "by_odometry", skip_serializing_if = "is_by_odometry")]
+    pub motion: Arc<dyn MotionModel>,
+    /// Noise and loss of the odometry's relative poses.
     #[serde(default)]
     pub odometry: OdometrySettings,
     /// The factor that holds the first pose.
@@ -94,6 +98,15 @@ fn no_aliases(aliases: &Aliases) -> bool {
     aliases.0.is_empty()
 }
 
+fn by_odometry() -> Arc<dyn MotionModel> {
+    Arc::new(Odometry {})
+}
+
+/// Documents that name no model are written as before there was a choice.
+fn is_by_odometry(motion: &Arc<dyn MotionModel>) -> bool {
+    motion.typetag_name() == "odometry"
+}
+
 fn given() -> Arc<dyn Association> {
     Arc::new(Given {})
 }
@@ -122,9 +135,28 @@ impl Settings {
             if let Some(prior) = &mut settings.prior_map {
                 prior.read(folder, &settings.aliases, node, &errors)?;
             }
+            settings.check_motion(node, &errors);
             Some(settings)
         });
         errors.finish(settings)
+    }
+
+    /// Reports settings that do not go with the motion model.
+    fn check_motion(&self, node: &Node, errors: &Errors) {
+        let place = |field: &str| node.field(field).unwrap_or(node).place.clone();
+        let model = self.motion.typetag_name();
+        for (key, prefix) in self.own.numbered(self.motion.prefixes()) {
+            let message = format!("`{key}` is the key of a variable of the motion model `{model}`");
+            let help = format!("{prefix}0, {prefix}1, … are variables of the frames: choose another name");
+            errors.report(place("variables"), Fault::with_help(message, help));
+        }
+        let is_estimated = self.variance_components.as_ref().is_some_and(|variance| variance.odometry);
+        if is_estimated && !is_by_odometry(&self.motion) {
+            let message =
+                format!("the motion model `{model}` has no odometry whose noise could be estimated");
+            let help = "set `variance_components.odometry = false`, or leave `motion` out";
+            errors.report(place("variance_components"), Fault::with_help(message, help));
+        }
     }
 
     /// These settings with what a stream adds: a weak `shape_prior` for all objects, unless a rule has one. While few boxes show an

@@ -1,5 +1,5 @@
 //! Which objects are mapped, and where they begin.
-use super::motion;
+use super::moving_objects;
 use crate::mapping::measurements::{Measured, ObjectBox};
 use crate::settings::{ObjectSettings, Settings};
 use manifactor_formats::tum::StampedPose;
@@ -138,7 +138,7 @@ pub(crate) fn still(
     if measured.prior.is_some() {
         return Ok(());
     }
-    motion::still(views, at, camera, depth_error)
+    moving_objects::still(views, at, camera, depth_error)
 }
 
 /// Whether an object has boxes enough, and such as one object has; what an earlier map has needs none.

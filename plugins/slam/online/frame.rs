@@ -6,7 +6,7 @@ use crate::association::{Image, Learned, Merge, Move};
 use crate::gravity::MapFrame;
 use crate::input::sequence::{Detection, Frame, ObjectId, Observation, UnusedDetection};
 use crate::mapping::measurements::{ObjectBox, Sifted, sift};
-use crate::mapping::{known_entry, object_key, odometry_entry, pose_key, prior_entry, view_entries};
+use crate::mapping::{known_entry, object_key, pose_key, prior_entry, step, view_entries};
 use crate::semantics::RuleError;
 use crate::settings::Settings;
 use manifactor_geometry::Se3;
@@ -191,10 +191,15 @@ impl Mapper {
         let (mut graph, mut values) = (Graph::new(), Values::new());
         report.pose = match &self.last {
             Some(last) => {
-                let relative = last.world_from_camera.between(&frame.world_from_camera);
+                let from = self.pose(report.frame - 1).unwrap_or_else(Se3::identity);
+                let estimates = |key: &str| self.session.estimate(key);
                 let frames = [report.frame - 1, report.frame];
-                graph.push(odometry_entry(frames, relative, &self.settings.odometry));
-                self.pose(report.frame - 1).unwrap_or_else(Se3::identity).compose(&relative)
+                let step = step(frames, [last, frame], &self.settings.odometry, &estimates);
+                let motion = &self.settings.motion;
+                let pose = motion.predict(&step, &from);
+                graph.factors_mut().extend(motion.factors(&step)?);
+                values = motion.variables(&step, [&from, &pose]);
+                pose
             }
             None => {
                 self.check_rules(map.up)?;

@@ -29,6 +29,15 @@ impl OwnGraph {
         Self { graph, values }
     }
 
+    /// Variables whose key is one of these prefixes and a number, each with its prefix.
+    pub(super) fn numbered(
+        &self,
+        prefixes: &'static [&'static str],
+    ) -> impl Iterator<Item = (&Key, &'static str)> {
+        let prefix = |key: &Key| prefixes.iter().copied().find(|prefix| is_numbered(key.as_str(), prefix));
+        self.values.iter().filter_map(move |(key, _)| Some((key, prefix(key)?)))
+    }
+
     /// Puts all of it into a graph.
     pub(crate) fn add_to(&self, graph: &mut Graph, values: &mut Values) {
         for (key, value) in self.values.iter() {
@@ -56,11 +65,14 @@ pub(crate) fn offset_owner(key: &Key) -> Option<&str> {
     (is_number(object.strip_prefix('q')?) && is_number(interval)).then_some(object)
 }
 
+/// Whether a key is a prefix and a number.
+fn is_numbered(key: &str, prefix: &str) -> bool {
+    let number = key.strip_prefix(prefix).unwrap_or_default();
+    !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())
+}
+
 fn is_of_the_map(key: &Key) -> bool {
-    let name = key.as_str();
-    let number = name.strip_prefix('x').or_else(|| name.strip_prefix('q')).unwrap_or_default();
-    let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
-    is_number || offset_owner(key).is_some()
+    ["x", "q"].iter().any(|prefix| is_numbered(key.as_str(), prefix)) || offset_owner(key).is_some()
 }
 
 /// As documents write it; nothing at all, where there is nothing.

@@ -10,6 +10,7 @@
 mod association;
 mod evo;
 mod ground_robots;
+mod motion;
 mod moved;
 mod online;
 mod prior_map;

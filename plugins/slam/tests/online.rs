@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 /// Keeps what came of each frame.
 #[derive(Default)]
-struct Kept(Vec<FrameReport>);
+pub(crate) struct Kept(Vec<FrameReport>);
 
 impl Watch for Kept {
     fn frame(
@@ -84,13 +84,13 @@ odometry = { noise = { sigma = 0.01 } }
 detections = { loss = { type = "cauchy", scale = 2.8 } }
 "#;
 
-fn run_of(text: &str, sets: &[&str]) -> RunDocument {
+pub(crate) fn run_of(text: &str, sets: &[&str]) -> RunDocument {
     let mut document = Document::parse("desk.toml", text, Format::Toml).unwrap();
     document.set(sets).unwrap();
     RunDocument::read(&document).unwrap()
 }
 
-fn both(run: &RunDocument, variant: &Variant, data: Option<PathBuf>) -> (VariantReport, VariantReport, Kept) {
+pub(crate) fn both(run: &RunDocument, variant: &Variant, data: Option<PathBuf>) -> (VariantReport, VariantReport, Kept) {
     let (mut kept, mut run) = (Kept::default(), Run::new(run, data));
     let (_, online) = run.variant_online(variant, &mut kept, &mut Silent).unwrap();
     // a stream says a little of the shape of all objects

@@ -1,0 +1,107 @@
+use super::{MotionError, MotionModel, Step, pose_key};
+use manifactor_geometry::{Prior, Se3, Twist};
+use manifactor_graph::checked::Positive;
+use manifactor_graph::{FactorEntry, Key, Manifold, Noise, Values, register};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// The camera keeps its velocity but for white noise on its acceleration; odometry is used to begin with and is not measured.
+///
+/// Each frame has a velocity `v0`, `v1`, … in its own frame as a second variable, and two frames share a `constant_velocity` factor. A
+/// weak prior holds the first velocity near zero. Suits a camera whose odometry is missing or useless, if boxes of several objects
+/// are in most frames.
+///
+/// ```toml
+/// motion = { type = "constant_velocity", angular_acceleration = 0.5, linear_acceleration = 0.5 }
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ConstantVelocity {
+    /// Density of the noise on the angular acceleration, in rad/s²/√Hz.
+    pub angular_acceleration: Positive,
+    /// Density of the noise on the linear acceleration, in m/s²/√Hz.
+    pub linear_acceleration: Positive,
+    /// Standard deviation of the first angular velocity, in rad/s.
+    pub first_angular: Positive,
+    /// Standard deviation of the first linear velocity, in m/s.
+    pub first_linear: Positive,
+}
+
+impl Default for ConstantVelocity {
+    fn default() -> Self {
+        Self {
+            angular_acceleration: Positive::literal(0.5),
+            linear_acceleration: Positive::literal(0.5),
+            first_angular: Positive::literal(1.0),
+            first_linear: Positive::literal(1.0),
+        }
+    }
+}
+
+impl ConstantVelocity {
+    fn entry(&self, step: &Step<'_>) -> Result<FactorEntry, MotionError> {
+        let seconds = Positive::new(step.seconds).map_err(|error| step.error(&error))?;
+        let factor = manifactor_geometry::ConstantVelocity { seconds };
+        let noise = factor.noise(self.angular_acceleration, self.linear_acceleration);
+        let noise = noise.map_err(|error| step.error(&error))?;
+        let [from, to] = step.frames;
+        let keys = vec![pose_key(from), velocity_key(from), pose_key(to), velocity_key(to)];
+        Ok(FactorEntry { keys, name: None, factor: Arc::new(factor), noise, loss: None })
+    }
+
+    /// The prior on the first velocity.
+    fn first(&self, step: &Step<'_>) -> Result<FactorEntry, MotionError> {
+        let [angular, linear] = [self.first_angular.get(), self.first_linear.get()];
+        let noise = Noise::sigmas(&[angular, angular, angular, linear, linear, linear]);
+        Ok(FactorEntry {
+            keys: vec![velocity_key(step.frames[0])],
+            name: None,
+            factor: Arc::new(Prior { value: Twist::zero() }),
+            noise: noise.map_err(|error| step.error(&error))?,
+            loss: None,
+        })
+    }
+}
+
+/// The key of a frame's velocity.
+fn velocity_key(frame: usize) -> Key {
+    Key::indexed("v", frame)
+}
+
+/// The velocity of a frame as it is estimated.
+fn velocity(step: &Step<'_>, frame: usize) -> Option<Twist> {
+    let estimate = (step.estimates)(velocity_key(frame).as_str())?;
+    estimate.erased().as_any().downcast_ref::<Twist>().copied()
+}
+
+#[typetag::serialize(name = "constant_velocity")]
+impl MotionModel for ConstantVelocity {
+    fn predict(&self, step: &Step<'_>, from: &Se3) -> Se3 {
+        // without a velocity yet, odometry is the better guess
+        velocity(step, step.frames[0]).map_or_else(
+            || from.compose(&step.odometry.pose),
+            |twist| from.compose(&Se3::exp(&(twist.0 * step.seconds))),
+        )
+    }
+
+    fn variables(&self, step: &Step<'_>, [from, to]: [&Se3; 2]) -> Values {
+        let twist = Twist(Se3::identity().local(&from.between(to)) / step.seconds);
+        let mut values = Values::new();
+        for frame in step.frames.into_iter().filter(|frame| velocity(step, *frame).is_none()) {
+            values.insert(velocity_key(frame), twist);
+        }
+        values
+    }
+
+    fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError> {
+        // its prior comes with the first velocity
+        let first = velocity(step, step.frames[0]).is_none().then(|| self.first(step));
+        first.into_iter().chain([self.entry(step)]).collect()
+    }
+
+    fn prefixes(&self) -> &'static [&'static str] {
+        &["v"]
+    }
+}
+register!(dyn MotionModel, "constant_velocity", ConstantVelocity);

@@ -1,0 +1,34 @@
+use super::{MotionError, MotionModel, RelativePose, Step, pose_key};
+use manifactor_geometry::{Between, Se3};
+use manifactor_graph::{FactorEntry, register};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// The odometry's relative pose ties two frames: r = Log(Z⁻¹ Xᵢ⁻¹ Xᵢ₊₁), with the noise and the loss of `[odometry]`.
+///
+/// ```toml
+/// motion = { type = "odometry" }
+/// ```
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Odometry {}
+
+#[typetag::serialize(name = "odometry")]
+impl MotionModel for Odometry {
+    fn predict(&self, step: &Step<'_>, from: &Se3) -> Se3 {
+        from.compose(&step.odometry.pose)
+    }
+
+    fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError> {
+        let RelativePose { pose, noise, loss } = step.odometry;
+        Ok(vec![FactorEntry {
+            keys: step.frames.map(pose_key).to_vec(),
+            name: None,
+            factor: Arc::new(Between { relative: pose }),
+            noise: noise.clone(),
+            loss: loss.cloned(),
+        }])
+    }
+}
+register!(dyn MotionModel, "odometry", Odometry);
