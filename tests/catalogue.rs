@@ -1,5 +1,6 @@
 //! What every registered type has to have, checked by walking the catalogue.
 use manifactor::config::{Definitions, Document, Format, Node, Value};
+use manifactor::geometry::AnyCamera;
 use manifactor::graph::catalogue::{Entry, Kind, all, entries};
 use manifactor::graph::loss::Loss;
 use manifactor::graph::{Factor, Noise, Variable};
@@ -157,6 +158,7 @@ macro_rules! for_kind {
             k if k == <dyn Source as Kind>::NAME => $call::<Box<dyn Source>>($($argument),*),
             k if k == <dyn Association as Kind>::NAME => $call::<Box<dyn Association>>($($argument),*),
             k if k == <dyn Gravity as Kind>::NAME => $call::<Box<dyn Gravity>>($($argument),*),
+            k if k == <dyn AnyCamera as Kind>::NAME => $call::<Box<dyn AnyCamera>>($($argument),*),
             k if k == <dyn MotionModel as Kind>::NAME => $call::<Box<dyn MotionModel>>($($argument),*),
             k if k == <dyn Initialiser as Kind>::NAME => $call::<Box<dyn Initialiser>>($($argument),*),
             other => panic!("the kind `{other}` is new: add it to this test"),

@@ -1,10 +1,14 @@
 //! Cameras, and points as they see them.
 mod bal_camera;
 mod camera;
+pub(crate) mod camera_model;
 mod projection;
 mod projection_bal;
+mod radial_tangential;
 
 pub use bal_camera::BalCamera;
 pub use camera::{Camera, NotACamera};
+pub use camera_model::{AnyCamera, CameraModel};
 pub use projection::Projection;
 pub use projection_bal::ProjectionBal;
+pub use radial_tangential::RadialTangential;

@@ -3,6 +3,13 @@
 //! Conventions: x ⊞ δ = x·Exp(δ) with the full exponential, y ⊟ x = Log(x⁻¹y). In space the tangent
 //! is rotation first, (ω, v); in the plane it is (x, y, θ). A pose takes points from its own frame to
 //! the outer one.
+#[doc(hidden)]
+pub mod __private {
+    pub use crate::bundle::camera_model::rectify;
+    pub use manifactor_graph;
+    pub use nalgebra::Vector2;
+}
+
 mod bundle;
 mod certificate;
 mod factors;
@@ -13,7 +20,9 @@ mod procrustes;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
-pub use bundle::{BalCamera, Camera, NotACamera, Projection, ProjectionBal};
+pub use bundle::{
+    AnyCamera, BalCamera, Camera, CameraModel, NotACamera, Projection, ProjectionBal, RadialTangential,
+};
 pub use certificate::{Certificate, CertificateError, certify};
 pub use factors::{
     BearingRange2, BearingRange3, Between, ChordalBetween, ConstantVelocity, Landmark, Located, Position,

@@ -1,5 +1,5 @@
 //! Strategies for rotations, poses and points, with the places where formulas tend to break.
-use crate::{BalCamera, Point2, Point3, Rn, Se2, Se3, So2, So3, Twist};
+use crate::{BalCamera, CameraModel, Point2, Point3, Rn, Se2, Se3, So2, So3, Twist};
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
 use nalgebra::{Vector1, Vector2, Vector3, Vector4, Vector6};
@@ -78,6 +78,21 @@ pub fn any_bal_camera() -> impl Strategy<Value = BalCamera> + Clone {
 pub fn in_front() -> impl Strategy<Value = Vector3<f64>> + Clone {
     let depth = prop_oneof![4 => 0.5..10.0f64, 1 => 100.0..1000.0f64];
     (vector::<2>(1.5), depth).prop_map(|(side, depth)| Vector3::new(side.x, side.y, 1.0) * depth)
+}
+
+/// The law of a camera model for a point that it sees: its pixel unprojects to the point's direction.
+///
+/// # Errors
+/// If it does not.
+pub fn camera_law<M: CameraModel>(camera: &M, point: &Vector3<f64>) -> Result<(), String> {
+    if !camera.sees(point) {
+        return Err(format!("{camera:?} does not see {point:?}"));
+    }
+    let pixel = camera.project(point);
+    match camera.unproject(&pixel) {
+        Some(direction) if direction.angle(point) < 1e-7 => Ok(()),
+        direction => Err(format!("{camera:?} has {direction:?} at the pixel of {point:?}")),
+    }
 }
 
 /// Tangent vectors of SO(2) inside of its chart.

@@ -1,13 +1,20 @@
 //! Pinhole cameras without distortion.
-use crate::Se3;
+use crate::{CameraModel, Se3, register_camera};
 use manifactor_graph::Scalar;
-use nalgebra::{Matrix3, Matrix3x4, Vector2, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Matrix3x4, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A pinhole camera: u = fx x/z + skew y/z + cx, v = fy y/z + cy. x is right, y down, z forward.
 ///
 /// Pixels are counted from the corner of the image: it covers 0 to `width` and 0 to `height`.
+///
+/// ```toml
+/// [source]
+/// type = "recorded"
+/// folder = "my_recording"
+/// camera = { type = "pinhole", fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Document", into = "Document")]
 #[schemars(with = "Document")]
@@ -99,12 +106,6 @@ impl Camera {
         let camera_from_world = world_from_camera.inverse().matrix();
         self.matrix() * camera_from_world.fixed_view::<3, 4>(0, 0)
     }
-    /// Where a point of the camera's frame is seen, in pixels; it means something for one in front.
-    #[inline(always)]
-    pub fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
-        let (x, y) = (point.x / point.z, point.y / point.z);
-        Vector2::new(x * self.fx + y * self.skew + T::from(self.cx), y * self.fy + T::from(self.cy))
-    }
     /// The direction, in the camera's frame, of what is seen at a pixel; its z is 1.
     pub fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
         let y = (pixel.y - self.cy) / self.fy;
@@ -115,6 +116,43 @@ impl Camera {
         Vector2::new(f64::from(self.width), f64::from(self.height))
     }
 }
+
+/// The depth of a point has to be more than this share of its distance.
+const MARGIN: f64 = 1e-6;
+
+impl CameraModel for Camera {
+    const PROJECTION: &'static str = "projection";
+    const EXAMPLE: &'static str =
+        "{ fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }";
+
+    #[inline(always)]
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        let (x, y) = (point.x / point.z, point.y / point.z);
+        Vector2::new(x * self.fx + y * self.skew + T::from(self.cx), y * self.fy + T::from(self.cy))
+    }
+
+    fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        Some(self.ray(*pixel))
+    }
+
+    #[inline(always)]
+    fn sees(&self, point: &Vector3<f64>) -> bool {
+        point.z > 0.0 && point.z * point.z > MARGIN * MARGIN * point.norm_squared()
+    }
+
+    fn pinhole(&self) -> Camera {
+        *self
+    }
+
+    #[inline(always)]
+    fn derivative(&self, point: &Vector3<f64>) -> Matrix2x3<f64> {
+        let Self { fx, fy, skew, .. } = *self;
+        let (x, y, w) = (point.x / point.z, point.y / point.z, point.z.recip());
+        Matrix2x3::new(fx, skew, -(fx * x + skew * y), 0.0, fy, -fy * y) * w
+    }
+}
+
+register_camera!("pinhole", "projection", Camera);
 
 impl TryFrom<Document> for Camera {
     type Error = NotACamera;

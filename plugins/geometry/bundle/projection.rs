@@ -1,33 +1,30 @@
-//! A point is seen by a camera that is calibrated.
-use crate::{Camera, Coordinates, Point3, Se3};
+//! A point in a calibrated camera.
+use crate::{Camera, CameraModel, Coordinates, Point3, Se3};
 use manifactor_graph::prelude::*;
-use nalgebra::Matrix2x3;
 
 /// The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
-///
-/// Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the
-/// pinhole of `camera`. Rows: x to the right and y down. Not defined where the point is not in front of the camera
-/// by a millionth of its distance; the factor is inactive there.
-///
-/// ```toml
-/// [[factors]]
-/// keys = ["x0", "l0"]
-/// factor = { type = "projection", pixel = [310.0, 262.5], camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
-/// noise = { sigma = 1.0 }
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Projection {
-    /// Where the point was seen, in pixels, x right and y down.
+#[serde(deny_unknown_fields, bound = "M: CameraModel")]
+#[schemars(bound = "M: CameraModel", description = description::<M>())]
+pub struct Projection<M = Camera> {
+    /// Pixel of the point, x right and y down.
     pub pixel: Coordinates<2>,
     /// The camera that saw it.
-    pub camera: Camera,
+    pub camera: M,
 }
 
-/// A point's depth has to be more than this share of its distance.
-const MARGIN: f64 = 1e-6;
+fn description<M: CameraModel>() -> String {
+    format!(
+        "The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.\n\nVariables: the pose of the camera, from its own frame (z \
+         forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if \
+         the camera cannot see the point, for example behind it; the factor is inactive there.\n\n```toml\n[[factors]]\nkeys = \
+         [\"x0\", \"l0\"]\nfactor = {{ type = \"{}\", pixel = [310.0, 262.5], camera = {} }}\nnoise = {{ sigma = 1.0 }}\n```",
+        M::PROJECTION,
+        M::EXAMPLE
+    )
+}
 
-impl Residual for Projection {
+impl<M: CameraModel> Residual for Projection<M> {
     type Variables = (Se3, Point3);
     type Dim = U2;
     const ROWS: &'static [&'static str] = &["u", "v"];
@@ -39,8 +36,7 @@ impl Residual for Projection {
 
     #[inline]
     fn is_defined(&self, (pose, point): Refs<'_, Self::Variables>) -> bool {
-        let seen = pose.inverse_act(point);
-        seen.z > 0.0 && seen.z * seen.z > MARGIN * MARGIN * seen.norm_squared()
+        self.camera.sees(&pose.inverse_act(point))
     }
 
     #[inline]
@@ -51,9 +47,7 @@ impl Residual for Projection {
         jacobians: &mut Jacobians<Self>,
     ) -> Vector2<f64> {
         let seen = pose.inverse_act(point);
-        let Camera { fx, fy, skew, .. } = self.camera;
-        let (x, y, w) = (seen.x / seen.z, seen.y / seen.z, seen.z.recip());
-        let by_seen = Matrix2x3::new(fx, skew, -(fx * x + skew * y), 0.0, fy, -fy * y) * w;
+        let by_seen = self.camera.derivative(&seen);
         // P = Exp(-δ)∘P: ∂P/∂(ω, v) = [P]×, -I
         jacobians.0.fixed_columns_mut::<3>(0).copy_from(&(by_seen * seen.cross_matrix()));
         jacobians.0.fixed_columns_mut::<3>(3).copy_from(&-by_seen);
@@ -61,7 +55,6 @@ impl Residual for Projection {
         self.camera.project(&seen) - *self.pixel
     }
 }
-register_factor!("projection", Projection);
 
 #[cfg(test)]
 mod tests {

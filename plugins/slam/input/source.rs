@@ -8,16 +8,16 @@ use std::path::{Path, PathBuf};
 
 mod assemble;
 mod camera;
-mod distortion;
 mod json_lines;
 mod recorded;
+mod rectification;
 mod tum;
 
 pub use camera::CameraChoice;
-pub use distortion::Distortion;
 pub(crate) use json_lines::parse;
 pub use json_lines::{JsonLines, line};
 pub use recorded::Recorded;
+pub use rectification::Distortion;
 pub use tum::TumRgbd;
 
 /// A source of a sequence.
@@ -188,7 +188,7 @@ pub enum SourceError {
     },
     /// A box that a lens cannot have shown.
     #[error(
-        "the box {bounds:?} of frame {frame} has no place in the image without the lens's `distortion`: it is not this camera's"
+        "the box {bounds:?} of frame {frame} has no place in the rectified image: check the camera's numbers and its `distortion`"
     )]
     Distorted {
         /// Of the box.
@@ -196,6 +196,11 @@ pub enum SourceError {
         /// xmin, ymin, xmax, ymax, in pixels.
         bounds: [f64; 4],
     },
+    /// A camera model with a distortion beside it.
+    #[error(
+        "`source.camera` is a model of its lens and `source.distortion` is another: leave one of them out"
+    )]
+    DistortedTwice,
     /// A simulation that cannot be run.
     #[error("the simulation cannot be run: {0}")]
     Simulation(String),

@@ -90,7 +90,11 @@ pub(crate) fn run_of(text: &str, sets: &[&str]) -> RunDocument {
     RunDocument::read(&document).unwrap()
 }
 
-pub(crate) fn both(run: &RunDocument, variant: &Variant, data: Option<PathBuf>) -> (VariantReport, VariantReport, Kept) {
+pub(crate) fn both(
+    run: &RunDocument,
+    variant: &Variant,
+    data: Option<PathBuf>,
+) -> (VariantReport, VariantReport, Kept) {
     let (mut kept, mut run) = (Kept::default(), Run::new(run, data));
     let (_, online) = run.variant_online(variant, &mut kept, &mut Silent).unwrap();
     // a stream says a little of the shape of all objects

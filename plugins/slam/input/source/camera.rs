@@ -1,5 +1,6 @@
 //! Cameras by name.
 use super::SourceError;
+use manifactor_geometry::AnyCamera;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
@@ -7,6 +8,7 @@ use serde::de::{self, IntoDeserializer, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The cameras of TUM RGB-D, 640 × 480; without distortion, as in the paper.
 const PRESETS: [(&str, [f64; 4]); 3] = [
@@ -16,13 +18,15 @@ const PRESETS: [(&str, [f64; 4]); 3] = [
 ];
 
 /// A camera by its numbers or by its name.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum CameraChoice {
     /// `freiburg1`, `freiburg2` or `freiburg3`: those of TUM RGB-D.
     Named(CameraName),
-    /// Its parameters, in pixels.
-    Camera(Camera),
+    /// A pinhole: its parameters, in pixels.
+    Pinhole(Camera),
+    /// A model by its `type`.
+    Model(Arc<dyn AnyCamera>),
 }
 
 /// The cameras of TUM RGB-D.
@@ -40,28 +44,41 @@ pub enum CameraName {
 // serde's own for untagged forms would only say that none fits, and not what is wrong with a table's field
 impl<'de> Deserialize<'de> for CameraChoice {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Plain(CameraChoice);
         struct Either;
         impl<'de> Visitor<'de> for Either {
             type Value = CameraChoice;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a camera, or a table of its fx, fy, cx, cy, width and height")
+                f.write_str("the name of a camera, or a table of its fx, fy, cx, cy, width and height, with the `type` of another model than the pinhole")
             }
             fn visit_str<E: de::Error>(self, name: &str) -> Result<CameraChoice, E> {
                 CameraName::deserialize(name.into_deserializer()).map(CameraChoice::Named)
             }
             fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<CameraChoice, A::Error> {
-                Camera::deserialize(MapAccessDeserializer::new(table)).map(CameraChoice::Camera)
+                Camera::deserialize(MapAccessDeserializer::new(table)).map(CameraChoice::Pinhole)
             }
         }
-        from.deserialize_any(Either)
+        impl<'de> Deserialize<'de> for Plain {
+            fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                from.deserialize_any(Either).map(Self)
+            }
+        }
+        manifactor_config::deserialize_with(from, |node| {
+            let choice = match node.field("type") {
+                Some(_) => Self::Model(node.try_read()?),
+                None => node.try_read::<Plain>()?.0,
+            };
+            Ok(Box::new(choice))
+        })
     }
 }
 
 impl CameraChoice {
-    /// The camera.
-    pub fn camera(&self) -> Camera {
+    /// The pinhole camera of the rectified image.
+    pub fn pinhole(&self) -> Camera {
         match self {
-            Self::Camera(camera) => *camera,
+            Self::Pinhole(camera) => *camera,
+            Self::Model(model) => model.pinhole(),
             Self::Named(name) => preset(PRESETS[*name as usize].1),
         }
     }
@@ -87,7 +104,7 @@ mod tests {
 
     #[test]
     fn names_and_folders_tell_the_same_camera() {
-        let named = CameraChoice::Named(CameraName::Freiburg2).camera();
+        let named = CameraChoice::Named(CameraName::Freiburg2).pinhole();
         assert_eq!(named.fx, 520.9);
         assert_eq!(by_folder(Path::new("x/rgbd_dataset_freiburg2_desk")).unwrap(), named);
         assert!(by_folder(Path::new("x/desk")).unwrap_err().to_string().contains("freiburg1, freiburg2"));

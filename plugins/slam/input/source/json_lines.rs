@@ -1,4 +1,5 @@
 use super::assemble::read_ground_truth;
+use super::rectification::Rectification;
 use super::{CameraChoice, Folders, Source, SourceError};
 use crate::input::sequence::{
     Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening, Sequence, UnusedDetection,
@@ -34,7 +35,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// ```toml
 /// source = { type = "json_lines", camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JsonLines {
     /// The camera.
@@ -230,7 +231,8 @@ impl JsonLines {
     fn lines(&self, folders: &Folders) -> Result<Stream, SourceError> {
         let truth = self.ground_truth.as_deref().map(|file| read_ground_truth(&folders.document, Some(file)));
         let ground_truth = truth.transpose()?.flatten();
-        let opening = Opening { camera: self.camera.camera(), up: self.up, ground_truth };
+        let lens = Rectification::new(&self.camera, None)?;
+        let opening = Opening { camera: lens.camera, up: self.up, ground_truth };
         let (file, reader): (_, Box<dyn BufRead + Send>) = match &self.file {
             Some(file) => {
                 let file = folders.beside_document(file);
@@ -244,7 +246,13 @@ impl JsonLines {
             None => (STDIN.into(), Box::new(BufReader::new(stdin()))),
         };
         let lines = Lines { file, reader, line: 0, text: vec![], unreadable: 0 };
-        Ok(Stream::new(opening, lines.fuse()))
+        let rectified = lines.fuse().map(move |read| {
+            read.map(|mut observation| {
+                lens.apply_to_frame(&mut observation);
+                observation
+            })
+        });
+        Ok(Stream::new(opening, rectified))
     }
 }
 

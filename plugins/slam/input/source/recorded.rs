@@ -1,6 +1,6 @@
 use super::assemble::{Matching, a_tenth, is_a_tenth, read_ground_truth, read_matched, read_objects};
 use super::camera::CameraChoice;
-use super::distortion::{Distortion, straighten};
+use super::rectification::{Distortion, Rectification};
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::Sequence;
 use manifactor_graph::checked::{not_negative, within};
@@ -18,14 +18,14 @@ use std::path::PathBuf;
 /// ```toml
 /// source = { type = "recorded", folder = "my_recording", camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Recorded {
     /// Where the files are.
     pub folder: PathBuf,
     /// The camera.
     pub camera: CameraChoice,
-    /// How its lens bends the image: k₁, k₂, p₁, p₂, k₃ as OpenCV has them. Boxes are freed of it. Default: it does not.
+    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV: boxes are rectified. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<Distortion>,
     /// The odometry in the folder.
@@ -68,18 +68,18 @@ fn exact() -> f64 {
 impl Source for Recorded {
     fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.folder)?;
-        let camera = self.camera.camera();
+        let lens = Rectification::new(&self.camera, self.distortion)?;
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
         let by = Matching { within: self.max_time_difference, without_pose: self.max_without_pose };
         let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
-        straighten(self.distortion, &camera, &mut detections)?;
+        lens.apply(&mut detections)?;
         let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         if self.objects.is_some() || truth.is_some() {
             let objects = read_objects(&folder, self.objects.as_deref())?;
             truth.get_or_insert_default().objects = objects;
         }
         Ok(Sequence {
-            camera,
+            camera: lens.camera,
             frames,
             detections,
             up: self.up,

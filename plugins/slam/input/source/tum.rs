@@ -1,6 +1,6 @@
 use super::assemble::{Matching, a_tenth, is_a_tenth, read_ground_truth, read_matched};
 use super::camera::{CameraChoice, by_folder};
-use super::distortion::{Distortion, straighten};
+use super::rectification::{Distortion, Rectification};
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
@@ -20,7 +20,7 @@ use std::path::PathBuf;
 /// ```toml
 /// source = { type = "tum", sequence = "rgbd_dataset_freiburg1_desk", odometry = "trajectories/dvo_vo.txt" }
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TumRgbd {
     /// The folder of the sequence.
@@ -36,7 +36,7 @@ pub struct TumRgbd {
     /// The camera: by name, or by its numbers. Default: the one that the folder's name tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraChoice>,
-    /// How its lens bends the image: k₁, k₂, p₁, p₂, k₃ as OpenCV has them. Boxes are freed of it. Default: it does not.
+    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV: boxes are rectified. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<Distortion>,
     /// How far apart in time a detection and its pose may be, in seconds. Time stamps are written to the
@@ -61,14 +61,14 @@ fn exact() -> f64 {
 impl Source for TumRgbd {
     fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
         let folder = folders.data_set(&self.sequence)?;
-        let camera = match &self.camera {
-            Some(choice) => choice.camera(),
-            None => by_folder(&folder)?,
+        let lens = match &self.camera {
+            Some(choice) => Rectification::new(choice, self.distortion)?,
+            None => Rectification::of_pinhole(by_folder(&folder)?, self.distortion),
         };
         let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
         let by = Matching { within: self.max_time_difference, without_pose: self.max_without_pose };
         let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
-        straighten(self.distortion, &camera, &mut detections)?;
+        lens.apply(&mut detections)?;
         let truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
         let file = folder.join("accelerometer.txt");
         let readings = if file.is_file() { accelerometer::read(&file)? } else { vec![] };
@@ -77,7 +77,7 @@ impl Source for TumRgbd {
             acceleration: r.acceleration,
         };
         Ok(Sequence {
-            camera,
+            camera: lens.camera,
             frames,
             detections,
             up: None,

@@ -1,0 +1,87 @@
+//! The seam of camera models: a model is one file that implements [`CameraModel`] and ends with `register_camera!`.
+use crate::{Camera, Point3};
+use manifactor_graph::{Jet, JetOf, Manifold, Scalar};
+use nalgebra::{Matrix2x3, U3, Vector2, Vector3};
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fmt::Debug;
+
+/// A calibrated camera: the pixel of a point, and the direction of a pixel. Points are in the camera's frame: x right, y down, z forward.
+pub trait CameraModel:
+    Clone + Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'static
+{
+    /// Name in documents of the [`Projection`](crate::Projection) of this model.
+    const PROJECTION: &'static str;
+    /// A camera, as TOML writes it inside of a factor; for the catalogue.
+    const EXAMPLE: &'static str;
+
+    /// Pixel of a point that the camera [sees](Self::sees).
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T>;
+
+    /// A direction that is seen at a pixel, of any length; `None` if the model has none there.
+    fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>>;
+
+    /// Whether a point is in the domain of [`project`](Self::project), in the image or beside it.
+    fn sees(&self, point: &Vector3<f64>) -> bool;
+
+    /// The pinhole camera of the rectified image: same focal lengths, principal point and size.
+    fn pinhole(&self) -> Camera;
+
+    /// Derivative of [`project`](Self::project) by the point; by dual numbers, unless a model knows better.
+    #[inline]
+    fn derivative(&self, point: &Vector3<f64>) -> Matrix2x3<f64> {
+        let pixel = self.project(&Point3::new(*point).seed());
+        let mut derivative = Matrix2x3::zeros();
+        for (i, coordinate) in pixel.iter().enumerate() {
+            if let Some(gradient) = JetOf::<U3>::gradient(coordinate) {
+                derivative.row_mut(i).copy_from_slice(gradient);
+            }
+        }
+        derivative
+    }
+}
+
+/// A [`CameraModel`] that a document names by its `type`. Written by [`register_camera!`](crate::register_camera).
+#[typetag::serialize(tag = "type")]
+pub trait AnyCamera: Debug + Send + Sync {
+    /// The pinhole camera of the rectified image.
+    fn pinhole(&self) -> Camera;
+
+    /// Pixel of the rectified image for a pixel of the camera's own; `None` if there is none.
+    fn rectify(&self, pixel: &Vector2<f64>) -> Option<Vector2<f64>>;
+}
+
+manifactor_graph::kind!(dyn AnyCamera, "camera");
+
+/// The pixel in the rectified image of a pixel of a camera; `None` for a direction that no pinhole sees.
+#[doc(hidden)]
+pub fn rectify<M: CameraModel>(camera: &M, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
+    let direction = camera.unproject(pixel)?;
+    (direction.z > 0.0).then(|| camera.pinhole().project(&direction))
+}
+
+/// Registers a [`CameraModel`](crate::CameraModel) for sources, and its projection of a point as a factor:
+/// `register_camera!("radial_tangential", "projection_radial_tangential", RadialTangential);`
+#[macro_export]
+macro_rules! register_camera {
+    ($name:literal, $projection:literal, $type:ty) => {
+        const _: () = {
+            use $crate::__private::manifactor_graph::__private::typetag;
+            #[typetag::serialize(name = $name)]
+            impl $crate::AnyCamera for $type {
+                fn pinhole(&self) -> $crate::Camera {
+                    $crate::CameraModel::pinhole(self)
+                }
+                fn rectify(
+                    &self,
+                    pixel: &$crate::__private::Vector2<f64>,
+                ) -> ::std::option::Option<$crate::__private::Vector2<f64>> {
+                    $crate::__private::rectify(self, pixel)
+                }
+            }
+            $crate::__private::manifactor_graph::register!(dyn $crate::AnyCamera, $name, $type);
+        };
+        $crate::__private::manifactor_graph::register_factor!($projection, $crate::Projection<$type>);
+    };
+}

@@ -1,0 +1,204 @@
+//! Lenses that bend the image along and across the radius.
+use crate::{Camera, CameraModel, Coordinates, NotACamera, register_camera};
+use manifactor_graph::Scalar;
+use nalgebra::{Vector2, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A camera whose lens bends the image along and across the radius, with five coefficients.
+///
+/// A point x/z, y/z at the radius r is seen by the pinhole at (x/z, y/z) · (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) plus the tangential part
+/// (2 p₁ xy/z² + p₂ (r² + 2 x²/z²), p₁ (r² + 2 y²/z²) + 2 p₂ xy/z²); Brown, *Close-range camera calibration*, 1971. Points beyond the radius
+/// at which the image would fold back are not seen.
+///
+/// ```toml
+/// [source]
+/// type = "recorded"
+/// folder = "my_recording"
+/// camera = { type = "radial_tangential", fx = 517.3, fy = 516.5, cx = 318.6, cy = 255.3, width = 640, height = 480, distortion = [0.2624, -0.9531, -0.0054, 0.0026, 1.1633] }
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "Document", into = "Document")]
+#[schemars(with = "Document")]
+pub struct RadialTangential {
+    pinhole: Camera,
+    /// k₁, k₂, p₁, p₂, k₃, in the order of OpenCV.
+    distortion: [f64; 5],
+    /// Square of the radius x²/z² + y²/z² up to which the image does not fold.
+    limit: f64,
+}
+
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "RadialTangential")]
+struct Document {
+    /// Focal length along x, in pixels.
+    fx: f64,
+    /// Focal length along y, in pixels.
+    fy: f64,
+    /// Principal point, in pixels.
+    cx: f64,
+    /// Principal point, in pixels.
+    cy: f64,
+    /// Size of the image, in pixels.
+    width: u32,
+    /// Size of the image, in pixels.
+    height: u32,
+    /// Coefficients k₁, k₂, p₁, p₂, k₃, in the order of OpenCV.
+    distortion: Coordinates<5>,
+}
+
+/// Steps until a direction is found, and its largest error, in units of the focal length.
+const STEPS: usize = 100;
+const NEAR: f64 = 1e-9;
+
+impl RadialTangential {
+    /// A camera with the coefficients k₁, k₂, p₁, p₂, k₃ in the order of OpenCV.
+    pub fn new(pinhole: Camera, distortion: [f64; 5]) -> Self {
+        Self { pinhole, distortion, limit: limit(distortion) }
+    }
+
+    /// Image of a point at x/z, y/z; both in units of the focal length, from the principal point.
+    fn bent<T: Scalar>(&self, [x, y]: [T; 2]) -> [T; 2] {
+        let [k1, k2, p1, p2, k3] = self.distortion.map(T::from);
+        let [one, two] = [T::from(1.0), T::from(2.0)];
+        let r2 = x * x + y * y;
+        let radial = one + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let sideways = two * p1 * x * y + p2 * (r2 + two * x * x);
+        let upward = p1 * (r2 + two * y * y) + two * p2 * x * y;
+        [x * radial + sideways, y * radial + upward]
+    }
+}
+
+/// Steps in which the fold of the image is looked for, and halvings of the one that has it.
+const SCANNED: u32 = 10_000;
+const HALVINGS: usize = 60;
+
+/// Smallest s > 0 at which r (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) stops growing with r, s = r²; infinite if it never does.
+fn limit([k1, k2, _, _, k3]: [f64; 5]) -> f64 {
+    // in t = 1/s the derivative is t³ + 3 k₁ t² + 5 k₂ t + 7 k₃: its largest root is below `bound`, where it is positive
+    let grows = |t: f64| t * (t * (t + 3.0 * k1) + 5.0 * k2) + 7.0 * k3 > 0.0;
+    let bound = 1.0 + (3.0 * k1).abs().max((5.0 * k2).abs()).max((7.0 * k3).abs());
+    let at = |i: u32| bound * f64::from(i) / f64::from(SCANNED);
+    let Some(first) = (0..SCANNED).rev().find(|i| !grows(at(*i))).filter(|i| *i > 0) else {
+        return f64::INFINITY;
+    };
+    let [mut low, mut high] = [at(first), at(first + 1)];
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        *(if grows(middle) { &mut high } else { &mut low }) = middle;
+    }
+    1.0 / high
+}
+
+impl CameraModel for RadialTangential {
+    const PROJECTION: &'static str = "projection_radial_tangential";
+    const EXAMPLE: &'static str = "{ fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, \
+                                   distortion = [0.1, 0.02, 0.0, 0.0, 0.0] }";
+
+    #[inline(always)]
+    fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T> {
+        let [x, y] = self.bent([point.x / point.z, point.y / point.z]);
+        self.pinhole.project(&Vector3::new(x, y, T::from(1.0)))
+    }
+
+    fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let seen = self.pinhole.ray(*pixel);
+        let mut point = [seen.x, seen.y];
+        for _ in 0..STEPS {
+            let [x, y] = self.bent(point);
+            let off = [seen.x - x, seen.y - y];
+            point = [point[0] + off[0], point[1] + off[1]];
+            if off[0].hypot(off[1]) < NEAR {
+                let direction = Vector3::new(point[0], point[1], 1.0);
+                return self.sees(&direction).then_some(direction);
+            }
+        }
+        None
+    }
+
+    #[inline(always)]
+    fn sees(&self, point: &Vector3<f64>) -> bool {
+        let square = point.xy().norm_squared();
+        point.z > 0.0 && square < self.limit * point.z * point.z
+    }
+
+    fn pinhole(&self) -> Camera {
+        self.pinhole
+    }
+}
+
+register_camera!("radial_tangential", "projection_radial_tangential", RadialTangential);
+
+impl TryFrom<Document> for RadialTangential {
+    type Error = NotACamera;
+    fn try_from(document: Document) -> Result<Self, NotACamera> {
+        let Document { fx, fy, cx, cy, width, height, distortion } = document;
+        Ok(Self::new(Camera::new([fx, fy, cx, cy], width, height)?, distortion.vector().into()))
+    }
+}
+
+impl From<RadialTangential> for Document {
+    fn from(camera: RadialTangential) -> Self {
+        let Camera { fx, fy, cx, cy, width, height, .. } = camera.pinhole;
+        Self { fx, fy, cx, cy, width, height, distortion: Coordinates::unchecked(camera.distortion.into()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{any_se3, camera_law};
+    use crate::{Point3, Projection};
+    use manifactor_testing::jacobian_laws;
+    use manifactor_testing::strategies::vector;
+    use proptest::prelude::*;
+
+    /// The calibration of freiburg1, as the benchmark publishes it.
+    fn freiburg1() -> RadialTangential {
+        let pinhole = Camera::new([517.3, 516.5, 318.6, 255.3], 640, 480).unwrap();
+        RadialTangential::new(pinhole, [0.2624, -0.9531, -0.0054, 0.0026, 1.1633])
+    }
+
+    /// Points that it sees in its image, or a little beside it.
+    fn seen() -> impl Strategy<Value = Vector3<f64>> {
+        ([-0.65..0.65f64, -0.5..0.5], 0.5..10.0f64).prop_map(|([x, y], z)| Vector3::new(x, y, 1.0) * z)
+    }
+
+    jacobian_laws! {
+        jacobians_agree: (seen(), vector::<2>(500.0), any_se3()).prop_map(|(point, pixel, pose)| {
+            let factor = Projection { pixel: Coordinates::new(pixel).unwrap(), camera: freiburg1() };
+            (factor, pose, Point3::new(pose.act(&point)))
+        })
+    }
+
+    #[test]
+    fn a_pixel_is_that_of_its_direction() {
+        proptest!(|(point in seen())| prop_assert_eq!(camera_law(&freiburg1(), &point), Ok(())));
+    }
+
+    #[test]
+    fn without_distortion_it_is_the_pinhole() {
+        let plain = RadialTangential::new(freiburg1().pinhole, [0.0; 5]);
+        let point = Vector3::new(0.3, -0.2, 1.5);
+        assert_eq!(plain.project(&point), plain.pinhole.project(&point));
+        assert_eq!(plain.limit, f64::INFINITY);
+    }
+
+    #[test]
+    fn a_point_beyond_the_fold_is_not_seen() {
+        let folds = RadialTangential::new(freiburg1().pinhole, [-1.0, 0.0, 0.0, 0.0, 0.0]);
+        // 1 - 3 s = 0
+        assert!((folds.limit - 1.0 / 3.0).abs() < 1e-12);
+        assert!(folds.sees(&Vector3::new(0.5, 0.0, 1.0)) && !folds.sees(&Vector3::new(0.6, 0.0, 1.0)));
+        assert!(folds.unproject(&Vector2::new(10.0, 10.0)).is_none());
+    }
+
+    #[test]
+    fn a_document_reads_back() {
+        let text = serde_json::to_string(&freiburg1()).unwrap();
+        assert_eq!(serde_json::from_str::<RadialTangential>(&text).unwrap(), freiburg1());
+        let bad = serde_json::from_str::<RadialTangential>(&text.replace("517.3", "-1.0")).unwrap_err();
+        assert!(bad.to_string().starts_with("camera: expected fx to be a finite number above zero"), "{bad}");
+    }
+}

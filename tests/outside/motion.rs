@@ -1,0 +1,57 @@
+//! A motion model: frames that nothing ties but a walk at random.
+use manifactor::config::{Document, Format};
+use manifactor::geometry::{Between, Se3};
+use manifactor::graph::FactorEntry;
+use manifactor::prelude::*;
+use manifactor::slam::motion::{MotionError, MotionModel, Step, pose_key};
+use manifactor::slam::run::Run;
+use manifactor::slam::run_document::RunDocument;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// A camera that stays where it is, more or less.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct RandomWalk {
+    /// Standard deviation in one second, in rad and m.
+    sigma: f64,
+}
+
+#[typetag::serialize(name = "test_random_walk")]
+impl MotionModel for RandomWalk {
+    fn predict(&self, _: &Step<'_>, from: &Se3) -> Se3 {
+        *from
+    }
+
+    fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError> {
+        let noise = Noise::sigma(self.sigma * step.seconds.sqrt()).map_err(|why| step.error(&why))?;
+        let keys = step.frames.map(pose_key).to_vec();
+        let factor = Arc::new(Between { relative: Se3::identity() });
+        Ok(vec![FactorEntry { keys, name: None, factor, noise, loss: None }])
+    }
+}
+register!(dyn MotionModel, "test_random_walk", RandomWalk);
+
+fn run(sigma: f64) -> Result<f64, String> {
+    let text = format!(
+        "source = {{ type = 'simulated', trajectory = {{ frames = 20 }}, detector = {{ depth_error = 0.02 }} }}
+         motion = {{ type = 'test_random_walk', sigma = {sigma} }}"
+    );
+    let document = Document::parse("run.toml", text, Format::Toml).unwrap();
+    let document = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
+    let done = Run::new(&document, None).variant(&document.variants[0], &mut Silent);
+    let (_, report) = done.map_err(|error| error.to_string())?;
+    Ok(report.trajectory[0].estimate.ate.rmse)
+}
+
+#[test]
+fn a_run_names_it() {
+    assert!(run(1.0).unwrap() < run(1e-3).unwrap(), "boxes move a camera that may move");
+}
+
+#[test]
+fn a_step_without_a_factor_ends_the_run_with_its_place() {
+    let error = run(0.0).unwrap_err();
+    assert!(error.starts_with("no motion from frame 0 to frame 1"), "{error}");
+}
