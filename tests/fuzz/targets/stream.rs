@@ -109,7 +109,7 @@ fn lines(folder: &Path, bytes: &[u8]) -> Vec<Result<Observation, SourceError>> {
     let file = "frames.jsonl";
     std::fs::write(folder.join(file), bytes).unwrap_or_else(|e| panic!("{e}"));
     let source = JsonLines {
-        camera: CameraChoice::Camera(camera()),
+        camera: CameraChoice::Pinhole(camera()),
         file: Some(file.into()),
         ground_truth: None,
         up: None,
