@@ -115,9 +115,6 @@ impl What {
 impl Error for ReadError {
     fn custom<T: fmt::Display>(message: T) -> Self {
         let message = message.to_string();
-        if let Some(error) = TextError::parse(&message) {
-            return Self::unplaced(What::Text(error));
-        }
         let line = message.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
         Self::unplaced(What::Message(line.trim().to_owned()))
     }
@@ -147,8 +144,18 @@ impl Error for ReadError {
     }
 }
 
+/// A fault within a text of the node that is read.
+impl From<TextError> for ReadError {
+    fn from(error: TextError) -> Self {
+        Self::unplaced(What::Text(error))
+    }
+}
+
 impl fmt::Display for ReadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Inner::Unplaced(What::Text(error)) = &*self.0 {
+            return error.fmt(f);
+        }
         let fault = self.fault();
         write!(f, "{fault}")?;
         fault.help().map_or(Ok(()), |help| write!(f, " ({help})"))

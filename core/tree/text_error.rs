@@ -10,8 +10,8 @@ use std::ops::Range;
 ///           ^^^
 /// did you mean `dot`?
 /// ```
-/// An error of serde carries no more than such a message: [`TextError::parse`] gets the error back out of it, so that
-/// a caller that knows where the text is written can point there.
+/// A type that is read with [`deserialize_with`](crate::deserialize_with) returns it as a [`ReadError`](crate::ReadError), which has the place
+/// in the document.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TextError {
     /// The text, on one line.
@@ -31,19 +31,6 @@ impl TextError {
     pub fn line(text: &str) -> String {
         text.replace(['\n', '\r', '\t'], " ")
     }
-
-    /// The error that a message displays; `None`, if it is another message.
-    pub fn parse(message: &str) -> Option<Self> {
-        let mut lines = message.lines();
-        let (first, text, carets) = (lines.next()?, lines.next()?.strip_prefix("  ")?, lines.next()?);
-        let indent = carets.strip_prefix("  ")?;
-        let before = indent.len() - indent.trim_start_matches(' ').len();
-        let width = indent.get(before..).filter(|c| !c.is_empty() && c.bytes().all(|b| b == b'^'))?.len();
-        let byte = |character: usize| text.char_indices().nth(character).map_or(text.len(), |(at, _)| at);
-        let span = byte(before)..byte(before + width);
-        let help = lines.next().map(str::to_owned);
-        Some(Self { text: text.to_owned(), span, message: first.to_owned(), help })
-    }
 }
 
 impl fmt::Display for TextError {
@@ -60,21 +47,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_error_is_read_back_from_its_message() {
+    fn a_caret_is_under_the_fault() {
         let text = "α + abs(dto(a, b))";
         let at = text.find("dto").unwrap();
         let help = Some("did you mean `dot`?".to_owned());
         let error = TextError { text: text.into(), span: at..at + 3, message: "unknown".into(), help };
         assert_eq!(error.to_string(), "unknown\n  α + abs(dto(a, b))\n          ^^^\ndid you mean `dot`?");
-        assert_eq!(TextError::parse(&error.to_string()), Some(error.clone()));
-        let end = TextError { span: text.len()..text.len(), help: None, ..error };
-        assert_eq!(TextError::parse(&end.to_string()), Some(end));
-    }
-
-    #[test]
-    fn other_messages_are_none() {
-        for message in ["", "wrong", "wrong\n  text", "wrong\ntext\n ^", "a\n  b\n  c"] {
-            assert_eq!(TextError::parse(message), None, "{message}");
-        }
     }
 }

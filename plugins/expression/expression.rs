@@ -6,13 +6,15 @@ use crate::program::Program;
 use crate::scope::Scope;
 use indexmap::IndexMap;
 use manifactor_graph::{Direction, Dynamic, ErasedResidual, Factor, TextError, Up, WrongRows, register};
+use manifactor_tree::{ReadError, deserialize_with};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A factor whose residual is written as formulas. The catalogue has the language, with every function that is linked:
 /// `manifactor explain expression`.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "Document", into = "Document")]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[serde(into = "Document")]
 #[schemars(with = "Document", description = page())]
 pub struct Expression {
     document: Document,
@@ -83,6 +85,24 @@ impl TryFrom<Document> for Expression {
         Ok(Self { document, program })
     }
 }
+
+/// From the node itself, so that a fault in a formula keeps its place.
+impl<'de> Deserialize<'de> for Expression {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserialize_with(deserializer, |node| {
+            let mut fields = node.clone();
+            fields.retain(|field| field != TAG);
+            let expression = Self::try_from(fields.try_read::<Document>()?);
+            Ok(Box::new(expression.map_err(|error| match error {
+                ExpressionError::Text(error) => ReadError::from(error),
+                other => ReadError::custom(other),
+            })?))
+        })
+    }
+}
+
+/// The field that names the type of a factor.
+const TAG: &str = "type";
 
 impl From<Expression> for Document {
     fn from(expression: Expression) -> Self {

@@ -2,6 +2,7 @@
 pub mod class;
 pub mod fusion;
 pub mod journal;
+pub mod measurement;
 pub mod prior_map;
 pub mod recording;
 pub mod sequence;

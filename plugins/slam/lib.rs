@@ -3,6 +3,11 @@
 //! A [`RunDocument`](run_document::RunDocument) says what to do. A [`Source`](source::Source) gives a
 //! [`Sequence`](sequence::Sequence); a [`Mapping`](mapping::Mapping) makes a graph of it; a solver an
 //! [`Estimate`](estimate::Estimate), which is compared with the truth in a [`report`].
+#[doc(hidden)]
+pub mod __private {
+    pub use {inventory, serde_json};
+}
+
 pub mod association;
 pub mod estimate;
 pub mod experiment;
@@ -19,7 +24,9 @@ pub mod semantics;
 pub mod settings;
 
 pub use estimate::{refine, variance};
-pub use input::{class, fusion, journal, prior_map, recording, sequence, simulator, source, stream};
+pub use input::{
+    class, fusion, journal, measurement, prior_map, recording, sequence, simulator, source, stream,
+};
 pub use mapping::measurements;
 pub use output::{record, report};
 pub use settings::run_document;

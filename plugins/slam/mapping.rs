@@ -6,29 +6,30 @@
 use crate::association::Ambiguity;
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::fusion::FusedClass;
+use crate::input::measurement::Errors;
 use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{Frame, ObjectId, Sequence, UnusedDetection};
 use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
 use crate::motion::{MotionError, RelativePose, Step};
-use crate::semantics::{Applied, Candidate, Judge, LeftOut, RuleError, Verdict, unmatched};
+use crate::semantics::{Applied, Candidate, LeftOut, RuleError, Verdict, unmatched};
 use crate::settings::{DetectionSettings, OdometrySettings, Settings};
 use manifactor_formats::plausible;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::{Prior, Se3};
-use manifactor_graph::checked::Positive;
-use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values, Variable};
-use manifactor_quadric::{BoundingBoxFactor, Camera, CentroidDepth, DualQuadric, QuadricPrior};
+use manifactor_graph::{FactorEntry, Graph, Key, Values, Variable};
+use manifactor_quadric::{BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
 use serde::Serialize;
-use std::collections::HashSet;
 use std::sync::Arc;
 
 pub mod measurements;
 mod moving_objects;
 pub(crate) mod rejection;
+pub(crate) mod rules;
 mod warning;
 
 pub(crate) use crate::motion::pose_key;
 pub use rejection::Rejection;
+use rules::Ledger;
 pub use warning::Warning;
 
 /// A graph made of a sequence, and how it was made.
@@ -106,28 +107,14 @@ impl Mapping {
         let located = settings.gravity.locate(sequence)?;
         let frame = settings.anchor().map_or(located, |anchor| anchor.frame(first, located));
         let measurements = Measurements::gather(sequence, settings);
-        let all = &measurements.objects;
         let at = |i: usize| {
             let seen = sequence.frames.get(i)?;
             let pose = frame.map_from_odometry.compose(&seen.world_from_camera);
             Some(StampedPose { timestamp: seen.timestamp, pose })
         };
         let start = |measured| rejection::start(measured, at, sequence.camera, settings);
-        let starts: Vec<_> = all.iter().map(start).collect();
-        let candidates = all.iter().zip(&starts).filter_map(|(object, start)| candidate(object, start));
-        let mut judge = Judge::new(
-            &settings.semantics,
-            &settings.aliases,
-            frame.up,
-            candidates.collect(),
-            HashSet::new(),
-        );
-        let mut decisions = vec![];
-        for (measured, start) in all.iter().zip(starts) {
-            let candidate = candidate(measured, &start);
-            let verdict = candidate.map(|candidate| judge.judge(&candidate)).transpose()?;
-            decisions.push(Decision { start, verdict: verdict.unwrap_or_default() });
-        }
+        let starts = measurements.objects.iter().map(start).collect();
+        let decisions = Ledger::default().complete(&measurements, starts, settings, frame.up)?;
         Self::assemble(sequence, settings, frame, measurements, decisions)
     }
 
@@ -162,19 +149,18 @@ impl Mapping {
     }
 
     fn add_poses(&mut self, sequence: &Sequence, settings: &Settings) -> Result<(), MappingError> {
-        let first = sequence.frames.first().ok_or(MappingError::NoFrames)?;
         for (i, frame) in sequence.frames.iter().enumerate() {
             let pose = self.frame.map_from_odometry.compose(&frame.world_from_camera);
             self.values.insert(pose_key(i), pose);
         }
-        let first = self.frame.map_from_odometry.compose(&first.world_from_camera);
+        let first = *self.values.get(pose_key(0)).map_err(|_| MappingError::NoFrames)?;
         self.graph.push(prior_entry(first, settings));
         for (i, pair) in sequence.frames.windows(2).enumerate() {
             let [from, to] = pair else { continue };
             let estimates = |key: &str| self.values.variable(key).map(|value| value.erased().clone_box());
             let step = step([i, i + 1], [from, to], &settings.odometry, &estimates);
             let factors = settings.motion.factors(&step)?;
-            if let (Ok(a), Ok(b)) = (self.values.get(&pose_key(i)), self.values.get(&pose_key(i + 1))) {
+            if let (Ok(a), Ok(b)) = (self.values.get(pose_key(i)), self.values.get(pose_key(i + 1))) {
                 let variables = settings.motion.variables(&step, [a, b]);
                 for (key, value) in variables.iter() {
                     self.values.insert_boxed(key.clone(), value.erased().clone_box());
@@ -311,11 +297,6 @@ pub(crate) struct Decision {
     pub verdict: Verdict,
 }
 
-/// A measured object as rules look at it; `None`, where it is not mapped.
-fn candidate(measured: &Measured, start: &Result<DualQuadric, Rejection>) -> Option<Candidate> {
-    Some(as_candidate(measured, *start.as_ref().ok()?))
-}
-
 /// An object that is mapped, as rules look at it.
 pub(crate) fn as_candidate(measured: &Measured, start: DualQuadric) -> Candidate {
     let (key, class, known) = (object_key(measured.id), measured.class(), measured.prior.is_some());
@@ -359,23 +340,16 @@ pub(crate) fn step<'a>(
     Step { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
 }
 
-/// The factors of a box: its own, and that of its depth, where it has one.
-pub(crate) fn view_entries(
-    view: &ObjectBox,
-    object: &Key,
+/// The factors of a detection: that of its box, then those of what it measures besides.
+pub(crate) fn view_entries<'a>(
+    view: &'a ObjectBox,
+    object: &'a Key,
     camera: Camera,
-    settings: &DetectionSettings,
-) -> impl Iterator<Item = FactorEntry> {
-    let of_depth = view.depth.and_then(|depth| {
-        Some(FactorEntry {
-            keys: vec![pose_key(view.frame), object.clone()],
-            name: None,
-            factor: Arc::new(CentroidDepth { depth: Positive::new(depth).ok()? }),
-            noise: Noise::sigma(settings.depth_error * depth).ok()?,
-            loss: settings.loss.clone(),
-        })
-    });
-    std::iter::once(box_entry(view, object.clone(), camera, settings)).chain(of_depth)
+    settings: &'a DetectionSettings,
+) -> impl Iterator<Item = FactorEntry> + 'a {
+    let errors = Errors { depth: settings.depth_error };
+    let others = view.quantities.entries(view.frame, object, errors, settings.loss.as_ref());
+    std::iter::once(box_entry(view, object.clone(), camera, settings)).chain(others)
 }
 
 /// The factor of a box.

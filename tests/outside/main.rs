@@ -8,6 +8,7 @@ mod factor;
 mod first_factor;
 mod loss;
 mod manifold;
+mod measurement;
 mod motion;
 mod own_manifold;
 mod solver;

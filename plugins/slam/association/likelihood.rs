@@ -12,6 +12,7 @@ mod union;
 
 use super::{Association, Associator};
 use crate::input::class::Aliases;
+use crate::input::measurement::{Errors, Quantities, UsualDepth};
 use crate::input::prior_map::PriorObject;
 use fit::BoxNoise;
 use manifactor_graph::checked::{Positive, positive, within};
@@ -19,7 +20,6 @@ use manifactor_graph::register;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::TAU;
 use std::sync::Arc;
 use tracker::Tracker;
 
@@ -134,7 +134,8 @@ register!(dyn Association, "likelihood", Likelihood);
 
 impl Likelihood {
     fn noise(&self) -> BoxNoise {
-        BoxNoise { px: self.box_sigma, of_size: self.box_sigma_of_size, of_depth: self.depth_error }
+        let others = Errors { depth: self.depth_error };
+        BoxNoise { px: self.box_sigma, of_size: self.box_sigma_of_size, others }
     }
 
     /// The likelihood of a class for an object that has this share of it.
@@ -144,13 +145,11 @@ impl Likelihood {
 
     /// What a box costs that shows a new object: it is anywhere in the image, of any size and class, and as far away as objects usually are,
     /// give or take the spread.
-    fn cost_of_new(&self, camera: &Camera, depth: Option<f64>, usual: f64) -> f64 {
+    fn cost_of_new(&self, camera: &Camera, quantities: &Quantities, usual: f64) -> f64 {
         let area = camera.size().product();
-        let of_depth = depth.map_or(0.0, |depth| {
-            let spread = self.depth_spread;
-            ((depth / usual).ln() / spread).powi(2) + TAU.ln() + 2.0 * (spread * depth).ln()
-        });
-        of_depth - 2.0 * (self.new_objects / (area * area / 4.0) / CLASSES).ln()
+        let usual = UsualDepth { depth: usual, spread: self.depth_spread };
+        let of_others: f64 = quantities.iter().map(|measurement| measurement.cost_of_new(&usual)).sum();
+        of_others - 2.0 * (self.new_objects / (area * area / 4.0) / CLASSES).ln()
     }
 }
 

@@ -99,7 +99,13 @@ mod tests {
     fn a_box_that_was_moved_goes_with_its_new_object() {
         let bounding_box = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 1.0, ymax: 1.0 };
         let scores = ClassScores::default();
-        let detection = Detection { frame: 4, object: None, scores, bounding_box, depth: None };
+        let detection = Detection {
+            frame: 4,
+            object: None,
+            scores,
+            bounding_box,
+            quantities: crate::input::measurement::Quantities::NONE,
+        };
         let put = |from, into| {
             let (from, into) = (ObjectId(from), ObjectId(into));
             Move { frame: 4, place: 1, from, into, detection: detection.clone() }

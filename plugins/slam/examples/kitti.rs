@@ -4,7 +4,9 @@
 //! whose box it overlaps most with, if that is by half and its object is within 2 m of one place in 10 frames or more; else none.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, missing_docs)]
 use manifactor_geometry::{Se3, So3};
+use manifactor_graph::checked::Positive;
 use manifactor_quadric::{BoundingBox, Camera};
+use manifactor_slam::measurement::{Depth, Quantities};
 use manifactor_slam::recording;
 use manifactor_slam::sequence::{ClassScores, Detection, Frame, ObjectId, Opening};
 use nalgebra::{Matrix3, Vector3};
@@ -100,7 +102,7 @@ fn main() {
             object,
             scores,
             bounding_box,
-            depth: Some(n[12]).filter(|z| *z > 0.0),
+            quantities: Positive::new(n[12]).map_or(Quantities::NONE, |z| Quantities::one(Depth(z))),
         });
     }
     recorded.detections.sort_by_key(|detection| detection.frame);

@@ -1,10 +1,12 @@
 //! A sequence as files: what [`Recorded`](crate::input::source::Recorded) reads.
+use crate::input::measurement::Measurement;
 use crate::input::sequence::Sequence;
 use manifactor_formats::FormatError;
 use manifactor_formats::detections::{self, Detection};
 use manifactor_formats::tum::{self, StampedPose};
 use manifactor_formats::whole::write_whole;
 use serde_json::json;
+use std::io;
 use std::path::Path;
 
 /// The file of the true objects.
@@ -39,6 +41,12 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
 /// # Errors
 /// Where the file cannot be written.
 pub fn write_detections(sequence: &Sequence, file: &Path) -> Result<(), FormatError> {
+    let quantities = sequence.detections.iter().flat_map(|detection| detection.quantities.iter());
+    if let Some(other) = quantities.map(Measurement::name).find(|name| *name != "depth") {
+        let message = format!("detections with `{other}` have no column here: use JSON lines");
+        let source = io::Error::new(io::ErrorKind::Unsupported, message);
+        return Err(FormatError::Io { path: file.to_owned(), source });
+    }
     detections::write(file, &rows(sequence))
 }
 
@@ -60,7 +68,7 @@ fn rows(sequence: &Sequence) -> Vec<Detection> {
             xmax,
             ymax,
             scores: (all.len() > 1).then(|| all.join(";")),
-            depth: d.depth,
+            depth: d.quantities.depth(),
         })
     };
     sequence.detections.iter().filter_map(row).collect()
@@ -94,7 +102,7 @@ mod tests {
         assert_eq!((read.frames.len(), read.detections.len()), (30, sequence.detections.len()));
         for (a, b) in read.detections.iter().zip(&sequence.detections) {
             assert_eq!((a.frame, a.object, &a.scores), (b.frame, b.object, &b.scores));
-            assert_eq!((a.bounding_box, a.depth), (b.bounding_box, b.depth));
+            assert_eq!((a.bounding_box, &a.quantities), (b.bounding_box, &b.quantities));
         }
         let (found, truth) = (read.ground_truth.unwrap(), sequence.ground_truth.unwrap());
         assert_eq!(found.objects, truth.objects);

@@ -3,6 +3,7 @@
 //! Real data and simulated data have the same form. Frames read right to left in names:
 //! `world_from_camera` maps a point in the camera's frame to the world's; the camera looks along +z,
 //! x is right and y down in the image.
+use crate::input::measurement::Quantities;
 use crate::input::stream::Observations;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -166,8 +167,8 @@ pub struct Detection {
     pub scores: ClassScores,
     /// Where it is in the image, in pixels.
     pub bounding_box: BoundingBox,
-    /// How far away the object's centre is along the optical axis, in metres, where that was measured.
-    pub depth: Option<f64>,
+    /// What is measured besides the box.
+    pub quantities: Quantities,
 }
 
 /// A number for an object, the same in detections and in the truth.

@@ -4,6 +4,7 @@
 //! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
 use crate::input::class::Aliases;
 use crate::input::fusion::{FusedClass, Fusion};
+use crate::input::measurement::Quantities;
 use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{Detection, ObjectId, Sequence};
 use crate::settings::{Anchor, DetectionSettings, Settings};
@@ -11,7 +12,7 @@ use manifactor_quadric::{BoundingBox, Camera};
 use std::sync::Arc;
 
 /// One box of an object.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ObjectBox {
     /// Place in the sequence's frames.
     pub frame: usize,
@@ -19,8 +20,8 @@ pub struct ObjectBox {
     pub bounding_box: BoundingBox,
     /// Which of its sides are the object's own, and not the border's: xmin, ymin, xmax, ymax.
     pub inside: [bool; 4],
-    /// How far away the object's centre is along the optical axis, in metres, where that was measured.
-    pub depth: Option<f64>,
+    /// What is measured besides the box.
+    pub quantities: Quantities,
 }
 
 /// One object.
@@ -153,7 +154,7 @@ impl Measurements {
         let (twice, new): (Vec<_>, Vec<_>) = gone.views.into_iter().partition(seen);
         self.duplicates += twice.len();
         for view in &new {
-            object.see(*view);
+            object.see(view.clone());
         }
         new
     }
@@ -204,7 +205,8 @@ pub(crate) fn sift(detection: &Detection, camera: &Camera, settings: &DetectionS
     if !settings.cut_sides.accepts(inside) {
         return Sifted::Cut;
     }
-    Sifted::View(ObjectBox { frame: detection.frame, bounding_box, inside, depth: detection.depth })
+    let quantities = detection.quantities.clone();
+    Sifted::View(ObjectBox { frame: detection.frame, bounding_box, inside, quantities })
 }
 
 impl Measured {
@@ -279,7 +281,7 @@ mod tests {
             object: Some(ObjectId(object)).filter(|_| object > 0),
             scores: ClassScores::single(class, score),
             bounding_box: BoundingBox::new(bounds).unwrap(),
-            depth: None,
+            quantities: Quantities::NONE,
         }
     }
 

@@ -43,7 +43,7 @@ pub(super) fn still(
     let error = depth_error.hypot(CENTRE_PX / camera.fx);
     let place = |view: &ObjectBox| {
         // the centre of a box that the border cuts is not that of the object
-        let depth = view.depth.filter(|_| view.inside == [true; 4])?;
+        let depth = view.quantities.depth().filter(|_| view.inside == [true; 4])?;
         let StampedPose { timestamp: time, pose } = at(view.frame)?;
         let place = pose.act(&(camera.ray(view.bounding_box.centre()) * depth));
         Some(Place { time, camera: pose.translation, place, sigma: depth * error })

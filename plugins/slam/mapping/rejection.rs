@@ -114,7 +114,11 @@ pub(crate) fn start(
     sound(measured, settings)?;
     let seen = |view: &ObjectBox| {
         let pose = at(view.frame)?.pose;
-        Some(View { observed: view.inside, depth: view.depth, ..View::new(pose, camera, view.bounding_box) })
+        Some(View {
+            observed: view.inside,
+            depth: view.quantities.depth(),
+            ..View::new(pose, camera, view.bounding_box)
+        })
     };
     let views: Vec<View> = measured.views.iter().filter_map(seen).collect();
     // over all pairs of views, so it is left out where any will do

@@ -134,7 +134,7 @@ impl Mapper {
                     let gone = mapped.boxes.extract_if(.., |(of, _)| frames.contains(of));
                     let gone: Vec<FactorId> = gone.map(|(_, factor)| factor).collect();
                     self.remove(&gone, report);
-                    let view = |frame: &usize| self.measured(id)?.view(*frame).copied();
+                    let view = |frame: &usize| self.measured(id)?.view(*frame).cloned();
                     let views: Vec<ObjectBox> = frames.iter().filter_map(view).collect();
                     self.push_boxes(id, &views, report);
                 }

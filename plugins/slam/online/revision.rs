@@ -2,11 +2,11 @@
 use super::Mapper;
 use super::frame::{FrameReport, Seen};
 use super::object::{Mapped, Tracked};
-use super::rules::Ledger;
 use crate::association::Learned;
 use crate::estimate::refine::refined;
 use crate::input::sequence::ObjectId;
 use crate::mapping::measurements::ObjectBox;
+use crate::mapping::rules::Ledger;
 use crate::mapping::{Rejection, as_candidate, object_key, rejection, view_entries};
 use crate::semantics::Candidate;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};

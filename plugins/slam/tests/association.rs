@@ -4,6 +4,7 @@ use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
 use manifactor_graph::FactorEntry;
 use manifactor_graph::checked::Positive;
+use manifactor_graph::checked::Positive;
 use manifactor_quadric::Camera;
 use manifactor_slam::association::{
     Ambiguity, Association, Associator, Given, Image, Iou, Learned, Likelihood,
@@ -13,6 +14,7 @@ use manifactor_slam::class::Aliases;
 use manifactor_slam::estimate::Estimate;
 use manifactor_slam::fusion::FusedClass;
 use manifactor_slam::mapping::Mapping;
+use manifactor_slam::measurement::{Depth, Quantities};
 use manifactor_slam::measurements::Measured;
 use manifactor_slam::metrics::IdentityScores;
 use manifactor_slam::online::Mapper;
@@ -395,7 +397,10 @@ fn depths_place_objects_at_once_and_tell_what_moves() {
     let mut moved = Sequence::clone(&measured);
     let id = moved.detections[0].object.unwrap();
     for detection in moved.detections.iter_mut().filter(|detection| detection.object == Some(id)) {
-        detection.depth = detection.depth.map(|depth| depth + 0.01 * detection.frame as f64);
+        if let Some(depth) = detection.quantities.depth() {
+            let depth = Positive::new(depth + 0.01 * detection.frame as f64).unwrap();
+            detection.quantities = Quantities::one(Depth(depth));
+        }
     }
     let report = estimate(&by(&settings, Given {}), &Arc::new(moved));
     let rejected: Vec<_> = report.objects.iter().filter(|object| object.rejected_because.is_some()).collect();

@@ -4,6 +4,7 @@ use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
 use manifactor_quadric::BoundingBox;
 use manifactor_slam::mapping::Mapping;
+use manifactor_slam::measurement::Quantities;
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::{Run, Watch};
@@ -257,7 +258,7 @@ fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
         object: Some(ObjectId(id)),
         scores: ClassScores::single("cup", 0.5),
         // a square of it is infinite
-        depth: None,
+        quantities: Quantities::NONE,
         bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
     };
     let measured = mapper.measurements().clone();

@@ -70,12 +70,12 @@ impl Fitter<'_> {
         let worst = all.iter().max_by(|a, b| error(a).total_cmp(&error(b)))?;
         let mut parts = [
             Part { belief: track.belief.clone(), fitted: track.fitted, sightings: all.to_vec() },
-            self.part(&track.fitted, None, vec![*worst])?,
+            self.part(&track.fitted, None, vec![worst.clone()])?,
         ];
         for _ in 0..ROUNDS {
             let [a, b] = &parts;
             let is_of_first = |seen: &Sighting| self.error(&a.fitted, seen) <= self.error(&b.fitted, seen);
-            let (of_a, of_b): (Vec<Sighting>, Vec<Sighting>) = all.iter().partition(|seen| is_of_first(seen));
+            let (of_a, of_b): (Vec<Sighting>, Vec<Sighting>) = all.iter().cloned().partition(is_of_first);
             if of_a.len() < FIRM || of_b.len() < FIRM {
                 return None;
             }

@@ -3,12 +3,10 @@
 //! One box says where an object is but for its depth. What is not known yet is held by a weak prior: a depth that is usual here,
 //! axes of about the same length, a rotation not far from that of the first camera.
 use super::sightings::Sighting;
+use crate::input::measurement::{Errors, Rows};
 use manifactor_geometry::Se3;
-use manifactor_graph::checked::Positive;
 use manifactor_graph::{Manifold, Residual};
-use manifactor_quadric::{
-    BoundingBox, BoundingBoxFactor, BoxModel, Camera, CentroidDepth, DualQuadric, QuadricPrior,
-};
+use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric, QuadricPrior};
 use nalgebra::{Cholesky, SMatrix, SVector, Vector3, Vector4};
 
 type Matrix9 = SMatrix<f64, 9, 9>;
@@ -21,8 +19,8 @@ pub(super) struct BoxNoise {
     pub px: f64,
     /// As a part of width and height.
     pub of_size: f64,
-    /// Of a depth, as a part of it.
-    pub of_depth: f64,
+    /// Of what is measured besides.
+    pub others: Errors,
 }
 
 /// What is believed of an object beside its boxes.
@@ -82,10 +80,10 @@ const WIDTH: f64 = 9.0;
 const LOST: f64 = 40.0;
 
 impl BoxNoise {
-    /// Standard deviations of the sides and of the depth, which is infinite where that was not measured.
-    pub(super) fn deviations(&self, b: &BoundingBox, depth: Option<f64>) -> SVector<f64, ROWS> {
+    /// Standard deviations of the sides.
+    pub(super) fn deviations(&self, b: &BoundingBox) -> Vector4<f64> {
         let (x, y) = (self.px.hypot(self.of_size * b.width()), self.px.hypot(self.of_size * b.height()));
-        [x, y, x, y, depth.map_or(f64::INFINITY, |depth| self.of_depth * depth)].into()
+        Vector4::new(x, y, x, y)
     }
 }
 
@@ -156,19 +154,15 @@ impl FirstSight {
     }
 }
 
-/// What a camera sees of an ellipsoid: the sides of its box, and the depth of its centre; with the derivatives by its tangent and by that
-/// of the pose.
+/// The box of an ellipsoid, with the derivatives of its sides by the tangents of the pose and of the ellipsoid.
 pub(super) struct Predicted {
     pub bounding_box: BoundingBox,
-    pub depth: f64,
-    pub by_pose: SMatrix<f64, ROWS, 6>,
-    pub by_quadric: SMatrix<f64, ROWS, 9>,
+    pub by_pose: SMatrix<f64, SIDES, 6>,
+    pub by_quadric: SMatrix<f64, SIDES, 9>,
 }
 
-/// Four sides and a depth.
-pub(super) const ROWS: usize = 5;
-/// The row of the depth.
-pub(super) const DEPTH: usize = 4;
+/// Sides of a box.
+pub(super) const SIDES: usize = 4;
 
 /// Predicts a box; `None` where nothing of the object is in the image.
 pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Option<Predicted> {
@@ -180,15 +174,7 @@ pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Opt
     let mut jacobians = (SMatrix::zeros(), SMatrix::zeros());
     let b = factor.linearize((pose, quadric), &[true; 15], &mut jacobians);
     let bounding_box = BoundingBox::new(b.into()).ok()?;
-    let mut by_depth = (SMatrix::zeros(), SMatrix::zeros());
-    let away = CentroidDepth { depth: Positive::literal(1.0) };
-    let depth = away.linearize((pose, quadric), &[true; 15], &mut by_depth).x + 1.0;
-    let (mut by_pose, mut by_quadric) = (SMatrix::<f64, ROWS, 6>::zeros(), SMatrix::<f64, ROWS, 9>::zeros());
-    by_pose.fixed_rows_mut::<DEPTH>(0).copy_from(&jacobians.0);
-    by_pose.set_row(DEPTH, &by_depth.0);
-    by_quadric.fixed_rows_mut::<DEPTH>(0).copy_from(&jacobians.1);
-    by_quadric.set_row(DEPTH, &by_depth.1);
-    Some(Predicted { bounding_box, depth, by_pose, by_quadric })
+    Some(Predicted { bounding_box, by_pose: jacobians.0, by_quadric: jacobians.1 })
 }
 
 /// The ellipsoid that fits best, reached from `start`; `None` where it is not determined.
@@ -239,14 +225,14 @@ impl System {
         let (r, j) = belief.rows(quadric);
         let mut all = Self { cost: r.norm_squared(), gradient: j.tr_mul(&r), h: j.tr_mul(&j) };
         for seen in seen {
-            match whiten(quadric, seen, camera, noise) {
+            match Whitened::new(quadric, seen, camera, noise) {
                 None => all.cost += LOST,
-                Some((r, j)) => {
-                    // Cauchy's loss of a box as a whole
-                    let square = r.norm_squared() / WIDTH;
+                Some(whitened) => {
+                    // Cauchy's loss of a detection as a whole
+                    let square = whitened.square / WIDTH;
                     all.cost += WIDTH * square.ln_1p();
-                    all.gradient += j.tr_mul(&r) / (1.0 + square);
-                    all.h += j.tr_mul(&j) / (1.0 + square);
+                    all.gradient += whitened.gradient / (1.0 + square);
+                    all.h += whitened.h / (1.0 + square);
                 }
             }
         }
@@ -255,51 +241,72 @@ impl System {
 }
 
 impl Predicted {
-    /// How far off the sides and the depth are from what was seen.
-    pub(super) fn error(&self, b: &BoundingBox, depth: Option<f64>) -> SVector<f64, ROWS> {
-        let sides = Vector4::from(self.bounding_box.bounds()) - Vector4::from(b.bounds());
-        sides.push(depth.map_or(0.0, |depth| self.depth - depth))
+    /// Predicted less measured sides.
+    pub(super) fn error(&self, b: &BoundingBox) -> Vector4<f64> {
+        Vector4::from(self.bounding_box.bounds()) - Vector4::from(b.bounds())
     }
 }
 
-/// The errors of a box's sides and of its depth, and their derivatives, in standard deviations; `None` where the ellipsoid has no box there.
-fn whiten(
-    quadric: &DualQuadric,
-    seen: &Sighting,
-    camera: &Camera,
-    noise: &BoxNoise,
-) -> Option<(SVector<f64, ROWS>, SMatrix<f64, ROWS, 9>)> {
-    let predicted = predict(&seen.world_from_camera, quadric, camera)?;
-    let error = predicted.error(&seen.bounding_box, seen.depth);
-    let weights = noise.deviations(&seen.bounding_box, seen.depth).map(|sigma| 1.0 / sigma);
-    Some((error.component_mul(&weights), SMatrix::from_diagonal(&weights) * predicted.by_quadric))
+/// The errors of a detection in standard deviations: Σr², Jᵀr and JᵀJ over its box and its other measurements.
+struct Whitened {
+    square: f64,
+    gradient: Vector9,
+    h: Matrix9,
 }
 
-/// The square of a box's errors in standard deviations, which counts less and less where it is large.
+impl Whitened {
+    /// `None` if the ellipsoid has no box there.
+    fn new(quadric: &DualQuadric, seen: &Sighting, camera: &Camera, noise: &BoxNoise) -> Option<Self> {
+        let predicted = predict(&seen.world_from_camera, quadric, camera)?;
+        let mut all = Self { square: 0.0, gradient: Vector9::zeros(), h: Matrix9::zeros() };
+        all.add(
+            predicted.error(&seen.bounding_box),
+            &predicted.by_quadric,
+            &noise.deviations(&seen.bounding_box).map(|sigma| 1.0 / sigma),
+        );
+        for measurement in seen.quantities.iter() {
+            let Some(innovation) = measurement.innovation(&seen.world_from_camera, quadric) else { continue };
+            let sigma = measurement.deviations(&noise.others, &Rows::zeros());
+            let weights = Rows::from_fn(|i, _| if i < innovation.rows { 1.0 / sigma[i] } else { 0.0 });
+            all.add(innovation.residual, &innovation.by_object, &weights);
+        }
+        Some(all)
+    }
+
+    fn add(&mut self, r: Vector4<f64>, j: &SMatrix<f64, SIDES, 9>, weights: &Vector4<f64>) {
+        let (r, j) = (r.component_mul(weights), SMatrix::from_diagonal(weights) * j);
+        self.square += r.norm_squared();
+        self.gradient += j.tr_mul(&r);
+        self.h += j.tr_mul(&j);
+    }
+}
+
+/// The square of a detection's errors in standard deviations, which counts less and less where it is large.
 pub(super) fn squared_error(
     quadric: &DualQuadric,
     seen: &Sighting,
     camera: &Camera,
     noise: &BoxNoise,
 ) -> f64 {
-    let error = whiten(quadric, seen, camera, noise);
-    error.map_or(LOST, |(error, _)| WIDTH * (error.norm_squared() / WIDTH).ln_1p())
+    let error = Whitened::new(quadric, seen, camera, noise);
+    error.map_or(LOST, |error| WIDTH * (error.square / WIDTH).ln_1p())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::measurement::Quantities;
     use nalgebra::Vector2;
 
     const CAMERA: Camera =
         Camera { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
-    const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02, of_depth: 0.03 };
+    const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02, others: Errors { depth: 0.03 } };
 
     /// A camera at x metres to the right that looks ahead.
     fn seen(x: f64, frame: usize, quadric: &DualQuadric) -> Sighting {
         let world_from_camera = Se3 { translation: Vector3::x() * x, ..Se3::identity() };
         let bounding_box = predict(&world_from_camera, quadric, &CAMERA).unwrap().bounding_box;
-        Sighting { frame, world_from_camera, bounding_box, depth: None }
+        Sighting { frame, world_from_camera, bounding_box, quantities: Quantities::NONE }
     }
 
     fn ball(z: f64) -> DualQuadric {

@@ -26,5 +26,11 @@ pub(super) fn seen(frame: usize, x: f64, class: &str) -> Detection {
     let pose = Se3 { translation: Vector3::new(x, 0.0, 2.0), ..Se3::identity() };
     let quadric = DualQuadric { pose, semi_axes: Vector3::new(0.1, 0.15, 0.1) };
     let bounding_box = predict(&Rail.pose(frame).unwrap(), &quadric, &CAMERA).unwrap().bounding_box;
-    Detection { frame, object: None, scores: ClassScores::single(class, 0.8), bounding_box, depth: None }
+    Detection {
+        frame,
+        object: None,
+        scores: ClassScores::single(class, 0.8),
+        bounding_box,
+        quantities: crate::input::measurement::Quantities::NONE,
+    }
 }

@@ -1,23 +1,25 @@
 //! Boxes of an object that say the most about its ellipsoid.
 use super::super::Map;
+use super::fit::SIDES;
+use crate::input::measurement::Quantities;
 use manifactor_geometry::Se3;
 use manifactor_quadric::BoundingBox;
 use nalgebra::Vector3;
 
 /// A box, and from where it was seen.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Sighting {
     pub frame: usize,
     pub world_from_camera: Se3,
     pub bounding_box: BoundingBox,
-    /// How far away its centre is along the optical axis, in metres, where that was measured.
-    pub depth: Option<f64>,
+    /// What is measured besides the box.
+    pub quantities: Quantities,
 }
 
 impl Sighting {
     /// How many numbers it measures.
     pub(super) fn rows(&self) -> usize {
-        4 + usize::from(self.depth.is_some())
+        SIDES + self.quantities.rows()
     }
 }
 
@@ -69,7 +71,7 @@ impl Sightings {
 
     /// Those of both.
     pub(super) fn and(&self, others: &Self) -> Self {
-        let mut all: Vec<Sighting> = self.0.iter().chain(&others.0).copied().collect();
+        let mut all: Vec<Sighting> = self.0.iter().chain(&others.0).cloned().collect();
         all.sort_by_key(|sighting| sighting.frame);
         Self(all)
     }

@@ -1,15 +1,19 @@
 //! One object, as far as it is known.
 use super::super::Map;
 use super::Likelihood;
-use super::fit::{Belief, BoxNoise, DEPTH, Fitted, Predicted, ROWS, fit, predict};
+use super::fit::{Belief, BoxNoise, Fitted, Predicted, SIDES, fit, predict};
 use super::sightings::{Sighting, Sightings};
 use crate::input::class::Aliases;
+use crate::input::measurement::Quantities;
 use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{ClassScores, Detection, ObjectId};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
-use nalgebra::{Cholesky, Matrix3, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::allocator::Allocator;
+use nalgebra::{
+    Cholesky, DMatrix, DVector, DefaultAllocator, Dim, Matrix3, Matrix6, OMatrix, OVector, SMatrix, Vector6,
+};
 use std::f64::consts::TAU;
 
 /// An object.
@@ -42,11 +46,16 @@ pub(super) struct Seen {
     pub detection: Detection,
 }
 
-/// The box that is expected of an object and its depth, and how far these may be off.
-pub(super) struct Expected {
+/// The box that is expected of an object, and how far its sides may be off.
+pub(super) struct Expected<'a> {
+    pose: &'a Se3,
+    fitted: &'a Fitted,
+    settings: &'a Likelihood,
+    /// Variances of the camera's drift: rad², m².
+    drift: Vector6<f64>,
     predicted: Predicted,
-    /// Of the sides, in pixels, and the depth, in metres.
-    covariance: SMatrix<f64, ROWS, ROWS>,
+    /// Of the sides, in square pixels.
+    covariance: SMatrix<f64, SIDES, SIDES>,
 }
 
 /// Where two are is not known where the way between them is known to this part of their sizes only.
@@ -67,7 +76,7 @@ impl Track {
         camera: &Camera,
         noise: &BoxNoise,
     ) -> Option<Self> {
-        let fitted = fit(&belief, belief.first(), &[*first], camera, noise)?;
+        let fitted = fit(&belief, belief.first(), std::slice::from_ref(first), camera, noise)?;
         Some(Self::bare(id, belief, fitted))
     }
 
@@ -145,22 +154,23 @@ impl Track {
     }
 
     /// The box that it should have, seen from here after so many seconds; `None` where it is not seen.
-    pub(super) fn expected(
-        &self,
+    pub(super) fn expected<'a>(
+        &'a self,
         seconds: f64,
-        pose: &Se3,
+        pose: &'a Se3,
         camera: &Camera,
-        settings: &Likelihood,
-    ) -> Option<Expected> {
+        settings: &'a Likelihood,
+    ) -> Option<Expected<'a>> {
         let predicted = predict(pose, &self.fitted.quadric, camera)?;
         let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| drift * drift * seconds);
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
         let by_drift = predicted.by_pose * Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
         let by_quadric = predicted.by_quadric * self.fitted.covariance * predicted.by_quadric.transpose();
         let noise = settings.noise();
-        let sigma = noise.deviations(&predicted.bounding_box, Some(predicted.depth)) * settings.lasting;
+        let sigma = noise.deviations(&predicted.bounding_box) * settings.lasting;
         let by_detector = SMatrix::from_diagonal(&sigma.component_mul(&sigma));
-        Some(Expected { predicted, covariance: by_quadric + by_drift + by_detector })
+        let (fitted, covariance) = (&self.fitted, by_quadric + by_drift + by_detector);
+        Some(Expected { pose, fitted, settings, drift, predicted, covariance })
     }
 
     /// Intersection over union of a box with that of its ellipsoid.
@@ -218,30 +228,59 @@ impl Seen {
 
     /// The same, seen from there.
     pub(super) fn from(&self, world_from_camera: Se3) -> Sighting {
-        let Detection { frame, bounding_box, depth, .. } = self.detection;
-        Sighting { frame, world_from_camera, bounding_box, depth }
+        let Detection { frame, bounding_box, ref quantities, .. } = self.detection;
+        Sighting { frame, world_from_camera, bounding_box, quantities: quantities.clone() }
     }
 }
 
-impl Expected {
+impl Expected<'_> {
     /// The box alone.
     pub(super) fn bounding_box(&self) -> &BoundingBox {
         &self.predicted.bounding_box
     }
 
-    /// What a box costs, with its depth, where it has one: d² + ln det 2πS.
-    pub(super) fn cost(&self, b: &BoundingBox, depth: Option<f64>) -> f64 {
-        let error = self.predicted.error(b, depth);
-        let sides = (error.fixed_rows::<DEPTH>(0), self.covariance.fixed_view::<DEPTH, DEPTH>(0, 0));
-        match depth {
-            Some(_) => cost(error, self.covariance),
-            None => cost(sides.0.into_owned(), sides.1.into_owned()),
+    /// -2 ln of the density of a detection: d² + ln det 2πS over its box and its other measurements.
+    pub(super) fn cost(&self, b: &BoundingBox, quantities: &Quantities) -> f64 {
+        let error = self.predicted.error(b);
+        if quantities.is_empty() {
+            return cost(&error, self.covariance);
         }
+        // all together: the sides depend on the object's place as the others do
+        let n = SIDES + quantities.rows();
+        let (mut all, mut by_detector) = (DVector::zeros(n), DMatrix::zeros(n, n));
+        let (mut by_pose, mut by_object) = (DMatrix::zeros(n, 6), DMatrix::zeros(n, 9));
+        all.rows_mut(0, SIDES).copy_from(&error);
+        by_pose.rows_mut(0, SIDES).copy_from(&self.predicted.by_pose);
+        by_object.rows_mut(0, SIDES).copy_from(&self.predicted.by_quadric);
+        let noise = self.settings.noise();
+        let sides = noise.deviations(&self.predicted.bounding_box) * self.settings.lasting;
+        (0..SIDES).for_each(|i| by_detector[(i, i)] = sides[i] * sides[i]);
+        let mut first = SIDES;
+        for measurement in quantities.iter() {
+            let Some(innovation) = measurement.innovation(self.pose, &self.fitted.quadric) else {
+                return f64::INFINITY;
+            };
+            let sigma = measurement.deviations(&noise.others, &innovation.residual) * self.settings.lasting;
+            for i in 0..innovation.rows {
+                all[first] = innovation.residual[i];
+                by_pose.row_mut(first).copy_from(&innovation.by_pose.row(i));
+                by_object.row_mut(first).copy_from(&innovation.by_object.row(i));
+                by_detector[(first, first)] = sigma[i] * sigma[i];
+                first += 1;
+            }
+        }
+        let of_object = &by_object * self.fitted.covariance * by_object.transpose();
+        let of_drift = &by_pose * Matrix6::from_diagonal(&self.drift) * by_pose.transpose();
+        cost(&all, of_object + of_drift + by_detector)
     }
 }
 
 /// d² + ln det 2πS.
-fn cost<const N: usize>(error: SVector<f64, N>, covariance: SMatrix<f64, N, N>) -> f64 {
+fn cost<N: Dim>(error: &OVector<f64, N>, covariance: OMatrix<f64, N, N>) -> f64
+where
+    DefaultAllocator: Allocator<N> + Allocator<N, N>,
+{
+    let rows = error.len() as f64;
     let Some(factor) = Cholesky::new(covariance) else { return f64::INFINITY };
-    error.dot(&factor.solve(&error)) + factor.ln_determinant() + N as f64 * TAU.ln()
+    error.dot(&factor.solve(error)) + factor.ln_determinant() + rows * TAU.ln()
 }

@@ -179,8 +179,8 @@ impl Tracker {
                 if !detection.bounding_box.intersects(expected.bounding_box()) {
                     continue;
                 }
-                let new = self.settings.cost_of_new(&self.camera, detection.depth, usual);
-                let cost = expected.cost(&detection.bounding_box, detection.depth)
+                let new = self.settings.cost_of_new(&self.camera, &detection.quantities, usual);
+                let cost = expected.cost(&detection.bounding_box, &detection.quantities)
                     - 2.0 * self.class_likelihood(track, classes[row].as_deref()).ln();
                 if cost < new {
                     gains.push((row, tracks.len(), new - cost));
@@ -218,7 +218,7 @@ impl Tracker {
     fn track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
         self.place(id).or_else(|| {
             // how well a measured depth is known is said by the sighting
-            let depth = first.depth.unwrap_or(depth);
+            let depth = first.quantities.depth().unwrap_or(depth);
             let belief = Belief::new(first, &self.camera, depth, self.settings.depth_spread);
             self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);
             Some(self.tracks.len() - 1)

@@ -4,6 +4,7 @@ use super::occlusion::DepthImage;
 use super::scene::SceneObject;
 use super::solid::Boxes;
 use super::{Simulated, catalogue, noise};
+use crate::input::measurement::Quantities;
 use crate::input::sequence::{ClassScores, Detection};
 use manifactor_geometry::Se3;
 use manifactor_quadric::BoundingBox;
@@ -35,7 +36,7 @@ struct View<'a> {
 struct Seen {
     bounding_box: BoundingBox,
     scores: ClassScores,
-    depth: Option<f64>,
+    quantities: Quantities,
     taken_for: usize,
 }
 
@@ -73,13 +74,14 @@ impl Simulated {
                 if let Some(moved) = scene.moved(i, time) {
                     seen = self.see(i, moved, &view, class, &mut after);
                 }
-                if let Some(Seen { bounding_box, scores, depth, taken_for }) = seen {
+                if let Some(Seen { bounding_box, scores, quantities, taken_for }) = seen {
                     let object = Some(scene.at(taken_for, time).truth.id);
-                    detections.push(Detection { frame, object, scores, bounding_box, depth });
+                    detections.push(Detection { frame, object, scores, bounding_box, quantities });
                 }
             }
             for (bounding_box, scores) in self.detector.imagine(&self.camera, &classes, imagination) {
-                detections.push(Detection { frame, object: None, scores, bounding_box, depth: None });
+                let quantities = Quantities::NONE;
+                detections.push(Detection { frame, object: None, scores, bounding_box, quantities });
             }
         }
         detections
@@ -108,8 +110,8 @@ impl Simulated {
         let scores = self.detector.classify(usual, classes, boxes);
         let taken_for = noise::mistaken(self.detector.wrong_object, i, objects, mistakes);
         let away = view.pose.inverse().act(&world_from_object.translation).z;
-        let depth = self.detector.measure(away, depths);
+        let quantities = self.detector.measure(away, depths);
         let bounding_box = drawn.filter(|_| left.is_some())?;
-        Some(Seen { bounding_box, scores, depth, taken_for })
+        Some(Seen { bounding_box, scores, quantities, taken_for })
     }
 }

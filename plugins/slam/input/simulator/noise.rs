@@ -1,4 +1,5 @@
 //! What is wrong with measurements.
+use crate::input::measurement::{Depth, Quantities};
 use crate::input::sequence::ClassScores;
 use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
@@ -202,10 +203,12 @@ impl Detector {
 }
 
 impl Detector {
-    /// What is measured of a depth, in metres, if it is at all; of what is behind the camera nothing is.
-    pub(super) fn measure(&self, depth: f64, rng: &mut Pcg64) -> Option<f64> {
-        let error = self.depth_error?.get() * normal(rng);
-        Some(depth * (1.0 + error)).filter(|measured| *measured > 0.0)
+    /// Measurements besides the box, of an object at this depth in metres: its depth, if it is in front of the camera.
+    pub(super) fn measure(&self, depth: f64, rng: &mut Pcg64) -> Quantities {
+        let Some(relative) = self.depth_error else { return Quantities::NONE };
+        let error = relative.get() * normal(rng);
+        let measured = Positive::new(depth * (1.0 + error));
+        measured.map_or(Quantities::NONE, |measured| Quantities::one(Depth(measured)))
     }
 
     /// Boxes of nothing in an image.

@@ -1,5 +1,6 @@
 //! Frames and detections put together by time.
 use super::SourceError;
+use crate::input::measurement::{Depth, Quantities};
 use crate::input::recording::OBJECTS;
 use crate::input::sequence::{
     ClassScores, Detection, Frame, GroundTruth, ObjectId, TrueObject, UnusedDetection, WithoutPose,
@@ -7,6 +8,7 @@ use crate::input::sequence::{
 use manifactor_config::{Document, Errors};
 use manifactor_formats::tum::{StampedPose, Trajectory};
 use manifactor_formats::{detections, tum};
+use manifactor_graph::checked::Positive;
 use manifactor_quadric::BoundingBox;
 use std::path::Path;
 
@@ -100,7 +102,10 @@ fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, Sou
         object: row.object_key.filter(|key| *key != 0).map(ObjectId),
         scores,
         bounding_box: BoundingBox { xmin: row.xmin, ymin: row.ymin, xmax: row.xmax, ymax: row.ymax },
-        depth: row.depth,
+        quantities: row
+            .depth
+            .and_then(|depth| Positive::new(depth).ok())
+            .map_or(Quantities::NONE, |depth| Quantities::one(Depth(depth))),
     })
 }
 

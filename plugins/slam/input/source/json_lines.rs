@@ -1,6 +1,7 @@
 use super::assemble::read_ground_truth;
 use super::rectification::Rectification;
 use super::{CameraChoice, Folders, Source, SourceError};
+use crate::input::measurement::Quantities;
 use crate::input::sequence::{
     Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening, Sequence, UnusedDetection,
 };
@@ -8,7 +9,7 @@ use crate::input::stream::Stream;
 use indexmap::IndexMap;
 use manifactor_formats::FormatError;
 use manifactor_geometry::Se3;
-use manifactor_graph::checked::{Positive, within};
+use manifactor_graph::checked::within;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::BoundingBox;
 use nalgebra::Vector3;
@@ -64,8 +65,8 @@ struct Line {
     accelerometer: Vec<Reading>,
 }
 
+/// A box; `quantities` has all fields that are none of its own.
 #[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 struct LineBox {
     #[serde(rename = "box")]
     bounding_box: BoundingBox,
@@ -77,9 +78,12 @@ struct LineBox {
     scores: IndexMap<String, f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     object: Option<ObjectId>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    depth: Option<Positive>,
+    #[serde(flatten)]
+    quantities: IndexMap<String, serde_json::Value>,
 }
+
+/// Fields of a box besides its measurements.
+const FIELDS: [&str; 5] = ["box", "class", "score", "scores", "object"];
 
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -108,7 +112,7 @@ pub fn line(observation: &Observation) -> String {
             score: single.as_ref().map_or(1.0, |(_, score)| *score),
             class: single.map(|(class, _)| class),
             object: detection.object,
-            depth: detection.depth.and_then(|depth| Positive::new(depth).ok()),
+            quantities: detection.quantities.to_fields().collect(),
         }
     };
     let of_reading = |r: &Acceleration| Reading { timestamp: r.timestamp, acceleration: r.acceleration };
@@ -137,7 +141,7 @@ pub(crate) fn parse(line: &[u8]) -> Result<Observation, String> {
     let (mut detections, mut unused) = (vec![], vec![]);
     for (place, value) in boxes.into_iter().enumerate() {
         match LineBox::read(value) {
-            Ok(seen) => detections.push(seen.into()),
+            Ok(seen) => detections.push(seen),
             Err(fault) => unused.push(UnusedDetection::Box { timestamp, place: place + 1, fault }),
         }
     }
@@ -178,7 +182,7 @@ fn without_infinities(line: &[u8]) -> Option<String> {
 }
 
 impl LineBox {
-    fn read(value: serde_json::Value) -> Result<Self, String> {
+    fn read(value: serde_json::Value) -> Result<Detection, String> {
         let seen: Self = serde_json::from_value(value).map_err(|error| error.to_string())?;
         if let Some((class, score)) = seen.scores.iter().find(|(_, score)| !(0.0..=1.0).contains(*score)) {
             return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
@@ -187,17 +191,15 @@ impl LineBox {
             Some(class) if !seen.scores.is_empty() => {
                 Err(format!("a box has `class` and `score`, or `scores`, and not both: `{class}`"))
             }
-            _ => Ok(seen),
+            _ => seen.into_detection(),
         }
     }
-}
 
-impl From<LineBox> for Detection {
-    fn from(seen: LineBox) -> Self {
-        let single = seen.class.map(|class| (class, seen.score));
-        let scores: ClassScores = seen.scores.into_iter().chain(single).collect();
-        let (bounding_box, depth) = (seen.bounding_box, seen.depth.map(Positive::get));
-        Self { frame: 0, object: seen.object, scores, bounding_box, depth }
+    fn into_detection(self) -> Result<Detection, String> {
+        let single = self.class.map(|class| (class, self.score));
+        let scores: ClassScores = self.scores.into_iter().chain(single).collect();
+        let quantities = Quantities::read(self.quantities, &FIELDS)?;
+        Ok(Detection { frame: 0, object: self.object, scores, bounding_box: self.bounding_box, quantities })
     }
 }
 
@@ -334,6 +336,7 @@ impl Iterator for Lines {
 mod tests {
     use super::*;
     use crate::input::simulator::Simulated;
+    use manifactor_graph::checked::Positive;
     use serde_json::json;
     use std::path::Path;
 

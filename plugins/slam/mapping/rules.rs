@@ -1,7 +1,9 @@
-//! Semantic factors in a map that grows: what rules have brought, and to whom.
+//! Semantic factors of a map, which may grow: the factors that rules have brought, and the object of each.
+//!
+//! A stream asks the rules again and again, as objects come and go. A batch asks once, with all objects in view.
+use super::measurements::{Measured, Measurements};
+use super::{Decision, Rejection, as_candidate, object_key};
 use crate::input::sequence::ObjectId;
-use crate::mapping::measurements::{Measured, Measurements};
-use crate::mapping::{Decision, Rejection, as_candidate, object_key};
 use crate::semantics::{Applied, Candidate, Connected, Judge, LeftOut, RuleError, Verdict};
 use crate::settings::Settings;
 use manifactor_graph::{Direction, FactorEntry, Key};
@@ -11,7 +13,7 @@ use std::collections::{BTreeMap, HashMap};
 
 /// All semantic factors that count.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Ledger {
+pub(crate) struct Ledger {
     factors: Vec<Ruled>,
     connected: Connected,
     left_out: BTreeMap<ObjectId, Vec<LeftOut>>,
@@ -19,7 +21,7 @@ pub(super) struct Ledger {
 
 /// One of them.
 #[derive(Debug, Clone)]
-pub(super) struct Ruled {
+pub(crate) struct Ruled {
     /// The object that the rule was applied to.
     owner: ObjectId,
     applied: Applied,
@@ -34,7 +36,7 @@ impl Ledger {
     ///
     /// # Errors
     /// Where a rule cannot be applied.
-    pub(super) fn ask(
+    pub(crate) fn ask(
         &mut self,
         about: &[ObjectId],
         all: &[Candidate],
@@ -49,9 +51,11 @@ impl Ledger {
         for owner in about {
             let Some(candidate) = by_key.get(&object_key(*owner)) else { continue };
             let Verdict { entries, applied, left_out } = judge.judge(candidate)?;
+            // of an object that is asked about for the first time, no factor is further in front
+            let first = if self.left_out.contains_key(owner) { 0 } else { self.factors.len() };
             self.left_out.insert(*owner, left_out);
             for (entry, applied) in entries.into_iter().zip(applied) {
-                let mut of_owner = self.factors.iter().filter(|factor| factor.owner == *owner);
+                let mut of_owner = self.factors[first..].iter().filter(|factor| factor.owner == *owner);
                 if !of_owner.any(|f| f.applied.rule == applied.rule && f.applied.keys == applied.keys) {
                     self.factors.push(Ruled { owner: *owner, applied, entry, id: None });
                 }
@@ -62,14 +66,14 @@ impl Ledger {
     }
 
     /// Notes the names in the session of those factors that have none yet, in their order.
-    pub(super) fn name(&mut self, ids: Vec<FactorId>) {
+    pub(crate) fn name(&mut self, ids: Vec<FactorId>) {
         for (factor, id) in self.factors.iter_mut().filter(|factor| factor.id.is_none()).zip(ids) {
             factor.id = Some(id);
         }
     }
 
     /// Forgets the factors of some objects: their names in the session, and the objects that the rules were applied to.
-    pub(super) fn revoke(&mut self, of: impl Fn(&Key) -> bool) -> (Vec<FactorId>, Vec<ObjectId>) {
+    pub(crate) fn revoke(&mut self, of: impl Fn(&Key) -> bool) -> (Vec<FactorId>, Vec<ObjectId>) {
         let (mut ids, mut owners) = (vec![], vec![]);
         let connected = &mut self.connected;
         self.factors.retain(|factor| {
@@ -90,25 +94,29 @@ impl Ledger {
     }
 
     /// Forgets that the rules were asked about an object.
-    pub(super) fn forget(&mut self, object: ObjectId) {
+    pub(crate) fn forget(&mut self, object: ObjectId) {
         self.left_out.remove(&object);
     }
 
-    /// What the rules have for an object.
-    fn verdict(&self, owner: ObjectId) -> Verdict {
-        let own = || self.factors.iter().filter(|factor| factor.owner == owner);
-        Verdict {
-            entries: own().map(|factor| factor.entry.clone()).collect(),
-            applied: own().map(|factor| factor.applied.clone()).collect(),
-            left_out: self.left_out.get(&owner).cloned().unwrap_or_default(),
+    /// What the rules have for each object.
+    fn verdicts(self) -> BTreeMap<ObjectId, Verdict> {
+        let mut verdicts: BTreeMap<ObjectId, Verdict> = BTreeMap::new();
+        for (owner, left_out) in self.left_out {
+            verdicts.entry(owner).or_default().left_out = left_out;
         }
+        for Ruled { owner, entry, applied, .. } in self.factors {
+            let verdict = verdicts.entry(owner).or_default();
+            verdict.entries.push(entry);
+            verdict.applied.push(applied);
+        }
+        verdicts
     }
 
     /// The decisions for a batch: rules are asked about those objects that were not asked about before.
     ///
     /// # Errors
     /// Where a rule cannot be applied.
-    pub(super) fn complete(
+    pub(crate) fn complete(
         mut self,
         measurements: &Measurements,
         starts: Vec<Result<DualQuadric, Rejection>>,
@@ -121,8 +129,11 @@ impl Ledger {
         let new = all.filter(|(measured, start)| start.is_ok() && !self.left_out.contains_key(&measured.id));
         let new: Vec<ObjectId> = new.map(|(measured, _)| measured.id).collect();
         self.ask(&new, &candidates.collect::<Vec<_>>(), settings, up)?;
-        let decide =
-            |(measured, start): (&Measured, _)| Decision { start, verdict: self.verdict(measured.id) };
+        let mut verdicts = self.verdicts();
+        let decide = |(measured, start): (&Measured, _)| {
+            let verdict = verdicts.remove(&measured.id).unwrap_or_default();
+            Decision { start, verdict }
+        };
         Ok(measurements.objects.iter().zip(starts).map(decide).collect())
     }
 }
