@@ -4,7 +4,6 @@ use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
 use manifactor_graph::FactorEntry;
 use manifactor_graph::checked::Positive;
-use manifactor_graph::checked::Positive;
 use manifactor_quadric::Camera;
 use manifactor_slam::association::{
     Ambiguity, Association, Associator, Given, Image, Iou, Learned, Likelihood,
