@@ -147,7 +147,7 @@ impl Estimate {
     pub(crate) fn from_start(
         sequence: Arc<Sequence>,
         mut mapping: Mapping,
-        mut start: Values,
+        start: Values,
         settings: &Settings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
@@ -157,13 +157,9 @@ impl Estimate {
             return Ok(estimate.with_mixtures(settings, observer)?);
         };
         let begin = Components::begin(&mapping, variance);
-        begin.apply(&mut mapping, &mut start, &sequence, variance, loss)?;
-        let mut estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-        // offsets would take up what a trajectory gets wrong whose noise is not known yet
-        for lasting in [false, true].into_iter().filter(|lasting| variance.lasting || !lasting) {
-            let variance = VarianceSettings { lasting, ..variance.clone() };
-            estimate = estimate.with_noise(&variance, settings, observer)?;
-        }
+        begin.apply(&mut mapping, variance, loss)?;
+        let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
+        let estimate = estimate.with_noise(variance, settings, observer)?;
         Ok(estimate.with_mixtures(settings, observer)?)
     }
 
@@ -202,10 +198,10 @@ impl Estimate {
             settled = rounds >= variance.rounds.get()
                 || self.components.last().is_some_and(|before| found.change(before) < variance.tolerance);
             let Self { sequence, mut mapping, mut solution, mut components, .. } = self;
-            let mut values = std::mem::take(&mut solution.values);
+            let values = std::mem::take(&mut solution.values);
             // what was compiled for it gives its memory back before the next solve
             drop(solution);
-            found.apply(&mut mapping, &mut values, &sequence, variance, loss)?;
+            found.apply(&mut mapping, variance, loss)?;
             components.push(found);
             // near enough to go on from, until the last
             let refinements = if settled { most } else { 0 };

@@ -91,6 +91,13 @@ pub(crate) fn pose_key(frame: usize) -> Key {
     Key::indexed("x", frame)
 }
 
+/// The frame that a pose's key names; `None` for any other key.
+pub(crate) fn frame_of(key: &Key) -> Option<usize> {
+    let number = key.as_str().strip_prefix('x')?;
+    let is_number = number.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| number.parse().ok()).flatten()
+}
+
 /// The key of an object.
 pub fn object_key(id: ObjectId) -> Key {
     Key::indexed("q", id)

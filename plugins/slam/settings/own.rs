@@ -41,26 +41,10 @@ impl OwnGraph {
     }
 }
 
-/// What is between the key of an object and the number of an interval.
-const OFFSET: &str = "_offset";
-
-/// The key of the offset that boxes of an object share in an interval; see [`variance`](crate::estimate::variance).
-pub(crate) fn offset_key(object: &Key, interval: usize) -> Key {
-    Key::indexed(&format!("{object}{OFFSET}"), interval)
-}
-
-/// The object whose boxes share an offset; `None` for the key of anything else.
-pub(crate) fn offset_owner(key: &Key) -> Option<&str> {
-    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    let (object, interval) = key.as_str().split_once(OFFSET)?;
-    (is_number(object.strip_prefix('q')?) && is_number(interval)).then_some(object)
-}
-
 fn is_of_the_map(key: &Key) -> bool {
     let name = key.as_str();
     let number = name.strip_prefix('x').or_else(|| name.strip_prefix('q')).unwrap_or_default();
-    let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
-    is_number || offset_owner(key).is_some()
+    !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())
 }
 
 /// As documents write it; nothing at all, where there is nothing.
