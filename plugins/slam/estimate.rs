@@ -1,6 +1,5 @@
 //! A sequence mapped and solved.
 pub(crate) mod looks;
-mod mixture;
 pub mod refine;
 pub mod variance;
 
@@ -153,33 +152,12 @@ impl Estimate {
     ) -> Result<Self, EstimateError> {
         let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
         let Some(variance) = &settings.variance_components else {
-            let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-            return Ok(estimate.with_mixtures(settings, observer)?);
+            return Ok(Self::solve(sequence, mapping, start, most, settings, observer)?);
         };
         let begin = Components::begin(&mapping, variance);
         begin.apply(&mut mapping, variance, loss)?;
         let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-        let estimate = estimate.with_noise(variance, settings, observer)?;
-        Ok(estimate.with_mixtures(settings, observer)?)
-    }
-
-    /// Solves once more where boxes may show either of two objects. That comes last: which of the two is the better explanation is decided where
-    /// both are known well.
-    fn with_mixtures(
-        mut self,
-        settings: &Settings,
-        observer: &mut dyn Observer,
-    ) -> Result<Self, CompileError> {
-        let is_interrupted = self.solution.outcome.termination == Termination::Interrupted;
-        if is_interrupted || mixture::mix(&mut self.mapping) == 0 {
-            return Ok(self);
-        }
-        let Self { sequence, mapping, mut solution, components, .. } = self;
-        let values = std::mem::take(&mut solution.values);
-        drop(solution);
-        let solved =
-            Self::solve(sequence, mapping, values, settings.objects.refinements, settings, observer)?;
-        Ok(Self { components, ..solved })
+        estimate.with_noise(variance, settings, observer)
     }
 
     /// Estimates the noise and solves, by turns.

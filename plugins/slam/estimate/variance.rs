@@ -14,7 +14,6 @@ mod motion;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
 pub use boxes::BoxComponent;
-pub(super) use boxes::box_of;
 pub use components::{Components, VarianceError};
 pub use cross_validation::Score;
 pub use motion::{MotionChoice, MotionComponent};

@@ -89,3 +89,21 @@ fn boxes_that_last_get_their_loss_in_units_of_one_box() {
         }
     }
 }
+
+#[test]
+fn the_noise_of_boxes_is_not_that_of_their_depths() {
+    let text = "
+        source = { type = 'simulated', scene = { objects = 3 }, trajectory = { frames = 60 },
+                   detector = { depth_error = 0.02 } }
+        objects = { refinements = 0 }
+        variance_components = { rounds = 1 }";
+    let document = Document::parse("run.toml", text, Format::Toml).unwrap();
+    let run = RunDocument::read(&document).unwrap();
+    let (estimate, _) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+    let factors = estimate.mapping.graph.factors().iter();
+    let depths = factors.filter(|entry| entry.factor.typetag_name() == "centroid_depth");
+    let information = depths.map(|entry| entry.noise.information_matrix(1).unwrap()[(0, 0)]);
+    let information: Vec<f64> = information.collect();
+    // a box has 1/σ² below 1 in pixels
+    assert!(!information.is_empty() && information.iter().all(|own| *own > 100.0), "{information:?}");
+}

@@ -72,7 +72,7 @@ impl BoxComponent {
 }
 
 /// The box that a factor measures; `None` for a factor that measures none.
-pub(in crate::estimate) fn box_of(entry: &FactorEntry) -> Option<&BoundingBoxFactor> {
+pub(super) fn box_of(entry: &FactorEntry) -> Option<&BoundingBoxFactor> {
     entry.factor.erased().as_any().downcast_ref()
 }
 
