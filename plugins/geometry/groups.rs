@@ -12,7 +12,7 @@ mod twist;
 
 pub use coordinates::{Coordinates, NoCoordinates};
 pub use lie_group::LieGroup;
-pub use rn::{Point1, Point2, Point3, Point4, Rn};
+pub use rn::{Point1, Point2, Point3, Rn};
 pub use se2::Se2;
 pub use se3::Se3;
 pub use so2::{NotAnAngle, So2, atan2, wrap};

@@ -29,8 +29,8 @@ pub use factors::{
     Prior, Range,
 };
 pub use groups::{
-    Coordinates, LieGroup, NoCoordinates, NotARotation, NotAnAngle, Point1, Point2, Point3, Point4, Rn, Se2,
-    Se3, So2, So3, Twist, atan2, wrap,
+    Coordinates, LieGroup, NoCoordinates, NotARotation, NotAnAngle, Point1, Point2, Point3, Rn, Se2, Se3,
+    So2, So3, Twist, atan2, wrap,
 };
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
 pub use procrustes::{NearestRotation, nearest_rotation};

@@ -2,7 +2,7 @@
 use crate::{BalCamera, CameraModel, Point2, Point3, Rn, Se2, Se3, So2, So3, Twist};
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
-use nalgebra::{Vector1, Vector2, Vector3, Vector4, Vector6};
+use nalgebra::{Vector1, Vector2, Vector3, Vector6};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
@@ -17,7 +17,6 @@ register_points!(Se3, any_se3(), [Se3::identity(), Se3::new(half_a_turn(), Vecto
 register_points!(Rn<1>, any_point::<1>(), [Rn::<1>(Vector1::zeros())]);
 register_points!(Point2, any_point2(), [Rn::<2>(Vector2::zeros())]);
 register_points!(Point3, any_point3(), [Rn::<3>(Vector3::zeros())]);
-register_points!(Rn<4>, any_point::<4>(), [Rn::<4>(Vector4::zeros())]);
 register_points!(Twist, any_twist(), [Twist::zero()]);
 register_points!(BalCamera, any_bal_camera(), []);
 

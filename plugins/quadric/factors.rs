@@ -1,6 +1,5 @@
 //! What is known of an ellipsoid: its box in an image, its orientation, its size.
 mod bounding_box;
-mod bounding_box_offset;
 mod centroid_depth;
 mod orientation;
 mod quadric_prior;
@@ -8,7 +7,6 @@ mod shape_prior;
 mod size_prior;
 
 pub use bounding_box::{BoundingBoxFactor, BoxModel};
-pub use bounding_box_offset::BoundingBoxOffset;
 pub use centroid_depth::CentroidDepth;
 pub use orientation::{
     HorizontalOrientation, HorizontalOrientationSmooth, VerticalOrientation, VerticalOrientationSmooth,

@@ -6,9 +6,7 @@ mod shapes;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 
-pub use factors::{
-    BoundingBoxFactor, BoundingBoxOffset, BoxModel, CentroidDepth, QuadricPrior, ShapePrior, SizePrior,
-};
+pub use factors::{BoundingBoxFactor, BoxModel, CentroidDepth, QuadricPrior, ShapePrior, SizePrior};
 pub use factors::{
     HorizontalOrientation, HorizontalOrientationSmooth, VerticalOrientation, VerticalOrientationSmooth,
 };

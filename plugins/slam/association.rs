@@ -3,7 +3,6 @@
 //! An [`Associator`] names the boxes of a frame, and learns from it once the frame is in the map. What it names wrongly at first
 //! it may mend later: two objects that turn out to be one are [merged](Merge), boxes that turn out to show another object [move](Move)
 //! to it, and [`Names`] has the name that counts.
-mod ambiguity;
 pub(crate) mod assignment;
 mod given;
 mod likelihood;
@@ -18,7 +17,6 @@ use manifactor_quadric::{Camera, DualQuadric};
 use std::fmt::Debug;
 use std::sync::Arc;
 
-pub use ambiguity::Ambiguity;
 pub use given::Given;
 pub use likelihood::Likelihood;
 pub use names::{Merge, Move, Names};
@@ -47,11 +45,6 @@ pub trait Associator: Debug + Send {
     /// Names the boxes of a frame again that had these names, when all other frames have been seen.
     fn reconsider(&self, _: &Image<'_>, names: &[Option<ObjectId>], _: &dyn Map) -> Vec<Option<ObjectId>> {
         names.to_vec()
-    }
-
-    /// The boxes of a frame with these names that may show another object, when all other frames have been seen.
-    fn ambiguities(&self, _: &Image<'_>, _: &[Option<ObjectId>], _: &dyn Map) -> Vec<Ambiguity> {
-        vec![]
     }
 
     /// Learns from the boxes of a frame, which is in the map now, under these names.

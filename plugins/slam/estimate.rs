@@ -1,6 +1,5 @@
 //! A sequence mapped and solved.
 pub(crate) mod looks;
-mod mixture;
 pub mod refine;
 pub mod variance;
 
@@ -147,43 +146,18 @@ impl Estimate {
     pub(crate) fn from_start(
         sequence: Arc<Sequence>,
         mut mapping: Mapping,
-        mut start: Values,
+        start: Values,
         settings: &Settings,
         observer: &mut dyn Observer,
     ) -> Result<Self, EstimateError> {
         let (most, loss) = (settings.objects.refinements, settings.detections.loss.as_ref());
         let Some(variance) = &settings.variance_components else {
-            let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-            return Ok(estimate.with_mixtures(settings, observer)?);
+            return Ok(Self::solve(sequence, mapping, start, most, settings, observer)?);
         };
         let begin = Components::begin(&mapping, variance);
-        begin.apply(&mut mapping, &mut start, &sequence, variance, loss)?;
-        let mut estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
-        // offsets would take up what a trajectory gets wrong whose noise is not known yet
-        for lasting in [false, true].into_iter().filter(|lasting| variance.lasting || !lasting) {
-            let variance = VarianceSettings { lasting, ..variance.clone() };
-            estimate = estimate.with_noise(&variance, settings, observer)?;
-        }
-        Ok(estimate.with_mixtures(settings, observer)?)
-    }
-
-    /// Solves once more where boxes may show either of two objects. That comes last: which of the two is the better explanation is decided where
-    /// both are known well.
-    fn with_mixtures(
-        mut self,
-        settings: &Settings,
-        observer: &mut dyn Observer,
-    ) -> Result<Self, CompileError> {
-        let is_interrupted = self.solution.outcome.termination == Termination::Interrupted;
-        if is_interrupted || mixture::mix(&mut self.mapping) == 0 {
-            return Ok(self);
-        }
-        let Self { sequence, mapping, mut solution, components, .. } = self;
-        let values = std::mem::take(&mut solution.values);
-        drop(solution);
-        let solved =
-            Self::solve(sequence, mapping, values, settings.objects.refinements, settings, observer)?;
-        Ok(Self { components, ..solved })
+        begin.apply(&mut mapping, variance, loss)?;
+        let estimate = Self::solve(sequence, mapping, start, most, settings, observer)?;
+        estimate.with_noise(variance, settings, observer)
     }
 
     /// Estimates the noise and solves, by turns.
@@ -202,10 +176,10 @@ impl Estimate {
             settled = rounds >= variance.rounds.get()
                 || self.components.last().is_some_and(|before| found.change(before) < variance.tolerance);
             let Self { sequence, mut mapping, mut solution, mut components, .. } = self;
-            let mut values = std::mem::take(&mut solution.values);
+            let values = std::mem::take(&mut solution.values);
             // what was compiled for it gives its memory back before the next solve
             drop(solution);
-            found.apply(&mut mapping, &mut values, &sequence, variance, loss)?;
+            found.apply(&mut mapping, variance, loss)?;
             components.push(found);
             // near enough to go on from, until the last
             let refinements = if settled { most } else { 0 };

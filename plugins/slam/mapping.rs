@@ -3,7 +3,6 @@
 //! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
 //! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
 //! semantic rules say of it; last, variables and factors of the document's own. Offsets of boxes, where they are asked for, come with their noise.
-use crate::association::Ambiguity;
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::fusion::FusedClass;
 use crate::input::measurement::Errors;
@@ -45,8 +44,6 @@ pub struct Mapping {
     pub objects: Vec<MappedObject>,
     /// What was done with the detections.
     pub measurements: Measurements,
-    /// Boxes that may show another object: mixtures in the last solve.
-    pub ambiguities: Vec<Ambiguity>,
     /// What the user should know.
     pub warnings: Vec<Warning>,
 }
@@ -92,6 +89,13 @@ pub enum MappingError {
     Motion(#[from] MotionError),
 }
 
+/// The frame that a pose's key names; `None` for any other key.
+pub(crate) fn frame_of(key: &Key) -> Option<usize> {
+    let number = key.as_str().strip_prefix('x')?;
+    let is_number = number.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| number.parse().ok()).flatten()
+}
+
 /// The key of an object.
 pub fn object_key(id: ObjectId) -> Key {
     Key::indexed("q", id)
@@ -127,8 +131,8 @@ impl Mapping {
         decisions: Vec<Decision>,
     ) -> Result<Self, MappingError> {
         let (graph, values) = (Graph::new(), Values::new());
-        let (objects, ambiguities, warnings) = (vec![], vec![], vec![]);
-        let mut mapping = Self { graph, values, frame, objects, measurements, ambiguities, warnings };
+        let (objects, warnings) = (vec![], vec![]);
+        let mut mapping = Self { graph, values, frame, objects, measurements, warnings };
         mapping.add_poses(sequence, settings)?;
         let all = mapping.measurements.objects.clone();
         for (measured, decision) in all.iter().zip(decisions) {

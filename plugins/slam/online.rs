@@ -11,7 +11,7 @@ mod object;
 mod present;
 mod revision;
 
-use crate::association::{Ambiguity, Associator, Image, Learned, Map, Names};
+use crate::association::{Associator, Image, Learned, Map, Names};
 use crate::estimate::{Estimate, EstimateError};
 use crate::gravity::GravityError;
 use crate::input::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
@@ -204,18 +204,6 @@ impl Mapper {
         self.associator.reconsider(&Image { frame, timestamp, detections }, names, &self.known((frame, pose)))
     }
 
-    /// The boxes of a frame, which have these names, that may show another object, when all other frames have been seen.
-    pub fn ambiguities(
-        &self,
-        frame: usize,
-        observation: &Observation,
-        names: &[Option<ObjectId>],
-    ) -> Vec<Ambiguity> {
-        let none = (self.live.len(), Se3::identity());
-        let (timestamp, detections) = (observation.frame.timestamp, observation.detections.as_slice());
-        self.associator.ambiguities(&Image { frame, timestamp, detections }, names, &self.known(none))
-    }
-
     /// What boxes are called now.
     pub fn names(&self) -> &Names {
         &self.names
@@ -237,15 +225,13 @@ impl Mapper {
     }
 
     /// Solves all of it as one batch, from the estimate. Objects that were never seen from far enough apart to be placed as
-    /// they came have another chance, with all their boxes: what is mapped in the end is what a batch maps. Boxes with `ambiguities` are mixtures in
-    /// the last solve.
+    /// they came have another chance, with all their boxes: what is mapped in the end is what a batch maps.
     ///
     /// # Errors
     /// Where `sequence`, all frames that were taken, has none, or the graph cannot be solved.
     pub fn finish(
         self,
         sequence: Arc<Sequence>,
-        ambiguities: Vec<Ambiguity>,
         observer: &mut dyn Observer,
     ) -> Result<Estimate, FinishError> {
         let frame = self.up.frame().ok_or(MappingError::NoFrames)?;
@@ -260,8 +246,7 @@ impl Mapper {
         let starts = self.measurements.objects.iter().map(start).collect();
         let decisions = self.ledger.complete(&self.measurements, starts, &self.settings, frame.up);
         let decisions = decisions.map_err(MappingError::from)?;
-        let mut mapping = Mapping::assemble(&sequence, &self.settings, frame, self.measurements, decisions)?;
-        mapping.ambiguities = ambiguities;
+        let mapping = Mapping::assemble(&sequence, &self.settings, frame, self.measurements, decisions)?;
         let mut values = mapping.values.clone();
         for (i, pose) in poses.into_iter().enumerate() {
             values.insert(pose_key(i), pose);

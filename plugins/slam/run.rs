@@ -80,14 +80,12 @@ impl<'a> Mapped<'a> {
             }
             None => Cow::Borrowed(settings),
         };
-        let Associated { mut sequence, ambiguities, report: association } =
-            associated(sequence, &settings, observer)?;
+        let Associated { mut sequence, report: association } = associated(sequence, &settings, observer)?;
         let held_out = match settings.evaluation.holdout {
             Some(holdout) => holdout.take_from(Arc::make_mut(&mut sequence)),
             None => vec![],
         };
-        let mut mapping = Mapping::new(&sequence, &settings)?;
-        mapping.ambiguities = ambiguities;
+        let mapping = Mapping::new(&sequence, &settings)?;
         Ok(Self { sequence, mapping, settings, association, found, held_out })
     }
 }

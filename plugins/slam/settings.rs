@@ -29,7 +29,6 @@ pub use evaluation::EvaluationSettings;
 pub use holdout::Holdout;
 pub use objects::ObjectSettings;
 pub use own::OwnGraph;
-pub(crate) use own::{offset_key, offset_owner};
 pub use poses::{OdometrySettings, PriorSettings};
 pub(crate) use prior_map::Anchor;
 pub use prior_map::PriorMapSettings;

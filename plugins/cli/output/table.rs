@@ -3,7 +3,7 @@ use crate::output::text::{self, Table, on_one_line, seconds};
 use manifactor::slam::mapping::object_key;
 use manifactor::slam::report::{Mean, Prediction, RunReport, TrajectoryReport, VariantReport};
 use manifactor::slam::sequence::ObjectId;
-use manifactor::slam::variance::{BoxComponent, LastingComponent, MotionComponent, Score};
+use manifactor::slam::variance::{BoxComponent, MotionComponent, Score};
 
 /// What a run came to, in a table and a few lines.
 pub(crate) fn of_run(report: &RunReport) -> String {
@@ -140,16 +140,10 @@ fn noise(variant: &VariantReport) -> String {
         });
     }
     parts.extend(found.boxes.iter().map(|(name, boxes)| {
-        let BoxComponent { sigma_px, of_size, correlation_time, lasting, .. } = boxes;
+        let BoxComponent { sigma_px, of_size, correlation_time, .. } = boxes;
         let grows =
             if *of_size > 0.0 { format!(" and {:.1} % of the size", 100.0 * of_size) } else { String::new() };
-        let lasts = match lasting {
-            None => format!("{correlation_time:.1} of them worth one"),
-            Some(LastingComponent { white, lasting, seconds }) => {
-                format!("{white:.2} of it new in each, {lasting:.2} for {seconds:.2} s")
-            }
-        };
-        format!("boxes ({name}) σ {sigma_px:.1} px{grows}, {lasts}")
+        format!("boxes ({name}) σ {sigma_px:.1} px{grows}, {correlation_time:.1} of them worth one")
     }));
     text::wrap(&format!("{}: {}", on_one_line(&variant.name), parts.join("; "))) + "\n"
 }

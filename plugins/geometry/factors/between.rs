@@ -2,7 +2,7 @@
 //!
 //! The logarithm jumps where measurement and estimate differ by a rotation of π.
 use crate::groups::LieGroup;
-use crate::{Point1, Point2, Point3, Point4, Se2, Se3, So2, So3};
+use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
 use manifactor_graph::prelude::*;
 
 /// The second variable is at `relative`, seen from the first.
@@ -59,7 +59,6 @@ register_factor!("between_se3", Between<Se3>);
 register_factor!("between_point1", Between<Point1>);
 register_factor!("between_point2", Between<Point2>);
 register_factor!("between_point3", Between<Point3>);
-register_factor!("between_point4", Between<Point4>);
 
 #[cfg(test)]
 mod tests {
@@ -87,7 +86,6 @@ mod tests {
         jacobians_agree_on_point1: shifted::<1>();
         jacobians_agree_on_point2: shifted::<2>();
         jacobians_agree_on_point3: shifted::<3>();
-        jacobians_agree_on_point4: shifted::<4>();
     }
 
     fn shifted<const N: usize>() -> impl Strategy<Value = (Between<Rn<N>>, Rn<N>, Rn<N>)> {

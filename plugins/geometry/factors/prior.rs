@@ -2,7 +2,7 @@
 //!
 //! The logarithm jumps where X differs from Z by a rotation of π.
 use crate::groups::LieGroup;
-use crate::{Point1, Point2, Point3, Point4, Se2, Se3, So2, So3, Twist};
+use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3, Twist};
 use manifactor_graph::prelude::*;
 
 /// The variable is close to `value`.
@@ -54,7 +54,6 @@ register_factor!("prior_se3", Prior<Se3>);
 register_factor!("prior_point1", Prior<Point1>);
 register_factor!("prior_point2", Prior<Point2>);
 register_factor!("prior_point3", Prior<Point3>);
-register_factor!("prior_point4", Prior<Point4>);
 register_factor!("prior_twist", Prior<Twist>);
 
 #[cfg(test)]
@@ -76,7 +75,6 @@ mod tests {
         jacobians_agree_on_point1: (any_point::<1>(), any_point::<1>()).prop_map(|(value, x)| (Prior { value }, x));
         jacobians_agree_on_point2: (any_point::<2>(), any_point::<2>()).prop_map(|(value, x)| (Prior { value }, x));
         jacobians_agree_on_point3: (any_point::<3>(), any_point::<3>()).prop_map(|(value, x)| (Prior { value }, x));
-        jacobians_agree_on_point4: (any_point::<4>(), any_point::<4>()).prop_map(|(value, x)| (Prior { value }, x));
         jacobians_agree_on_twist: (any_twist(), any_twist()).prop_map(|(value, x)| (Prior { value }, x));
     }
 

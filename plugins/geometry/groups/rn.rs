@@ -24,8 +24,6 @@ pub type Point1 = Rn<1>;
 pub type Point2 = Rn<2>;
 /// A point in space.
 pub type Point3 = Rn<3>;
-/// Four numbers, such as the offsets of the sides of a box.
-pub type Point4 = Rn<4>;
 
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -141,7 +139,6 @@ macro_rules! point {
 point!(1, "point1", "{ position = [1.0] }");
 point!(2, "point2", "{ position = [1.0, 0.5] }");
 point!(3, "point3", "{ position = [1.0, 0.5, 0.0] }");
-point!(4, "point4", "{ position = [1.0, 0.5, 0.0, 0.5] }");
 
 #[cfg(test)]
 mod tests {
@@ -154,7 +151,6 @@ mod tests {
         numbers_are_a_manifold: (any_point::<1>(), any_point::<1>(), vector::<1>(10.0));
         the_plane_is_a_manifold: (any_point::<2>(), any_point::<2>(), vector::<2>(10.0));
         space_is_a_manifold: (any_point::<3>(), any_point::<3>(), vector::<3>(10.0));
-        four_numbers_are_a_manifold: (any_point::<4>(), any_point::<4>(), vector::<4>(10.0));
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use super::{as_factor, seen_point};
 use crate::groups::LieGroup;
 use crate::{Between, Prior};
-use crate::{Point1, Point2, Point3, Point4, Se2, Se3, So2, So3};
+use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
 use manifactor_graph::{Factor, Graph, Key, ValueError, Values, Variable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,7 +42,6 @@ pub fn spanning_tree(graph: &Graph, values: &Values, tree: Tree) -> Result<Value
     grow::<Point1>(graph, &mut values, tree)?;
     grow::<Point2>(graph, &mut values, tree)?;
     grow::<Point3>(graph, &mut values, tree)?;
-    grow::<Point4>(graph, &mut values, tree)?;
     for entry in graph.factors() {
         let Some((key, point)) = seen_point(entry, &values) else { continue };
         if !values.contains(key.as_str()) {

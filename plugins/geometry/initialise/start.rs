@@ -1,7 +1,7 @@
 //! Spanning trees as a start that is chosen by name.
 use super::parts::Parts;
 use super::{Tree, as_factor, seen_point, spanning_tree};
-use crate::{Between, Point1, Point2, Point3, Point4, Prior, Se2, Se3, So2, So3};
+use crate::{Between, Point1, Point2, Point3, Prior, Se2, Se3, So2, So3};
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, register};
 use manifactor_solve::{Start, StartError};
 use schemars::JsonSchema;
@@ -71,8 +71,8 @@ macro_rules! of_any_type {
         }
     };
 }
-of_any_type!(joined, Between, 2, Se3, Se2, So3, So2, Point4, Point3, Point2, Point1);
-of_any_type!(prior, Prior, 1, Se3, Se2, So3, So2, Point4, Point3, Point2, Point1);
+of_any_type!(joined, Between, 2, Se3, Se2, So3, So2, Point3, Point2, Point1);
+of_any_type!(prior, Prior, 1, Se3, Se2, So3, So2, Point3, Point2, Point1);
 
 /// The values that variables are placed from: those held, and of each part that nothing holds and no prior
 /// is in, the first. `None` where there is no between factor.

@@ -14,7 +14,6 @@ fn every_entry_is_documented() {
         names,
         [
             "bounding_box",
-            "bounding_box_offset",
             "centroid_depth",
             "horizontal_orientation",
             "horizontal_orientation_smooth",

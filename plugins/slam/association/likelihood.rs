@@ -1,5 +1,4 @@
 //! By the joint likelihood of box and class.
-mod ambiguity;
 mod division;
 mod fit;
 #[cfg(test)]
@@ -15,7 +14,7 @@ use crate::input::class::Aliases;
 use crate::input::measurement::{Errors, Quantities, UsualDepth};
 use crate::input::prior_map::PriorObject;
 use fit::BoxNoise;
-use manifactor_graph::checked::{Positive, positive, within};
+use manifactor_graph::checked::{positive, within};
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
@@ -96,10 +95,6 @@ pub struct Likelihood {
     #[serde(deserialize_with = "positive")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub second_look_s: f64,
-    /// A box that is less than this many times as likely of its object as of another one is, in the last solve, the better of both (a max-mixture).
-    /// Default: each box shows the object that it was put to.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mixture_odds: Option<Positive>,
 }
 
 impl Default for Likelihood {
@@ -118,7 +113,6 @@ impl Default for Likelihood {
             twin_iou: 0.7,
             merge_error: 1.2,
             second_look_s: 10.0,
-            mixture_odds: None,
         }
     }
 }

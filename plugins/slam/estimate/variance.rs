@@ -5,19 +5,15 @@
 //! (Helmert; Förstner, *Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten*, 1979). The noise of *odometry* is the one
 //! that leads to the trajectory which suits objects best that had no part in it.
 //!
-//! The errors of boxes last. They have a standard deviation that is larger for it, or variables of their own for what lasts, where that is asked for.
+//! The errors of consecutive boxes are correlated. Boxes have a standard deviation that is larger for it.
 mod boxes;
 mod components;
 mod correlation;
 mod cross_validation;
-mod lasting;
 mod motion;
-mod offsets;
 
 pub use crate::settings::{BoxGroups, VarianceSettings};
 pub use boxes::BoxComponent;
 pub use components::{Components, VarianceError};
 pub use cross_validation::Score;
-pub use lasting::LastingComponent;
 pub use motion::{MotionChoice, MotionComponent};
-pub(super) use offsets::box_of;

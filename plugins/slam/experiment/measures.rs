@@ -27,7 +27,7 @@ const BY_ALIGNMENT: [OfTrajectory; 9] = [
 ];
 
 /// What is measured once.
-const ONCE: [OfEstimate; 35] = [
+const ONCE: [OfEstimate; 32] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
     ("shape", |_, r| Some(r.landmarks?.estimate.mean.shape)),
@@ -53,9 +53,6 @@ const ONCE: [OfEstimate; 35] = [
         let boxes = &e.components.last()?.boxes;
         Some(boxes.values().map(|component| component.effective_px).sum::<f64>() / boxes.len() as f64)
     }),
-    ("lasting", |e, _| Some(e.components.last()?.boxes.values().next()?.lasting?.lasting)),
-    ("white", |e, _| Some(e.components.last()?.boxes.values().next()?.lasting?.white)),
-    ("lasting_s", |e, _| Some(e.components.last()?.boxes.values().next()?.lasting?.seconds)),
     ("variance_rounds", |e, _| e.components.last().map(|_| e.components.len() as f64)),
     ("objects_detected", |_, r| Some(r.counts.objects_detected as f64)),
     ("objects", |_, r| Some(r.counts.objects as f64)),

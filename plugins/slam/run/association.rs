@@ -1,7 +1,6 @@
 //! Boxes are put to objects, frame by frame and once more when all are there.
 use super::RunError;
-use crate::association::Ambiguity;
-use crate::input::sequence::{ObjectId, Observation, Sequence};
+use crate::input::sequence::{Observation, Sequence};
 use crate::online::Mapper;
 use crate::output::report::{AssociationReport, Naming};
 use crate::settings::Settings;
@@ -13,8 +12,6 @@ use std::sync::Arc;
 pub(super) struct Associated {
     /// The sequence with these names.
     pub sequence: Arc<Sequence>,
-    /// Boxes that may show another object as well.
-    pub ambiguities: Vec<Ambiguity>,
     /// How well it went; `None` where the names are those of the source.
     pub report: Option<AssociationReport>,
 }
@@ -31,7 +28,7 @@ pub(super) fn associated(
     observer: &mut dyn Observer,
 ) -> Result<Associated, RunError> {
     if settings.association.uses_names() {
-        return Ok(Associated { sequence, ambiguities: vec![], report: None });
+        return Ok(Associated { sequence, report: None });
     }
     let mut mapper = Mapper::new(sequence.opening(), settings)?;
     let (mut named, mut naming) = (Sequence::clone(&sequence), Naming::default());
@@ -66,21 +63,8 @@ pub(super) fn associated(
     for (detection, name) in named.detections.iter_mut().zip(naming.now(mapper.names())) {
         detection.object = name;
     }
-    let ambiguities = ambiguities(&mapper, &named, &taken);
-    let report = naming.report(&*settings.association, ambiguities.len(), mapper.names());
-    Ok(Associated { sequence: Arc::new(named), ambiguities, report })
-}
-
-/// The boxes of a sequence that may show another object than they are put to. `taken` has the number of each frame in the map, where it is there.
-pub(super) fn ambiguities(mapper: &Mapper, named: &Sequence, taken: &[Option<usize>]) -> Vec<Ambiguity> {
-    let mut all = vec![];
-    for (of_sequence, ((observation, boxes), of_map)) in with_boxes(named).zip(taken).enumerate() {
-        let Some(of_map) = *of_map else { continue };
-        let names: Vec<Option<ObjectId>> = named.detections[boxes].iter().map(|d| d.object).collect();
-        let found = mapper.ambiguities(of_map, &observation, &names);
-        all.extend(found.into_iter().map(|ambiguity| Ambiguity { frame: of_sequence, ..ambiguity }));
-    }
-    all
+    let report = naming.report(&*settings.association, mapper.names());
+    Ok(Associated { sequence: Arc::new(named), report })
 }
 
 /// The frames of a sequence, each with the places of its boxes among all.

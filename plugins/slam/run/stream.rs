@@ -1,6 +1,5 @@
 //! A stream, mapped while it comes.
 use super::RunError;
-use super::association::ambiguities;
 use super::location::Search;
 use crate::estimate::Estimate;
 use crate::input::sequence::{Observation, Opening, Sequence};
@@ -78,10 +77,8 @@ pub fn online(
     for (detection, name) in sequence.detections.iter_mut().zip(naming.now(mapper.names())) {
         detection.object = name;
     }
-    let taken: Vec<Option<usize>> = (0..sequence.frames.len()).map(Some).collect();
-    let ambiguities = ambiguities(&mapper, &sequence, &taken);
-    let association = naming.report(&*settings.association, ambiguities.len(), mapper.names());
-    let estimate = mapper.finish(Arc::new(sequence), ambiguities, observer)?;
+    let association = naming.report(&*settings.association, mapper.names());
+    let estimate = mapper.finish(Arc::new(sequence), observer)?;
     progress.compare(&estimate, &settings.evaluation);
     let mut report = VariantReport::new(name, &estimate, settings, 0.0);
     report.association = association;

@@ -50,21 +50,6 @@ impl OwnGraph {
     }
 }
 
-/// What is between the key of an object and the number of an interval.
-const OFFSET: &str = "_offset";
-
-/// The key of the offset that boxes of an object share in an interval; see [`variance`](crate::estimate::variance).
-pub(crate) fn offset_key(object: &Key, interval: usize) -> Key {
-    Key::indexed(&format!("{object}{OFFSET}"), interval)
-}
-
-/// The object whose boxes share an offset; `None` for the key of anything else.
-pub(crate) fn offset_owner(key: &Key) -> Option<&str> {
-    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    let (object, interval) = key.as_str().split_once(OFFSET)?;
-    (is_number(object.strip_prefix('q')?) && is_number(interval)).then_some(object)
-}
-
 /// Whether a key is a prefix and a number.
 fn is_numbered(key: &str, prefix: &str) -> bool {
     let number = key.strip_prefix(prefix).unwrap_or_default();
@@ -72,7 +57,7 @@ fn is_numbered(key: &str, prefix: &str) -> bool {
 }
 
 fn is_of_the_map(key: &Key) -> bool {
-    ["x", "q"].iter().any(|prefix| is_numbered(key.as_str(), prefix)) || offset_owner(key).is_some()
+    ["x", "q"].iter().any(|prefix| is_numbered(key.as_str(), prefix))
 }
 
 /// As documents write it; nothing at all, where there is nothing.

@@ -22,12 +22,6 @@ pub struct VarianceSettings {
     /// way in image after image, and no ellipsoid has the outline of a chair. τ such boxes say as much as one alone,
     /// τ their integrated autocorrelation time, so their standard deviation is √τ times as large.
     pub correlation: bool,
-    /// Whether what lasts of the errors becomes variables, in place of a larger standard deviation: an object's boxes share
-    /// offsets of their four sides, which change slowly. How large these are, and for how long they last, is estimated as well.
-    // not written where it is off: what experiments made before is not stale
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    #[schemars(extend("default" = false))]
-    pub lasting: bool,
     /// Whether the noise of odometry is estimated; it stays as it is given, otherwise, and with fewer than four objects.
     pub odometry: bool,
     /// Whether odometry may err by turning about what the camera sees, and not only about the camera.
@@ -43,7 +37,6 @@ impl Default for VarianceSettings {
             boxes: BoxGroups::All,
             size: false,
             correlation: true,
-            lasting: false,
             odometry: true,
             pivot: true,
         }

@@ -2,17 +2,12 @@
 use crate::prior_map::Found;
 use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
-use manifactor_graph::FactorEntry;
 use manifactor_graph::checked::Positive;
 use manifactor_quadric::Camera;
-use manifactor_slam::association::{
-    Ambiguity, Association, Associator, Given, Image, Iou, Learned, Likelihood,
-};
+use manifactor_slam::association::{Association, Associator, Given, Image, Iou, Learned, Likelihood};
 use manifactor_slam::association::{Map, Merge, Move, Projection};
 use manifactor_slam::class::Aliases;
-use manifactor_slam::estimate::Estimate;
 use manifactor_slam::fusion::FusedClass;
-use manifactor_slam::mapping::Mapping;
 use manifactor_slam::measurement::{Depth, Quantities};
 use manifactor_slam::measurements::Measured;
 use manifactor_slam::metrics::IdentityScores;
@@ -25,7 +20,6 @@ use manifactor_slam::sequence::{Detection, ObjectId, Sequence};
 use manifactor_slam::settings::Settings;
 use manifactor_slam::source::Folders;
 use manifactor_solve::Silent;
-use nalgebra::Vector3;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -273,86 +267,6 @@ fn what_the_last_frame_teaches_is_corrected_in_the_end() {
     let both = mapper.mapped();
     assert!(!mapper.settle().merged.is_empty());
     assert!(mapper.mapped() < both && mapper.objects().all(|(measured, _)| measured.id.0 < OTHER));
-}
-
-#[test]
-fn a_box_that_may_show_either_of_two_objects_counts_for_the_one_that_it_shows() {
-    let (mut settings, sequence) = scene(&[]);
-    settings.association = Arc::new(Given {});
-    settings.detections.loss = None;
-    let [a, b] = [0, 1].map(|i| sequence.ground_truth.as_ref().unwrap().objects[i].id);
-    let (mut wrong, mut ambiguities) = (Sequence::clone(&sequence), vec![]);
-    for detection in wrong.detections.iter_mut().filter(|detection| detection.frame.is_multiple_of(5)) {
-        let other = match detection.object {
-            Some(id) if id == a => b,
-            Some(id) if id == b => a,
-            _ => continue,
-        };
-        let (frame, own) = (detection.frame, detection.object.replace(other).unwrap());
-        let class_ratio = Positive::new(1.0).unwrap();
-        ambiguities.push(Ambiguity { frame, object: other, other: own, class_ratio });
-    }
-    assert!(ambiguities.len() > 20, "{}", ambiguities.len());
-    let places = |sequence: &Arc<Sequence>, ambiguities: &[Ambiguity]| {
-        let mapping = Mapping::new(sequence, &settings).unwrap();
-        let mapping = Mapping { ambiguities: ambiguities.to_vec(), ..mapping };
-        let estimate = Estimate::new(sequence.clone(), mapping, &settings, &mut Silent).unwrap();
-        let place = |id| {
-            let landmark = estimate.landmarks().into_iter().find(|landmark| landmark.object.id == id);
-            landmark.unwrap().quadric.centroid()
-        };
-        [a, b].map(place)
-    };
-    let (right, wrong) = (places(&sequence, &[]), Arc::new(wrong));
-    let off = |found: [Vector3<f64>; 2]| (found[0] - right[0]).norm() + (found[1] - right[1]).norm();
-    let (with, without) = (off(places(&wrong, &ambiguities)), off(places(&wrong, &[])));
-    assert!(with < 0.2 * without && without > 0.05, "{with} {without}");
-}
-
-#[test]
-fn boxes_of_a_crowd_are_mixtures_where_that_is_asked_for() {
-    let (settings, sequence) = scene(&["source.scene.classes=[\"bottle\"]", "source.scene.area=[1.2,1.2]"]);
-    let odds = Some(Positive::new(10.0).unwrap());
-    let mixed = by(&settings, Likelihood { mixture_odds: odds, ..Likelihood::default() });
-    let mixtures = |(estimate, report): (Estimate, VariantReport)| {
-        let factors = estimate.mapping.graph.factors().iter();
-        let mixtures = factors.filter(|entry| entry.factor.typetag_name() == "max_mixture").count();
-        let told = report.association.unwrap().ambiguous;
-        assert!(
-            mixtures <= told,
-            "of the boxes that may show either, those of mapped objects: {mixtures} {told}"
-        );
-        mixtures
-    };
-    let batch = |settings| run::estimate("crowd", sequence.clone(), settings, &mut Silent).unwrap();
-    let stream = |settings| {
-        let stream = sequence.clone().into();
-        run::online("crowd", stream, settings, &mut Found::default(), &mut Silent).unwrap()
-    };
-    assert_eq!((mixtures(batch(&settings)), mixtures(stream(&settings))), (0, 0));
-    assert!(mixtures(batch(&mixed)) > 10);
-    assert!(mixtures(stream(&mixed)) > 10);
-}
-
-#[test]
-fn depths_and_boxes_whose_errors_last_are_mixtures_as_well() {
-    let crowd = ["source.scene.classes=[\"bottle\"]", "source.scene.area=[1.2,1.2]"];
-    let with = ["source.detector.depth_error=0.02", "variance_components={lasting=true}"];
-    let (settings, sequence) = scene(&[&crowd[..], &with].concat());
-    let odds = Some(Positive::new(10.0).unwrap());
-    let mixed = by(&settings, Likelihood { mixture_odds: odds, ..Likelihood::default() });
-    let (estimate, _) = run::estimate("crowd", sequence, &mixed, &mut Silent).unwrap();
-    let of = |name: &str, keys: usize| {
-        let factors = estimate.mapping.graph.factors().iter();
-        let named = factors.filter(|entry| entry.factor.typetag_name() == name && entry.keys.len() == keys);
-        named.collect::<Vec<_>>()
-    };
-    // a depth over the pose and either object; a box with its offset besides
-    assert!(of("max_mixture", 3).len() > 10 && of("max_mixture", 4).len() > 10);
-    // what the noise of boxes is found to be is not that of depths
-    let depths = of("centroid_depth", 2);
-    let information = |entry: &FactorEntry| entry.noise.information_matrix(1).unwrap()[(0, 0)];
-    assert!(!depths.is_empty() && depths.iter().all(|depth| information(depth) > 100.0));
 }
 
 #[test]

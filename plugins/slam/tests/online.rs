@@ -238,7 +238,7 @@ fn a_window_keeps_objects_and_lets_poses_go() {
         assert!((2..40).contains(&poses), "{window}: {poses}");
         assert_eq!(keys.len() - poses, mapper.mapped());
         // the batch at the end has all frames again
-        let estimate = mapper.finish(sequence.clone().into(), vec![], &mut Silent).unwrap();
+        let estimate = mapper.finish(sequence.clone().into(), &mut Silent).unwrap();
         assert_eq!(estimate.trajectory().len(), 80);
     }
 }

@@ -1,13 +1,10 @@
 //! Variance components on data whose noise is known.
 use manifactor_config::{Document, Format};
-use manifactor_graph::Key;
 use manifactor_graph::loss::Loss;
-use manifactor_slam::estimate::Estimate;
 use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::variance::Components;
 use manifactor_solve::Silent;
-use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// The noise that is found in a simulated recording, where the search begins at `sigma` and `sigma_px`.
@@ -93,58 +90,20 @@ fn boxes_that_last_get_their_loss_in_units_of_one_box() {
     }
 }
 
-/// An estimate with offsets where the noise of the detector lasts so long, in seconds. Odometry is right: what it gets wrong lasts as well.
-fn with_offsets(seconds: f64) -> Estimate {
-    let text = format!(
-        "
-        source = {{ type = 'simulated', scene = {{ objects = 5, classes = ['sports ball'] }}, trajectory = {{ frames = 60 }},
-                   detector = {{ sigma_px = 4.0, noise_lasts_s = {seconds} }},
-                   odometry = {{ translation = 1e-5, rotation = 1e-5 }} }}
-        objects = {{ refinements = 0 }}
-        variance_components = {{ lasting = true, odometry = false }}
-        odometry = {{ noise = {{ sigma = 0.001 }} }}"
-    );
+#[test]
+fn the_noise_of_boxes_is_not_that_of_their_depths() {
+    let text = "
+        source = { type = 'simulated', scene = { objects = 3 }, trajectory = { frames = 60 },
+                   detector = { depth_error = 0.02 } }
+        objects = { refinements = 0 }
+        variance_components = { rounds = 1 }";
     let document = Document::parse("run.toml", text, Format::Toml).unwrap();
     let run = RunDocument::read(&document).unwrap();
-    Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap().0
-}
-
-#[test]
-fn errors_that_last_become_offsets_of_one_variance() {
-    let estimate = with_offsets(1.0);
-    let found = estimate.components.last().unwrap().boxes["all"];
-    let lasting = found.lasting.unwrap();
-    assert!(lasting.lasting > lasting.white && (0.2..5.0).contains(&lasting.seconds), "{lasting:?}");
-    let object = estimate.mapping.mapped().next().unwrap().key.clone();
-    let offset = |key: &Key| key.as_str().strip_prefix(&format!("{object}_offset"))?.parse::<usize>().ok();
-    let mut information: DMatrix<f64> = DMatrix::zeros(0, 0);
-    for entry in estimate.mapping.graph.factors() {
-        let places: Vec<usize> = entry.keys.iter().filter_map(offset).collect();
-        if places.len() < entry.keys.len() {
-            continue;
-        }
-        let n = information.nrows().max(places.iter().max().unwrap() + 1);
-        information.resize_mut(n, n, 0.0);
-        let own = entry.noise.information_matrix(4).unwrap()[(0, 0)];
-        for (i, a) in places.iter().enumerate() {
-            for (j, b) in places.iter().enumerate() {
-                information[(*a, *b)] += if i == j { own } else { -own };
-            }
-        }
-    }
-    let covariance = information.try_inverse().unwrap();
-    let variance = covariance[(0, 0)];
-    assert!(covariance.nrows() > 4, "{} offsets", covariance.nrows());
-    assert!(covariance.diagonal().iter().all(|own| (own / variance - 1.0).abs() < 1e-9), "{covariance}");
-    // Markov: what a later one has of an earlier one came by all between
-    let last = covariance.nrows() - 1;
-    let steps: f64 = (0..last).map(|k| covariance[(k, k + 1)] / variance).product();
-    assert!((covariance[(0, last)] / variance - steps).abs() < 1e-9, "{steps}");
-}
-
-#[test]
-fn white_errors_have_no_offsets() {
-    let estimate = with_offsets(0.0);
-    assert_eq!(estimate.components.last().unwrap().boxes["all"].lasting, None);
-    assert!(estimate.mapping.graph.factors().iter().all(|entry| entry.keys.len() < 3));
+    let (estimate, _) = Run::new(&run, None).variant(&run.variants[0], &mut Silent).unwrap();
+    let factors = estimate.mapping.graph.factors().iter();
+    let depths = factors.filter(|entry| entry.factor.typetag_name() == "centroid_depth");
+    let information = depths.map(|entry| entry.noise.information_matrix(1).unwrap()[(0, 0)]);
+    let information: Vec<f64> = information.collect();
+    // a box has 1/σ² below 1 in pixels
+    assert!(!information.is_empty() && information.iter().all(|own| *own > 100.0), "{information:?}");
 }

@@ -60,7 +60,7 @@ pub fn mapper(data: &[u8]) {
     let loaded = Session::load(&saved).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(loaded.save().unwrap_or_else(|e| panic!("{e}")), saved);
     assert_eq!(estimates(&loaded), estimates(mapper.session()));
-    let Ok(estimate) = mapper.finish(Arc::new(sequence), vec![], &mut third()) else { return };
+    let Ok(estimate) = mapper.finish(Arc::new(sequence), &mut third()) else { return };
     is_finite(&estimate.solution.values);
     let Ok(map) = PriorMap::of(&estimate, settings) else { return };
     let (folder, text) = (temporary(), serde_json::to_string(&map).unwrap_or_else(|e| panic!("{e}")));

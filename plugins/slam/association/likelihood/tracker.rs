@@ -1,5 +1,5 @@
 //! All objects: boxes are put to them, and they learn from boxes.
-use super::super::{Ambiguity, Associator, Image, Learned, Map, assignment};
+use super::super::{Associator, Image, Learned, Map, assignment};
 use super::Likelihood;
 use super::fit::Belief;
 use super::second_look::Past;
@@ -64,13 +64,6 @@ impl Associator for Tracker {
         let is_free = |before: &ObjectId| !again.contains(&Some(*before));
         let keep = |(now, before): (&Option<ObjectId>, &Option<ObjectId>)| now.or(before.filter(is_free));
         again.iter().zip(names).map(keep).collect()
-    }
-
-    fn ambiguities(&self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Vec<Ambiguity> {
-        match (self.settings.mixture_odds, map.pose(image.frame)) {
-            (Some(odds), Some(pose)) => self.ambiguous(image, names, &pose, odds.get()),
-            _ => vec![],
-        }
     }
 
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned {

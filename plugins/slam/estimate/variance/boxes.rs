@@ -1,13 +1,12 @@
-//! The noise of boxes: how large it is, how it grows with them, how it differs by object, and how long it lasts.
+//! The noise of boxes: its size, its growth with the box, its differences between objects, and its correlation.
 use super::correlation::autocorrelation_time;
-use super::lasting::{self, LastingComponent, Sides, TimedError};
-use super::offsets::box_of;
 use super::{BoxGroups, VarianceSettings};
 use crate::mapping::{MappedObject, Mapping};
 use indexmap::IndexMap;
 use manifactor_graph::batch::FactorState;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{FactorEntry, Key, Noise};
+use manifactor_quadric::BoundingBoxFactor;
 use serde::Serialize;
 
 /// The noise of a group of boxes.
@@ -20,11 +19,8 @@ pub struct BoxComponent {
     pub of_size: f64,
     /// How many consecutive boxes say as much as one alone.
     pub correlation_time: f64,
-    /// What the graph is given, for a box of the mean size: √(correlation_time) · σ, or what is left to boxes that have offsets.
+    /// Standard deviation in the graph, for a box of the mean size: √(correlation_time) · σ.
     pub effective_px: f64,
-    /// What has offsets of its own, in place of the correlation time; `None` where that is not asked for, or nothing lasts.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lasting: Option<LastingComponent>,
 }
 
 /// Half of all normal deviates are below this.
@@ -42,14 +38,8 @@ const ALIKE: f64 = 1e-6;
 
 impl BoxComponent {
     /// `size` is the mean size of boxes, in pixels.
-    pub(super) fn of(
-        sigma_px: f64,
-        of_size: f64,
-        correlation_time: f64,
-        lasting: Option<LastingComponent>,
-        size: f64,
-    ) -> Self {
-        let new = Self { sigma_px, of_size, correlation_time, effective_px: 0.0, lasting };
+    pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, size: f64) -> Self {
+        let new = Self { sigma_px, of_size, correlation_time, effective_px: 0.0 };
         Self { effective_px: new.at(size) * new.inflation(), ..new }
     }
 
@@ -72,18 +62,18 @@ impl BoxComponent {
 
     /// How many times as large as that of residuals the standard deviation in the graph is.
     fn inflation(&self) -> f64 {
-        self.lasting.map_or_else(|| self.correlation_time.sqrt(), |lasting| lasting.in_boxes())
-    }
-
-    /// How many boxes the loss takes for one.
-    pub(super) fn alike(&self) -> f64 {
-        if self.lasting.is_some() { 1.0 } else { self.correlation_time }
+        self.correlation_time.sqrt()
     }
 
     /// Of a side of a box of this extent.
     pub(super) fn at(&self, size: f64) -> f64 {
         self.sigma_px.hypot(self.of_size * size)
     }
+}
+
+/// The box that a factor measures; `None` for a factor that measures none.
+pub(super) fn box_of(entry: &FactorEntry) -> Option<&BoundingBoxFactor> {
+    entry.factor.erased().as_any().downcast_ref()
 }
 
 /// Width and height of the box that a factor measures; `None` for what has no box.
@@ -102,8 +92,6 @@ struct SideError {
     error: f64,
     /// The box's width, for a left or right side, or its height; 0 where that is not known.
     size: f64,
-    /// As it is, of known time; `None` where it is not asked what lasts.
-    timed: Option<TimedError>,
 }
 
 /// A box at the estimate, and what is known of its factor.
@@ -111,26 +99,19 @@ pub(super) struct Observed<'a> {
     pub(super) entry: &'a FactorEntry,
     pub(super) state: &'a FactorState,
     pub(super) leverage: &'a [f64],
-    /// The errors of its sides without its offset; `None` where it is not asked what lasts.
-    pub(super) timed: Option<[TimedError; 4]>,
 }
 
 impl Errors {
-    /// Residuals at the estimate are less than errors: σ²(1 - h), h the leverage of a row. Those of a box that has an offset are taken without
-    /// it, and as they are.
+    /// Residuals at the estimate are less than errors: σ²(1 - h), h the leverage of a row.
     pub(super) fn add(&mut self, observed: &Observed<'_>) {
-        let Observed { entry, state, leverage, timed } = observed;
+        let Observed { entry, state, leverage } = observed;
         let (size, rows) = (size(entry).unwrap_or_default(), entry.noise.observed());
-        let has_offset = entry.keys.len() > 2;
         for (side, errors) in self.0.iter_mut().enumerate() {
             let seen = rows.is_none_or(|rows| rows.get(side).copied().unwrap_or(false));
             let redundancy = 1.0 - leverage.get(side).copied().unwrap_or(1.0);
             if let (true, Some(residual)) = (seen && redundancy > LEAST_REDUNDANCY, state.residual.get(side))
             {
-                let (size, timed) = (size[side % 2], timed.map(|sides| sides[side]));
-                let alone = timed.filter(|_| has_offset).map(|timed| timed.error);
-                let error = alone.unwrap_or_else(|| residual / redundancy.sqrt());
-                errors.push(SideError { error, size, timed });
+                errors.push(SideError { error: residual / redundancy.sqrt(), size: size[side % 2] });
             }
         }
     }
@@ -216,11 +197,11 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
     }
     let (sigma_px, of_size) = settings.size.then(|| grown(&errors)).flatten().unwrap_or((white, 0.0));
     let size = errors.iter().map(|e| e.size).sum::<f64>() / errors.len() as f64;
-    let one = BoxComponent::of(sigma_px, of_size, 1.0, None, size);
+    let one = BoxComponent::of(sigma_px, of_size, 1.0, size);
     if !settings.correlation {
         return Some(one);
     }
-    // gross errors are detections of something else, and not what lasts
+    // gross errors are detections of something else, and no correlated noise
     let within = |errors: &&[SideError]| -> Vec<SideError> {
         errors.iter().filter(|e| e.error.abs() < 3.0 * one.at(e.size)).copied().collect()
     };
@@ -229,16 +210,7 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
     let in_units = |e: &SideError| if of_size > 0.0 { e.error / one.at(e.size) } else { e.error };
     let errors: Vec<Vec<f64>> = within.iter().map(|series| series.iter().map(in_units).collect()).collect();
     let time = autocorrelation_time(&errors);
-    // four sides an object
-    let lasting = settings.lasting.then(|| within.chunks_exact(4).map(|sides| timed(sides, &one)).collect());
-    let lasting = lasting.and_then(|objects: Vec<Sides>| lasting::lasting(&objects));
-    Some(BoxComponent::of(sigma_px, of_size, time, lasting, size))
-}
-
-/// The errors of the sides of an object, in standard deviations.
-fn timed(sides: &[Vec<SideError>], one: &BoxComponent) -> Sides {
-    let of = |e: &SideError| Some(e.timed?.divided_by(one.at(e.size)));
-    std::array::from_fn(|i| sides.get(i).into_iter().flatten().filter_map(of).collect())
+    Some(BoxComponent::of(sigma_px, of_size, time, size))
 }
 
 /// What does not grow, and what grows with size: σ² = σ₀² + κ² size², by medians over parts of like size. `None` for too few.
@@ -286,7 +258,7 @@ mod tests {
         let one = |_| {
             let size: f64 = rng.random_range(20.0..300.0);
             let deviate: f64 = StandardNormal.sample(&mut rng);
-            SideError { error: deviate * sigma.hypot(of_size * size), size, timed: None }
+            SideError { error: deviate * sigma.hypot(of_size * size), size }
         };
         (0..count).map(one).collect()
     }

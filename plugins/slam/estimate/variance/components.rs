@@ -1,20 +1,16 @@
 //! The noise of each group of measurements.
-use super::boxes::{self, BoxComponent, Errors, Observed, group};
+use super::boxes::{self, BoxComponent, Errors, Observed, box_of, group};
 use super::cross_validation::CrossValidation;
-use super::lasting::TimedError;
 use super::motion::{self, MotionChoice};
-use super::offsets::{self, box_of};
 use super::{BoxGroups, VarianceSettings};
 use crate::estimate::Estimate;
-use crate::input::sequence::Sequence;
-use crate::mapping::{Mapping, pose_key};
+use crate::mapping::{Mapping, frame_of};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::{NotPositive, Positive};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::noise::NoiseError;
-use manifactor_graph::{FactorEntry, Key, Residual, Values};
-use manifactor_quadric::DualQuadric;
+use manifactor_graph::{FactorEntry, Key};
 use manifactor_solve::{CompileError, CovarianceError, Observer};
 use serde::Serialize;
 use std::any::TypeId;
@@ -48,7 +44,7 @@ pub enum VarianceError {
     Compile(#[from] CompileError),
 }
 
-/// What a factor measures.
+/// Kind of measurement that a factor makes.
 pub(super) enum Measures {
     Motion,
     Box { object: Key },
@@ -63,7 +59,7 @@ const SAME_BOXES: f64 = 0.2;
 impl Components {
     /// What the search begins with, whatever a document says.
     pub(in crate::estimate) fn begin(mapping: &Mapping, settings: &VarianceSettings) -> Self {
-        let component = BoxComponent::of(BEGIN_PX, 0.0, 1.0, None, 0.0);
+        let component = BoxComponent::of(BEGIN_PX, 0.0, 1.0, 0.0);
         let boxes = mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given);
         let boxes = boxes.map(|object| (group(object, settings.boxes), component)).collect();
         let is_chosen = settings.odometry && CrossValidation::is_possible(mapping);
@@ -82,15 +78,12 @@ impl Components {
     ) -> Result<Self, VarianceError> {
         let graph = &estimate.mapping.graph;
         let leverages = estimate.solution.leverages(graph)?;
-        let times = times(&estimate.sequence);
         let mut boxes: IndexMap<Key, Errors> = IndexMap::new();
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
             // factors are in the order of the graph: an object's boxes in the order of their frames
             if let Measures::Box { object } = measures(entry) {
-                let timed =
-                    settings.lasting.then(|| timed(entry, &estimate.solution.values, &times)).flatten();
-                boxes.entry(object).or_default().add(&Observed { entry, state, leverage, timed });
+                boxes.entry(object).or_default().add(&Observed { entry, state, leverage });
             }
         }
         let mut found =
@@ -102,9 +95,9 @@ impl Components {
         let chosen = before.and_then(|before| before.odometry);
         found.odometry = chosen;
         if before.is_none_or(|before| found.change(before) > SAME_BOXES) {
-            let (mut mapping, mut values) = (estimate.mapping.clone(), estimate.solution.values.clone());
-            found.apply(&mut mapping, &mut values, &estimate.sequence, settings, loss)?;
-            if let Some(validation) = CrossValidation::new(&mapping, &values) {
+            let mut mapping = estimate.mapping.clone();
+            found.apply(&mut mapping, settings, loss)?;
+            if let Some(validation) = CrossValidation::new(&mapping, &estimate.solution.values) {
                 let pivot = if settings.pivot { motion::distance(estimate) } else { 0.0 };
                 found.odometry = motion::choose(&validation, pivot, chosen, observer)?;
             }
@@ -112,24 +105,21 @@ impl Components {
         Ok(found)
     }
 
-    /// Gives the graph this noise, boxes whose errors last offsets, which begin at zero, and boxes a loss whose scale is in units of their own σ: ρ(τs)/τ, so that an outlier
-    /// is one among boxes, and not among averages of τ of them.
+    /// Gives the graph this noise, and boxes a loss whose scale is in units of their own σ: ρ(τs)/τ. An outlier is then one among
+    /// boxes, and not among averages of τ of them.
     ///
     /// # Errors
     /// A standard deviation that is zero or not finite.
     pub fn apply(
         &self,
         mapping: &mut Mapping,
-        values: &mut Values,
-        sequence: &Sequence,
         settings: &VarianceSettings,
         loss: Option<&Arc<dyn Loss>>,
     ) -> Result<(), VarianceError> {
-        offsets::remove(mapping, values);
         let mut groups = HashMap::new();
         for object in mapping.mapped() {
             if let Some(component) = self.boxes.get(&group(object, settings.boxes)) {
-                let tau = Positive::new(component.alike())?;
+                let tau = Positive::new(component.correlation_time)?;
                 groups.insert(object.key.clone(), (component, loss.map(|loss| loss.erased().tempered(tau))));
             }
         }
@@ -150,7 +140,7 @@ impl Components {
                 None => noise,
             };
         }
-        offsets::add(self, mapping, values, sequence, settings)
+        Ok(())
     }
 
     /// The largest change of any standard deviation of boxes, as a share of it.
@@ -162,28 +152,44 @@ impl Components {
     }
 }
 
-/// The errors of the sides of a box without its offset, in pixels.
-fn timed(entry: &FactorEntry, values: &Values, times: &HashMap<Key, f64>) -> Option<[TimedError; 4]> {
-    let ([pose, object, ..], factor) = (&entry.keys[..], box_of(entry)?) else { return None };
-    let time = *times.get(pose)?;
-    let variables = (values.get::<Se3>(pose).ok()?, values.get::<DualQuadric>(object).ok()?);
-    let mut jacobians = Default::default();
-    let errors = factor.linearize(variables, &[true, true], &mut jacobians);
-    let side = |i: usize| TimedError { time, error: errors[i], by_object: jacobians.1.row(i).transpose() };
-    Some([0, 1, 2, 3].map(side))
-}
-
-/// When each pose was, in seconds.
-pub(super) fn times(sequence: &Sequence) -> HashMap<Key, f64> {
-    sequence.frames.iter().enumerate().map(|(i, frame)| (pose_key(i), frame.timestamp)).collect()
-}
-
+/// The measurement that a factor makes. Odometry is between the poses of consecutive frames.
 pub(super) fn measures(entry: &FactorEntry) -> Measures {
     let pose = TypeId::of::<Se3>();
-    let variables = entry.factor.erased().signature().variables;
-    match (&entry.keys[..], &variables[..]) {
-        ([_, _], [a, b]) if *a == pose && *b == pose => Measures::Motion,
-        ([_, seen, ..], _) if box_of(entry).is_some() => Measures::Box { object: seen.clone() },
+    let are_poses = || entry.factor.erased().signature().variables.iter().all(|variable| *variable == pose);
+    match &entry.keys[..] {
+        [from, to] if are_consecutive(from, to) && are_poses() => Measures::Motion,
+        [_, object, ..] if box_of(entry).is_some() => Measures::Box { object: object.clone() },
         _ => Measures::Other,
+    }
+}
+
+fn are_consecutive(from: &Key, to: &Key) -> bool {
+    let frames = frame_of(from).zip(frame_of(to));
+    frames.is_some_and(|(from, to)| from.checked_add(1) == Some(to))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_geometry::Between;
+    use manifactor_graph::Noise;
+
+    fn is_odometry(keys: [&str; 2]) -> bool {
+        let entry = FactorEntry {
+            keys: keys.map(Key::from).to_vec(),
+            name: None,
+            factor: Arc::new(Between { relative: Se3::identity() }),
+            noise: Noise::default(),
+            loss: None,
+        };
+        matches!(measures(&entry), Measures::Motion)
+    }
+
+    #[test]
+    fn odometry_is_between_poses_of_consecutive_frames_alone() {
+        assert!(is_odometry(["x0", "x1"]) && is_odometry(["x9", "x10"]));
+        assert!(!is_odometry(["x0", "x2"]) && !is_odometry(["x1", "x0"]), "a loop closure");
+        assert!(!is_odometry(["table", "shelf"]) && !is_odometry(["x1", "shelf"]), "factors of the document");
+        assert!(!is_odometry(["x", "x1"]) && !is_odometry(["x+0", "x1"]), "other names that begin with x");
     }
 }

@@ -6,10 +6,8 @@
 //! need not be known how wrong boxes are.
 use super::MotionComponent;
 use super::components::{Measures, VarianceError, measures};
-use super::offsets::zero;
 use crate::estimate::refine::{alone, roughly};
 use crate::mapping::Mapping;
-use crate::settings::offset_owner;
 use manifactor_geometry::Se3;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_quadric::DualQuadric;
@@ -82,7 +80,7 @@ impl<'a> CrossValidation<'a> {
         let fold = |fold: usize| {
             let names: Vec<&Key> = keys.iter().skip(fold).step_by(FOLDS).copied().collect();
             let mut graph = mapping.graph.clone();
-            let is_left_out = |key: &Key| names.iter().any(|name| is_of(key, name));
+            let is_left_out = |key: &Key| names.contains(&key);
             graph.factors_mut().retain(|entry| !entry.keys.iter().any(is_left_out));
             let motions = graph.factors().iter().enumerate();
             let motions = motions.filter(|(_, entry)| matches!(measures(entry), Measures::Motion));
@@ -132,17 +130,11 @@ impl Fold {
     }
 }
 
-/// Whether this is the key of an object, or of an offset of its boxes.
-fn is_of(key: &Key, object: &Key) -> bool {
-    key == object || offset_owner(key) == Some(object.as_str())
-}
-
 impl LeftOut {
     fn new(key: &Key, mapping: &Mapping, shapes: &Values) -> Self {
         let is_alone = |entry: &&FactorEntry| {
-            let others = || entry.keys.iter().filter(|other| !is_of(other, key));
-            entry.keys.iter().any(|own| is_of(own, key))
-                && others().all(|other| mapping.values.get::<Se3>(other).is_ok())
+            let others = || entry.keys.iter().filter(|other| *other != key);
+            entry.keys.contains(key) && others().all(|other| mapping.values.get::<Se3>(other).is_ok())
         };
         let entries = mapping.graph.factors().iter().filter(is_alone).cloned().collect();
         let mut object = Self { key: key.clone(), entries, before: 0.0 };
@@ -154,20 +146,13 @@ impl LeftOut {
     /// What its boxes cost where it fits best, from the shape that it has in the map of all objects.
     fn cost(&self, poses: &Values, shapes: &Values) -> Result<f64, CompileError> {
         let Ok(shape) = shapes.get::<DualQuadric>(&self.key) else { return Ok(0.0) };
-        let (graph, mut values) = alone(&self.key, *shape, self.entries.iter(), poses);
-        for offset in
-            self.entries.iter().flat_map(|entry| &entry.keys).filter(|key| offset_owner(key).is_some())
-        {
-            values.insert(offset.clone(), zero());
-        }
+        let (graph, values) = alone(&self.key, *shape, self.entries.iter(), poses);
         let mut problem = Problem::compile(&graph, &values)?;
         roughly(ITERATIONS, SETTLED).descend(&mut problem, &mut Silent);
         let states = problem.inspect();
         let boxes = states.iter().filter(|state| {
-            self.entries.get(state.entry).is_some_and(|entry| {
-                matches!(measures(entry), Measures::Box { .. })
-                    || entry.keys.iter().all(|key| *key != self.key)
-            })
+            let entry = self.entries.get(state.entry);
+            entry.is_some_and(|entry| matches!(measures(entry), Measures::Box { .. }))
         });
         let costs = boxes.map(|state| if state.defined { state.cost } else { LOST });
         // not a number is no better than lost

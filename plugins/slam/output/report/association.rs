@@ -16,19 +16,12 @@ pub struct AssociationReport {
     pub merged: usize,
     /// Boxes that were given to another object later, while frames came.
     pub moved: usize,
-    /// Boxes that may show another object as well: mixtures in the last solve.
-    #[serde(skip_serializing_if = "is_zero")]
-    pub ambiguous: usize,
     /// With the names that boxes had when they came.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_the_time: Option<IdentityScores>,
     /// With those that they had in the end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_the_end: Option<IdentityScores>,
-}
-
-fn is_zero(n: &usize) -> bool {
-    *n == 0
 }
 
 /// The names of all boxes, in order of time: of the source, and given.
@@ -95,12 +88,7 @@ impl Naming {
     }
 
     /// The report; none, where the names are those of the source.
-    pub(crate) fn report(
-        &self,
-        by: &dyn Association,
-        ambiguous: usize,
-        names: &Names,
-    ) -> Option<AssociationReport> {
+    pub(crate) fn report(&self, by: &dyn Association, names: &Names) -> Option<AssociationReport> {
         let is_known = self.boxes.iter().any(|named| named.truth.is_some());
         let score = |put: &mut dyn Iterator<Item = Option<ObjectId>>| {
             let truth = self.boxes.iter().map(|named| named.truth);
@@ -110,7 +98,6 @@ impl Naming {
             by: by.typetag_name(),
             merged: names.given_up(),
             moved: names.moved(),
-            ambiguous,
             at_the_time: score(&mut self.boxes.iter().map(|named| named.then)),
             in_the_end: score(&mut self.now(names)),
         })
