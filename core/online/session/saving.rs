@@ -114,16 +114,6 @@ impl Session {
         Ok(session)
     }
 
-    /// Whether there is, or was, a variable of this name.
-    pub(crate) fn has_had(&self, key: &str) -> bool {
-        self.find(key).is_some() || self.gone.contains(key)
-    }
-
-    /// Whether there is, or was, a factor of this number.
-    pub(crate) fn has_given(&self, factor: FactorId) -> bool {
-        factor.0 < self.model.next_factor()
-    }
-
     fn save_prior(&self, number: u32) -> Option<SavedPrior> {
         let Prior { variables, h, g, constant } = self.model.prior(number)?;
         let bits = |list: Vec<f64>| list.into_iter().map(f64::to_bits).collect();
