@@ -7,10 +7,9 @@ use crate::error::ChangeError;
 use crate::factor_id::FactorId;
 use crate::session::{CovarianceError, InnovationError, Session};
 use candidates::{Candidates, Choice};
-use manifactor_graph::checked::{one_or_more, positive};
+use manifactor_graph::checked::{OneOrMore, Positive};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, FactorEntry, Graph, Key, Noise, Values, Variable};
-use manifactor_solve::SettingError;
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -36,36 +35,15 @@ pub struct Sighting {
 pub struct LandmarkSettings {
     /// New landmarks that a pose sees on average, for each unit of the volume that its sensor measures in: for each metre and radian
     /// of range and bearing, say. A sighting that is less likely of every landmark is of a new one. Default: 0.001.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub density: f64,
+    pub density: Positive,
     /// A sighting that is not so many times as likely of one landmark as of another, or of a new one, is left out. 1 takes all of
     /// them. Default: 3.
-    #[serde(deserialize_with = "one_or_more")]
-    #[schemars(range(min = 1))]
-    pub odds: f64,
+    pub odds: OneOrMore,
 }
 
 impl Default for LandmarkSettings {
     fn default() -> Self {
-        Self { density: 0.001, odds: 3.0 }
-    }
-}
-
-impl LandmarkSettings {
-    /// Whether each setting is within its domain.
-    ///
-    /// # Errors
-    /// Names the one that is not.
-    pub fn check(&self) -> Result<(), SettingError> {
-        let Self { density, odds } = *self;
-        if !(density > 0.0 && density.is_finite()) {
-            return Err(SettingError { setting: "density", expected: "above 0", got: density });
-        }
-        if !(odds >= 1.0 && odds.is_finite()) {
-            return Err(SettingError { setting: "odds", expected: "1 or more", got: odds });
-        }
-        Ok(())
+        Self { density: Positive::literal(0.001), odds: OneOrMore::literal(3.0) }
     }
 }
 
@@ -109,7 +87,7 @@ pub struct Named {
 /// ```
 /// # use manifactor_online::{LandmarkSettings, Landmarks, Session, Sighting};
 /// # fn example(mut session: Session, pose: manifactor_graph::Key, seen: Vec<Sighting>) -> Result<(), Box<dyn std::error::Error>> {
-/// let mut landmarks = Landmarks::new("l", LandmarkSettings::default())?;
+/// let mut landmarks = Landmarks::new("l", LandmarkSettings::default());
 /// // for each pose, when it is in the session with its odometry:
 /// session.update()?;
 /// let named = landmarks.see(&mut session, &pose, &seen)?;
@@ -139,12 +117,8 @@ struct Known {
 
 impl Landmarks {
     /// None yet. Their keys are to be `prefix0`, `prefix1` and so on.
-    ///
-    /// # Errors
-    /// Where a setting is outside its domain.
-    pub fn new(prefix: &str, settings: LandmarkSettings) -> Result<Self, SettingError> {
-        settings.check()?;
-        Ok(Self { prefix: prefix.to_owned(), settings, known: vec![], born: 0 })
+    pub fn new(prefix: &str, settings: LandmarkSettings) -> Self {
+        Self { prefix: prefix.to_owned(), settings, known: vec![], born: 0 }
     }
 
     /// The keys of all landmarks, the oldest first.

@@ -362,7 +362,7 @@ pub(crate) fn view_entries(
             keys: vec![pose_key(view.frame), object.clone()],
             name: None,
             factor: Arc::new(CentroidDepth { depth: Positive::new(depth).ok()? }),
-            noise: Noise::sigma(settings.depth_error * depth).ok()?,
+            noise: Noise::sigma(*settings.depth_error * depth).ok()?,
             loss: settings.loss.clone(),
         })
     });

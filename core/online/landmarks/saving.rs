@@ -57,7 +57,7 @@ impl Landmarks {
     /// Where the text is none, is damaged, or is of another version; where the landmarks are not those of this session at this time.
     pub fn load(text: &str, session: &Session) -> Result<Self, LoadError> {
         let Saved { prefix, settings, born, known } = LANDMARKS.read(text)?;
-        let mut landmarks = Self::new(&prefix, settings).map_err(|e| LoadError::Read(e.to_string()))?;
+        let mut landmarks = Self::new(&prefix, settings);
         if session.has_had(Key::indexed(&prefix, born).as_str()) {
             return Err(LoadError::Landmarks("it has more of them"));
         }

@@ -1,5 +1,6 @@
 //! Landmarks without names, in a world that is linear: a sighting is where the landmark is from the pose.
 use crate::world::{Beyond, Near, Space};
+use manifactor_graph::checked::OneOrMore;
 use manifactor_graph::{FactorEntry, Graph, Key, Noise, Values};
 use manifactor_online::{
     Given, InnovationError, LandmarkSettings, Landmarks, LoadError, Named, Session, Settings, Sighting,
@@ -37,8 +38,8 @@ fn entry(from: &str, to: &str, by: [f64; 3]) -> FactorEntry {
 
 /// Two landmarks, a metre apart along x, that a pose at 0 has seen.
 fn two(settings: LandmarkSettings) -> (Session, Landmarks) {
-    let mut session = Session::new(Settings::default()).unwrap();
-    let mut landmarks = Landmarks::new("l", settings).unwrap();
+    let mut session = Session::new(Settings::default());
+    let mut landmarks = Landmarks::new("l", settings);
     put(&mut session, "x0", [0.0; 3], 0.01);
     let both = [[2.0, 0.0, 0.0], [3.0, 0.0, 0.0]].map(|by| seen([0.0; 3], by));
     let named = landmarks.see(&mut session, &"x0".into(), &both).unwrap();
@@ -90,7 +91,7 @@ fn sightings_of_a_pose_are_put_to_landmarks_together() {
 
 #[test]
 fn what_is_far_is_new_and_what_is_between_is_left_out() {
-    for (odds, expected) in [(3.0, None), (1.0, Some("l0"))] {
+    for (odds, expected) in [(OneOrMore::literal(3.0), None), (OneOrMore::literal(1.0), Some("l0"))] {
         let (mut session, mut landmarks) = two(LandmarkSettings { odds, ..LandmarkSettings::default() });
         put(&mut session, "x1", [0.0; 3], 0.5);
         let seen = [seen([0.0; 3], [2.49, 0.0, 0.0]), seen([0.0; 3], [9.0, 4.0, 0.0])];
@@ -131,11 +132,8 @@ fn what_does_not_fit_changes_nothing() {
     let error = session.innovation(&[entry("x0", "l9", [0.0; 3])]).unwrap_err();
     assert!(matches!(error, InnovationError::Graph(_)), "{error}");
     assert_eq!((landmarks.keys().count(), session.variables()), (2, 3));
-    for settings in [
-        LandmarkSettings { density: 0.0, ..LandmarkSettings::default() },
-        LandmarkSettings { odds: 0.5, ..LandmarkSettings::default() },
-    ] {
-        assert!(Landmarks::new("l", settings).is_err());
+    for settings in [r#"{"density": 0}"#, r#"{"odds": 0.5}"#] {
+        assert!(serde_json::from_str::<LandmarkSettings>(settings).is_err(), "{settings}");
     }
 }
 
@@ -144,8 +142,8 @@ fn walk(
     stay: usize,
     kept: impl Fn(Session, Landmarks) -> (Session, Landmarks),
 ) -> (Session, Landmarks, Vec<Named>) {
-    let mut session = Session::new(Settings::default()).unwrap();
-    let mut landmarks = Landmarks::new("l", LandmarkSettings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
+    let mut landmarks = Landmarks::new("l", LandmarkSettings::default());
     let mut all = vec![];
     for i in 0..60 {
         let x = 0.5 * i.min(60 - i) as f64;
@@ -199,9 +197,9 @@ fn landmarks_of_something_else_are_refused_with_a_reason() {
     }
     assert_eq!(told(&text.replacen("\"born\":2", "\"born\":3", 1), &session), LoadError::Damaged);
     // of another session, and of a time before and after
-    let empty = Session::new(Settings::default()).unwrap();
+    let empty = Session::new(Settings::default());
     assert_eq!(told(&text, &empty), LoadError::Landmarks("it has never had one of them"));
-    let none = Landmarks::new("l", LandmarkSettings::default()).unwrap().save().unwrap();
+    let none = Landmarks::new("l", LandmarkSettings::default()).save().unwrap();
     assert_eq!(told(&none, &session), LoadError::Landmarks("it has more of them"));
     let (mut other, mut more) = two(LandmarkSettings::default());
     more.see(&mut other, &"x0".into(), &[seen([0.0; 3], [2.0, 0.0, 0.0])]).unwrap();

@@ -101,8 +101,8 @@ fn cpu_seconds() -> f64 {
 
 /// Maps landmarks: by their true names, or without.
 fn drive(steps: &[Step], nameless: Option<LandmarkSettings>, steering: Option<&Noise>) -> Driven {
-    let mut landmarks = nameless.map(|settings| Landmarks::new("l", settings).unwrap());
-    let session = Session::new(Settings::default()).unwrap();
+    let mut landmarks = nameless.map(|settings| Landmarks::new("l", settings));
+    let session = Session::new(Settings::default());
     let (newest, odometry, names, times, gaps) = (vec![], vec![], vec![], vec![], vec![]);
     let mut driven = Driven { session, newest, odometry, names, times, gaps };
     let (mut pose, mut alone) = (Se2::identity(), Se2::identity());

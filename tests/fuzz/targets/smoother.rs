@@ -44,8 +44,8 @@ pub fn landmarks(data: &[u8]) {
 
 /// A session with two poses and two landmarks, and its landmarks, as text.
 pub(super) static TWO: LazyLock<(String, String)> = LazyLock::new(|| {
-    let mut session = Session::new(Settings::default()).unwrap_or_else(|e| panic!("{e}"));
-    let mut landmarks = Landmarks::new("l", LandmarkSettings::default()).unwrap_or_else(|e| panic!("{e}"));
+    let mut session = Session::new(Settings::default());
+    let mut landmarks = Landmarks::new("l", LandmarkSettings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let sigma = |sigma| Noise::sigma(sigma).unwrap_or_else(|_| Noise::unit());
     let at = |x: f64| Se2::new(So2::identity(), [x, 0.0].into());

@@ -153,12 +153,12 @@ impl Track {
         settings: &Likelihood,
     ) -> Option<Expected> {
         let predicted = predict(pose, &self.fitted.quadric, camera)?;
-        let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| drift * drift * seconds);
+        let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| *drift * *drift * seconds);
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
         let by_drift = predicted.by_pose * Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
         let by_quadric = predicted.by_quadric * self.fitted.covariance * predicted.by_quadric.transpose();
         let noise = settings.noise();
-        let sigma = noise.deviations(&predicted.bounding_box, Some(predicted.depth)) * settings.lasting;
+        let sigma = noise.deviations(&predicted.bounding_box, Some(predicted.depth)) * *settings.lasting;
         let by_detector = SMatrix::from_diagonal(&sigma.component_mul(&sigma));
         Some(Expected { predicted, covariance: by_quadric + by_drift + by_detector })
     }

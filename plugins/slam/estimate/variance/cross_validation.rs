@@ -11,6 +11,7 @@ use crate::estimate::refine::{alone, roughly};
 use crate::mapping::Mapping;
 use crate::settings::offset_owner;
 use manifactor_geometry::Se3;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_quadric::DualQuadric;
 use manifactor_solve::{CompileError, Optimizer, Problem, Silent, solve};
@@ -126,7 +127,9 @@ impl Fold {
         for place in &self.motions {
             factors[*place].noise = noise.clone();
         }
-        let poses = solve(&graph, &self.start, &roughly(ITERATIONS, SETTLED), &mut Silent)?.values;
+        let poses =
+            solve(&graph, &self.start, &roughly(ITERATIONS, NotNegative::literal(SETTLED)), &mut Silent)?
+                .values;
         let gains = self.left_out.iter().map(|object| Ok(object.cost(&poses, shapes)? - object.before));
         gains.collect()
     }
@@ -161,7 +164,7 @@ impl LeftOut {
             values.insert(offset.clone(), zero());
         }
         let mut problem = Problem::compile(&graph, &values)?;
-        roughly(ITERATIONS, SETTLED).descend(&mut problem, &mut Silent);
+        roughly(ITERATIONS, NotNegative::literal(SETTLED)).descend(&mut problem, &mut Silent);
         let states = problem.inspect();
         let boxes = states.iter().filter(|state| {
             self.entries.get(state.entry).is_some_and(|entry| {

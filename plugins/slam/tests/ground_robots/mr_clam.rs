@@ -5,7 +5,7 @@
 //! size, so their error grows with the range. Some barcodes are read as others: hence a robust loss.
 use super::{Seen, Step, aligned_errors, data, drive, errors, is_for_tables};
 use manifactor_geometry::{BearingRange2, Point2, Se2, So2};
-use manifactor_graph::checked::Positive;
+use manifactor_graph::checked::{OneOrMore, Positive};
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Key, Noise};
 use manifactor_online::LandmarkSettings;
@@ -157,7 +157,7 @@ fn compare(with_robots: bool, settings: LandmarkSettings) -> Option<(IdentitySco
 #[test]
 fn barcodes_that_nobody_reads_are_told_apart_by_groups() {
     // one landmark in a hundred poses is new, anywhere in a radian and five metres
-    let settings = LandmarkSettings { density: 0.002, ..LandmarkSettings::default() };
+    let settings = LandmarkSettings { density: Positive::literal(0.002), ..LandmarkSettings::default() };
     let Some((of_groups, ate)) = compare(false, settings) else { return };
     // Odometry alone is off by 1.88 m. The landmark within a group stays in doubt, and one wrong name leads to others: small
     // changes of the smoother gave an ATE from 0.13 to 0.70 m, and a precision from 0.84 to 1.
@@ -166,7 +166,11 @@ fn barcodes_that_nobody_reads_are_told_apart_by_groups() {
         for density in [0.02, 0.002, 0.0002] {
             for odds in [1.0, 3.0, 10.0] {
                 println!("robots {with_robots}, density {density}, odds {odds}");
-                compare(with_robots, LandmarkSettings { density, odds });
+                let settings = LandmarkSettings {
+                    density: Positive::new(density).unwrap(),
+                    odds: OneOrMore::new(odds).unwrap(),
+                };
+                compare(with_robots, settings);
             }
         }
     }

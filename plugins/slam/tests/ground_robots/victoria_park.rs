@@ -2,6 +2,7 @@
 use super::{Seen, Step, aligned_errors, data, drive, is_for_tables};
 use manifactor_geometry::{Coordinates, Landmark, Se2, So2};
 use manifactor_graph::Noise;
+use manifactor_graph::checked::Positive;
 use manifactor_online::LandmarkSettings;
 use manifactor_slam::metrics::IdentityScores;
 use nalgebra::{DMatrix, Vector2};
@@ -60,7 +61,7 @@ fn compare(sensors: &Sensors) -> Option<(IdentityScores, (f64, f64))> {
     let steering = sensors.steering.then(|| Noise::sigmas(&[0.005, 0.1]).unwrap());
     let named = drive(&steps, None, steering.as_ref());
     // one tree in a hundred poses is new, anywhere in a half circle of 80 m
-    let settings = LandmarkSettings { density: 1e-6, ..LandmarkSettings::default() };
+    let settings = LandmarkSettings { density: Positive::literal(1e-6), ..LandmarkSettings::default() };
     let driven = drive(&steps, Some(settings), steering.as_ref());
     let (scores, apart) = (driven.scores(|_| true, |id| id), aligned_errors(&driven.path(), &named.path()));
     let alone = aligned_errors(&driven.odometry, &named.path());
