@@ -77,7 +77,7 @@
 //! use manifactor::online::{Session, Settings};
 //! use manifactor::prelude::*;
 //!
-//! let mut session = Session::new(Settings::default())?;
+//! let mut session = Session::new(Settings::default());
 //! // the first pose is held
 //! let (mut factors, mut values) = (Graph::new(), Values::new());
 //! values.insert("x0", Se2::identity());

@@ -3,6 +3,7 @@
 use manifactor::geometry::{Between, Prior, Se2};
 use manifactor::prelude::*;
 use manifactor::solve::{Auto, IterationRecord};
+use manifactor_graph::checked::NotNegative;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 use std::alloc::System;
 use std::ops::ControlFlow;
@@ -74,7 +75,8 @@ fn steps_take_no_more_than_the_second() {
             steps.push(held(&region));
             ControlFlow::Continue(())
         };
-        let stop = Stopping { relative_cost: 0.0, max_iterations: 8, ..Stopping::default() };
+        let stop =
+            Stopping { relative_cost: NotNegative::literal(0.0), max_iterations: 8, ..Stopping::default() };
         let solver = LevenbergMarquardt { stop, ..LevenbergMarquardt::default() };
         let outcome = solve(&graph, &values, &solver, &mut watch).unwrap().outcome;
         assert!(outcome.final_cost < 0.5 * outcome.initial_cost, "{outcome:?}");

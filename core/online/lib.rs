@@ -8,7 +8,7 @@
 //! # use manifactor_online::{Session, Settings};
 //! # use manifactor_graph::{Graph, Values};
 //! # fn example(frames: Vec<(Graph, Values)>) -> Result<(), Box<dyn std::error::Error>> {
-//! let mut session = Session::new(Settings::default())?;
+//! let mut session = Session::new(Settings::default());
 //! for (factors, values) in frames {
 //!     session.push(&factors, &values)?;
 //!     let report = session.update()?;

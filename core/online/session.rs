@@ -21,7 +21,6 @@ use crate::settings::Settings;
 use crate::tree::{Couplings, Tree};
 use changes::Pending;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
-use manifactor_solve::SettingError;
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
@@ -91,12 +90,8 @@ impl fmt::Debug for Session {
 
 impl Session {
     /// An empty session.
-    ///
-    /// # Errors
-    /// Where a setting is outside its domain.
-    pub fn new(settings: Settings) -> Result<Self, SettingError> {
-        settings.check()?;
-        Ok(Self {
+    pub fn new(settings: Settings) -> Self {
+        Self {
             settings,
             model: Model::default(),
             tree: Tree::default(),
@@ -127,7 +122,7 @@ impl Session {
             gone: GoneKeys::default(),
             gone_factors: Runs::default(),
             waiting_keys: Shared::default(),
-        })
+        }
     }
 
     /// The estimate of a variable, as of the last update; `None` where it is not there. O(1).

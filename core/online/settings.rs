@@ -1,10 +1,11 @@
 //! How a session trades time for accuracy.
 mod window;
 
-use manifactor_graph::checked::{at_least_one, not_negative};
-use manifactor_solve::{FactorType, Probability, SettingError};
+use manifactor_graph::checked::NotNegative;
+use manifactor_solve::{FactorType, Probability};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::num::NonZeroUsize;
 
 pub use window::{ManifoldType, NotOneSpan, Span, UnknownManifold, Window};
 
@@ -13,29 +14,24 @@ pub use window::{ManifoldType, NotOneSpan, Span, UnknownManifold, Window};
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// Updates from one relinearization to the next, at least 1. Default: 10.
-    #[serde(deserialize_with = "at_least_one")]
-    #[schemars(range(min = 1))]
-    pub relinearize_every: usize,
+    pub relinearize_every: NonZeroUsize,
     /// Largest error of a linearization, in standard deviations of the factors around. A variable is linearized anew if a component
     /// of its step δ is larger than √(bend · σ), with σ = 1/√Hᵢᵢ, or if new weights of robust losses change its gradient by more
     /// than 1/σ. 0 relinearizes every variable that moves. Default: 0.1.
-    #[serde(deserialize_with = "not_negative")]
-    pub bend: f64,
+    pub bend: NotNegative,
     /// Changes of a step δ that are not passed on to other variables, in standard deviations σ = 1/√Hᵢᵢ of the factors around. 0 passes on
     /// every change. Default: 0.01.
-    #[serde(deserialize_with = "not_negative")]
-    pub deviation: f64,
+    pub deviation: NotNegative,
     /// Multiples of the threshold for relinearization from which on a variable does not wait for its turn: the update is
     /// followed by another pass at once. Default: 10.
-    #[serde(deserialize_with = "not_negative")]
-    pub urgent: f64,
+    pub urgent: NotNegative,
     /// Such passes that one update may take. Default: 1.
     pub passes: usize,
     /// Multiply-adds that an update may take where it relinearizes, for deadlines. Relinearizations beyond it wait for the next
     /// updates, those furthest out first; an update that has nothing else to do takes one at least. What new factors need
     /// is never put off, nor is a step shortened later because of it. Default: no budget.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub budget: Option<f64>,
+    pub budget: Option<NotNegative>,
     /// What stays of a graph that grows without end. Default: all of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<Window>,
@@ -56,8 +52,7 @@ pub struct Outliers {
     /// Nats for each row by which a factor alone may narrow down where its variables are, where as many candidates count as are rejected;
     /// the logarithm of that ratio is added. What says more is hardly tested by what is known, and waits for another that bears it
     /// out. Default: 1.5.
-    #[serde(deserialize_with = "not_negative")]
-    pub gain: f64,
+    pub gain: NotNegative,
     /// Of the candidates only the factors of these types. Default: all of them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub types: Vec<FactorType>,
@@ -65,43 +60,21 @@ pub struct Outliers {
 
 impl Default for Outliers {
     fn default() -> Self {
-        Self { probability: Probability::default(), gain: 1.5, types: vec![] }
+        Self { probability: Probability::default(), gain: NotNegative::literal(1.5), types: vec![] }
     }
 }
 
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            relinearize_every: 10,
-            bend: 0.1,
-            deviation: 0.01,
-            urgent: 10.0,
+            relinearize_every: NonZeroUsize::MIN.saturating_add(9),
+            bend: NotNegative::literal(0.1),
+            deviation: NotNegative::literal(0.01),
+            urgent: NotNegative::literal(10.0),
             passes: 1,
             budget: None,
             window: None,
             outliers: None,
-        }
-    }
-}
-
-impl Settings {
-    /// Whether each setting is within its domain.
-    ///
-    /// # Errors
-    /// Names the one that is not.
-    pub fn check(&self) -> Result<(), SettingError> {
-        if self.relinearize_every == 0 {
-            return Err(SettingError { setting: "relinearize_every", expected: "1 or more", got: 0.0 });
-        }
-        if self.window.as_ref().is_some_and(|window| matches!(window.span, Span::Poses(0))) {
-            return Err(SettingError { setting: "window.poses", expected: "1 or more", got: 0.0 });
-        }
-        let all = [("bend", self.bend), ("deviation", self.deviation), ("urgent", self.urgent)];
-        let budget = self.budget.map(|budget| ("budget", budget));
-        let gain = self.outliers.as_ref().map(|outliers| ("outliers.gain", outliers.gain));
-        match all.into_iter().chain(budget).chain(gain).find(|(_, x)| !(*x >= 0.0 && x.is_finite())) {
-            Some((setting, got)) => Err(SettingError { setting, expected: "0 or more", got }),
-            None => Ok(()),
         }
     }
 }

@@ -8,7 +8,6 @@ mod linear;
 mod observer;
 mod outcome;
 mod problem;
-mod setting;
 mod strategy;
 
 pub use inspect::{AtStart, CovarianceError, Diagnosis, FactorCost, Factorized, Marginal, Weak};
@@ -19,11 +18,10 @@ pub use observer::{All, Interrupt, Observer, Silent};
 pub use outcome::{InactiveFactor, IterationRecord, Moving, Outcome, Rejected, Times, Untouched};
 pub use outcome::{Stall, Termination, Tolerance, Undetermined};
 pub use problem::{ChangeError, CompileError, Problem, WeightError};
-pub use setting::SettingError;
 pub use strategy::{
-    Auto, BadParameter, Candidates, Descent, Dogleg, FactorType, GaussNewton, Given, Gnc, Growth,
-    LevenbergMarquardt, Optimizer, Probability, Start, StartError, Step, Stopping, Tried, Truncation,
-    UnknownFactor, is_sequential,
+    Auto, Candidates, Descent, DiagonalLimits, Dogleg, FactorType, GaussNewton, Given, Gnc, Growth,
+    LevenbergMarquardt, NotLimits, Optimizer, Probability, Start, StartError, Step, Stopping, Tried,
+    Truncation, UnknownFactor, is_sequential,
 };
 
 /// The dense kernel of a front, for solvers that keep fronts of their own.
@@ -54,15 +52,13 @@ pub struct Solution {
 /// Compiles and solves.
 ///
 /// # Errors
-/// Where graph and values do not fit each other, or a setting of the solver is outside its domain. Numerical trouble is no error: see
-/// [`Outcome::termination`].
+/// Graph and values that do not fit each other. Numerical trouble is no error: see [`Outcome::termination`].
 pub fn solve(
     graph: &Graph,
     values: &Values,
     optimizer: &dyn Optimizer,
     observer: &mut dyn Observer,
 ) -> Result<Solution, CompileError> {
-    optimizer.check()?;
     let solution = optimizer.solve(graph, values, observer)?;
     let Outcome { termination, iterations, initial_cost, final_cost, times, .. } = &solution.outcome;
     let (solver, seconds) = (optimizer.typetag_name(), times.total);

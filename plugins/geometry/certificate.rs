@@ -14,6 +14,7 @@ use crate::initialise::parts::Parts;
 use crate::initialise::pose::Pose;
 use crate::{Between, ChordalBetween, Prior, Se2, Se3};
 use dual::{Dual, Weights};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{Factor, Fixed, Graph, Key, Noise, Values};
 use manifactor_solve::{
@@ -219,12 +220,17 @@ where
     }
     let stop =
         |relative_cost, max_iterations| Stopping { relative_cost, max_iterations, ..Stopping::default() };
-    let near = LevenbergMarquardt { stop: stop(1e-9, 100), ..LevenbergMarquardt::default() };
+    let near =
+        LevenbergMarquardt { stop: stop(NotNegative::literal(1e-9), 100), ..LevenbergMarquardt::default() };
     let near = solve(&graph, &values, &near, &mut Silent)?.values;
     // the last digits: the certificate matrix is only as close to singular as the gradient is to zero
-    let exact =
-        solve(&graph, &near, &GaussNewton { stop: stop(1e-12, 30), ..Default::default() }, &mut Silent)?
-            .values;
+    let exact = solve(
+        &graph,
+        &near,
+        &GaussNewton { stop: stop(NotNegative::literal(1e-12), 30), ..Default::default() },
+        &mut Silent,
+    )?
+    .values;
     let pose = |(key, start): (&Key, &P)| exact.get::<P>(key).map_or(*start, |pose| *pose);
     Ok(keys.iter().zip(&net.poses).map(pose).collect())
 }

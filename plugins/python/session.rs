@@ -52,7 +52,7 @@ impl Session {
             }
             None => Settings::default(),
         };
-        Inner::new(settings).map(Self).map_err(|error| errors::argument("Session", error.setting, &error))
+        Ok(Self(Inner::new(settings)))
     }
 
     /// Adds variables with their first values, and factors between any variables, new or not; what the graph holds is held.

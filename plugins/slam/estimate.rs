@@ -174,7 +174,7 @@ impl Estimate {
             let found = Components::of(&self, variance, loss, observer)?;
             rounds += 1;
             settled = rounds >= variance.rounds.get()
-                || self.components.last().is_some_and(|before| found.change(before) < variance.tolerance);
+                || self.components.last().is_some_and(|before| found.change(before) < *variance.tolerance);
             let Self { sequence, mut mapping, mut solution, mut components, .. } = self;
             let values = std::mem::take(&mut solution.values);
             // what was compiled for it gives its memory back before the next solve

@@ -351,7 +351,7 @@ pub(crate) fn view_entries<'a>(
     camera: Camera,
     settings: &'a DetectionSettings,
 ) -> impl Iterator<Item = FactorEntry> + 'a {
-    let errors = Errors { depth: settings.depth_error };
+    let errors = Errors { depth: *settings.depth_error };
     let others = view.quantities.entries(view.frame, object, errors, settings.loss.as_ref());
     std::iter::once(box_entry(view, object.clone(), camera, settings)).chain(others)
 }

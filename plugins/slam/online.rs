@@ -29,7 +29,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::manifold_name;
 use manifactor_online::{ChangeError, ManifoldType, Session, UpdateError};
 use manifactor_quadric::{Camera, DualQuadric};
-use manifactor_solve::{Observer, SettingError};
+use manifactor_solve::Observer;
 use object::Tracked;
 use std::any::TypeId;
 use std::collections::BTreeMap;
@@ -115,10 +115,7 @@ pub enum FinishError {
 impl Mapper {
     /// An empty map, by the settings [for streams](Settings::for_stream). If the settings have a prior map and the start in it, the
     /// map begins with its objects.
-    ///
-    /// # Errors
-    /// Where a setting of the session is outside its domain.
-    pub fn new(opening: Opening, settings: &Settings) -> Result<Self, SettingError> {
+    pub fn new(opening: Opening, settings: &Settings) -> Self {
         let settings = settings.clone().for_stream();
         let mut online = settings.online.clone();
         if let Some(window) = &mut online.window {
@@ -132,9 +129,9 @@ impl Mapper {
         let measurements = Measurements::new(settings.anchor());
         let objects =
             measurements.objects.iter().filter_map(|measured| Some((measured.id, Tracked::known(measured)?)));
-        Ok(Self {
+        Self {
             camera: opening.camera,
-            session: Session::new(online)?,
+            session: Session::new(online),
             associator: settings.association.begin(opening.camera, &settings.aliases, &known),
             settings: Arc::new(settings),
             names: Names::default(),
@@ -145,7 +142,7 @@ impl Mapper {
             ledger: Ledger::default(),
             last: None,
             live: vec![],
-        })
+        }
     }
 
     /// Takes a frame in: its pose, and its boxes of objects that are in the map; then objects that it completes. The settings'

@@ -10,7 +10,7 @@ use crate::settings::Settings;
 use crate::settings::run_document::{RunDocument, Variant};
 use association::{Associated, associated};
 use location::find;
-use manifactor_solve::{Observer, SettingError, Termination};
+use manifactor_solve::{Observer, Termination};
 use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -35,9 +35,6 @@ pub enum RunError {
     /// The graph cannot be solved.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
-    /// A setting of the session is outside its domain.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
     /// Frames that cannot be kept.
     #[error(transparent)]
     Journal(#[from] JournalError),

@@ -6,7 +6,7 @@ use crate::input::source::Source;
 use crate::motion::{MotionModel, Odometry};
 use crate::semantics::{Rule, add_weak_shape, read_semantics};
 use manifactor_config::{Diagnostics, Errors, Fault, Node, Section};
-use manifactor_solve::{LevenbergMarquardt, Optimizer};
+use manifactor_solve::{DiagonalLimits, LevenbergMarquardt, Optimizer};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::hash::Hasher;
@@ -27,7 +27,7 @@ mod variance;
 pub use detections::{CutSides, DetectionSettings};
 pub use evaluation::EvaluationSettings;
 pub use holdout::Holdout;
-pub use objects::ObjectSettings;
+pub use objects::{Degrees, ObjectSettings};
 pub use own::OwnGraph;
 pub use poses::{OdometrySettings, PriorSettings};
 pub(crate) use prior_map::Anchor;
@@ -117,7 +117,7 @@ fn from_source() -> Arc<dyn Gravity> {
 /// Damping of one size for all directions: in proportion to the diagonal of H, a semi-axis that has all but vanished
 /// would go for good, since next to nothing is left of its derivative.
 fn default_solver() -> Arc<dyn Optimizer> {
-    Arc::new(LevenbergMarquardt { diagonal: [1.0, 1.0], ..LevenbergMarquardt::default() })
+    Arc::new(LevenbergMarquardt { diagonal: DiagonalLimits::EVEN, ..LevenbergMarquardt::default() })
 }
 
 impl Settings {

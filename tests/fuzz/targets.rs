@@ -35,6 +35,7 @@ use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::sequence::Sequence;
 use manifactor::slam::simulator::Simulated;
 use manifactor::solve::{Auto, IterationRecord};
+use manifactor_graph::checked::Count;
 use std::num::NonZero;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
@@ -137,7 +138,8 @@ pub fn expression(data: &[u8]) {
 pub fn run(data: &[u8]) {
     static SEQUENCE: LazyLock<Arc<Sequence>> = LazyLock::new(|| {
         let mut simulation = Simulated::default();
-        (simulation.trajectory.frames, simulation.scene.objects) = (6, 2);
+        simulation.trajectory.frames = Count::literal(6);
+        simulation.scene.objects = Count::literal(2);
         Arc::new(simulation.simulate().unwrap_or_else(|e| panic!("{e}")))
     });
     let Ok(document) = Document::parse("run.toml", String::from_utf8_lossy(data), Format::Toml) else {

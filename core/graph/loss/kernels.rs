@@ -24,7 +24,7 @@ macro_rules! loss {
             ///
             /// # Errors
             /// Where `scale` is not positive and finite.
-            pub fn new(scale: f64) -> Result<Self, crate::registry::checked::NotPositive> {
+            pub fn new(scale: f64) -> Result<Self, crate::registry::checked::OutOfDomain> {
                 Ok(Self { scale: Positive::new(scale)? })
             }
         }

@@ -1,147 +1,162 @@
-//! Numbers that are checked when they are read.
+//! Numbers with a domain: a value outside of it cannot be made, neither in code nor by a document.
 use schemars::JsonSchema;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
+use std::ops::Deref;
 
-/// A finite number above zero.
-#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "f64", into = "f64")]
-#[schemars(extend("exclusiveMinimum" = 0))]
-pub struct Positive(f64);
-
-/// A number that should be positive and is not.
+/// A number outside its domain.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("expected a finite number above zero, got {0}")]
-pub struct NotPositive(pub f64);
-
-impl Positive {
-    /// # Errors
-    /// Where `x` is zero, negative or not finite.
-    pub fn new(x: f64) -> Result<Self, NotPositive> {
-        if x > 0.0 && x.is_finite() { Ok(Self(x)) } else { Err(NotPositive(x)) }
-    }
-    /// For literals in code; a constant that is not positive does not compile where `const` is asked for.
-    pub const fn literal(x: f64) -> Self {
-        assert!(x > 0.0 && x < f64::INFINITY);
-        Self(x)
-    }
+#[error("expected {expected}, got {got}")]
+pub struct OutOfDomain {
+    /// The domain.
+    pub expected: &'static str,
     /// The number.
-    pub const fn get(self) -> f64 {
-        self.0
-    }
+    pub got: f64,
 }
 
-/// A number from 0 to 1.
-#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize, JsonSchema)]
+/// Defines types of numbers with a domain: a documentation, a name, the domain in words and as an expression, and its JSON schema.
+/// Settings have them as fields, so that code and documents are checked alike:
+///
+/// ```
+/// # use manifactor_graph::number;
+/// number! {
+///     /// A temperature in kelvin.
+///     pub Kelvin: "a finite number, 0 or more", |x| x >= 0.0 && x < f64::INFINITY, { "minimum": 0 };
+/// }
+/// const ROOM: Kelvin = Kelvin::literal(293.15);
+/// assert!(Kelvin::new(-1.0).is_err());
+/// assert!(ROOM.sqrt() < *ROOM);
+/// ```
+#[macro_export]
+macro_rules! number {
+    ($(
+        $(#[$doc:meta])*
+        $visible:vis $name:ident: $expected:literal, |$x:ident| $is_within:expr, { $($key:literal: $value:expr),* };
+    )+) => { $(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+        $visible struct $name(f64);
+
+        #[allow(dead_code, reason = "not every number is used in every way")]
+        impl $name {
+            /// A number that is only known when the program runs.
+            ///
+            /// # Errors
+            /// A number outside the domain, or one that is not finite.
+            pub const fn new($x: f64) -> Result<Self, $crate::checked::OutOfDomain> {
+                if $is_within {
+                    Ok(Self($x))
+                } else {
+                    Err($crate::checked::OutOfDomain { expected: $expected, got: $x })
+                }
+            }
+            /// A number that is written in code. In a constant, one outside the domain does not compile; elsewhere it panics.
+            #[track_caller]
+            pub const fn literal($x: f64) -> Self {
+                assert!($is_within, concat!("expected ", $expected));
+                Self($x)
+            }
+            /// The number.
+            pub const fn get(self) -> f64 {
+                self.0
+            }
+        }
+        impl ::std::ops::Deref for $name {
+            type Target = f64;
+            fn deref(&self) -> &f64 {
+                &self.0
+            }
+        }
+        impl TryFrom<f64> for $name {
+            type Error = $crate::checked::OutOfDomain;
+            fn try_from(x: f64) -> Result<Self, $crate::checked::OutOfDomain> {
+                Self::new(x)
+            }
+        }
+        impl From<$name> for f64 {
+            fn from(x: $name) -> f64 {
+                x.0
+            }
+        }
+        impl $crate::__private::serde::Serialize for $name {
+            fn serialize<S: $crate::__private::serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                to.serialize_f64(self.0)
+            }
+        }
+        impl<'de> $crate::__private::serde::Deserialize<'de> for $name {
+            fn deserialize<D: $crate::__private::serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                let x = <f64 as $crate::__private::serde::Deserialize>::deserialize(from)?;
+                Self::new(x).map_err($crate::__private::serde::de::Error::custom)
+            }
+        }
+        impl $crate::__private::schemars::JsonSchema for $name {
+            fn inline_schema() -> bool {
+                true
+            }
+            fn schema_name() -> ::std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+            fn json_schema(
+                _: &mut $crate::__private::schemars::SchemaGenerator,
+            ) -> $crate::__private::schemars::Schema {
+                $crate::__private::schemars::json_schema!({ "type": "number", "format": "double" $(, $key: $value)* })
+            }
+        }
+    )+ };
+}
+
+number! {
+    /// A finite number.
+    pub Finite: "a finite number", |x| x.is_finite(), {};
+    /// A finite number above zero.
+    pub Positive: "a finite number above zero", |x| x > 0.0 && x < f64::INFINITY, { "exclusiveMinimum": 0 };
+    /// A finite number, 0 or more.
+    pub NotNegative: "a finite number, 0 or more", |x| x >= 0.0 && x < f64::INFINITY, { "minimum": 0 };
+    /// A finite number, 1 or more.
+    pub OneOrMore: "a finite number, 1 or more", |x| x >= 1.0 && x < f64::INFINITY, { "minimum": 1 };
+    /// A number from 0 to 1.
+    pub Share: "a number from 0 to 1", |x| x >= 0.0 && x <= 1.0, { "minimum": 0, "maximum": 1 };
+}
+
+/// A whole number from `LEAST` to `MOST`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(transparent)]
-pub struct Share(
-    #[serde(deserialize_with = "within::<0, 1, _>")]
-    #[schemars(range(min = 0, max = 1))]
-    f64,
-);
+pub struct Count<const LEAST: usize, const MOST: usize>(usize);
 
-impl Share {
-    /// The number.
-    pub const fn get(self) -> f64 {
-        self.0
+impl<const LEAST: usize, const MOST: usize> Count<LEAST, MOST> {
+    /// A number that is written in code. In a constant, one outside the domain does not compile; elsewhere it panics.
+    #[track_caller]
+    pub const fn literal(n: usize) -> Self {
+        assert!(LEAST <= n && n <= MOST);
+        Self(n)
     }
 }
 
-/// For fields that are plain numbers in code: `#[serde(deserialize_with = "positive")]`.
-///
-/// # Errors
-/// Where the number is zero, negative or not finite.
-pub fn positive<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    Positive::deserialize(from).map(Positive::get)
-}
-
-/// The same for a number that is 0 or more.
-///
-/// # Errors
-/// Where it is negative, or not finite.
-pub fn not_negative<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    let x = f64::deserialize(from)?;
-    if x >= 0.0 && x.is_finite() {
-        Ok(x)
-    } else {
-        Err(D::Error::custom(format!("expected a finite number, 0 or more, got {x}")))
+impl<const LEAST: usize, const MOST: usize> Deref for Count<LEAST, MOST> {
+    type Target = usize;
+    fn deref(&self) -> &usize {
+        &self.0
     }
 }
 
-/// The same for a number that is 1 or more.
-///
-/// # Errors
-/// Where it is less than 1, or not finite.
-pub fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    let x = f64::deserialize(from)?;
-    if x >= 1.0 && x.is_finite() {
-        Ok(x)
-    } else {
-        Err(D::Error::custom(format!("expected a finite number, 1 or more, got {x}")))
+impl<'de, const LEAST: usize, const MOST: usize> Deserialize<'de> for Count<LEAST, MOST> {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        match usize::deserialize(from)? {
+            n if (LEAST..=MOST).contains(&n) => Ok(Self(n)),
+            n if LEAST == 0 => Err(D::Error::custom(format!("expected a number of at most {MOST}, got {n}"))),
+            n => Err(D::Error::custom(format!("expected a number from {LEAST} to {MOST}, got {n}"))),
+        }
     }
 }
 
-/// The same for a count that is 1 or more.
-///
-/// # Errors
-/// Where it is less than 1, or no whole number.
-pub fn at_least_one<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
-    match usize::deserialize(from)? {
-        0 => Err(D::Error::custom("expected a whole number, 1 or more, got 0")),
-        count => Ok(count),
+impl<const LEAST: usize, const MOST: usize> JsonSchema for Count<LEAST, MOST> {
+    fn inline_schema() -> bool {
+        true
     }
-}
-
-/// The same for a least and a most, neither of them negative.
-///
-/// # Errors
-/// Where the first is above the second, below zero, or one of them is not a number.
-pub fn least_and_most<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 2], D::Error> {
-    let [least, most] = <[f64; 2]>::deserialize(from)?;
-    if 0.0 <= least && least <= most {
-        return Ok([least, most]);
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        format!("from_{LEAST}_to_{MOST}").into()
     }
-    Err(D::Error::custom(format!("expected two numbers, 0 ≤ least ≤ most, got [{least}, {most}]")))
-}
-
-/// The same for a number within bounds: `#[serde(deserialize_with = "within::<0, 180, _>")]`.
-///
-/// # Errors
-/// Where it is not.
-pub fn within<'de, const LEAST: i32, const MOST: i32, D: Deserializer<'de>>(
-    from: D,
-) -> Result<f64, D::Error> {
-    let x = f64::deserialize(from)?;
-    if (f64::from(LEAST)..=f64::from(MOST)).contains(&x) {
-        Ok(x)
-    } else {
-        Err(D::Error::custom(format!("expected a number from {LEAST} to {MOST}, got {x}")))
-    }
-}
-
-/// A count that is at most `MOST`, for fields that are plain numbers in code:
-/// `#[serde(deserialize_with = "at_most::<1000, _>")]`.
-///
-/// # Errors
-/// Where it is larger.
-pub fn at_most<'de, const MOST: usize, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
-    let n = usize::deserialize(from)?;
-    if n <= MOST {
-        Ok(n)
-    } else {
-        Err(D::Error::custom(format!("expected a number of at most {MOST}, got {n}")))
-    }
-}
-
-impl TryFrom<f64> for Positive {
-    type Error = NotPositive;
-    fn try_from(x: f64) -> Result<Self, NotPositive> {
-        Self::new(x)
-    }
-}
-
-impl From<Positive> for f64 {
-    fn from(x: Positive) -> f64 {
-        x.0
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": "integer", "format": "uint", "minimum": LEAST, "maximum": MOST })
     }
 }

@@ -52,13 +52,12 @@ impl Session {
     /// Solves all that is there as one batch, from the estimate. The session stays as it is.
     ///
     /// # Errors
-    /// Where there is nothing to solve for, a setting of the solver is outside its domain, or there is no memory.
+    /// Where there is nothing to solve for, or there is no memory.
     pub fn finish(
         &self,
         optimizer: &dyn Optimizer,
         observer: &mut dyn Observer,
     ) -> Result<Finished, CompileError> {
-        optimizer.check()?;
         let (mut graph, factors) = self.graph();
         self.add_priors(&mut graph);
         let mut values = self.estimates();

@@ -71,7 +71,7 @@ impl Session {
             && (best.get(&ascending(variables)).is_some_and(|best| *best != number)
                 || !self.is_odometry(variables));
         let rows = entry.factor.erased().signature().rows.filter(|rows| *rows > 0)?;
-        let (bound, gain) = (outliers.probability.chi_squared(rows), outliers.gain * rows as f64);
+        let (bound, gain) = (outliers.probability.chi_squared(rows), *outliers.gain * rows as f64);
         (is_named && couples).then_some(Suspect { bound, gain, since: Some(self.updates + 1) })
     }
 

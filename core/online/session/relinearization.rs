@@ -35,7 +35,7 @@ impl Session {
     pub(super) fn excess(&self, variable: u32) -> f64 {
         let blocks = &self.model.blocks;
         let steps = self.delta[blocks.range(variable)].iter().zip(blocks.precision(variable));
-        steps.map(|(step, precision)| step * step * precision / self.settings.bend).fold(0.0, f64::max)
+        steps.map(|(step, precision)| step * step * precision / *self.settings.bend).fold(0.0, f64::max)
     }
 
     /// The largest share that is left: an idle update leaves far less.
@@ -45,7 +45,7 @@ impl Session {
 
     /// The largest change of a step that is not passed on, in σ.
     pub(super) fn deviation(&self) -> f64 {
-        if self.is_idle { FINE * self.settings.deviation } else { self.settings.deviation }
+        if self.is_idle { FINE * *self.settings.deviation } else { *self.settings.deviation }
     }
 
     /// Whether something cannot wait for the next turn: after a large loop closure, a step is no estimate of anything.
@@ -77,7 +77,7 @@ impl Session {
                 wanted.sort_unstable_by(|(a, v), (b, u)| v.cmp(u).then(b.total_cmp(a)));
                 wanted.dedup_by_key(|(_, v)| *v);
                 self.postponed = wanted.len();
-                let taken = self.afford(wanted, budget - spent, spent == 0.0 && chosen.is_empty(), affected);
+                let taken = self.afford(wanted, *budget - spent, spent == 0.0 && chosen.is_empty(), affected);
                 self.postponed -= taken.len();
                 chosen.extend(taken);
             } else {

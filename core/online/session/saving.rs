@@ -1,6 +1,5 @@
 //! A session that goes on after a restart.
 use super::Session;
-use crate::factor_id::FactorId;
 use crate::model::{Model, NewNumber, Prior};
 use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
 use crate::tree::{Couplings, Tree};
@@ -61,7 +60,7 @@ impl Session {
     /// or factors; where it contradicts itself.
     pub fn load(text: &str) -> Result<Self, LoadError> {
         let saved = Saved::read(text)?;
-        let mut session = Session::new(saved.settings).map_err(|e| LoadError::Read(e.to_string()))?;
+        let mut session = Session::new(saved.settings);
         (session.updates, session.postponed) = (saved.updates, saved.postponed);
         session.is_quiet = saved.is_quiet;
         for variable in &saved.variables {

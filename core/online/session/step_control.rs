@@ -10,7 +10,7 @@ use super::parking::Moves;
 use crate::model::Model;
 use crate::report::Report;
 use manifactor_graph::batch::Evaluation;
-use manifactor_solve::{LevenbergMarquardt, Silent};
+use manifactor_solve::{DiagonalLimits, LevenbergMarquardt, Silent};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
@@ -227,5 +227,5 @@ fn rises(before: &Evaluation, after: &Evaluation) -> bool {
 /// Damping of one size for all directions, as above: in proportion to the diagonal of H, a direction that has all but lost its
 /// derivative would go for good.
 fn batch_solver() -> LevenbergMarquardt {
-    LevenbergMarquardt { diagonal: [1.0, 1.0], ..LevenbergMarquardt::default() }
+    LevenbergMarquardt { diagonal: DiagonalLimits::EVEN, ..LevenbergMarquardt::default() }
 }

@@ -74,7 +74,7 @@ impl Session {
         undo.moves = self.park(&mut touched);
         let is_turn = self.is_idle
             || self.postponed > 0
-            || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
+            || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.get());
         let moves = std::mem::take(&mut undo.moves);
         if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);

@@ -73,7 +73,7 @@ impl Session {
                 place.is_there && place.born == held.born && !leaving.contains(&held.variable)
             });
             let more = match window.span {
-                Span::Poses(poses) => self.ages.len().saturating_sub(poses.max(1)),
+                Span::Poses(poses) => self.ages.len().saturating_sub(poses.get()),
                 Span::Seconds(seconds) => {
                     let from = self.time.unwrap_or_default() - seconds.get();
                     let older = self.ages.partition_point(|held| held.time < from);

@@ -20,8 +20,8 @@ pub struct Window {
 /// How far back a window reaches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Span {
-    /// So many variables stay, the newest of those whose type is not kept; at least one.
-    Poses(usize),
+    /// So many variables stay, the newest of those whose type is not kept.
+    Poses(NonZeroUsize),
     /// Variables stay that came within so many seconds before now, and always the newest. Now is the last
     /// [`Session::set_time`](crate::Session::set_time).
     Seconds(Positive),
@@ -59,7 +59,7 @@ impl TryFrom<Document> for Window {
     type Error = NotOneSpan;
     fn try_from(Document { poses, seconds, keep }: Document) -> Result<Self, NotOneSpan> {
         let span = match (poses, seconds) {
-            (Some(poses), None) => Span::Poses(poses.get()),
+            (Some(poses), None) => Span::Poses(poses),
             (None, Some(seconds)) => Span::Seconds(seconds),
             (poses, _) => return Err(NotOneSpan { both: poses.is_some() }),
         };
@@ -70,7 +70,7 @@ impl TryFrom<Document> for Window {
 impl From<Window> for Document {
     fn from(Window { span, keep }: Window) -> Self {
         let (poses, seconds) = match span {
-            Span::Poses(poses) => (NonZeroUsize::new(poses), None),
+            Span::Poses(poses) => (Some(poses), None),
             Span::Seconds(seconds) => (None, Some(seconds)),
         };
         Self { poses, seconds, keep }

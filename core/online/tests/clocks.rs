@@ -5,13 +5,14 @@ use crate::windows::step;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Values};
 use manifactor_online::{ChangeError, LoadError, Session, Settings, Span, UpdateError, Window};
+use std::num::NonZeroUsize;
 
 fn seconds(seconds: f64) -> Span {
     Span::Seconds(Positive::new(seconds).unwrap())
 }
 
 fn session(span: Span) -> Session {
-    Session::new(Settings { window: Some(span.into()), ..Settings::default() }).unwrap()
+    Session::new(Settings { window: Some(span.into()), ..Settings::default() })
 }
 
 /// A pose that comes at this time; which ones have left.
@@ -25,7 +26,8 @@ fn pose(session: &mut Session, i: usize, time: f64) -> Vec<String> {
 
 #[test]
 fn a_pose_each_second_is_as_in_a_window_by_poses() {
-    let (mut by_seconds, mut by_poses) = (session(seconds(4.5)), session(Span::Poses(5)));
+    let (mut by_seconds, mut by_poses) =
+        (session(seconds(4.5)), session(Span::Poses(NonZeroUsize::new(5).unwrap())));
     for i in 0..40 {
         let leaving = pose(&mut by_seconds, i, 1e9 + i as f64);
         assert_eq!(leaving, pose(&mut by_poses, i, i as f64));
@@ -86,7 +88,7 @@ fn time_does_not_go_back() {
     assert!(session.set_time(10.75).is_err(), "one that no update has seen yet counts too");
     session.set_time(11.0).unwrap();
     // without a window, or with one by poses, the time is not needed
-    let mut other = Session::new(Settings::default()).unwrap();
+    let mut other = Session::new(Settings::default());
     other.push(&graph, &values).unwrap();
 }
 
@@ -158,7 +160,7 @@ fn times_that_cannot_be_are_refused() {
 #[test]
 fn a_window_is_either_by_poses_or_by_seconds() {
     let read = |text: &str| serde_json::from_str::<Window>(text).map_err(|e| e.to_string());
-    assert_eq!(read("{\"poses\": 7}").unwrap(), Span::Poses(7).into());
+    assert_eq!(read("{\"poses\": 7}").unwrap(), Span::Poses(NonZeroUsize::new(7).unwrap()).into());
     let window = read("{\"seconds\": 60, \"keep\": [\"toy_space\"]}").unwrap();
     assert_eq!((window.span, window.keep[0].as_str()), (seconds(60.0), "toy_space"));
     let text = serde_json::to_string(&window).unwrap();

@@ -1,10 +1,12 @@
 //! A session that refuses something is as it was.
 use crate::toy::{Apart, At, Careless, Plane};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Fixed, Graph, Noise, Values};
 use manifactor_online::{ChangeError, FactorId, Session, Settings, Span, UpdateError, Window};
+use std::num::NonZeroUsize;
 
 fn chain(n: usize) -> Session {
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     for i in 0..n {
         let (mut graph, mut values) = (Graph::new(), Values::new());
         let key = format!("x{i}");
@@ -90,9 +92,12 @@ fn sums_that_overflow_are_refused_and_taken_back() {
 }
 
 #[test]
-fn settings_outside_their_domain_are_named() {
-    let error = Session::new(Settings { bend: f64::NAN, ..Settings::default() }).unwrap_err().to_string();
-    assert!(error.contains("`bend`") && error.contains("0 or more"), "{error}");
+fn settings_outside_their_domain_are_refused() {
+    for settings in
+        [r#"{"bend": -1}"#, r#"{"relinearize_every": 0}"#, r#"{"budget": -1}"#, r#"{"window": {"poses": 0}}"#]
+    {
+        assert!(serde_json::from_str::<Settings>(settings).is_err(), "{settings}");
+    }
 }
 
 /// Two variables whose numbers are close to the largest, and fit only as long as both are there.
@@ -103,12 +108,18 @@ fn close_to_overflow() -> (Session, Vec<FactorId>) {
 }
 
 fn never_linearized_anew() -> Settings {
-    Settings { relinearize_every: usize::MAX, bend: 1e300, deviation: 0.0, passes: 0, ..Settings::default() }
+    Settings {
+        relinearize_every: NonZeroUsize::MAX,
+        bend: NotNegative::literal(1e300),
+        deviation: NotNegative::literal(0.0),
+        passes: 0,
+        ..Settings::default()
+    }
 }
 
 /// The same before the first update.
 fn pushed_close_to_overflow(settings: Settings) -> (Session, Vec<FactorId>) {
-    let mut session = Session::new(settings).unwrap();
+    let mut session = Session::new(settings);
     let (mut graph, mut values) = (Graph::new(), Values::new());
     // H is 5e307 for each factor
     let strong = || Noise::sigma(2.0_f64.sqrt() * 1e-154).unwrap();
@@ -154,7 +165,7 @@ fn variables_stay_if_their_linear_prior_overflows() {
 
 #[test]
 fn a_window_tries_again_what_could_not_leave() {
-    let window = Some(Window { span: Span::Poses(1), keep: vec![] });
+    let window = Some(Window { span: Span::Poses(NonZeroUsize::MIN), keep: vec![] });
     let (mut session, ids) = pushed_close_to_overflow(Settings { window, ..never_linearized_anew() });
     assert_eq!(session.update().unwrap().stayed[..], ["a".into(), "b".into()]);
     assert!(session.update().unwrap().sealed.is_empty());
@@ -166,7 +177,7 @@ fn a_window_tries_again_what_could_not_leave() {
 
 #[test]
 fn variables_stay_if_the_sums_without_them_overflow() {
-    let mut session = Session::new(never_linearized_anew()).unwrap();
+    let mut session = Session::new(never_linearized_anew());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let strong = || Noise::sigma(2.0_f64.sqrt() * 1e-154).unwrap();
     values.insert("a", Plane { x: 0.0, y: 0.0 });

@@ -2,9 +2,11 @@
 use crate::history::{Change, History, allowed, bits, change, outliers, window};
 use crate::toy::{At, Careless, Plane};
 use crate::world::{Shadow, Space};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Fixed, Graph, Noise, Values};
 use manifactor_online::{Report, Session, Settings};
 use proptest::prelude::*;
+use std::num::NonZeroUsize;
 
 /// Pushes, removes, re-weights and holds, and fails at last: by a residual that is not finite, or a sum that overflows.
 fn fail(history: &mut History, n: usize, overflows: bool) {
@@ -46,8 +48,8 @@ proptest! {
         after in prop::collection::vec(change(), 1..40),
         n in 0..1000usize,
         overflows in any::<bool>(),
-        every in 1..4usize,
-        budget in prop_oneof![Just(None), Just(Some(300.0))],
+        every in (1..4usize).prop_filter_map("zero", NonZeroUsize::new),
+        budget in prop_oneof![Just(None), Just(Some(NotNegative::literal(300.0)))],
         window in prop_oneof![Just(None), window().prop_map(Some)],
         outliers in outliers(),
     ) {

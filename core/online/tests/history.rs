@@ -1,11 +1,13 @@
 //! Whatever comes and goes, and in whatever order: the estimate is that of a graph that is built at once.
 use crate::toy::{Apart, At, Centre, Distance, Plane};
 use crate::world::{Beyond, Near, Shadow, Space};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::loss::Huber;
 use manifactor_graph::{Fixed, Graph, Key, Noise, Values, Variable};
 use manifactor_online::{ChangeError, FactorId, Outliers, Report, Session, Settings, Span, Window};
 use manifactor_solve::{GaussNewton, Silent};
 use proptest::prelude::*;
+use std::num::NonZeroUsize;
 
 #[derive(Debug, Clone)]
 pub(crate) enum Change {
@@ -39,7 +41,8 @@ pub(crate) fn change() -> impl Strategy<Value = Change> {
 
 pub(crate) fn window() -> impl Strategy<Value = Window> {
     let keep = prop_oneof![Just(vec![]), Just(vec!["toy_space".to_owned().try_into().unwrap()])];
-    (1..6usize, keep).prop_map(|(poses, keep)| Window { span: Span::Poses(poses), keep })
+    (1..6usize, keep)
+        .prop_map(|(poses, keep)| Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep })
 }
 
 pub(crate) fn outliers() -> impl Strategy<Value = Option<Outliers>> {
@@ -66,7 +69,7 @@ pub(crate) struct History {
 
 impl History {
     pub(crate) fn new(settings: Settings) -> Self {
-        Self { session: Session::new(settings).unwrap(), keys: vec![], ids: vec![], count: 0 }
+        Self { session: Session::new(settings), keys: vec![], ids: vec![], count: 0 }
     }
 
     fn is_plane(&self, v: usize) -> bool {
@@ -204,7 +207,13 @@ fn difference(a: &Values, b: &Values) -> f64 {
 
 /// Everything relinearized, and every change passed on: steps of Gauss-Newton.
 fn exact() -> Settings {
-    Settings { relinearize_every: 1, bend: 0.0, deviation: 0.0, passes: 0, ..Settings::default() }
+    Settings {
+        relinearize_every: NonZeroUsize::MIN,
+        bend: NotNegative::literal(0.0),
+        deviation: NotNegative::literal(0.0),
+        passes: 0,
+        ..Settings::default()
+    }
 }
 
 proptest! {
@@ -228,7 +237,7 @@ proptest! {
         }
         prop_assume!(!values.is_empty());
         // the same factors, pushed at once, where the estimate is: both take the same step from there
-        let mut fresh = Session::new(exact()).unwrap();
+        let mut fresh = Session::new(exact());
         let ids = fresh.push(&graph, &values).unwrap();
         for (id, old) in ids.iter().zip(history.session.graph().1) {
             fresh.set_weight(*id, history.session.weight(old).unwrap()).unwrap();

@@ -1,10 +1,12 @@
 //! Updates without changes lead to the minimum that the estimate is nearest to.
 use crate::toy::{Apart, At, Distance, Plane};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::loss::{Cauchy, Dcs, Fair, GemanMcClure, Huber, L1, Loss, Tukey, Welsch};
 use manifactor_graph::{Graph, Key, Noise, Values};
 use manifactor_online::{Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Silent, Stopping};
 use proptest::prelude::*;
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 /// Nats that may be left.
@@ -15,10 +17,10 @@ const LEFT: f64 = 1e-3;
 fn left(session: &mut Session, iterations: usize) -> f64 {
     let stop = Stopping {
         max_iterations: iterations,
-        relative_cost: if iterations == 1 { 1.0 } else { 0.0 },
-        absolute_cost: 0.0,
-        gradient: 0.0,
-        step: 0.0,
+        relative_cost: if iterations == 1 { NotNegative::literal(1.0) } else { NotNegative::literal(0.0) },
+        absolute_cost: NotNegative::literal(0.0),
+        gradient: NotNegative::literal(0.0),
+        step: NotNegative::literal(0.0),
     };
     let batch = LevenbergMarquardt { stop, ..LevenbergMarquardt::default() };
     session.cost() - session.finish(&batch, &mut Silent).unwrap().outcome.final_cost
@@ -26,7 +28,7 @@ fn left(session: &mut Session, iterations: usize) -> f64 {
 
 #[test]
 fn a_step_too_short_for_a_new_linearization_still_changes_robust_weights() {
-    let mut session = Session::new(Settings { relinearize_every: 1, ..Settings::default() }).unwrap();
+    let mut session = Session::new(Settings { relinearize_every: NonZeroUsize::MIN, ..Settings::default() });
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: 0.0, y: 0.0 });
     graph.add(["p"], At { at: [0.0, 0.0] });
@@ -80,7 +82,7 @@ proptest! {
     ) {
         let (is_convex, is_l1) = (loss < CONVEX && !ranges, loss == 3);
         let loss = losses()[loss].clone();
-        let mut session = Session::new(Settings { relinearize_every: every, ..Settings::default() }).unwrap();
+        let mut session = Session::new(Settings { relinearize_every: NonZeroUsize::new(every).unwrap(), ..Settings::default() });
         let (mut graph, mut values) = (Graph::new(), Values::new());
         for v in 0..5 {
             let x = v as f64;

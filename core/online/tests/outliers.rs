@@ -1,16 +1,17 @@
 //! Factors that may be wrong.
 use crate::toy::{Apart, Plane};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Graph, Noise, Values};
 use manifactor_online::{FactorId, Outliers, Report, Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 
 fn with(outliers: Outliers) -> Session {
-    Session::new(Settings { outliers: Some(outliers), ..Settings::default() }).unwrap()
+    Session::new(Settings { outliers: Some(outliers), ..Settings::default() })
 }
 
 /// One that lets a closure in though no other bears it out.
 fn session() -> Session {
-    with(Outliers { gain: 100.0, ..Outliers::default() })
+    with(Outliers { gain: NotNegative::literal(100.0), ..Outliers::default() })
 }
 
 /// A step of 1 m to the next plane, and closures from there: to which plane, and where that seems to be from here.

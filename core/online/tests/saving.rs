@@ -1,18 +1,20 @@
 //! A session that was saved goes on as if nothing had been.
 use crate::history::{Change, History, bits, change, outliers, window};
 use crate::toy::{Plane, Valley};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Graph, Values};
 use manifactor_online::{LoadError, SaveError, Session, Settings, Window};
 use proptest::prelude::*;
+use std::num::NonZeroUsize;
 
 proptest! {
     #[test]
     fn a_session_goes_on_after_a_restart_bit_for_bit(
         before in prop::collection::vec(change(), 1..60),
         after in prop::collection::vec(change(), 1..40),
-        every in 1..4usize,
-        bend in prop_oneof![Just(0.1), Just(0.001)],
-        budget in prop_oneof![Just(None), Just(Some(300.0))],
+        every in (1..4usize).prop_filter_map("zero", NonZeroUsize::new),
+        bend in prop_oneof![Just(NotNegative::literal(0.1)), Just(NotNegative::literal(0.001))],
+        budget in prop_oneof![Just(None), Just(Some(NotNegative::literal(300.0)))],
         window in prop_oneof![Just(None), window().prop_map(Some)],
         outliers in outliers(),
     ) {
@@ -122,7 +124,7 @@ fn steps_that_lead_to_no_finite_estimate_are_refused() {
 
 #[test]
 fn a_session_that_is_damped_goes_on_with_the_same_bits() {
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: -1.2, y: 1.0 });
     graph.add(["p"], Valley {});

@@ -1,13 +1,15 @@
 //! Steps that are too long, and steps out of a domain.
 use crate::toy::{At, Logarithm, Plane, Valley};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Fixed, Graph, Noise, Values};
 use manifactor_online::{Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
+use std::num::NonZeroUsize;
 
 #[test]
 fn a_step_that_raises_the_cost_is_damped() {
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: -1.2, y: 1.0 });
     graph.add(["p"], Valley {});
@@ -22,7 +24,7 @@ fn a_step_that_raises_the_cost_is_damped() {
     assert!(session.cost() < 1e-6, "{}", session.cost());
     // damping goes where it is not needed any more: what is known is as it is without
     let one = session.covariance(&["p"]).unwrap();
-    let mut fresh = Session::new(Settings::default()).unwrap();
+    let mut fresh = Session::new(Settings::default());
     fresh.push(&session.graph().0, &session.estimates()).unwrap();
     assert_eq!(fresh.update().unwrap().damped, 0);
     // but for points of linearization that are not quite the same
@@ -31,7 +33,7 @@ fn a_step_that_raises_the_cost_is_damped() {
 
 #[test]
 fn a_linearization_stays_in_the_domain_of_its_factors() {
-    let mut session = Session::new(Settings { relinearize_every: 1, ..Settings::default() }).unwrap();
+    let mut session = Session::new(Settings { relinearize_every: NonZeroUsize::MIN, ..Settings::default() });
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: 9.0, y: 0.0 });
     graph.add(["p"], Logarithm { to: 0.5 }).noise(Noise::sigma(0.01).unwrap());
@@ -46,7 +48,7 @@ fn a_linearization_stays_in_the_domain_of_its_factors() {
 
 #[test]
 fn what_is_held_stays_at_the_estimate_and_moves_when_it_is_freed() {
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: 0.0, y: 0.0 });
     graph.add(["p"], At { at: [1.0, 1.0] });
@@ -70,9 +72,12 @@ fn what_is_held_stays_at_the_estimate_and_moves_when_it_is_freed() {
 
 #[test]
 fn losses_and_weights_end_where_a_batch_does() {
-    let mut session =
-        Session::new(Settings { relinearize_every: 1, bend: 0.0, deviation: 0.0, ..Settings::default() })
-            .unwrap();
+    let mut session = Session::new(Settings {
+        relinearize_every: NonZeroUsize::MIN,
+        bend: NotNegative::literal(0.0),
+        deviation: NotNegative::literal(0.0),
+        ..Settings::default()
+    });
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: 0.0, y: 0.0 });
     for x in [0.0, 0.2, 0.1, 9.0] {
@@ -91,7 +96,7 @@ fn losses_and_weights_end_where_a_batch_does() {
 
 #[test]
 fn damped_steps_lead_along_a_narrow_valley() {
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: -1.2, y: 1.0 });
     // so narrow that steps of Gauss-Newton leave it again and again
@@ -108,8 +113,13 @@ fn damped_steps_lead_along_a_narrow_valley() {
 
 #[test]
 fn a_factor_that_would_leave_its_domain_does_not_stop_others() {
-    let patient = Settings { relinearize_every: 1, bend: 1e-4, urgent: 1e9, ..Settings::default() };
-    let mut session = Session::new(patient).unwrap();
+    let patient = Settings {
+        relinearize_every: NonZeroUsize::MIN,
+        bend: NotNegative::literal(1e-4),
+        urgent: NotNegative::literal(1e9),
+        ..Settings::default()
+    };
+    let mut session = Session::new(patient);
     let (mut graph, mut values) = (Graph::new(), Values::new());
     // the first step leads to x ≈ −8000, and an eighth of it is too far
     values.insert("out", Plane { x: 1000.0, y: 0.0 });

@@ -2,14 +2,22 @@
 use crate::history::{Change, History, change};
 use crate::toy::{Apart, At, Distance, Logarithm, Plane};
 use crate::world::Ahead;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Fixed, Graph, Key, Values, Variable};
 use manifactor_online::{ChangeError, Session, Settings, Span, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent};
 use proptest::prelude::*;
+use std::num::NonZeroUsize;
 
 /// Nothing is linearized anew, and every change passed on: what is solved is one linear system.
 fn linear() -> Settings {
-    Settings { relinearize_every: usize::MAX, bend: 1e30, deviation: 0.0, passes: 0, ..Settings::default() }
+    Settings {
+        relinearize_every: NonZeroUsize::MAX,
+        bend: NotNegative::literal(1e30),
+        deviation: NotNegative::literal(0.0),
+        passes: 0,
+        ..Settings::default()
+    }
 }
 
 fn numbers(session: &Session, keys: &[&str]) -> Vec<f64> {
@@ -65,8 +73,8 @@ pub(crate) fn step(i: usize) -> (Graph, Values) {
 
 fn windowed(poses: usize, keep: &[&str]) -> Session {
     let keep = keep.iter().map(|name| (*name).to_owned().try_into().unwrap()).collect();
-    let window = Some(Window { span: Span::Poses(poses), keep });
-    Session::new(Settings { window, ..Settings::default() }).unwrap()
+    let window = Some(Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep });
+    Session::new(Settings { window, ..Settings::default() })
 }
 
 #[test]
@@ -158,7 +166,7 @@ fn types_that_are_kept_never_leave() {
 
 #[test]
 fn a_factor_that_takes_no_part_is_dropped_and_named() {
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     for (key, x) in [("a", 2.0), ("b", 1.0), ("c", 4.0)] {
         values.insert(key, Plane { x, y: 0.0 });
@@ -221,7 +229,7 @@ fn a_batch_solve_knows_what_has_left() {
 
 #[test]
 fn a_name_that_is_used_again_is_saved_once() {
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     let push = |session: &mut Session, key: &str| {
         let (mut graph, mut values) = (Graph::new(), Values::new());
         graph.add([key], At { at: [1.0, 2.0] });

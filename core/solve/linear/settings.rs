@@ -1,7 +1,6 @@
 //! How the linear system of each step is solved, as a config says it.
-use crate::setting::{SettingError, not_negative as all_not_negative};
 use manifactor_graph::Key;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +25,7 @@ pub struct LinearSolver {
     pub conjugate_gradients: ConjugateGradients,
     /// Most memory that the factor may take, in GiB; what the system has available, where it is not given.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub memory_gib: Option<f64>,
+    pub memory_gib: Option<NotNegative>,
 }
 
 /// A way to solve (H + damping) δ = -g.
@@ -56,16 +55,18 @@ pub struct ConjugateGradients {
     /// What the preconditioner knows.
     pub preconditioner: Preconditioner,
     /// Stop once the residual is this share of the right-hand side, in the preconditioner's norm.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub tolerance: f64,
+    pub tolerance: NotNegative,
     /// Most iterations; the step is then the best found, which lowers the quadratic model all the same.
     pub max_iterations: usize,
 }
 
 impl Default for ConjugateGradients {
     fn default() -> Self {
-        Self { preconditioner: Preconditioner::default(), tolerance: 1e-6, max_iterations: 1000 }
+        Self {
+            preconditioner: Preconditioner::default(),
+            tolerance: NotNegative::literal(1e-6),
+            max_iterations: 1000,
+        }
     }
 }
 
@@ -100,17 +101,4 @@ pub enum Ordering {
     First(Vec<String>),
     /// These variables first, as listed; then the others, by minimum degree.
     Given(Vec<Key>),
-}
-
-impl LinearSolver {
-    /// Whether each number is within its domain.
-    ///
-    /// # Errors
-    /// Names the one that is not.
-    pub fn check(&self) -> Result<(), SettingError> {
-        all_not_negative(&[
-            ("linear.conjugate_gradients.tolerance", self.conjugate_gradients.tolerance),
-            ("linear.memory_gib", self.memory_gib.unwrap_or(0.0)),
-        ])
-    }
 }

@@ -25,9 +25,6 @@ pub enum CompileError {
     /// The linear solver does not fit the graph.
     #[error("the linear solver does not fit the graph: {0}")]
     LinearSolver(String),
-    /// A setting of the solver is outside its domain.
-    #[error(transparent)]
-    Setting(#[from] crate::SettingError),
     /// A solver that names a factor which is not there.
     #[error("there is no factor {factor}: the graph has {factors}, from 0")]
     NoFactor {

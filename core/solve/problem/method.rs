@@ -106,7 +106,7 @@ pub(crate) fn method(
 fn available(linear: &LinearSolver, needed: u64, entries: usize) -> u64 {
     const SMALL: u64 = 256 << 20;
     match linear.memory_gib {
-        Some(gib) => (gib * f64::from(1 << 30)) as u64,
+        Some(gib) => (*gib * f64::from(1 << 30)) as u64,
         None if needed <= SMALL => SMALL.min(memory::beside(entries)),
         None => memory::for_factor(entries),
     }

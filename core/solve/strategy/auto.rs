@@ -9,11 +9,11 @@ use crate::outcome::Outcome;
 use crate::outcome::Termination;
 use crate::problem::CompileError;
 use crate::problem::Problem;
-use crate::setting::SettingError;
 use crate::strategy::descent::Descent;
 use crate::strategy::gauss_newton::GaussNewton;
 use crate::strategy::levenberg_marquardt::LevenbergMarquardt;
 use crate::strategy::optimizer::{Optimizer, Stopping};
+use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Values, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,7 @@ pub struct Auto {
 }
 
 /// Damping of the first step, as a share of the diagonal: none to speak of.
-const DAMPING: f64 = 1e-10;
+const DAMPING: Positive = Positive::literal(1e-10);
 /// All directions are damped alike, but those that the factors leave a standard deviation of more than this, in metres or
 /// radians, the noise scaled to fit the residuals. By the diagonal of H itself, steps run off along what little constrains,
 /// as the size of an object that is seen from one side, and out of factors' domains.
@@ -58,11 +58,6 @@ const FLOOR: f64 = 1e-12;
 impl Optimizer for Auto {
     fn linear(&self) -> LinearSolver {
         self.linear.clone()
-    }
-
-    fn check(&self) -> Result<(), SettingError> {
-        self.stop.check()?;
-        self.linear.check()
     }
 
     fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
@@ -102,7 +97,12 @@ register!(dyn Optimizer, "auto", Auto);
 
 impl Auto {
     /// Damped steps, the first by so much. The damping follows the noise: (H + λ D) δ = -g is the same for any unit of it.
-    fn damped(&self, initial_lambda: f64, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
+    fn damped(
+        &self,
+        initial_lambda: Positive,
+        problem: &mut Problem,
+        observer: &mut dyn Observer,
+    ) -> Outcome {
         let rows: u32 = problem.model.factors.iter().map(|factor| factor.rows).sum();
         let bounds = |descent: &Descent<'_>| {
             let variance = 2.0 * descent.at.cost / f64::from(rows.max(1));

@@ -222,9 +222,9 @@ impl<'a> Descent<'a> {
             Some(termination)
         } else if self.interrupted {
             Some(Termination::Interrupted)
-        } else if self.at.cost <= self.stop.absolute_cost * self.unit() {
+        } else if self.at.cost <= *self.stop.absolute_cost * self.unit() {
             Some(Termination::Converged { reason: Tolerance::AbsoluteCost })
-        } else if gradient <= self.stop.gradient * self.unit() {
+        } else if gradient <= *self.stop.gradient * self.unit() {
             Some(Termination::Converged { reason: Tolerance::Gradient })
         } else if self.iterations >= self.stop.max_iterations {
             Some(Termination::MaxIterations)
@@ -285,7 +285,7 @@ impl<'a> Descent<'a> {
 
     /// Whether a change of the cost is within the tolerance.
     pub(crate) fn is_small(&self, change: f64) -> bool {
-        change.abs() <= self.stop.relative_cost * self.at.cost.abs()
+        change.abs() <= *self.stop.relative_cost * self.at.cost.abs()
     }
 
     /// Why no step is good enough, as the last one shows, which is next to nothing.
@@ -329,9 +329,9 @@ impl<'a> Descent<'a> {
         if self.at.inactive != inactive {
             return None;
         }
-        let reason = if (before - after).abs() <= self.stop.relative_cost * before.abs() {
+        let reason = if (before - after).abs() <= *self.stop.relative_cost * before.abs() {
             Tolerance::RelativeCost
-        } else if step.norm <= self.stop.step {
+        } else if step.norm <= *self.stop.step {
             Tolerance::Step
         } else {
             return None;

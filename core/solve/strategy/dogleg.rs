@@ -5,7 +5,6 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::{Stall, Termination, Tolerance};
 use crate::problem::Problem;
-use crate::setting::SettingError;
 use crate::strategy::descent::{Descent, Step, Tried};
 use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::checked::Positive;
@@ -43,11 +42,6 @@ const GAIN: f64 = 1e-4;
 impl Optimizer for Dogleg {
     fn linear(&self) -> LinearSolver {
         self.linear.clone()
-    }
-
-    fn check(&self) -> Result<(), SettingError> {
-        self.stop.check()?;
-        self.linear.check()
     }
 
     fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
@@ -155,7 +149,7 @@ impl Dogleg {
                 if !is_cut && !matches!(tried, Tried::Undefined) && descent.settled(&step) {
                     return Termination::Converged { reason: Tolerance::RelativeCost };
                 }
-                if step.norm <= descent.stop.step {
+                if step.norm <= *descent.stop.step {
                     return match is_cut || descent.is_steep() {
                         true => descent.stalled_by(Stall::TrustRegion),
                         false => Termination::Converged { reason: Tolerance::Step },

@@ -4,7 +4,6 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::{Stall, Termination};
 use crate::problem::Problem;
-use crate::setting::SettingError;
 use crate::strategy::descent::{Best, Descent, Step, Tried};
 use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::register;
@@ -38,11 +37,6 @@ const HALVINGS: usize = 30;
 impl Optimizer for GaussNewton {
     fn linear(&self) -> LinearSolver {
         self.linear.clone()
-    }
-
-    fn check(&self) -> Result<(), SettingError> {
-        self.stop.check()?;
-        self.linear.check()
     }
 
     fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {

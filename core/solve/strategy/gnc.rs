@@ -5,7 +5,6 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::problem::CompileError;
 use crate::problem::{FactorPlace, Problem};
-use crate::setting::SettingError;
 use crate::strategy::auto::Auto;
 use crate::strategy::optimizer::Optimizer;
 use graduation::Graduation;
@@ -21,7 +20,7 @@ mod parameters;
 mod surrogate;
 
 pub use candidates::{Candidates, FactorType, UnknownFactor, is_sequential};
-pub use parameters::{BadParameter, Growth, Probability};
+pub use parameters::{Growth, Probability};
 pub use surrogate::Truncation;
 
 /// Rejects outliers: solves with all factors, then with ever less weight on those that do not fit.
@@ -86,10 +85,6 @@ impl Optimizer for Gnc {
 
     fn linear(&self) -> LinearSolver {
         self.solver.linear()
-    }
-
-    fn check(&self) -> Result<(), SettingError> {
-        self.solver.check()
     }
 
     fn solve(

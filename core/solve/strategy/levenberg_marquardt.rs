@@ -5,10 +5,9 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::outcome::{Termination, Tolerance};
 use crate::problem::Problem;
-use crate::setting::{SettingError, check, positive};
 use crate::strategy::descent::{Descent, Step, Tried};
 use crate::strategy::optimizer::{Optimizer, Stopping};
-use manifactor_graph::checked::{self, Positive, least_and_most, one_or_more};
+use manifactor_graph::checked::{OneOrMore, Positive};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,24 +25,15 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct LevenbergMarquardt {
     /// Damping of the first step, as a share of the diagonal.
-    #[serde(deserialize_with = "checked::positive")]
-    #[schemars(with = "Positive")]
-    pub initial_lambda: f64,
+    pub initial_lambda: Positive,
     /// Least damping.
-    #[serde(deserialize_with = "checked::positive")]
-    #[schemars(with = "Positive")]
-    pub min_lambda: f64,
+    pub min_lambda: Positive,
     /// Damping at which a solve gives up.
-    #[serde(deserialize_with = "checked::positive")]
-    #[schemars(with = "Positive")]
-    pub max_lambda: f64,
+    pub max_lambda: Positive,
     /// Largest factor by which one good step lowers the damping.
-    #[serde(deserialize_with = "one_or_more")]
-    #[schemars(extend("minimum" = 1))]
-    pub decrease: f64,
+    pub decrease: OneOrMore,
     /// Least and largest entry of the diagonal that is used for damping.
-    #[serde(deserialize_with = "least_and_most")]
-    pub diagonal: [f64; 2],
+    pub diagonal: DiagonalLimits,
     /// When to stop.
     pub stop: Stopping,
     /// How the linear system of each step is solved.
@@ -53,15 +43,47 @@ pub struct LevenbergMarquardt {
 impl Default for LevenbergMarquardt {
     fn default() -> Self {
         Self {
-            initial_lambda: 1e-5,
-            min_lambda: 1e-15,
-            max_lambda: 1e12,
-            decrease: 10.0,
-            diagonal: [1e-6, 1e32],
+            initial_lambda: Positive::literal(1e-5),
+            min_lambda: Positive::literal(1e-15),
+            max_lambda: Positive::literal(1e12),
+            decrease: OneOrMore::literal(10.0),
+            diagonal: DiagonalLimits { least: 1e-6, most: 1e32 },
             stop: Stopping::default(),
             linear: LinearSolver::default(),
         }
     }
+}
+
+/// The least and the largest entry of the diagonal that is used for damping: two numbers, 0 ≤ least ≤ most.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "[f64; 2]", into = "[f64; 2]")]
+#[schemars(with = "[f64; 2]")]
+pub struct DiagonalLimits {
+    least: f64,
+    most: f64,
+}
+
+/// Limits that are not in order, or not numbers.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("expected two numbers, 0 ≤ least ≤ most, got [{}, {}]", .0[0], .0[1])]
+pub struct NotLimits([f64; 2]);
+
+impl TryFrom<[f64; 2]> for DiagonalLimits {
+    type Error = NotLimits;
+    fn try_from([least, most]: [f64; 2]) -> Result<Self, NotLimits> {
+        if 0.0 <= least && least <= most { Ok(Self { least, most }) } else { Err(NotLimits([least, most])) }
+    }
+}
+
+impl From<DiagonalLimits> for [f64; 2] {
+    fn from(DiagonalLimits { least, most }: DiagonalLimits) -> Self {
+        [least, most]
+    }
+}
+
+impl DiagonalLimits {
+    /// Damping by the same number in every direction, instead of the diagonal.
+    pub const EVEN: Self = Self { least: 1.0, most: 1.0 };
 }
 
 /// Least share of the predicted decrease that makes a step good enough to take.
@@ -88,21 +110,8 @@ impl Optimizer for LevenbergMarquardt {
         self.linear.clone()
     }
 
-    fn check(&self) -> Result<(), SettingError> {
-        let Self { initial_lambda, min_lambda, max_lambda, decrease, diagonal: [least, most], .. } = *self;
-        positive(&[
-            ("initial_lambda", initial_lambda),
-            ("min_lambda", min_lambda),
-            ("max_lambda", max_lambda),
-        ])?;
-        check(&[("decrease", decrease)], "1 or more", |x| x >= 1.0)?;
-        check(&[("diagonal", least)], "0 or more, and the second one no less", |x| 0.0 <= x && x <= most)?;
-        self.stop.check()?;
-        self.linear.check()
-    }
-
     fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
-        let [least, most] = self.diagonal;
+        let DiagonalLimits { least, most } = self.diagonal;
         self.solve_within(&|descent| [least * descent.unit(), most], problem, observer)
     }
 }
@@ -123,13 +132,13 @@ impl LevenbergMarquardt {
             Ok(descent) => descent,
             Err(outcome) => return *outcome,
         };
-        let mut lambda = self.initial_lambda;
+        let mut lambda = *self.initial_lambda;
         let termination = loop {
             let termination = self.iterate(&mut descent, &mut lambda, bounds);
             if !descent.leave_stationary_point(&termination) {
                 break termination;
             }
-            lambda = self.initial_lambda;
+            lambda = *self.initial_lambda;
         };
         // damping hides what nothing else holds; by now there is little left of it
         let open = match termination {
@@ -165,8 +174,8 @@ impl LevenbergMarquardt {
                     let accepted = matches!(tried, Tried::Lower { gain } if gain > GAIN);
                     descent.record(&step, accepted);
                     if let (true, Tried::Lower { gain }) = (accepted, &tried) {
-                        let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / self.decrease).min(1.0);
-                        (*lambda, rise) = ((*lambda * fall).max(self.min_lambda), 2.0);
+                        let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / *self.decrease).min(1.0);
+                        (*lambda, rise) = ((*lambda * fall).max(*self.min_lambda), 2.0);
                         let ended = descent.take(&step);
                         // a step that damping has made small says little of the cost around
                         let small = ended.is_some() && is_trusted;
@@ -186,7 +195,7 @@ impl LevenbergMarquardt {
                     }
                     let reason = if !matches!(tried, Tried::Undefined) && descent.settled(&step) {
                         Some(Tolerance::RelativeCost)
-                    } else if step.norm <= descent.stop.step && !descent.is_steep() {
+                    } else if step.norm <= *descent.stop.step && !descent.is_steep() {
                         Some(Tolerance::Step)
                     } else {
                         None
@@ -201,7 +210,7 @@ impl LevenbergMarquardt {
                     return Termination::Interrupted;
                 }
                 (*lambda, rise) = ((*lambda * rise).max(NEGLIGIBLE), rise * 2.0);
-                if *lambda > self.max_lambda {
+                if *lambda > *self.max_lambda {
                     return match descent.is_at_rest(&mut step) {
                         true => Termination::Converged { reason: Tolerance::RelativeCost },
                         false => descent.stalled(),

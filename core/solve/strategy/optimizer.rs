@@ -5,13 +5,11 @@ use crate::observer::Observer;
 use crate::outcome::Outcome;
 use crate::problem::CompileError;
 use crate::problem::Problem;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Graph, Values};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
-
-use crate::setting::{SettingError, not_negative as all_not_negative};
 
 /// A strategy that lowers the cost of a problem. Chosen by name.
 #[typetag::serialize(tag = "type")]
@@ -25,17 +23,8 @@ pub trait Optimizer: Debug + Send + Sync {
         LinearSolver::default()
     }
 
-    /// Whether each setting is within its domain. [`solve`](crate::solve()) asks before it begins; a config is checked
-    /// when it is read.
-    ///
-    /// # Errors
-    /// Names the setting that is not.
-    fn check(&self) -> Result<(), SettingError> {
-        Ok(())
-    }
-
     /// Solves a graph: compiles it, and [`descend`](Self::descend)s from `values`. A solver that begins elsewhere as well, as
-    /// `auto` does with the registered starts, overrides this. [`solve`](crate::solve()) calls it, once settings are checked.
+    /// `auto` does with the registered starts, overrides this. [`solve`](crate::solve()) calls it.
     ///
     /// # Errors
     /// Where graph and values do not fit each other.
@@ -60,40 +49,23 @@ pub struct Stopping {
     /// Most linearizations.
     pub max_iterations: usize,
     /// Stop once a step changes the cost by less than this share of it.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub relative_cost: f64,
+    pub relative_cost: NotNegative,
     /// Stop once the cost is below this.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub absolute_cost: f64,
+    pub absolute_cost: NotNegative,
     /// Stop once no entry of the gradient is larger than this.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub gradient: f64,
+    pub gradient: NotNegative,
     /// Stop once the Euclidean norm of a step is below this.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub step: f64,
+    pub step: NotNegative,
 }
 
 impl Default for Stopping {
     fn default() -> Self {
-        Self { max_iterations: 100, relative_cost: 1e-8, absolute_cost: 1e-20, gradient: 1e-12, step: 1e-12 }
-    }
-}
-
-impl Stopping {
-    /// Whether each tolerance is a finite number, 0 or more: one that is not would never be met.
-    ///
-    /// # Errors
-    /// Names the one that is not.
-    pub fn check(&self) -> Result<(), SettingError> {
-        all_not_negative(&[
-            ("stop.relative_cost", self.relative_cost),
-            ("stop.absolute_cost", self.absolute_cost),
-            ("stop.gradient", self.gradient),
-            ("stop.step", self.step),
-        ])
+        Self {
+            max_iterations: 100,
+            relative_cost: NotNegative::literal(1e-8),
+            absolute_cost: NotNegative::literal(1e-20),
+            gradient: NotNegative::literal(1e-12),
+            step: NotNegative::literal(1e-12),
+        }
     }
 }

@@ -1,11 +1,12 @@
 //! What a program hands over is checked, as a config is; and long steps can be interrupted.
 use crate::toy::*;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{
     Dimension, Graph, Jet, JetOf, Manifold, Scalar, ValueError, Values, register_manifold,
 };
 use manifactor_solve::{
-    Auto, CompileError, ConjugateGradients, Dogleg, GaussNewton, Gnc, IterationRecord, LevenbergMarquardt,
-    LinearSolver, Method, Observer, Optimizer, Problem, Silent, Stopping, Termination, WeightError, solve,
+    Auto, ConjugateGradients, Dogleg, GaussNewton, Gnc, IterationRecord, LevenbergMarquardt, LinearSolver,
+    Method, Observer, Optimizer, Problem, Silent, Termination, WeightError, solve,
 };
 use nalgebra::{U1, Vector1};
 use schemars::JsonSchema;
@@ -98,49 +99,17 @@ fn values_are_checked() {
 }
 
 #[test]
-fn tolerances_that_cannot_be_met_are_refused() {
-    let (graph, values) = row(3);
-    for wrong in [f64::NAN, -1e-9, f64::INFINITY] {
-        let stop = |field: fn(&mut Stopping) -> &mut f64| {
-            let mut stop = Stopping::default();
-            *field(&mut stop) = wrong;
-            stop
-        };
-        for (name, stop) in [
-            ("stop.relative_cost", stop(|s| &mut s.relative_cost)),
-            ("stop.absolute_cost", stop(|s| &mut s.absolute_cost)),
-            ("stop.gradient", stop(|s| &mut s.gradient)),
-            ("stop.step", stop(|s| &mut s.step)),
-        ] {
-            let lm = LevenbergMarquardt { stop: stop.clone(), ..Default::default() };
-            let solvers: [Box<dyn Optimizer>; 5] = [
-                Box::new(GaussNewton { stop: stop.clone(), ..Default::default() }),
-                Box::new(Dogleg { stop: stop.clone(), ..Default::default() }),
-                Box::new(Auto { stop, ..Default::default() }),
-                Box::new(Gnc { solver: Arc::new(lm.clone()), ..Default::default() }),
-                Box::new(lm),
-            ];
-            for solver in solvers {
-                let error = solve(&graph, &values, &*solver, &mut Silent).unwrap_err();
-                assert!(matches!(error, CompileError::Setting(_)), "{error}");
-                let text = format!(
-                    "the solver's setting `{name}`: expected a finite number, 0 or more, got {wrong}"
-                );
-                assert_eq!(error.to_string(), text);
-            }
-        }
-    }
-    let lambda = LevenbergMarquardt { max_lambda: -1.0, ..Default::default() };
-    let error = solve(&graph, &values, &lambda, &mut Silent).unwrap_err().to_string();
-    assert_eq!(error, "the solver's setting `max_lambda`: expected a finite number, above zero, got -1");
-}
-
-#[test]
-fn a_config_of_tolerances_is_checked_when_it_is_read() {
-    for setting in ["relative_cost", "absolute_cost", "gradient", "step"] {
-        let text = format!(r#"{{"type": "gauss_newton", "stop": {{"{setting}": -1e-9}}}}"#);
+fn a_config_is_checked_when_it_is_read() {
+    for (settings, expected) in [
+        (r#""stop": {"relative_cost": -1e-9}"#, "expected a finite number, 0 or more, got -0.000000001"),
+        (r#""linear": {"memory_gib": -1}"#, "expected a finite number, 0 or more, got -1"),
+        (r#""max_lambda": 0"#, "expected a finite number above zero, got 0"),
+        (r#""decrease": 0.5"#, "expected a finite number, 1 or more, got 0.5"),
+        (r#""diagonal": [2, 1]"#, "expected two numbers, 0 ≤ least ≤ most, got [2, 1]"),
+    ] {
+        let text = format!(r#"{{"type": "levenberg_marquardt", {settings}}}"#);
         let error = serde_json::from_str::<Box<dyn Optimizer>>(&text).unwrap_err().to_string();
-        assert!(error.contains("expected a finite number, 0 or more, got -0.000000001"), "{error}");
+        assert!(error.contains(expected), "{error}");
     }
 }
 
@@ -174,8 +143,11 @@ fn by(linear: &LinearSolver) -> [Box<dyn Optimizer>; 5] {
 #[test]
 fn a_step_by_conjugate_gradients_can_be_interrupted() {
     let (graph, values) = row(40);
-    let conjugate_gradients =
-        ConjugateGradients { tolerance: 0.0, max_iterations: usize::MAX, ..Default::default() };
+    let conjugate_gradients = ConjugateGradients {
+        tolerance: NotNegative::literal(0.0),
+        max_iterations: usize::MAX,
+        ..Default::default()
+    };
     let linear =
         LinearSolver { method: Method::ConjugateGradients, conjugate_gradients, ..Default::default() };
     for solver in by(&linear) {

@@ -119,7 +119,7 @@ impl Replay {
     }
 
     fn replay(&self, input: &GraphFile, interrupt: &Interrupt) -> Result<Replayed, Failure> {
-        let session = Session::new(input.online.clone()).map_err(Failure::input)?;
+        let session = Session::new(input.online.clone());
         let report = Report::default();
         let mut replayed = Replayed { session, times: vec![], report, interrupted: false, left_out: 0 };
         let mut steps = Steps::of(&input.graph, &input.values);

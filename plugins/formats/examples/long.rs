@@ -109,7 +109,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let is_windowed = window.is_some();
-    let mut session = Session::new(Settings { window, ..Settings::default() })?;
+    let mut session = Session::new(Settings { window, ..Settings::default() });
     let mut robot = Robot::new(seed, step);
     let sigmas = ODOMETRY.map(|sigma| sigma * step.sqrt());
     let (odometry, closure) = (Noise::sigmas(&sigmas)?, Noise::sigmas(&CLOSURE)?);
@@ -171,7 +171,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cost {cost:.3}, as one batch {best:.3}: {:.1e} above", (cost - best) / best);
     if !is_windowed {
         // how much of the memory history has made: the same graph, ordered at once
-        let mut fresh = Session::new(Settings::default())?;
+        let mut fresh = Session::new(Settings::default());
         fresh.push(&session.graph().0, &session.estimates())?;
         let begin = cpu_seconds();
         fresh.update()?;

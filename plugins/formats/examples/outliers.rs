@@ -106,7 +106,7 @@ fn judge(rejected: &HashSet<usize>, misled: &Misled) -> (f64, f64, f64) {
 
 fn online(truth: &Graph, misled: &Misled) -> Line {
     let settings = Settings { outliers: Some(Outliers::default()), ..Settings::default() };
-    let mut session = Session::new(settings).unwrap();
+    let mut session = Session::new(settings);
     let mut places: std::collections::HashMap<String, Vec<usize>> = std::collections::HashMap::new();
     let text = |entry: &FactorEntry| serde_json::to_string(entry).unwrap();
     for (i, entry) in misled.graph.factors().iter().enumerate() {

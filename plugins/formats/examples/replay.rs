@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     for path in files {
         let PoseGraph { graph, values, .. } = pose_graph::read(&path, &options)?;
-        let mut session = Session::new(Settings::default())?;
+        let mut session = Session::new(Settings::default());
         let (mut times, mut differences) = (vec![], vec![]);
         let (mut damped, mut batches) = (0, 0);
         let mut replay = Replay::of(&graph, &values);

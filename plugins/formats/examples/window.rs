@@ -8,6 +8,7 @@ use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use manifactor_formats::replay::{Latencies, Replay};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_online::{Session, Settings, Span, Window};
+use std::num::NonZeroUsize;
 
 /// Of this thread: what others do on the machine has no part in it.
 fn cpu_seconds() -> f64 {
@@ -33,8 +34,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let PoseGraph { graph, values, .. } = pose_graph::read(&path, &Options::default())?;
-    let window = Some(Window::from(Span::Poses(poses)));
-    let mut session = Session::new(Settings { window, ..Settings::default() })?;
+    let window = Some(Window::from(Span::Poses(NonZeroUsize::new(poses).unwrap())));
+    let mut session = Session::new(Settings { window, ..Settings::default() });
     let name = |pass: usize, key: &Key| Key::from(format!("{pass}:{key}"));
     let mut last: Option<Key> = None;
     println!("| pass | left out | p50 | p99 | max | MB of fronts | MB of the process | bytes saved |");

@@ -2,12 +2,13 @@
 use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use manifactor_formats::replay::Replay;
 use manifactor_geometry::{Between, Point2, Range, Se2, Se3};
-use manifactor_graph::checked::Positive;
+use manifactor_graph::checked::{NotNegative, Positive};
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
 use manifactor_online::{Report, Session, Settings, Span, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{Vector2, Vector3};
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 fn data(path: &str) -> Option<PathBuf> {
@@ -21,7 +22,7 @@ fn data(path: &str) -> Option<PathBuf> {
 
 /// All steps, and the report of the last.
 fn replay(graph: &Graph, most: usize) -> (Session, Report) {
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     let (mut steps, mut report) = (Replay::of(graph, &Values::new()), Report::default());
     for _ in 0..most {
         let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
@@ -82,8 +83,7 @@ fn a_replay_goes_on_after_a_restart_bit_for_bit() {
     for name in ["intel", "parking-garage", "input_M3500_g2o"] {
         let Some(path) = data(&format!("g2o/{name}.g2o")) else { return };
         let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
-        let (mut steps, mut session) =
-            (Replay::of(&graph, &values), Session::new(Settings::default()).unwrap());
+        let (mut steps, mut session) = (Replay::of(&graph, &values), Session::new(Settings::default()));
         let mut other = None;
         for n in 0..400 {
             let Some(step) = steps.step(|key| session.estimate(key)).unwrap() else { break };
@@ -110,7 +110,8 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
     let Some(path) = data("g2o/input_M3500_g2o.g2o") else { return };
     let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
     let run = |budget: Option<f64>| {
-        let mut session = Session::new(Settings { budget, ..Settings::default() }).unwrap();
+        let budget = budget.map(NotNegative::literal);
+        let mut session = Session::new(Settings { budget, ..Settings::default() });
         let (mut steps, mut reports) = (Replay::of(&graph, &values), vec![]);
         for _ in 0..1000 {
             let step = steps.step(|key| session.estimate(key)).unwrap().unwrap();
@@ -147,9 +148,9 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
 fn a_window_that_holds_all_closures_is_as_good_as_all() {
     let Some(path) = data("g2o/sphere2500.g2o") else { return };
     let PoseGraph { graph, values, .. } = pose_graph::read(path, &Options::default()).unwrap();
-    let window = Some(Window::from(Span::Poses(120)));
-    let mut narrow = Session::new(Settings { window, ..Settings::default() }).unwrap();
-    let (mut all, mut steps) = (Session::new(Settings::default()).unwrap(), Replay::of(&graph, &values));
+    let window = Some(Window::from(Span::Poses(NonZeroUsize::new(120).unwrap())));
+    let mut narrow = Session::new(Settings { window, ..Settings::default() });
+    let (mut all, mut steps) = (Session::new(Settings::default()), Replay::of(&graph, &values));
     let mut bytes = vec![];
     for n in 0..500 {
         let step = steps.step(|key| all.estimate(key)).unwrap().unwrap();
@@ -186,7 +187,7 @@ fn antennas_wait_for_a_second_range() {
         return;
     };
     let (odometry, ranges) = (rows(odometry), rows(ranges));
-    let mut session = Session::new(Settings::default()).unwrap();
+    let mut session = Session::new(Settings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("x0", Se2::identity());
     graph.fix("x0");

@@ -1,5 +1,6 @@
 //! Every way to solve the linear system of a step leads to the same estimate.
 use manifactor_geometry::{Between, Coordinates, Landmark, Prior, Rn, Se3};
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
 use manifactor_solve::{
     CompileError, ConjugateGradients, GaussNewton, LevenbergMarquardt, LinearSolver, Method, Optimizer,
@@ -99,7 +100,11 @@ fn refused(linear: LinearSolver) -> String {
 #[test]
 fn what_does_not_fit_into_memory_says_how_much_it_takes() {
     let (graph, values) = room();
-    let linear = LinearSolver { method: Method::Cholesky, memory_gib: Some(1e-5), ..Default::default() };
+    let linear = LinearSolver {
+        method: Method::Cholesky,
+        memory_gib: Some(NotNegative::literal(1e-5)),
+        ..Default::default()
+    };
     let solver = GaussNewton { linear, ..Default::default() };
     let error = solve(&graph, &values, &solver, &mut Silent).unwrap_err();
     assert!(
@@ -108,7 +113,7 @@ fn what_does_not_fit_into_memory_says_how_much_it_takes() {
     );
     assert!(error.to_string().contains("conjugate_gradients"), "{error}");
     // and, left to itself, iterates
-    agrees(&LinearSolver { memory_gib: Some(1e-5), ..Default::default() }, 1e-8);
+    agrees(&LinearSolver { memory_gib: Some(NotNegative::literal(1e-5)), ..Default::default() }, 1e-8);
 }
 
 #[test]

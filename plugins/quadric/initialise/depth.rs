@@ -1,7 +1,7 @@
 //! A box and how far away its middle is: one view is enough.
 use super::{InitialiseError, Initialiser, View, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::register;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -24,14 +24,12 @@ use serde::{Deserialize, Serialize};
 pub struct Depth {
     /// How deep objects are, relative to their width and height: 1 for a ball, 0 where the depth is
     /// that of the centre.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub thickness: f64,
+    pub thickness: NotNegative,
 }
 
 impl Default for Depth {
     fn default() -> Self {
-        Self { thickness: 1.0 }
+        Self { thickness: NotNegative::literal(1.0) }
     }
 }
 
@@ -42,7 +40,7 @@ impl Depth {
         let (b, camera) = (&view.bounding_box, &view.camera);
         // half the size at depth 1; the box may be so large that no such object is behind the surface
         let half = (b.width() / camera.fx + b.height() / camera.fy) / 4.0;
-        let z = depth / (1.0 - (self.thickness * half).clamp(0.0, 0.5));
+        let z = depth / (1.0 - (*self.thickness * half).clamp(0.0, 0.5));
         Some(view.world_from_camera.act(&(camera.ray(b.centre()) * z)))
     }
 }

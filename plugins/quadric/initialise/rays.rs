@@ -1,7 +1,7 @@
 //! Where lines of sight meet, with a size from the boxes.
 use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,14 +22,12 @@ pub struct Rays {
     /// The least number of views, 2 or more.
     pub min_views: usize,
     /// The least angle between the lines of sight of two views, in degrees.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub min_parallax: f64,
+    pub min_parallax: NotNegative,
 }
 
 impl Default for Rays {
     fn default() -> Self {
-        Self { min_views: 2, min_parallax: 1.0 }
+        Self { min_views: 2, min_parallax: NotNegative::literal(1.0) }
     }
 }
 
@@ -37,7 +35,7 @@ impl Default for Rays {
 impl Initialiser for Rays {
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
         check_views(views, self.min_views.max(2))?;
-        check_parallax(views, self.min_parallax)?;
+        check_parallax(views, *self.min_parallax)?;
         let quadric = shape::ellipsoid(views, shape::centroid(views)?)?;
         check_visible(&quadric, views)?;
         Ok(quadric)

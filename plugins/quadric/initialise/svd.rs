@@ -2,7 +2,7 @@
 use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
 use crate::shapes::OnHyperboloid;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::register;
 use nalgebra::{DMatrix, Dyn, Matrix4, SVD, Vector3, Vector4};
 use schemars::JsonSchema;
@@ -33,9 +33,7 @@ pub struct Svd {
     /// The least number of views; 3 determine it, if they have all their sides.
     pub min_views: usize,
     /// The least angle between the lines of sight of two views, in degrees.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub min_parallax: f64,
+    pub min_parallax: NotNegative,
     /// Whether the system is scaled to be well conditioned.
     pub normalised: bool,
     /// What to make of a surface that is no ellipsoid: `reject`, or the `absolute` values of its squared
@@ -45,7 +43,12 @@ pub struct Svd {
 
 impl Default for Svd {
     fn default() -> Self {
-        Self { min_views: 3, min_parallax: 0.0, normalised: true, on_hyperboloid: OnHyperboloid::Reject }
+        Self {
+            min_views: 3,
+            min_parallax: NotNegative::literal(0.0),
+            normalised: true,
+            on_hyperboloid: OnHyperboloid::Reject,
+        }
     }
 }
 
@@ -53,7 +56,7 @@ impl Default for Svd {
 impl Initialiser for Svd {
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError> {
         check_views(views, self.min_views)?;
-        check_parallax(views, self.min_parallax)?;
+        check_parallax(views, *self.min_parallax)?;
         let found = views.iter().map(|v| v.lines().count()).sum();
         if found < NEEDED {
             return Err(InitialiseError::TooFewSides { found, needed: NEEDED });

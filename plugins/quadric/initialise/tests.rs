@@ -1,6 +1,7 @@
 use super::*;
 use crate::{BoundingBoxFactor, BoxModel};
 use manifactor_geometry::So3;
+use manifactor_graph::checked::NotNegative;
 use manifactor_testing::{catalogue::documentation_law, check};
 use nalgebra::{Matrix3, SVector};
 use proptest::prelude::*;
@@ -161,7 +162,9 @@ fn one_view_with_a_depth_is_enough() {
     let ball = DualQuadric { pose: Se3::identity(), semi_axes: Vector3::repeat(0.2) };
     let found = Depth::default().initialise(&views(&ball, &arc(1, 1.0, 2.0), 0.0)).unwrap();
     assert!(found.centroid().norm() < 0.01 && (found.semi_axes - ball.semi_axes).norm() < 0.01);
-    let far = Depth { thickness: 0.0 }.initialise(&views(&ball, &arc(1, 1.0, 2.0), 0.0)).unwrap();
+    let far = Depth { thickness: NotNegative::literal(0.0) }
+        .initialise(&views(&ball, &arc(1, 1.0, 2.0), 0.0))
+        .unwrap();
     assert!((far.centroid().norm() - 0.2).abs() < 0.01, "the surface, taken for the centre");
 }
 
@@ -182,7 +185,7 @@ fn what_cannot_be_initialised_says_why() {
     assert!(matches!(Rays::default().initialise(&same), Err(InitialiseError::TooLittleParallax { .. })));
     assert!(Svd::default().initialise(&same).is_err());
     assert_eq!(
-        Rays { min_parallax: 0.0, ..Rays::default() }.initialise(&same),
+        Rays { min_parallax: NotNegative::literal(0.0), ..Rays::default() }.initialise(&same),
         Err(InitialiseError::Undetermined)
     );
 

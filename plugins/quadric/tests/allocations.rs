@@ -1,6 +1,7 @@
 //! No iteration after the first takes memory from the system: a counting allocator counts none.
 #![allow(missing_docs, clippy::unwrap_used)]
 mod scene;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Graph, Values};
 use manifactor_solve::{GaussNewton, IterationRecord, LevenbergMarquardt, Optimizer, Problem, Stopping};
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
@@ -30,7 +31,7 @@ fn allocations((graph, values): &(Graph, Values), solver: &dyn Optimizer) -> Vec
 // one test, as another on another thread would be counted with it
 #[test]
 fn no_iteration_after_the_first_allocates() {
-    let stop = Stopping { relative_cost: 1e-14, ..Stopping::default() };
+    let stop = Stopping { relative_cost: NotNegative::literal(1e-14), ..Stopping::default() };
     let solvers: [Box<dyn Optimizer>; 2] = [
         Box::new(GaussNewton { stop: stop.clone(), ..GaussNewton::default() }),
         Box::new(LevenbergMarquardt { stop, ..LevenbergMarquardt::default() }),

@@ -14,7 +14,7 @@ use crate::input::class::Aliases;
 use crate::input::measurement::{Errors, Quantities, UsualDepth};
 use crate::input::prior_map::PriorObject;
 use fit::BoxNoise;
-use manifactor_graph::checked::{positive, within};
+use manifactor_graph::checked::{Positive, Share};
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
 use schemars::JsonSchema;
@@ -43,76 +43,50 @@ use tracker::Tracker;
 #[serde(deny_unknown_fields, default)]
 pub struct Likelihood {
     /// Standard deviation of a box's sides, in pixels.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub box_sigma: f64,
+    pub box_sigma: Positive,
     /// The same as a part of its width and height; the two add up as squares.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub box_sigma_of_size: f64,
+    pub box_sigma_of_size: Positive,
     /// How many times as far off a box may be as one of many that are averaged: a detector's errors last for many frames.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub lasting: f64,
+    pub lasting: Positive,
     /// How far away a new object is believed to be, in metres, until there are others to go by.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub depth: f64,
+    pub depth: Positive,
     /// Standard deviation of the logarithm of that.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub depth_spread: f64,
+    pub depth_spread: Positive,
     /// How far the camera drifts in a second, as standard deviations of a random walk: radians.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub drift_rad: f64,
+    pub drift_rad: Positive,
     /// The same in metres.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub drift_m: f64,
+    pub drift_m: Positive,
     /// Standard deviation of measured depths, where the source has any, as a part of the depth.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub depth_error: f64,
+    pub depth_error: Positive,
     /// The share of boxes that have a class which is not their object's.
-    #[serde(deserialize_with = "within::<0, 1, _>")]
-    #[schemars(range(min = 0, max = 1))]
-    pub class_error: f64,
+    pub class_error: Share,
     /// New objects in a frame, on average.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub new_objects: f64,
+    pub new_objects: Positive,
     /// Boxes in a frame with this intersection over union show one object.
-    #[serde(deserialize_with = "within::<0, 1, _>")]
-    #[schemars(range(min = 0, max = 1))]
-    pub twin_iou: f64,
+    pub twin_iou: Share,
     /// Two objects are one where the sides of their boxes are off by this many standard deviations at most from one ellipsoid, as a root of
     /// the mean square: 1.4 times less for two of different classes, twice as many for two of one class in one place.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub merge_error: f64,
+    pub merge_error: Positive,
     /// The boxes of a frame are put to objects once more after so many seconds, by what is known then.
-    #[serde(deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub second_look_s: f64,
+    pub second_look_s: Positive,
 }
 
 impl Default for Likelihood {
     fn default() -> Self {
         Self {
-            box_sigma: 4.0,
-            box_sigma_of_size: 0.06,
-            lasting: 2.5,
-            depth: 1.5,
-            depth_spread: 0.6,
-            depth_error: 0.03,
-            drift_rad: 0.016,
-            drift_m: 0.016,
-            class_error: 0.1,
-            new_objects: 0.05,
-            twin_iou: 0.7,
-            merge_error: 1.2,
-            second_look_s: 10.0,
+            box_sigma: Positive::literal(4.0),
+            box_sigma_of_size: Positive::literal(0.06),
+            lasting: Positive::literal(2.5),
+            depth: Positive::literal(1.5),
+            depth_spread: Positive::literal(0.6),
+            depth_error: Positive::literal(0.03),
+            drift_rad: Positive::literal(0.016),
+            drift_m: Positive::literal(0.016),
+            class_error: Share::literal(0.1),
+            new_objects: Positive::literal(0.05),
+            twin_iou: Share::literal(0.7),
+            merge_error: Positive::literal(1.2),
+            second_look_s: Positive::literal(10.0),
         }
     }
 }
@@ -128,22 +102,22 @@ register!(dyn Association, "likelihood", Likelihood);
 
 impl Likelihood {
     fn noise(&self) -> BoxNoise {
-        let others = Errors { depth: self.depth_error };
-        BoxNoise { px: self.box_sigma, of_size: self.box_sigma_of_size, others }
+        let others = Errors { depth: *self.depth_error };
+        BoxNoise { px: *self.box_sigma, of_size: *self.box_sigma_of_size, others }
     }
 
     /// The likelihood of a class for an object that has this share of it.
     fn likelihood(&self, share: f64) -> f64 {
-        (1.0 - self.class_error) * share + self.class_error / CLASSES
+        (1.0 - *self.class_error) * share + *self.class_error / CLASSES
     }
 
     /// What a box costs that shows a new object: it is anywhere in the image, of any size and class, and as far away as objects usually are,
     /// give or take the spread.
     fn cost_of_new(&self, camera: &Camera, quantities: &Quantities, usual: f64) -> f64 {
         let area = camera.size().product();
-        let usual = UsualDepth { depth: usual, spread: self.depth_spread };
+        let usual = UsualDepth { depth: usual, spread: *self.depth_spread };
         let of_others: f64 = quantities.iter().map(|measurement| measurement.cost_of_new(&usual)).sum();
-        of_others - 2.0 * (self.new_objects / (area * area / 4.0) / CLASSES).ln()
+        of_others - 2.0 * (*self.new_objects / (area * area / 4.0) / CLASSES).ln()
     }
 }
 

@@ -4,7 +4,7 @@ use crate::input::class::Aliases;
 use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{Detection, ObjectId};
 use manifactor_geometry::Se3;
-use manifactor_graph::checked::within;
+use manifactor_graph::checked::Share;
 use manifactor_graph::register;
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
 use schemars::JsonSchema;
@@ -23,9 +23,7 @@ use std::sync::Arc;
 #[serde(deny_unknown_fields, default)]
 pub struct Iou {
     /// Intersection over union, at least.
-    #[serde(deserialize_with = "within::<0, 1, _>")]
-    #[schemars(range(min = 0, max = 1))]
-    pub least: f64,
+    pub least: Share,
     /// A box is compared with the one before for so many frames.
     pub frames: usize,
 }
@@ -39,30 +37,29 @@ pub struct Iou {
 #[serde(deny_unknown_fields, default)]
 pub struct Projection {
     /// Intersection over union with the outline in the map, at least.
-    #[serde(deserialize_with = "within::<0, 1, _>")]
-    #[schemars(range(min = 0, max = 1))]
-    pub least: f64,
+    pub least: Share,
     /// The same with the box before.
-    #[serde(deserialize_with = "within::<0, 1, _>")]
-    #[schemars(range(min = 0, max = 1))]
-    pub least_before: f64,
+    pub least_before: Share,
     /// A box is compared with the one before for so many frames.
     pub frames: usize,
     /// The share of the outline that is inside of the image, at least.
-    #[serde(deserialize_with = "within::<0, 1, _>")]
-    #[schemars(range(min = 0, max = 1))]
-    pub visible: f64,
+    pub visible: Share,
 }
 
 impl Default for Iou {
     fn default() -> Self {
-        Self { least: 0.2, frames: 30 }
+        Self { least: Share::literal(0.2), frames: 30 }
     }
 }
 
 impl Default for Projection {
     fn default() -> Self {
-        Self { least: 0.3, least_before: 0.2, frames: 30, visible: 0.3 }
+        Self {
+            least: Share::literal(0.3),
+            least_before: Share::literal(0.2),
+            frames: 30,
+            visible: Share::literal(0.3),
+        }
     }
 }
 
@@ -70,7 +67,7 @@ impl Default for Projection {
 impl Association for Iou {
     fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator> {
         let Self { least, frames } = *self;
-        let rule = Projection { least, least_before: least, frames, visible: 0.0 };
+        let rule = Projection { least, least_before: least, frames, visible: Share::literal(0.0) };
         Box::new(Overlap::new(rule, false, camera, aliases, known))
     }
 }
@@ -133,7 +130,7 @@ impl Overlap {
             BoundingBoxFactor { bounding_box, camera: self.camera, model }.predict(&pose, &quadric)
         };
         let (all, inside) = (predict(BoxModel::Standard)?, predict(BoxModel::Truncated)?);
-        (inside.area() >= self.rule.visible * all.area()).then_some(inside)
+        (inside.area() >= *self.rule.visible * all.area()).then_some(inside)
     }
 }
 
@@ -152,7 +149,7 @@ impl Associator for Overlap {
                 let with = |other: &Option<BoundingBox>, least: f64| {
                     other.map(|other| other.iou(&detection.bounding_box)).filter(|iou| *iou >= least)
                 };
-                let (before, outline) = (with(&before, rule.least_before), with(&outline, rule.least));
+                let (before, outline) = (with(&before, *rule.least_before), with(&outline, *rule.least));
                 let most = before.into_iter().chain(outline).reduce(f64::max);
                 overlaps.extend(most.map(|iou| (row, column, iou)));
             }

@@ -7,9 +7,10 @@
 use crate::mapping::Mapping;
 use indexmap::IndexMap;
 use manifactor_geometry::{Se3, So3};
+use manifactor_graph::checked::{NotNegative, Positive};
 use manifactor_graph::{Direction, FactorEntry, Graph, Key, Values};
 use manifactor_quadric::{DualQuadric, SHORTEST};
-use manifactor_solve::{LevenbergMarquardt, Optimizer, Problem, Silent, Stopping};
+use manifactor_solve::{DiagonalLimits, LevenbergMarquardt, Optimizer, Problem, Silent, Stopping};
 use nalgebra::{Rotation3, Vector3};
 
 /// How much longer than the others the longest axis of a start is.
@@ -131,13 +132,18 @@ fn rank(problem: &Problem) -> (usize, f64) {
 }
 
 fn solver() -> LevenbergMarquardt {
-    roughly(30, 1e-5)
+    roughly(30, NotNegative::literal(1e-5))
 }
 
 /// Descends until a step lowers the cost by less than this share of it.
-pub(super) fn roughly(max_iterations: usize, relative_cost: f64) -> LevenbergMarquardt {
+pub(super) fn roughly(max_iterations: usize, relative_cost: NotNegative) -> LevenbergMarquardt {
     let stop = Stopping { max_iterations, relative_cost, ..Stopping::default() };
     // damping of one size for all directions: a semi-axis that has all but vanished has next to no derivative, and
     // damping in proportion to that would let it go
-    LevenbergMarquardt { diagonal: [1.0, 1.0], initial_lambda: 1e-3, stop, ..LevenbergMarquardt::default() }
+    LevenbergMarquardt {
+        diagonal: DiagonalLimits::EVEN,
+        initial_lambda: Positive::literal(1e-3),
+        stop,
+        ..LevenbergMarquardt::default()
+    }
 }

@@ -154,7 +154,7 @@ impl<'a> Over<'a> {
             clusters.entry(key).or_default().push(value);
         }
         let clusters: Vec<Vec<f64>> = clusters.into_values().collect();
-        bootstrap(&clusters, self.settings.resamples, self.settings.seed)
+        bootstrap(&clusters, *self.settings.resamples, self.settings.seed)
     }
 }
 

@@ -1,6 +1,6 @@
 use super::measures::measure_names_in_words;
 use indexmap::IndexMap;
-use manifactor_graph::checked::at_most;
+use manifactor_graph::checked::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,9 +26,7 @@ pub struct SummarySettings {
     pub curve: Option<String>,
     /// How often trials are drawn anew. At most a million: with that many the ends of an interval are settled to a
     /// thousandth of its width.
-    #[serde(deserialize_with = "at_most::<1_000_000, _>")]
-    #[schemars(extend("maximum" = 1_000_000))]
-    pub resamples: usize,
+    pub resamples: Count<0, 1_000_000>,
     /// Of the random numbers that they are drawn by.
     pub seed: u64,
 }
@@ -42,7 +40,7 @@ impl Default for SummarySettings {
             metrics: vec![],
             across: None,
             curve: None,
-            resamples: 10_000,
+            resamples: Count::literal(10_000),
             seed: 1,
         }
     }

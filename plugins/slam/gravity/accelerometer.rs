@@ -1,7 +1,7 @@
 use super::{Gravity, GravityError, MapFrame, first_frame};
 use crate::input::sequence::{Frame, Sequence};
 use manifactor_geometry::{NotARotation, So3};
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Direction, register};
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -21,9 +21,7 @@ use serde::{Deserialize, Serialize};
 pub struct Accelerometer {
     /// Readings this near in time to the first frame are averaged, in seconds: the longer, the less the pushes count, and
     /// the more the drift of the odometry.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub window: f64,
+    pub window: NotNegative,
     /// Rotation from the sensor's frame to the camera's, a unit quaternion (x, y, z, w). The Kinect's of TUM RGB-D
     /// is half a turn about z, [0, 0, 1, 0].
     pub camera_from_sensor: Quaternion,
@@ -49,7 +47,7 @@ impl From<Quaternion> for [f64; 4] {
 
 impl Default for Accelerometer {
     fn default() -> Self {
-        Self { window: 10.0, camera_from_sensor: Quaternion(So3::identity()) }
+        Self { window: NotNegative::literal(10.0), camera_from_sensor: Quaternion(So3::identity()) }
     }
 }
 
@@ -57,10 +55,10 @@ impl Default for Accelerometer {
 impl Gravity for Accelerometer {
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
         let first = first_frame(sequence)?;
-        let near = |timestamp: f64| (timestamp - first.timestamp).abs() <= self.window;
+        let near = |timestamp: f64| (timestamp - first.timestamp).abs() <= *self.window;
         let mut near = sequence.accelerometer.iter().filter(|r| near(r.timestamp)).peekable();
         if near.peek().is_none() {
-            return Err(GravityError::NoReadings { timestamp: first.timestamp, within: self.window });
+            return Err(GravityError::NoReadings { timestamp: first.timestamp, within: *self.window });
         }
         let up: Vector3<f64> = near
             .map(|reading| {
@@ -76,7 +74,7 @@ impl Gravity for Accelerometer {
     }
 
     fn settled_after(&self) -> f64 {
-        self.window
+        *self.window
     }
 }
 register!(dyn Gravity, "accelerometer", Accelerometer);
@@ -101,7 +99,7 @@ mod tests {
 
     fn half_turn() -> Accelerometer {
         let camera_from_sensor = Quaternion(So3::from_quaternion_xyzw([0.0, 0.0, 1.0, 0.0]).unwrap());
-        Accelerometer { window: 1.0, camera_from_sensor }
+        Accelerometer { window: NotNegative::literal(1.0), camera_from_sensor }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 use super::{Gravity, GravityError, MapFrame, first_frame};
 use crate::input::sequence::Sequence;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,14 +17,12 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct GroundTruthPose {
     /// How near that pose has to be, in seconds.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub max_time_difference: f64,
+    pub max_time_difference: NotNegative,
 }
 
 impl Default for GroundTruthPose {
     fn default() -> Self {
-        Self { max_time_difference: 0.1 }
+        Self { max_time_difference: NotNegative::literal(0.1) }
     }
 }
 
@@ -36,13 +34,13 @@ impl Gravity for GroundTruthPose {
         let truth = sequence.ground_truth.iter().flat_map(|truth| &truth.trajectory);
         let nearest = truth.min_by(|a, b| away(a.timestamp).total_cmp(&away(b.timestamp)));
         match nearest {
-            Some(pose) if away(pose.timestamp) <= self.max_time_difference => Ok(MapFrame {
+            Some(pose) if away(pose.timestamp) <= *self.max_time_difference => Ok(MapFrame {
                 map_from_odometry: pose.pose.compose(&first.world_from_camera.inverse()),
                 up: Some(Direction::Z),
             }),
             _ => Err(GravityError::NoGroundTruth {
                 timestamp: first.timestamp,
-                within: self.max_time_difference,
+                within: *self.max_time_difference,
                 nearest: nearest.map(|pose| pose.timestamp),
             }),
         }

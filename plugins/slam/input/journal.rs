@@ -190,10 +190,11 @@ fn keep(file: &mut File, frame: &Observation) -> io::Result<Observation> {
 mod tests {
     use super::*;
     use crate::input::simulator::Simulated;
+    use manifactor_graph::checked::Count;
 
     fn stream() -> Stream {
         let mut settings = Simulated::default();
-        settings.trajectory.frames = 12;
+        settings.trajectory.frames = Count::literal(12);
         Arc::new(settings.simulate().unwrap()).into()
     }
 

@@ -80,13 +80,13 @@ mod tests {
     use crate::input::sequence::ClassScores;
     use crate::input::simulator::Simulated;
     use crate::input::source::{CameraChoice, Folders, Recorded, Source};
-    use manifactor_graph::checked::Positive;
+    use manifactor_graph::checked::{Count, NotNegative, Positive};
 
     #[test]
     fn what_is_written_is_read_back() {
         let mut settings = Simulated::default();
-        settings.trajectory.frames = 30;
-        settings.detector.false_boxes = 0.2;
+        settings.trajectory.frames = Count::literal(30);
+        settings.detector.false_boxes = NotNegative::literal(0.2);
         settings.detector.depth_error = Some(Positive::literal(0.02));
         let mut sequence = settings.simulate().unwrap();
         // a detector need not say what it sees

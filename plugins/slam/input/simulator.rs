@@ -94,16 +94,6 @@ pub enum SimulationError {
         /// Number of the object, from 0.
         object: usize,
     },
-    /// A number that makes no sense.
-    #[error("`{field}` must be {expected}, got {found}")]
-    Setting {
-        /// The setting.
-        field: &'static str,
-        /// What it may be.
-        expected: &'static str,
-        /// What it is.
-        found: f64,
-    },
 }
 
 impl Simulated {
@@ -112,10 +102,9 @@ impl Simulated {
     /// # Errors
     /// Settings that make no sense, or a scene without room.
     pub fn simulate(&self) -> Result<Sequence, SimulationError> {
-        self.check()?;
         let scene = self.scene.scene()?;
         let mut path = Pcg64::seed_from_u64(self.trajectory.seed);
-        let poses = self.trajectory.poses(self.scene.height, &mut path);
+        let poses = self.trajectory.poses(*self.scene.height, &mut path);
         // trials of other scenes or trajectories have noise of their own, whatever the seed: they are independent
         let seeds = [self.seed, self.scene.seed, self.trajectory.seed];
         let mixed = seeds.iter().fold(0, |mixed, seed| Pcg64::seed_from_u64(mixed ^ seed).next_u64());
@@ -123,7 +112,7 @@ impl Simulated {
         let mut noise = Pcg64::seed_from_u64(mixed);
         let (mut motion, boxes) = (Pcg64::from_rng(&mut noise), Pcg64::from_rng(&mut noise));
 
-        let time = |i: usize| i as f64 * self.trajectory.interval;
+        let time = |i: usize| i as f64 * *self.trajectory.interval;
         let mut frames: Vec<Frame> = vec![];
         for (i, pose) in poses.iter().enumerate() {
             let world_from_camera = match (i.checked_sub(1).map(|j| &poses[j]), frames.last()) {
@@ -143,7 +132,7 @@ impl Simulated {
         let after = Errors::new(count, boxes, mistakes, depths);
         let detections = self.detect(&scene, &poses, [before, after], &mut imagination);
         let readings = self.accelerometer.as_ref().map(|sensor| {
-            let readings = sensor.read(&poses, self.trajectory.interval, &mut felt).into_iter().enumerate();
+            let readings = sensor.read(&poses, *self.trajectory.interval, &mut felt).into_iter().enumerate();
             readings.map(|(i, acceleration)| Acceleration { timestamp: time(i), acceleration }).collect()
         });
         let truth = GroundTruth {
@@ -160,62 +149,6 @@ impl Simulated {
             unused: vec![],
         })
     }
-
-    fn check(&self) -> Result<(), SimulationError> {
-        let (s, t, o, d) = (&self.scene, &self.trajectory, &self.odometry, &self.detector);
-        let shares = [
-            ("scene.tilted", s.tilted),
-            ("scene.size_variation", s.size_variation),
-            ("scene.moved", s.moved),
-            ("detector.min_visible", d.min_visible),
-            ("detector.missed", d.missed),
-            ("detector.occluded", d.occluded),
-            ("detector.occlusion", d.occlusion),
-            ("detector.misclassified", d.misclassified),
-            ("detector.wrong_object", d.wrong_object),
-            ("detector.confused", d.confused),
-        ];
-        let sizes = [
-            ("scene.area", s.area[0]),
-            ("scene.area", s.area[1]),
-            ("scene.gap", s.gap),
-            ("scene.moved_at_s", s.moved_at_s),
-            ("trajectory.waves", t.waves[0]),
-            ("trajectory.waves", t.waves[1]),
-            ("trajectory.wander", t.wander),
-            ("odometry.translation", o.translation),
-            ("odometry.rotation", o.rotation),
-            ("detector.sigma_px", d.sigma_px),
-            ("detector.sigma_of_size", d.sigma_of_size),
-            ("detector.noise_lasts_s", d.noise_lasts_s),
-            ("detector.false_boxes", d.false_boxes),
-            ("detector.min_size_px", d.min_size_px),
-            ("accelerometer.sigma", self.accelerometer.as_ref().map_or(0.0, |a| a.sigma)),
-            ("accelerometer.bias", self.accelerometer.as_ref().map_or(0.0, |a| a.bias)),
-        ];
-        let positive = [("trajectory.interval", t.interval), ("trajectory.radius", t.radius)];
-        let finite = [
-            ("scene.height", s.height),
-            ("scene.tilt", s.tilt[0]),
-            ("scene.tilt", s.tilt[1]),
-            ("trajectory.sweep", t.sweep),
-            ("trajectory.height", t.height),
-        ];
-        let wrong = |all: &[(&'static str, f64)], ok: fn(f64) -> bool, expected| {
-            let bad = all.iter().find(|(_, x)| !(x.is_finite() && ok(*x)));
-            bad.map(|(field, found)| SimulationError::Setting { field, expected, found: *found })
-        };
-        let frames = [("trajectory.frames", t.frames as f64)];
-        // each is placed apart from all others
-        let objects = [("scene.objects", s.objects as f64)];
-        let found = wrong(&shares, |x| (0.0..=1.0).contains(&x), "from 0 to 1")
-            .or_else(|| wrong(&sizes, |x| x >= 0.0, "a finite number, not negative"))
-            .or_else(|| wrong(&positive, |x| x > 0.0, "a finite number above zero"))
-            .or_else(|| wrong(&finite, |_| true, "a finite number"))
-            .or_else(|| wrong(&frames, |x| (2.0..=1e6).contains(&x), "from 2 to a million"))
-            .or_else(|| wrong(&objects, |x| x <= 1e4, "at most ten thousand"));
-        found.map_or(Ok(()), Err)
-    }
 }
 
 #[typetag::serialize(name = "simulated")]
@@ -229,6 +162,7 @@ register!(dyn Source, "simulated", Simulated);
 #[cfg(test)]
 mod tests {
     use super::*;
+    use manifactor_graph::checked::{Count, Finite, NotNegative, Share};
     use nalgebra::Vector3;
     use std::collections::BTreeMap;
 
@@ -267,8 +201,12 @@ mod tests {
     #[test]
     fn without_noise_all_is_as_it_is() {
         let mut settings = Simulated::default();
-        settings.odometry = MotionNoise { translation: 0.0, rotation: 0.0, ..settings.odometry };
-        settings.detector.sigma_px = 0.0;
+        settings.odometry = MotionNoise {
+            translation: NotNegative::literal(0.0),
+            rotation: NotNegative::literal(0.0),
+            ..settings.odometry
+        };
+        settings.detector.sigma_px = NotNegative::literal(0.0);
         let sequence = settings.simulate().unwrap();
         let truth = sequence.ground_truth.unwrap();
         for (frame, stamped) in sequence.frames.iter().zip(&truth.trajectory) {
@@ -284,7 +222,7 @@ mod tests {
     #[test]
     fn noise_is_as_large_as_it_says() {
         let mut settings = Simulated::default();
-        settings.trajectory.frames = 4000;
+        settings.trajectory.frames = Count::literal(4000);
         let sequence = settings.simulate().unwrap();
         let truth = sequence.ground_truth.unwrap().trajectory;
         let (mut shift, mut turn) = (0.0, 0.0);
@@ -304,8 +242,8 @@ mod tests {
     #[test]
     fn each_object_rests_on_the_plane_and_is_seen() {
         let mut settings = Simulated::default();
-        settings.scene.tilted = 0.5;
-        settings.scene.height = 0.7;
+        settings.scene.tilted = Share::literal(0.5);
+        settings.scene.height = Finite::literal(0.7);
         let sequence = settings.simulate().unwrap();
         let objects = sequence.ground_truth.unwrap().objects;
         assert_eq!(objects.len(), 15);
@@ -324,9 +262,9 @@ mod tests {
             settings.simulate().unwrap().detections.len() as f64
         };
         let all = count(|_| {});
-        let share = count(|d| d.missed = 0.25) / all;
+        let share = count(|d| d.missed = Share::literal(0.25)) / all;
         assert!((share - 0.75).abs() < 0.03, "{share}");
-        assert_eq!(count(|d| d.confused = 0.5), all);
+        assert_eq!(count(|d| d.confused = Share::literal(0.5)), all);
     }
 
     #[test]
@@ -348,7 +286,7 @@ mod tests {
     fn boxes_of_a_wrong_object_are_as_many_as_said() {
         let mut settings = Simulated::default();
         let right = settings.simulate().unwrap().detections;
-        settings.detector.wrong_object = 0.2;
+        settings.detector.wrong_object = Share::literal(0.2);
         let wrong = settings.simulate().unwrap().detections;
         assert_eq!(right.len(), wrong.len());
         let pairs = || right.iter().zip(&wrong);
@@ -359,7 +297,7 @@ mod tests {
 
     #[test]
     fn an_accelerometer_feels_up_and_its_own_motion() {
-        let sensor = AccelerometerNoise { sigma: 0.0, bias: 0.0 };
+        let sensor = AccelerometerNoise { sigma: NotNegative::literal(0.0), bias: NotNegative::literal(0.0) };
         let settings = Simulated { accelerometer: Some(sensor), ..Simulated::default() };
         let sequence = settings.simulate().unwrap();
         let truth = &sequence.ground_truth.as_ref().unwrap().trajectory;
@@ -371,7 +309,7 @@ mod tests {
         let before = Simulated::default().simulate().unwrap();
         assert_eq!(sequence.detections, before.detections);
         let mut two = settings;
-        two.trajectory.frames = 2;
+        two.trajectory.frames = Count::literal(2);
         for reading in two.simulate().unwrap().accelerometer {
             assert!((reading.acceleration.norm() - 9.81).abs() < 1e-9, "{reading:?}");
         }
@@ -379,23 +317,24 @@ mod tests {
 
     #[test]
     fn settings_that_make_no_sense_are_refused() {
-        let refused = |change: fn(&mut Simulated)| {
-            let mut settings = Simulated::default();
-            change(&mut settings);
-            settings.simulate().unwrap_err().to_string()
-        };
-        assert!(refused(|s| s.scene.tilted = 1.5).contains("scene.tilted"));
-        assert!(refused(|s| s.scene.moved = -0.1).contains("scene.moved"));
-        assert!(refused(|s| s.scene.moved_at_s = f64::INFINITY).contains("scene.moved_at_s"));
-        assert!(refused(|s| s.detector.sigma_px = f64::NAN).contains("detector.sigma_px"));
-        assert!(refused(|s| s.detector.wrong_object = 2.0).contains("detector.wrong_object"));
-        assert!(
-            refused(|s| s.accelerometer = Some(AccelerometerNoise { sigma: -1.0, bias: 0.0 }))
-                .contains("sigma")
-        );
-        assert!(refused(|s| s.scene.objects = 5000).contains("no room"));
-        assert!(refused(|s| s.scene.objects = usize::MAX).contains("at most ten thousand"));
-        assert!(refused(|s| s.scene.classes = vec!["unicorn".into()]).contains("unicorn"));
-        assert!(refused(|s| s.trajectory.frames = 0).contains("trajectory.frames"));
+        let read =
+            |settings: &str| serde_json::from_str::<Simulated>(settings).map_err(|error| error.to_string());
+        for (settings, expected) in [
+            (r#"{"scene": {"tilted": 1.5}}"#, "from 0 to 1, got 1.5"),
+            (r#"{"scene": {"moved_at_s": -1}}"#, "0 or more, got -1"),
+            (r#"{"detector": {"wrong_object": 2}}"#, "from 0 to 1, got 2"),
+            (r#"{"accelerometer": {"sigma": -1}}"#, "0 or more, got -1"),
+            (r#"{"scene": {"objects": 10001}}"#, "at most 10000, got 10001"),
+            (r#"{"trajectory": {"frames": 0}}"#, "from 2 to 1000000, got 0"),
+            (r#"{"trajectory": {"interval": 0}}"#, "above zero, got 0"),
+        ] {
+            assert!(read(settings).unwrap_err().contains(expected), "{settings}");
+        }
+        for (settings, expected) in [
+            (r#"{"scene": {"objects": 5000}}"#, "no room"),
+            (r#"{"scene": {"classes": ["unicorn"]}}"#, "unicorn"),
+        ] {
+            assert!(read(settings).unwrap().simulate().unwrap_err().to_string().contains(expected));
+        }
     }
 }

@@ -197,11 +197,11 @@ pub(crate) fn sift(detection: &Detection, camera: &Camera, settings: &DetectionS
     if !detection.bounding_box.has_area() {
         return Sifted::WithoutArea;
     }
-    if detection.scores.best().is_some_and(|(_, score)| score < settings.min_score) {
+    if detection.scores.best().is_some_and(|(_, score)| score < *settings.min_score) {
         return Sifted::LowScore;
     }
     let bounding_box = detection.bounding_box;
-    let inside = bounding_box.sides_inside(camera.width, camera.height, settings.border_px);
+    let inside = bounding_box.sides_inside(camera.width, camera.height, *settings.border_px);
     if !settings.cut_sides.accepts(inside) {
         return Sifted::Cut;
     }
@@ -274,6 +274,7 @@ mod tests {
     use crate::gravity::tests::sequence;
     use crate::input::sequence::ClassScores;
     use crate::settings::CutSides;
+    use manifactor_graph::checked::{NotNegative, Share};
 
     fn detection(frame: usize, object: u32, class: &str, score: f64, bounds: [f64; 4]) -> Detection {
         Detection {
@@ -298,7 +299,7 @@ mod tests {
     }
 
     fn with(cut_sides: CutSides) -> DetectionSettings {
-        DetectionSettings { border_px: 20.0, cut_sides, ..DetectionSettings::default() }
+        DetectionSettings { border_px: NotNegative::literal(20.0), cut_sides, ..DetectionSettings::default() }
     }
 
     #[test]
@@ -335,7 +336,7 @@ mod tests {
 
     #[test]
     fn strangers_and_doubtful_boxes_are_counted() {
-        let settings = DetectionSettings { min_score: 0.3, ..with(CutSides::Drop) };
+        let settings = DetectionSettings { min_score: Share::literal(0.3), ..with(CutSides::Drop) };
         let all =
             gather(&[detection(0, 0, "cup", 0.9, INSIDE), detection(0, 2, "cup", 0.2, INSIDE)], &settings);
         assert_eq!((all.unassociated, all.low_score, all.objects.len()), (1, 1, 0));

@@ -122,13 +122,13 @@ pub(crate) fn start(
     };
     let views: Vec<View> = measured.views.iter().filter_map(seen).collect();
     // over all pairs of views, so it is left out where any will do
-    let parallax_deg = if settings.min_parallax_deg > 0.0 { parallax(&views) } else { 0.0 };
-    if parallax_deg < settings.min_parallax_deg {
-        return Err(Rejection::Parallax { parallax_deg, least_deg: settings.min_parallax_deg });
+    let parallax_deg = if *settings.min_parallax_deg > 0.0 { parallax(&views) } else { 0.0 };
+    if parallax_deg < *settings.min_parallax_deg {
+        return Err(Rejection::Parallax { parallax_deg, least_deg: *settings.min_parallax_deg });
     }
     let started = settings.initialiser.initialise(&views);
     let start = started.map_err(|error| Rejection::Initialisation { message: error.to_string() })?;
-    still(measured, &measured.views, at, &camera, detections.depth_error).map(|()| start)
+    still(measured, &measured.views, at, &camera, *detections.depth_error).map(|()| start)
 }
 
 /// Whether an object stands still, as far as the depths of these boxes of it tell; what an earlier map has does.
@@ -155,8 +155,8 @@ pub(crate) fn sound(measured: &Measured, settings: &ObjectSettings) -> Result<()
         return Err(Rejection::Views { views, least: settings.min_views });
     }
     let deviation_px = measured.box_deviation();
-    if deviation_px >= settings.max_box_deviation_px {
-        return Err(Rejection::BoxDeviation { deviation_px, limit_px: settings.max_box_deviation_px });
+    if deviation_px >= *settings.max_box_deviation_px {
+        return Err(Rejection::BoxDeviation { deviation_px, limit_px: *settings.max_box_deviation_px });
     }
     Ok(())
 }

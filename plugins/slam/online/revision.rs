@@ -116,7 +116,7 @@ impl Mapper {
         let (measured, settings) = (self.measured(id)?, &self.settings.objects);
         match self.objects.get(&id)? {
             Tracked::Waiting(sights) => {
-                let degrees = settings.birth_parallax_deg.max(settings.min_parallax_deg);
+                let degrees = settings.birth_parallax_deg.max(*settings.min_parallax_deg);
                 let is_due =
                     sights.are_enough(measured, degrees) && rejection::sound(measured, settings).is_ok();
                 is_due.then_some(Due::Birth)
@@ -124,7 +124,7 @@ impl Mapper {
             Tracked::Mapped(mapped) => match rejection::sound(measured, settings).and_then(|()| {
                 let last = &measured.views[measured.views.len().saturating_sub(LAST)..];
                 let depth_error = self.settings.detections.depth_error;
-                rejection::still(measured, last, |frame| self.at(frame), &self.camera, depth_error)
+                rejection::still(measured, last, |frame| self.at(frame), &self.camera, *depth_error)
             }) {
                 Err(rejection) => Some(Due::Withdrawal(rejection)),
                 Ok(()) if measured.class_name() != mapped.class.as_deref() => {

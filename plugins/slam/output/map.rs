@@ -40,7 +40,7 @@ impl PriorMap {
     /// # Errors
     /// Where there are no covariances.
     pub fn of(estimate: &Estimate, settings: &Settings) -> Result<Self, MapError> {
-        let new = looks(estimate, settings.detections.border_px);
+        let new = looks(estimate, *settings.detections.border_px);
         let mut covariances = covariances(estimate)?;
         let object = |landmark: Landmark<'_>| {
             let Landmark { object, quadric, .. } = landmark;
@@ -75,7 +75,7 @@ const LOOKS: usize = 8;
 
 /// The mapped objects that are not there any more, by number.
 pub(super) fn gone(estimate: &Estimate, settings: &Settings) -> Vec<ObjectId> {
-    let looks = looks(estimate, settings.detections.border_px);
+    let looks = looks(estimate, *settings.detections.border_px);
     let is_gone = |(id, looked): (ObjectId, Looked)| {
         let measured = estimate.mapping.measurements.object(id)?;
         is_gone(measured, looked, settings).then_some(id)

@@ -134,7 +134,7 @@ impl VariantRecord {
     /// The record of an estimate.
     pub fn new(variant: &Variant, estimate: &Estimate) -> Self {
         let settings: &Settings = &variant.settings;
-        let drawn = drawn::Frames::of(estimate, settings.evaluation.max_time_difference);
+        let drawn = drawn::Frames::of(estimate, *settings.evaluation.max_time_difference);
         let (frames, alignment) = frames::frames(estimate, &settings.evaluation, &drawn);
         Self {
             name: variant.name.clone(),
@@ -149,7 +149,7 @@ impl VariantRecord {
             variables: variables::variables(&settings.own, estimate),
             cost: cost(estimate),
             residuals: factors::residuals(estimate),
-            images: settings.report.images,
+            images: *settings.report.images,
         }
     }
 

@@ -30,7 +30,7 @@ pub(super) fn associated(
     if settings.association.uses_names() {
         return Ok(Associated { sequence, report: None });
     }
-    let mut mapper = Mapper::new(sequence.opening(), settings)?;
+    let mut mapper = Mapper::new(sequence.opening(), settings);
     let (mut named, mut naming) = (Sequence::clone(&sequence), Naming::default());
     let mut taken = vec![];
     let mut interrupted = false;

@@ -51,7 +51,7 @@ pub(super) fn find(
     if search.map.is_none() {
         return Ok(None);
     }
-    let mut mapper = Mapper::new(sequence.opening(), settings)?;
+    let mut mapper = Mapper::new(sequence.opening(), settings);
     for observation in sequence.observations() {
         if observer.poll().is_break() {
             break;

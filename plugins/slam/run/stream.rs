@@ -9,7 +9,7 @@ use crate::mapping::Warning;
 use crate::online::{FrameError, FrameReport, Mapper};
 use crate::output::report::{Found, Naming, OnlineReport, VariantReport};
 use crate::settings::Settings;
-use manifactor_solve::{Observer, SettingError};
+use manifactor_solve::Observer;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
@@ -29,7 +29,7 @@ pub fn online(
 ) -> Result<(Estimate, VariantReport), RunError> {
     let clock = Instant::now();
     let lost = stream.lost.clone();
-    let mut taken = Taken::new(stream.opening, settings)?;
+    let mut taken = Taken::new(stream.opening, settings);
     let (mut progress, mut search, mut found) = (OnlineReport::default(), Search::new(settings), None);
     let mut awaited = Awaited::new(Box::new(Confirmed::new(stream.observations)));
     loop {
@@ -55,7 +55,7 @@ pub fn online(
             && let Some(located) = search.look(report, &taken.mapper)
         {
             let known = settings.beginning_at(located.start, located.noise.clone());
-            taken = taken.again(&known, report)?;
+            taken = taken.again(&known, report);
             progress.begin_again();
             report.located = Some(located.clone());
             found = Some(Found { frame: report.frame, located });
@@ -100,9 +100,9 @@ struct Taken {
 }
 
 impl Taken {
-    fn new(opening: Opening, settings: &Settings) -> Result<Self, SettingError> {
-        let mapper = Mapper::new(opening.clone(), settings)?;
-        Ok(Self { mapper, sequence: opening.into_sequence(), naming: Naming::default() })
+    fn new(opening: Opening, settings: &Settings) -> Self {
+        let mapper = Mapper::new(opening.clone(), settings);
+        Self { mapper, sequence: opening.into_sequence(), naming: Naming::default() }
     }
 
     fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
@@ -113,8 +113,8 @@ impl Taken {
     }
 
     /// The same frames with other settings; `report` becomes that of the last, and tells of all that has happened to the new map.
-    fn again(self, settings: &Settings, report: &mut FrameReport) -> Result<Self, SettingError> {
-        let (mut again, mut before) = (Self::new(self.sequence.opening(), settings)?, None);
+    fn again(self, settings: &Settings, report: &mut FrameReport) -> Self {
+        let (mut again, mut before) = (Self::new(self.sequence.opening(), settings), None);
         let mut refused = vec![];
         for observation in self.sequence.observations() {
             match again.take(&observation) {
@@ -131,7 +131,7 @@ impl Taken {
             *report = last;
         }
         report.refused.extend(refused);
-        Ok(again)
+        again
     }
 }
 

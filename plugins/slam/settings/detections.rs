@@ -1,6 +1,6 @@
 use super::poses::{every_row, noise_of};
 use manifactor_graph::Noise;
-use manifactor_graph::checked::{not_negative, positive, within};
+use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_graph::loss::Loss;
 use manifactor_quadric::BoxModel;
 use schemars::JsonSchema;
@@ -22,17 +22,12 @@ pub struct DetectionSettings {
     /// What becomes of a box with sides at the border.
     pub cut_sides: CutSides,
     /// Sides this near to the border count as cut, in pixels.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(range(min = 0))]
-    pub border_px: f64,
+    pub border_px: NotNegative,
     /// Detections whose best class scores less are left out.
-    #[serde(deserialize_with = "within::<0, 1, _>")]
-    #[schemars(range(min = 0, max = 1))]
-    pub min_score: f64,
+    pub min_score: Share,
     /// Standard deviation of depths, where the source has any, as a part of the depth. Default: 0.03.
-    #[serde(deserialize_with = "positive", skip_serializing_if = "is_usual")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub depth_error: f64,
+    #[serde(skip_serializing_if = "is_usual")]
+    pub depth_error: Positive,
 }
 
 /// What becomes of a box that the border of the image cuts.
@@ -60,11 +55,11 @@ impl CutSides {
 }
 
 /// Of a depth, as a part of it, where a document does not say.
-const DEPTH_ERROR: f64 = 0.03;
+const DEPTH_ERROR: Positive = Positive::literal(0.03);
 
 /// What is as usual is not written: sources without depths have it as well.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-fn is_usual(depth_error: &f64) -> bool {
+fn is_usual(depth_error: &Positive) -> bool {
     *depth_error == DEPTH_ERROR
 }
 
@@ -88,8 +83,8 @@ impl Default for DetectionSettings {
             loss: None,
             model: BoxModel::Standard,
             cut_sides: CutSides::Drop,
-            border_px: 20.0,
-            min_score: 0.0,
+            border_px: NotNegative::literal(20.0),
+            min_score: Share::literal(0.0),
             depth_error: DEPTH_ERROR,
         }
     }

@@ -1,6 +1,6 @@
 use super::Holdout;
 use crate::metrics::Alignment;
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
@@ -12,9 +12,7 @@ pub struct EvaluationSettings {
     /// Ways to bring the estimate into the frame of the truth, each reported; the first in tables.
     pub alignments: Vec<Alignment>,
     /// How far apart in time a pose and its truth may be, in seconds.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub max_time_difference: f64,
+    pub max_time_difference: NotNegative,
     /// Over how many frames relative errors are taken.
     pub relative_over: NonZeroUsize,
     /// Boxes that the estimate does without, and which are then predicted by it; for `manifactor run`: `{ share = 0.2 }` of all at
@@ -27,7 +25,7 @@ impl Default for EvaluationSettings {
     fn default() -> Self {
         Self {
             alignments: vec![Alignment::Se3],
-            max_time_difference: 0.02,
+            max_time_difference: NotNegative::literal(0.02),
             relative_over: NonZeroUsize::MIN,
             holdout: None,
         }

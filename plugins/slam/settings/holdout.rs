@@ -1,5 +1,5 @@
 use crate::input::sequence::{Detection, Sequence};
-use manifactor_graph::checked::within;
+use manifactor_graph::checked::Share;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use schemars::JsonSchema;
@@ -11,17 +11,9 @@ use std::num::NonZeroUsize;
 #[serde(rename_all = "snake_case")]
 pub enum Holdout {
     /// This share of all boxes, drawn at random; others of the same frames take part.
-    Share(
-        #[serde(deserialize_with = "within::<0, 1, _>")]
-        #[schemars(range(min = 0, max = 1))]
-        f64,
-    ),
+    Share(Share),
     /// Those of the last frames, this share of all.
-    Last(
-        #[serde(deserialize_with = "within::<0, 1, _>")]
-        #[schemars(range(min = 0, max = 1))]
-        f64,
-    ),
+    Last(Share),
     /// Those of so many frames in a row, of each five times as many: longer than a detector's errors last.
     Block(NonZeroUsize),
 }
@@ -37,8 +29,8 @@ impl Holdout {
         let mut rng = Pcg64::seed_from_u64(SEED);
         let frames = sequence.frames.len();
         let mut is_held_out = |detection: &Detection| match self {
-            Self::Share(share) => rng.random_bool(share),
-            Self::Last(share) => detection.frame as f64 >= (1.0 - share) * frames as f64,
+            Self::Share(share) => rng.random_bool(*share),
+            Self::Last(share) => detection.frame as f64 >= (1.0 - *share) * frames as f64,
             Self::Block(length) => detection.frame / length.get() % BLOCKS == BLOCKS - 1,
         };
         let all = std::mem::take(&mut sequence.detections);
@@ -63,10 +55,14 @@ mod tests {
             assert_eq!(held_out.len() + rest.detections.len(), boxes);
             (held_out, rest.detections)
         };
-        let (held_out, _) = split(Holdout::Share(0.25));
+        let (held_out, _) = split(Holdout::Share(Share::literal(0.25)));
         assert!((held_out.len() as f64 / boxes as f64 - 0.25).abs() < 0.05);
-        assert_eq!(split(Holdout::Share(0.0)).0.len() + split(Holdout::Share(1.0)).1.len(), 0);
-        let (held_out, rest) = split(Holdout::Last(0.2));
+        assert_eq!(
+            split(Holdout::Share(Share::literal(0.0))).0.len()
+                + split(Holdout::Share(Share::literal(1.0))).1.len(),
+            0
+        );
+        let (held_out, rest) = split(Holdout::Last(Share::literal(0.2)));
         assert!(
             held_out.iter().all(|d| 5 * d.frame >= 4 * frames)
                 && rest.iter().all(|d| 5 * d.frame < 4 * frames)

@@ -1,8 +1,13 @@
-use manifactor_graph::checked::{not_negative, within};
+use manifactor_graph::checked::NotNegative;
 use manifactor_quadric::initialise::{Initialiser, Svd};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+manifactor_graph::number! {
+    /// An angle in degrees.
+    pub Degrees: "a number from 0 to 180", |x| x >= 0.0 && x <= 180.0, { "minimum": 0, "maximum": 180 };
+}
 
 /// `[objects]`: which objects are mapped, and where they begin.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -12,19 +17,13 @@ pub struct ObjectSettings {
     pub min_views: usize,
     /// Objects whose boxes have a standard deviation of width or height of this or more are left out, in pixels:
     /// as a rule, detections of several things under one number.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(range(min = 0))]
-    pub max_box_deviation_px: f64,
+    pub max_box_deviation_px: NotNegative,
     /// Objects that are seen under a smaller angle between two views are left out, in degrees: their depth is not
     /// observed.
-    #[serde(deserialize_with = "within::<0, 180, _>")]
-    #[schemars(range(min = 0, max = 180))]
-    pub min_parallax_deg: f64,
+    pub min_parallax_deg: Degrees,
     /// In a stream: an object is placed as soon as it is seen under this angle between two views, in degrees, though not under less
     /// than `min_parallax_deg`. What is never seen so is tried once more at the end, with all boxes.
-    #[serde(deserialize_with = "within::<0, 180, _>")]
-    #[schemars(range(min = 0, max = 180))]
-    pub birth_parallax_deg: f64,
+    pub birth_parallax_deg: Degrees,
     /// How an object's first estimate is made of its boxes.
     pub initialiser: Arc<dyn Initialiser>,
     /// How many times, at most, each object is fitted alone to its own factors, from several places, before all is
@@ -36,9 +35,9 @@ impl Default for ObjectSettings {
     fn default() -> Self {
         Self {
             min_views: 3,
-            max_box_deviation_px: 50.0,
-            min_parallax_deg: 0.0,
-            birth_parallax_deg: 10.0,
+            max_box_deviation_px: NotNegative::literal(50.0),
+            min_parallax_deg: Degrees::literal(0.0),
+            birth_parallax_deg: Degrees::literal(10.0),
             initialiser: Arc::new(Svd::default()),
             refinements: 5,
         }

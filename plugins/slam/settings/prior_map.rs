@@ -4,7 +4,7 @@ use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::Frame;
 use manifactor_config::{Errors, Fault, Node, Placed};
 use manifactor_geometry::Se3;
-use manifactor_graph::checked::{not_negative, positive};
+use manifactor_graph::checked::{NotNegative, Positive};
 use manifactor_graph::loss::{Cauchy, Loss};
 use manifactor_graph::{Direction, Noise};
 use schemars::JsonSchema;
@@ -23,13 +23,11 @@ pub struct PriorMapSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<Se3>,
     /// How many times as far off its objects may be as their covariances say: a detector's errors last for many frames.
-    #[serde(default = "sigma_scale", deserialize_with = "positive")]
-    #[schemars(extend("exclusiveMinimum" = 0))]
-    pub sigma_scale: f64,
+    #[serde(default = "sigma_scale")]
+    pub sigma_scale: Positive,
     /// How far off they may be besides, in rad and as a part of their size: what is no ellipsoid is another one from each side.
-    #[serde(default = "shape_error", deserialize_with = "not_negative")]
-    #[schemars(range(min = 0))]
-    pub shape_error: f64,
+    #[serde(default = "shape_error")]
+    pub shape_error: NotNegative,
     /// How much of a large error of them counts. Default: Cauchy's, as things are moved.
     #[serde(default = "loss")]
     pub loss: Arc<dyn Loss>,
@@ -43,12 +41,12 @@ pub struct PriorMapSettings {
     pub(crate) read_from: Option<Placed<PathBuf>>,
 }
 
-fn sigma_scale() -> f64 {
-    2.5
+fn sigma_scale() -> Positive {
+    Positive::literal(2.5)
 }
 
-fn shape_error() -> f64 {
-    0.3
+fn shape_error() -> NotNegative {
+    NotNegative::literal(0.3)
 }
 
 fn loss() -> Arc<dyn Loss> {
@@ -96,7 +94,7 @@ impl PriorMapSettings {
     /// An object of the map, known as well as it is trusted. What is written again is the object as it was read: who reads that has a trust
     /// of its own.
     pub(crate) fn trusted(&self, object: &PriorObject) -> PriorObject {
-        object.trusted(self.sigma_scale, self.shape_error)
+        object.trusted(*self.sigma_scale, *self.shape_error)
     }
 
     /// The map with its objects as they are trusted.

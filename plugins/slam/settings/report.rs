@@ -1,4 +1,4 @@
-use manifactor_graph::checked::at_most;
+use manifactor_graph::checked::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -10,13 +10,11 @@ pub struct ReportSettings {
     pub covariances: bool,
     /// How many images are drawn with their boxes, measured and estimated; spread over all frames where objects are seen.
     /// At most 1000: the page of the run holds all of them.
-    #[serde(deserialize_with = "at_most::<1000, _>")]
-    #[schemars(extend("maximum" = 1000))]
-    pub images: usize,
+    pub images: Count<0, 1000>,
 }
 
 impl Default for ReportSettings {
     fn default() -> Self {
-        Self { covariances: false, images: 4 }
+        Self { covariances: false, images: Count::literal(4) }
     }
 }

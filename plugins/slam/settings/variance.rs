@@ -1,4 +1,4 @@
-use manifactor_graph::checked::not_negative;
+use manifactor_graph::checked::NotNegative;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
@@ -11,9 +11,7 @@ pub struct VarianceSettings {
     /// Most estimates of the noise, each followed by a solve.
     pub rounds: NonZeroUsize,
     /// The last round is the one after which no standard deviation changes by more than this share.
-    #[serde(deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub tolerance: f64,
+    pub tolerance: NotNegative,
     /// Which boxes have a noise in common. Noises of several groups are drawn towards each other, as far as chance explains that they differ.
     pub boxes: BoxGroups,
     /// Whether the noise of a box may grow with its width and height.
@@ -33,7 +31,7 @@ impl Default for VarianceSettings {
         let rounds = NonZeroUsize::MIN.saturating_add(9);
         Self {
             rounds,
-            tolerance: 0.02,
+            tolerance: NotNegative::literal(0.02),
             boxes: BoxGroups::All,
             size: false,
             correlation: true,

@@ -59,7 +59,7 @@ fn scores(report: &VariantReport) -> IdentityScores {
 
 /// The names of all boxes as they come, by this association.
 fn names(settings: &Settings, sequence: &Sequence) -> Vec<Option<ObjectId>> {
-    let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), settings);
     sequence.observations().flat_map(|frame| mapper.take(&frame).unwrap().names).collect()
 }
 
@@ -113,7 +113,7 @@ fn an_eye_that_is_shut_for_a_while_knows_the_objects_again() {
 fn a_detector_gone_mad_is_borne() {
     let (settings, sequence) = scene(&["source.detector.false_boxes=250", "source.trajectory.frames=40"]);
     assert!(sequence.detections.len() > 10_000);
-    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), &settings);
     let mut named = BTreeSet::new();
     for frame in sequence.observations() {
         let report = mapper.take(&frame).unwrap();
@@ -182,7 +182,7 @@ impl Associator for Twofold {
 fn found_out(merges: bool) -> usize {
     let (settings, sequence) = scene(&[]);
     let (given, twofold) = (by(&settings, Given {}), by(&settings, Twofold::new(merges)));
-    let mut mapper = Mapper::new(sequence.opening(), &twofold).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), &twofold);
     let mut most = 0;
     for frame in sequence.observations() {
         let report = mapper.take(&frame).unwrap();
@@ -192,7 +192,7 @@ fn found_out(merges: bool) -> usize {
         // it is corrected with the next frame
         assert_eq!((merged, moved), (merges && report.frame == 121, !merges && report.frame == 121));
     }
-    let mut expected = Mapper::new(sequence.opening(), &given).unwrap();
+    let mut expected = Mapper::new(sequence.opening(), &given);
     sequence.observations().for_each(|frame| drop(expected.take(&frame).unwrap()));
     let boxes = |mapper: &Mapper| {
         let all = &mapper.measurements().objects;
@@ -237,9 +237,9 @@ fn what_is_named_wrongly_in_a_crowd_is_mended_while_frames_come_and_when_no_othe
     let crowd =
         ["source.scene.classes=[\"bottle\"]", "source.scene.area=[1.2,1.2]", "source.trajectory.frames=250"];
     let (settings, sequence) = scene(&crowd);
-    let never = by(&settings, Likelihood { second_look_s: 1e9, ..Likelihood::default() });
+    let never = by(&settings, Likelihood { second_look_s: Positive::literal(1e9), ..Likelihood::default() });
     let moved = |settings: &Settings| {
-        let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
+        let mut mapper = Mapper::new(sequence.opening(), settings);
         let come =
             sequence.observations().map(|frame| mapper.take(&frame).unwrap().moved.len()).sum::<usize>();
         let settled = mapper.settle();
@@ -262,7 +262,7 @@ fn what_is_named_wrongly_in_a_crowd_is_mended_while_frames_come_and_when_no_othe
 fn what_the_last_frame_teaches_is_corrected_in_the_end() {
     let (settings, sequence) = scene(&[]);
     let twofold = Twofold { found_out_at: sequence.frames.len() - 1, ..Twofold::new(true) };
-    let mut mapper = Mapper::new(sequence.opening(), &by(&settings, twofold)).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), &by(&settings, twofold));
     sequence.observations().for_each(|frame| drop(mapper.take(&frame).unwrap()));
     let both = mapper.mapped();
     assert!(!mapper.settle().merged.is_empty());
@@ -302,7 +302,7 @@ fn depths_place_objects_at_once_and_tell_what_moves() {
         (scores(&estimate(&settings, &measured)).f1, scores(&estimate(&without, &sequence)).f1);
     assert!(f1 > f1_without - 0.01, "{f1} {f1_without}");
     let born = |settings: &Settings, sequence: &Sequence| {
-        let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
+        let mut mapper = Mapper::new(sequence.opening(), settings);
         sequence.observations().take(20).map(|frame| mapper.take(&frame).unwrap().born.len()).sum::<usize>()
     };
     let (early, late) = (born(&settings, &measured), born(&without, &sequence));

@@ -94,7 +94,7 @@ fn cpu_seconds() -> f64 {
 
 /// Maps landmarks by their ids.
 fn drive(steps: &[Step], steering: Option<&Noise>) -> Driven {
-    let session = Session::new(Settings::default()).unwrap();
+    let session = Session::new(Settings::default());
     let mut driven = Driven { session, newest: vec![], odometry: vec![], times: vec![], gaps: vec![] };
     let (mut pose, mut alone) = (Se2::identity(), Se2::identity());
     for (i, Step { odometry, seen }) in steps.iter().enumerate() {

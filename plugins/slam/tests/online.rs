@@ -118,7 +118,7 @@ fn mapped(mapper: &mut Mapper) -> String {
 }
 
 fn take_all(settings: &Settings, sequence: &Sequence) -> Mapper {
-    let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), settings);
     for observation in sequence.observations() {
         mapper.take(&observation).unwrap();
     }
@@ -152,7 +152,7 @@ fn the_same_frames_give_the_same_bits() {
 fn a_frame_that_cannot_be_taken_leaves_no_trace() {
     let (settings, sequence) = scene(DESK);
     let mut expected = take_all(&settings, &sequence);
-    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), &settings);
     for (i, observation) in sequence.observations().enumerate() {
         let mut bad = observation.clone();
         bad.frame.world_from_camera.translation.x = f64::NAN;
@@ -171,7 +171,7 @@ fn a_frame_that_cannot_be_taken_leaves_no_trace() {
 fn a_rule_without_up_is_refused_at_the_first_frame() {
     let (settings, mut sequence) = scene(DESK);
     sequence.up = None;
-    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), &settings);
     let first: Observation = sequence.observations().next().unwrap();
     let error = mapper.take(&first).unwrap_err().to_string();
     assert!(error.contains("set `[gravity]`"), "{error}");
@@ -190,7 +190,7 @@ fn an_object_of_several_things_is_taken_out_again_and_does_not_come_back() {
         let bounds = detection.bounding_box.bounds();
         detection.bounding_box.xmax = bounds[0] + 4.0 * (bounds[2] - bounds[0]);
     }
-    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), &settings);
     let (mut born, mut withdrawn) = (vec![], vec![]);
     for observation in sequence.observations() {
         let report = mapper.take(&observation).unwrap();
@@ -214,7 +214,7 @@ fn an_object_whose_class_changes_gets_the_factors_of_the_other() {
         let (class, score) = if detection.frame < 40 { ("cup", 0.3) } else { ("book", 0.9) };
         detection.scores = ClassScores::single(class, score);
     }
-    let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), &settings);
     let revised: usize = sequence.observations().map(|o| mapper.take(&o).unwrap().revised.len()).sum();
     assert!(revised >= 1);
     let (graph, _) = mapper.session().graph();
@@ -228,7 +228,7 @@ fn an_object_whose_class_changes_gets_the_factors_of_the_other() {
 fn a_window_keeps_objects_and_lets_poses_go() {
     for window in ["{ poses = 12 }", "{ seconds = 1.0 }"] {
         let (settings, sequence) = scene(&format!("{DESK}\n[online]\nwindow = {window}"));
-        let mut mapper = Mapper::new(sequence.opening(), &settings).unwrap();
+        let mut mapper = Mapper::new(sequence.opening(), &settings);
         for observation in sequence.observations() {
             let report = mapper.take(&observation).unwrap();
             assert_eq!(report.refused, Vec::<String>::new(), "{window}");
@@ -325,7 +325,7 @@ fn a_frame_that_is_refused_does_not_say_which_way_is_up() {
         pushed.push(observation);
     }
     let mut expected = take_all(&settings, &pushed);
-    let mut mapper = Mapper::new(pushed.opening(), &settings).unwrap();
+    let mut mapper = Mapper::new(pushed.opening(), &settings);
     for observation in pushed.observations() {
         mapper.take(&observation).unwrap();
         let mut bad = observation.clone();
@@ -400,7 +400,7 @@ fn keeps_shapes(settings: &Settings) {
         detections: sequence.detections.iter().map(|d| Detection { object: None, ..d.clone() }).collect(),
         ..sequence
     };
-    let mut mapper = Mapper::new(sequence.opening(), settings).unwrap();
+    let mut mapper = Mapper::new(sequence.opening(), settings);
     let mut most = 0;
     for observation in sequence.observations() {
         let report = mapper.take(&observation).unwrap();

@@ -30,8 +30,7 @@ pub fn prior_map(data: &[u8]) {
     let document = Document::parse(&name, text, Format::Toml).unwrap_or_else(|e| panic!("{e}"));
     let run = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
     let settings = &run.variants[0].settings;
-    let mut mapper =
-        Mapper::new(Opening::new(super::stream::camera()), settings).unwrap_or_else(|e| panic!("{e}"));
+    let mut mapper = Mapper::new(Opening::new(super::stream::camera()), settings);
     for timestamp in [0.0, 1.0] {
         let frame = Frame { timestamp, world_from_camera: Se3::identity() };
         let observation = Observation { frame, detections: vec![], accelerometer: vec![], unused: vec![] };

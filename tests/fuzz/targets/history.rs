@@ -22,7 +22,7 @@ pub fn history(data: &[u8]) {
     let settings = written.and_then(|line| serde_json::from_str(line.strip_prefix("settings")?).ok());
     let mut settings: Settings = settings.unwrap_or_default();
     settings.passes = settings.passes.min(PASSES);
-    let Ok(session) = Session::new(settings) else { return };
+    let session = Session::new(settings);
     let mut own = Smoother::new(session);
     // a session that has never seen the updates that failed
     let mut twin: Option<Smoother> = None;

@@ -35,7 +35,7 @@ pub fn mapper(data: &[u8]) {
     let number = text.split_whitespace().next().and_then(|word| word.parse::<usize>().ok());
     let settings = &READ[number.unwrap_or_default() % SETTINGS.len()];
     let opening = Opening::new(super::stream::camera());
-    let new = || Mapper::new(opening.clone(), settings).unwrap_or_else(|e| panic!("{e}"));
+    let new = || Mapper::new(opening.clone(), settings);
     // the second one never sees a frame that the first one refuses
     let (mut mapper, mut clean) = (new(), new());
     let mut sequence = opening.clone().into_sequence();

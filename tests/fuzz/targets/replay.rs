@@ -16,7 +16,7 @@ pub fn replay(data: &[u8]) {
     if values.len() > SOLVED || graph.factors().len() > SOLVED {
         return;
     }
-    let mut session = Session::new(Settings::default()).unwrap_or_else(|e| panic!("{e}"));
+    let mut session = Session::new(Settings::default());
     let mut steps = Replay::of(&graph, &values);
     let (mut factors, mut keys, has_poses) = (0, HashSet::new(), !steps.is_empty());
     loop {

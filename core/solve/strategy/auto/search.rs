@@ -9,6 +9,7 @@ use crate::strategy::dogleg::Dogleg;
 use crate::strategy::optimizer::Optimizer;
 use crate::strategy::start::{Given, Start};
 use manifactor_graph::catalogue::{self, Kind};
+use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Values};
 use manifactor_tree::Node;
 use std::cmp::Ordering;
@@ -16,7 +17,7 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Damping of the first step where next to none has been tried.
-const REFUSED: f64 = 1e-5;
+const REFUSED: Positive = Positive::literal(1e-5);
 
 /// Values to begin with.
 pub(crate) struct Point {
@@ -24,7 +25,7 @@ pub(crate) struct Point {
     pub cost: f64,
     pub values: Values,
     /// Damping of the first step, from where full ones have been tried.
-    pub damping: Option<f64>,
+    pub damping: Option<Positive>,
 }
 
 /// The registered starts, with their defaults, but for the values as they are given. Made once: small graphs are solved in
@@ -149,9 +150,9 @@ pub(super) fn is_minimum(termination: &Termination) -> bool {
 fn here(watch: &Watch<'_>, outcome: &Outcome, values: &Values) -> Option<Point> {
     let damping = match watch.pause? {
         _ if outcome.termination != Termination::Interrupted => return None,
-        Pause::Rise { .. } | Pause::Undefined => REFUSED,
-        Pause::Long { damping } => damping.max(DAMPING),
+        Pause::Rise { .. } | Pause::Undefined => Some(REFUSED),
+        Pause::Long { damping } => Positive::new(damping.max(*DAMPING)).ok(),
     };
     let (inactive, cost) = (outcome.inactive, outcome.final_cost);
-    Some(Point { inactive, cost, values: values.clone(), damping: Some(damping) })
+    Some(Point { inactive, cost, values: values.clone(), damping })
 }

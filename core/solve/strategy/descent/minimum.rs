@@ -5,6 +5,7 @@
 use super::Descent;
 use crate::linear::system::{dot, norm};
 use crate::outcome::{Termination, Tolerance};
+use manifactor_graph::checked::NotNegative;
 use nalgebra::DMatrix;
 
 /// Most ways on in one solve.
@@ -45,7 +46,10 @@ impl Descent<'_> {
     pub(crate) fn leave_stationary_point(&mut self, termination: &Termination) -> bool {
         let Termination::Converged { reason } = termination else { return false };
         let is_zero = *reason == Tolerance::AbsoluteCost && self.at.inactive == 0;
-        if is_zero || self.stop.relative_cost > ROUGH || self.escapes >= ESCAPES || self.gradient().is_empty()
+        if is_zero
+            || self.stop.relative_cost > NotNegative::literal(ROUGH)
+            || self.escapes >= ESCAPES
+            || self.gradient().is_empty()
         {
             return false;
         }

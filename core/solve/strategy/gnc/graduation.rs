@@ -8,6 +8,7 @@ use crate::strategy::auto::starts;
 use crate::strategy::levenberg_marquardt::LevenbergMarquardt;
 use crate::strategy::optimizer::{Optimizer, Stopping};
 use manifactor_graph::Graph;
+use manifactor_graph::checked::{NotNegative, Positive};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -44,8 +45,10 @@ impl<'a> Graduation<'a> {
         graph: Option<&'a Graph>,
         observer: &'a mut dyn Observer,
     ) -> Self {
-        let stop = Stopping { relative_cost: 1e-3, max_iterations: 10, ..Stopping::default() };
-        let inner = LevenbergMarquardt { initial_lambda: 1e-10, stop, ..Default::default() };
+        let stop =
+            Stopping { relative_cost: NotNegative::literal(1e-3), max_iterations: 10, ..Stopping::default() };
+        let inner =
+            LevenbergMarquardt { initial_lambda: Positive::literal(1e-10), stop, ..Default::default() };
         let (bounds, weights) = (gnc.bounds(problem), vec![1.0; problem.factors()]);
         Self { gnc, problem, graph, observer, bounds, costs: vec![], weights, inner, outcome: None }
     }

@@ -119,7 +119,7 @@ impl Fitter<'_> {
     fn part(&self, like: &Fitted, start: Option<Fitted>, sightings: Vec<Sighting>) -> Option<Part> {
         let first = sightings.first()?;
         let depth = (like.quadric.centroid() - first.world_from_camera.translation).norm();
-        let belief = Belief::new(first, self.camera, depth, self.settings.depth_spread);
+        let belief = Belief::new(first, self.camera, depth, *self.settings.depth_spread);
         let start = start.map_or_else(|| belief.first(), |start| start.quadric);
         let fitted = fit(&belief, start, &sightings, self.camera, &self.settings.noise())?;
         Some(Part { belief, fitted, sightings })
@@ -133,7 +133,7 @@ impl Fitter<'_> {
     fn is_good(&self, fitted: &Fitted, sightings: &[Sighting], times: f64) -> bool {
         let rows: usize = sightings.iter().map(Sighting::rows).sum();
         let errors: f64 = sightings.iter().map(|seen| self.error(fitted, seen)).sum();
-        errors <= (times * self.settings.merge_error).powi(2) * rows as f64
+        errors <= (times * *self.settings.merge_error).powi(2) * rows as f64
     }
 }
 
@@ -157,12 +157,13 @@ mod tests {
     use super::super::super::{Association, Image};
     use super::super::rail::{CAMERA, Rail, seen};
     use super::*;
+    use manifactor_graph::checked::Positive;
     use std::collections::BTreeSet;
 
     /// Tells a tracker that all boxes are of one object: every third is at `x`, the others in the middle. Returns the boxes that were moved.
     fn moved(x: f64) -> (BTreeSet<usize>, Vec<Option<ObjectId>>) {
         // no frame is old enough for a second look
-        let settings = Likelihood { second_look_s: 1e9, ..Likelihood::default() };
+        let settings = Likelihood { second_look_s: Positive::literal(1e9), ..Likelihood::default() };
         let mut tracker = settings.begin(CAMERA, &Aliases::default(), &[]);
         let mut all = vec![];
         for frame in 0..40 {

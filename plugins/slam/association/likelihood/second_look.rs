@@ -47,7 +47,7 @@ impl Past {
 impl Tracker {
     /// Looks once more at frames that are old enough by now, and moves boxes that turn out to show another object.
     pub(super) fn look_again(&mut self, now: f64, map: &dyn Map) -> Vec<Move> {
-        let (mut all, until) = (vec![], now - self.settings.second_look_s);
+        let (mut all, until) = (vec![], now - *self.settings.second_look_s);
         while let Some(past) = self.past.pop_front_if(|past| past.timestamp <= until) {
             let again = self.reconsider(&past.image(), &past.names, map);
             let Past { frame, detections, places, names, .. } = past;

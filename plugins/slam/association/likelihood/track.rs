@@ -162,12 +162,12 @@ impl Track {
         settings: &'a Likelihood,
     ) -> Option<Expected<'a>> {
         let predicted = predict(pose, &self.fitted.quadric, camera)?;
-        let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| drift * drift * seconds);
+        let [turn, shift] = [settings.drift_rad, settings.drift_m].map(|drift| *drift * *drift * seconds);
         let drift = Vector6::new(turn, turn, turn, shift, shift, shift);
         let by_drift = predicted.by_pose * Matrix6::from_diagonal(&drift) * predicted.by_pose.transpose();
         let by_quadric = predicted.by_quadric * self.fitted.covariance * predicted.by_quadric.transpose();
         let noise = settings.noise();
-        let sigma = noise.deviations(&predicted.bounding_box) * settings.lasting;
+        let sigma = noise.deviations(&predicted.bounding_box) * *settings.lasting;
         let by_detector = SMatrix::from_diagonal(&sigma.component_mul(&sigma));
         let (fitted, covariance) = (&self.fitted, by_quadric + by_drift + by_detector);
         Some(Expected { pose, fitted, settings, drift, predicted, covariance })
@@ -253,14 +253,14 @@ impl Expected<'_> {
         by_pose.rows_mut(0, SIDES).copy_from(&self.predicted.by_pose);
         by_object.rows_mut(0, SIDES).copy_from(&self.predicted.by_quadric);
         let noise = self.settings.noise();
-        let sides = noise.deviations(&self.predicted.bounding_box) * self.settings.lasting;
+        let sides = noise.deviations(&self.predicted.bounding_box) * *self.settings.lasting;
         (0..SIDES).for_each(|i| by_detector[(i, i)] = sides[i] * sides[i]);
         let mut first = SIDES;
         for measurement in quantities.iter() {
             let Some(innovation) = measurement.innovation(self.pose, &self.fitted.quadric) else {
                 return f64::INFINITY;
             };
-            let sigma = measurement.deviations(&noise.others, &innovation.residual) * self.settings.lasting;
+            let sigma = measurement.deviations(&noise.others, &innovation.residual) * *self.settings.lasting;
             for i in 0..innovation.rows {
                 all[first] = innovation.residual[i];
                 by_pose.row_mut(first).copy_from(&innovation.by_pose.row(i));

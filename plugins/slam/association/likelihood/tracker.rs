@@ -203,7 +203,7 @@ impl Tracker {
             .iter()
             .zip(names)
             .filter_map(|(other, name)| Some((own.iou(&other.bounding_box), (*name)?)));
-        let near = named.filter(|(iou, _)| *iou >= self.settings.twin_iou);
+        let near = named.filter(|(iou, _)| *iou >= *self.settings.twin_iou);
         near.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
     }
 
@@ -212,7 +212,7 @@ impl Tracker {
         self.place(id).or_else(|| {
             // how well a measured depth is known is said by the sighting
             let depth = first.quantities.depth().unwrap_or(depth);
-            let belief = Belief::new(first, &self.camera, depth, self.settings.depth_spread);
+            let belief = Belief::new(first, &self.camera, depth, *self.settings.depth_spread);
             self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);
             Some(self.tracks.len() - 1)
         })
@@ -223,7 +223,7 @@ impl Tracker {
         let known = self.tracks.iter().filter(|track| track.place_spread() < KNOWN);
         let mut depths: Vec<f64> = known.map(|track| track.distance(pose)).collect();
         depths.sort_by(f64::total_cmp);
-        if depths.len() < FIRM { self.settings.depth } else { depths[depths.len() / 2] }
+        if depths.len() < FIRM { *self.settings.depth } else { depths[depths.len() / 2] }
     }
 
     /// Forgets objects that are seen too rarely, and those that are seen least lately where there are too many such.

@@ -120,9 +120,9 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
     };
     let error = error_of(&more.sightings).max(error_of(&fewer.sightings));
     let limit = match alike(more, fewer) {
-        alike if alike < ALIKE => settings.merge_error / STRICTER,
-        alike if alike > SAME && more.is_where(fewer) => settings.merge_error * LOOSER,
-        _ => settings.merge_error,
+        alike if alike < ALIKE => *settings.merge_error / STRICTER,
+        alike if alike > SAME && more.is_where(fewer) => *settings.merge_error * LOOSER,
+        _ => *settings.merge_error,
     };
     if error > limit * limit {
         return None;

@@ -7,7 +7,7 @@ use crate::estimate::Estimate;
 use crate::mapping::{Mapping, frame_of};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
-use manifactor_graph::checked::{NotPositive, Positive};
+use manifactor_graph::checked::{OutOfDomain, Positive};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{FactorEntry, Key};
@@ -38,7 +38,7 @@ pub enum VarianceError {
     Noise(#[from] NoiseError),
     /// A correlation time that is zero or not finite.
     #[error("the correlation time of the boxes: {0}")]
-    CorrelationTime(#[from] NotPositive),
+    CorrelationTime(#[from] OutOfDomain),
     /// A graph without some of the objects is none.
     #[error("the variance components cannot be estimated: {0}")]
     Compile(#[from] CompileError),

@@ -9,6 +9,7 @@ use super::components::{Measures, VarianceError, measures};
 use crate::estimate::refine::{alone, roughly};
 use crate::mapping::Mapping;
 use manifactor_geometry::Se3;
+use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_quadric::DualQuadric;
 use manifactor_solve::{CompileError, Optimizer, Problem, Silent, solve};
@@ -124,7 +125,9 @@ impl Fold {
         for place in &self.motions {
             factors[*place].noise = noise.clone();
         }
-        let poses = solve(&graph, &self.start, &roughly(ITERATIONS, SETTLED), &mut Silent)?.values;
+        let poses =
+            solve(&graph, &self.start, &roughly(ITERATIONS, NotNegative::literal(SETTLED)), &mut Silent)?
+                .values;
         let gains = self.left_out.iter().map(|object| Ok(object.cost(&poses, shapes)? - object.before));
         gains.collect()
     }
@@ -148,7 +151,7 @@ impl LeftOut {
         let Ok(shape) = shapes.get::<DualQuadric>(&self.key) else { return Ok(0.0) };
         let (graph, values) = alone(&self.key, *shape, self.entries.iter(), poses);
         let mut problem = Problem::compile(&graph, &values)?;
-        roughly(ITERATIONS, SETTLED).descend(&mut problem, &mut Silent);
+        roughly(ITERATIONS, NotNegative::literal(SETTLED)).descend(&mut problem, &mut Silent);
         let states = problem.inspect();
         let boxes = states.iter().filter(|state| {
             let entry = self.entries.get(state.entry);

@@ -55,14 +55,14 @@ impl Simulated {
         for object in &scene.objects {
             let rng = &mut before.boxes;
             let (wrong, other) = (
-                rng.random_bool(self.detector.misclassified),
+                rng.random_bool(*self.detector.misclassified),
                 noise::another(&object.truth.class, &classes, rng),
             );
             usual.push(if wrong { other } else { object.truth.class.as_str() });
         }
         let mut detections = vec![];
         for (frame, pose) in poses.iter().enumerate() {
-            let time = frame as f64 * self.trajectory.interval;
+            let time = frame as f64 * *self.trajectory.interval;
             let there = (0..usual.len()).map(|i| scene.at(i, time));
             let solids = there.map(|o| (&o.solid, pose.between(&o.truth.world_from_object)));
             let depths = self.detector.occluded_by_objects.then(|| DepthImage::new(solids, &self.camera));
@@ -98,7 +98,7 @@ impl Simulated {
     ) -> Option<Seen> {
         let objects = lasting.len();
         let (noise, seconds) = &mut lasting[i];
-        *seconds += self.trajectory.interval;
+        *seconds += *self.trajectory.interval;
         let world_from_object = &object.truth.world_from_object;
         let Boxes { whole, inside } = object.solid.boxes(world_from_object, &self.camera, view.pose)?;
         let left = view.depths.as_ref().map_or(Some((inside, 1.0)), |depths| depths.left_of(i, inside));
@@ -108,7 +108,7 @@ impl Simulated {
         let drawn = self.detector.draw(&seen, visible, &self.camera, (noise, *seconds), boxes);
         *seconds = 0.0;
         let scores = self.detector.classify(usual, classes, boxes);
-        let taken_for = noise::mistaken(self.detector.wrong_object, i, objects, mistakes);
+        let taken_for = noise::mistaken(*self.detector.wrong_object, i, objects, mistakes);
         let away = view.pose.inverse().act(&world_from_object.translation).z;
         let quantities = self.detector.measure(away, depths);
         let bounding_box = drawn.filter(|_| left.is_some())?;

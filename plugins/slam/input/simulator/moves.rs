@@ -50,13 +50,13 @@ impl SceneSettings {
         let mut rng = Pcg64::from_rng(&mut rng);
         let mut placed: Vec<_> = objects.iter().map(footprint).collect();
         let (mut left, mut moved): (Vec<usize>, _) = ((0..objects.len()).collect(), BTreeMap::new());
-        for id in objects.len()..objects.len() + (self.moved * objects.len() as f64).round() as usize {
+        for id in objects.len()..objects.len() + (*self.moved * objects.len() as f64).round() as usize {
             let object = left.swap_remove(rng.random_range(0..left.len()));
             let elsewhere = self.elsewhere(&objects[object], id, &placed, &mut rng)?;
             placed[object] = footprint(&elsewhere);
             moved.insert(object, elsewhere);
         }
-        Ok(Scene { objects, moved, moved_at_s: self.moved_at_s })
+        Ok(Scene { objects, moved, moved_at_s: *self.moved_at_s })
     }
 
     /// The same object under another number, apart from where it and all others are, turned about the vertical.
@@ -95,21 +95,22 @@ mod tests {
     use super::super::Simulated;
     use super::*;
     use crate::input::sequence::{Detection, Sequence};
+    use manifactor_graph::checked::{NotNegative, Share};
 
     /// A third of the objects is put elsewhere after 10 of 20 seconds.
     fn moving() -> Simulated {
         let mut settings = Simulated::default();
-        settings.scene.area = [3.0, 2.4];
-        settings.scene.moved = 1.0 / 3.0;
-        settings.scene.moved_at_s = 10.0;
+        settings.scene.area = [NotNegative::literal(3.0), NotNegative::literal(2.4)];
+        settings.scene.moved = Share::literal(1.0 / 3.0);
+        settings.scene.moved_at_s = NotNegative::literal(10.0);
         settings.detector.depth_error = Some(manifactor_graph::checked::Positive::literal(0.02));
-        settings.detector.noise_lasts_s = 0.5;
+        settings.detector.noise_lasts_s = NotNegative::literal(0.5);
         settings
     }
 
     fn still(settings: &Simulated) -> Simulated {
         let mut settings = settings.clone();
-        settings.scene.moved = 0.0;
+        settings.scene.moved = Share::literal(0.0);
         settings
     }
 
@@ -120,12 +121,17 @@ mod tests {
     #[test]
     fn a_share_is_put_where_nothing_is() {
         for seed in 1..=20 {
-            let settings = SceneSettings { seed, moved: 0.4, area: [3.0, 2.4], ..SceneSettings::default() };
+            let settings = SceneSettings {
+                seed,
+                moved: Share::literal(0.4),
+                area: [NotNegative::literal(3.0), NotNegative::literal(2.4)],
+                ..SceneSettings::default()
+            };
             let scene = settings.scene().unwrap();
             assert_eq!(scene.moved.len(), 6);
             let apart = |a: &SceneObject, b: &SceneObject| {
                 let [(a, r), (b, s)] = [a, b].map(footprint);
-                (a - b).norm() - r - s > settings.gap - 1e-9
+                (a - b).norm() - r - s > *settings.gap - 1e-9
             };
             let all: Vec<_> = (0..15).map(|i| scene.at(i, 0.0)).collect();
             for (i, object) in all.iter().enumerate() {
@@ -139,7 +145,7 @@ mod tests {
                 assert_eq!((&moved.truth.class, &moved.solid), (&before.truth.class, &before.solid));
                 let [up, was] = [moved, before].map(|o| o.truth.world_from_object.rotation.inverse());
                 assert!((up.act(&Vector3::z()) - was.act(&Vector3::z())).norm() < 1e-9);
-                assert!((moved.truth.bounding_box.min.z - settings.height).abs() < 1e-9);
+                assert!((moved.truth.bounding_box.min.z - *settings.height).abs() < 1e-9);
             }
         }
     }
@@ -172,7 +178,7 @@ mod tests {
     fn the_truth_is_what_is_there_in_some_image() {
         let ids = |at: f64| {
             let mut settings = moving();
-            settings.scene.moved_at_s = at;
+            settings.scene.moved_at_s = NotNegative::new(at).unwrap();
             truth(&settings.simulate().unwrap()).iter().map(|object| object.id.0).collect::<Vec<_>>()
         };
         let [first, middle, never] = [0.0, 19.9, 20.0].map(ids);

@@ -3,7 +3,7 @@ use crate::input::measurement::{Depth, Quantities};
 use crate::input::sequence::ClassScores;
 use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
-use manifactor_graph::checked::Positive;
+use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::{Vector3, Vector6};
 use rand::RngExt;
@@ -19,16 +19,20 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct MotionNoise {
     /// Standard deviation as a share of the translation.
-    pub translation: f64,
+    pub translation: NotNegative,
     /// Standard deviation as a share of the rotation.
-    pub rotation: f64,
+    pub rotation: NotNegative,
     /// What the share is of.
     pub spread: Spread,
 }
 
 impl Default for MotionNoise {
     fn default() -> Self {
-        Self { translation: 0.05, rotation: 0.15, spread: Spread::default() }
+        Self {
+            translation: NotNegative::literal(0.05),
+            rotation: NotNegative::literal(0.15),
+            spread: Spread::default(),
+        }
     }
 }
 
@@ -52,8 +56,8 @@ fn normal(rng: &mut Pcg64) -> f64 {
 impl MotionNoise {
     /// A relative pose as it is measured.
     pub(super) fn corrupt(&self, motion: &Se3, rng: &mut Pcg64) -> Se3 {
-        let turn = self.sigmas(&motion.rotation.log(), self.rotation);
-        let shift = self.sigmas(&motion.translation, self.translation);
+        let turn = self.sigmas(&motion.rotation.log(), *self.rotation);
+        let shift = self.sigmas(&motion.translation, *self.translation);
         let sigmas = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
         motion.retract(&Vector6::from_iterator(sigmas.into_iter().map(|s| s * normal(rng))))
     }
@@ -71,14 +75,14 @@ impl MotionNoise {
 #[serde(deny_unknown_fields, default)]
 pub struct AccelerometerNoise {
     /// Standard deviation of each axis, in m/s².
-    pub sigma: f64,
+    pub sigma: NotNegative,
     /// Standard deviation of the offset of each axis, in m/s².
-    pub bias: f64,
+    pub bias: NotNegative,
 }
 
 impl Default for AccelerometerNoise {
     fn default() -> Self {
-        Self { sigma: 0.1, bias: 0.05 }
+        Self { sigma: NotNegative::literal(0.1), bias: NotNegative::literal(0.05) }
     }
 }
 
@@ -88,7 +92,7 @@ const GRAVITY: f64 = 9.81;
 impl AccelerometerNoise {
     /// What it reads at each pose, in the camera's frame: up, and its own acceleration, by differences over `interval` seconds.
     pub(super) fn read(&self, poses: &[Se3], interval: f64, rng: &mut Pcg64) -> Vec<Vector3<f64>> {
-        let bias = Vector3::from_fn(|_, _| self.bias * normal(rng));
+        let bias = Vector3::from_fn(|_, _| *self.bias * normal(rng));
         let at = |i: usize| poses[i.min(poses.len() - 1)].translation;
         let reading = |i: usize| {
             // at both ends, that of the pose beside; of two poses nobody can tell
@@ -96,7 +100,7 @@ impl AccelerometerNoise {
             let moved = at(middle + 1) - at(middle) * 2.0 + at(middle - 1);
             let moved = if poses.len() < 3 { Vector3::zeros() } else { moved };
             let felt = Vector3::z() * GRAVITY + moved / interval.powi(2);
-            let noise = Vector3::from_fn(|_, _| self.sigma * normal(rng));
+            let noise = Vector3::from_fn(|_, _| *self.sigma * normal(rng));
             poses[i].rotation.inverse().act(&felt) + bias + noise
         };
         (0..poses.len()).map(reading).collect()
@@ -109,31 +113,31 @@ impl AccelerometerNoise {
 pub struct Detector {
     /// Standard deviation of each side of a box, in pixels. The paper says a variance of 4 px², its
     /// authors' code draws with 2 px: the same.
-    pub sigma_px: f64,
+    pub sigma_px: NotNegative,
     /// What the noise has besides, as a part of width and height; the two add up as squares.
-    pub sigma_of_size: f64,
+    pub sigma_of_size: NotNegative,
     /// For how long the noise of an object's boxes lasts, in seconds: after that time 1/e of it is left. 0 for new noise in each frame.
-    pub noise_lasts_s: f64,
+    pub noise_lasts_s: NotNegative,
     /// Boxes of nothing in an image, on average.
-    pub false_boxes: f64,
+    pub false_boxes: NotNegative,
     /// Boxes with a side shorter than this are not seen, in pixels.
-    pub min_size_px: f64,
+    pub min_size_px: NotNegative,
     /// Objects of which less than this share is in the image are not seen.
-    pub min_visible: f64,
+    pub min_visible: Share,
     /// Rate at which a box is not there.
-    pub missed: f64,
+    pub missed: Share,
     /// Rate at which something hides a part of an object: its box loses part of one side.
-    pub occluded: f64,
+    pub occluded: Share,
     /// By how much of its width or height such a box shrinks, at most.
-    pub occlusion: f64,
+    pub occlusion: Share,
     /// Whether nearer objects hide what is behind them: a box is around what is left to see, to four pixels or a thousandth of the image, and `min_visible` is about it.
     pub occluded_by_objects: bool,
     /// Rate at which a box is put to another object of the scene: a tracker's mistake.
-    pub wrong_object: f64,
+    pub wrong_object: Share,
     /// Share of the objects that are taken for another class in most of their images.
-    pub misclassified: f64,
+    pub misclassified: Share,
     /// Rate at which a box has another class than the object's usual.
-    pub confused: f64,
+    pub confused: Share,
     /// Standard deviation of the depths of objects' centres that come with their boxes, as a part of the depth. Default: none come.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth_error: Option<Positive>,
@@ -142,19 +146,19 @@ pub struct Detector {
 impl Default for Detector {
     fn default() -> Self {
         Self {
-            sigma_px: 2.0,
-            sigma_of_size: 0.0,
-            noise_lasts_s: 0.0,
-            false_boxes: 0.0,
-            min_size_px: 8.0,
-            min_visible: 0.3,
-            missed: 0.0,
-            occluded: 0.0,
-            occlusion: 0.4,
+            sigma_px: NotNegative::literal(2.0),
+            sigma_of_size: NotNegative::literal(0.0),
+            noise_lasts_s: NotNegative::literal(0.0),
+            false_boxes: NotNegative::literal(0.0),
+            min_size_px: NotNegative::literal(8.0),
+            min_visible: Share::literal(0.3),
+            missed: Share::literal(0.0),
+            occluded: Share::literal(0.0),
+            occlusion: Share::literal(0.4),
             occluded_by_objects: false,
-            wrong_object: 0.0,
-            misclassified: 0.0,
-            confused: 0.0,
+            wrong_object: Share::literal(0.0),
+            misclassified: Share::literal(0.0),
+            confused: Share::literal(0.0),
             depth_error: None,
         }
     }
@@ -173,12 +177,16 @@ impl Detector {
         rng: &mut Pcg64,
     ) -> Option<BoundingBox> {
         // the same draws for each box, seen or not: one setting changes nothing but its own effect
-        let (missed, hidden) = (rng.random_bool(self.missed), rng.random_bool(self.occluded));
-        let (side, share) = (rng.random_range(0..4), rng.random::<f64>() * self.occlusion);
-        let left = if self.noise_lasts_s > 0.0 { (-seconds / self.noise_lasts_s).exp() } else { 0.0 };
+        let (missed, hidden) = (rng.random_bool(*self.missed), rng.random_bool(*self.occluded));
+        let (side, share) = (rng.random_range(0..4), rng.random::<f64>() * *self.occlusion);
+        let left = if self.noise_lasts_s > NotNegative::literal(0.0) {
+            (-seconds / *self.noise_lasts_s).exp()
+        } else {
+            0.0
+        };
         noise.iter_mut().for_each(|n| *n = left * *n + (1.0 - left * left).sqrt() * normal(rng));
         let (width, height) = (bounding_box.width(), bounding_box.height());
-        let sigma = [width, height].map(|size| self.sigma_px.hypot(self.sigma_of_size * size));
+        let sigma = [width, height].map(|size| self.sigma_px.hypot(*self.sigma_of_size * size));
         let mut b = bounding_box.bounds();
         if hidden {
             let extent = b[side % 2 + 2] - b[side % 2];
@@ -190,13 +198,13 @@ impl Detector {
             let (low, high) = (b[axis].min(b[axis + 2]), b[axis].max(b[axis + 2]));
             (b[axis], b[axis + 2]) = (low.clamp(0.0, size[axis]), high.clamp(0.0, size[axis]));
         }
-        let large = b[2] - b[0] >= self.min_size_px && b[3] - b[1] >= self.min_size_px;
-        (!missed && large && visible >= self.min_visible).then(|| BoundingBox::new(b).ok()).flatten()
+        let large = b[2] - b[0] >= *self.min_size_px && b[3] - b[1] >= *self.min_size_px;
+        (!missed && large && visible >= *self.min_visible).then(|| BoundingBox::new(b).ok()).flatten()
     }
 
     /// What it takes an object for whose usual class is this.
     pub(super) fn classify(&self, usual: &str, classes: &[&str], rng: &mut Pcg64) -> ClassScores {
-        let (confused, score) = (rng.random_bool(self.confused), rng.random_range(0.5..1.0));
+        let (confused, score) = (rng.random_bool(*self.confused), rng.random_range(0.5..1.0));
         let other = another(usual, classes, rng);
         ClassScores::single(if confused { other } else { usual }, score)
     }
@@ -218,7 +226,7 @@ impl Detector {
         classes: &[&str],
         rng: &mut Pcg64,
     ) -> Vec<(BoundingBox, ClassScores)> {
-        let count = Poisson::new(self.false_boxes).map_or(0, |poisson| poisson.sample(rng) as usize);
+        let count = Poisson::new(*self.false_boxes).map_or(0, |poisson| poisson.sample(rng) as usize);
         let size = camera.size();
         let mut one = || {
             let mut ends = |length: f64| {

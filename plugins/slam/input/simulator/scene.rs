@@ -4,6 +4,7 @@ use super::catalogue::{KINDS, kind};
 use super::solid::Solid;
 use crate::input::sequence::{ObjectId, TrueObject};
 use manifactor_geometry::{Se3, So3};
+use manifactor_graph::checked::{Count, Finite, NotNegative, Share};
 use manifactor_quadric::Box3;
 use nalgebra::Vector3;
 use rand::RngExt;
@@ -11,6 +12,7 @@ use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use std::ops::Deref;
 
 /// Which objects there are: classes at random, at random places of a rectangle, apart from each other.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -19,50 +21,49 @@ pub struct SceneSettings {
     /// What the scene depends on, and nothing else does.
     pub seed: u64,
     /// How many objects: at most ten thousand, as each is placed apart from all others.
-    pub objects: usize,
+    pub objects: Count<0, 10_000>,
     /// Their classes, in turn; all that are known, where none is given.
     pub classes: Vec<String>,
     /// Extents of the rectangle, in metres; its centre is the origin.
-    pub area: [f64; 2],
+    pub area: [NotNegative; 2],
     /// Height of the plane that they rest on, in metres.
-    pub height: f64,
+    pub height: Finite,
     /// Least distance between the outlines of two objects, seen from above, in metres.
-    pub gap: f64,
+    pub gap: NotNegative,
     /// Sizes vary by up to this share.
-    pub size_variation: f64,
+    pub size_variation: Share,
     /// Share of the objects that lean or lie otherwise than usual.
-    pub tilted: f64,
+    pub tilted: Share,
     /// By how much those are tilted, from and to, in degrees.
-    pub tilt: [f64; 2],
+    pub tilt: [Finite; 2],
     /// Share of the objects that are put elsewhere, one after the other: to a free place that is apart from their own, and turned about the vertical.
     /// Each has a new number from then on: to a map of what stands still it is another object. Default: 0.
     #[serde(skip_serializing_if = "is_zero")]
-    pub moved: f64,
+    pub moved: Share,
     /// When they are, in seconds. The truth has an object at each place where it is in some image. Default: 0, before the first image.
     #[serde(skip_serializing_if = "is_zero")]
-    pub moved_at_s: f64,
+    pub moved_at_s: NotNegative,
 }
 
 /// What is as usual is not written.
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-fn is_zero(number: &f64) -> bool {
-    *number == 0.0
+fn is_zero(number: &impl Deref<Target = f64>) -> bool {
+    **number == 0.0
 }
 
 impl Default for SceneSettings {
     fn default() -> Self {
         Self {
             seed: 1,
-            objects: 15,
+            objects: Count::literal(15),
             classes: vec![],
-            area: [2.4, 1.6],
-            height: 0.0,
-            gap: 0.05,
-            size_variation: 0.15,
-            tilted: 0.0,
-            tilt: [20.0, 90.0],
-            moved: 0.0,
-            moved_at_s: 0.0,
+            area: [NotNegative::literal(2.4), NotNegative::literal(1.6)],
+            height: Finite::literal(0.0),
+            gap: NotNegative::literal(0.05),
+            size_variation: Share::literal(0.15),
+            tilted: Share::literal(0.0),
+            tilt: [Finite::literal(20.0), Finite::literal(90.0)],
+            moved: Share::literal(0.0),
+            moved_at_s: NotNegative::literal(0.0),
         }
     }
 }
@@ -92,7 +93,7 @@ impl SceneSettings {
         let mut order: Vec<&str> = vec![];
         let mut placed: Vec<(Vector3<f64>, f64)> = vec![];
         let mut objects = vec![];
-        for id in 0..self.objects {
+        for id in 0..*self.objects {
             if order.is_empty() {
                 order.clone_from(&classes);
             }
@@ -114,10 +115,10 @@ impl SceneSettings {
             known: KINDS.iter().map(|kind| kind.class).collect(),
         })?;
         let vary = self.size_variation;
-        let solid = (kind.solid)().scaled(1.0 + vary * rng.random_range(-1.0..=1.0));
-        let tilted = rng.random_bool(self.tilted);
+        let solid = (kind.solid)().scaled(1.0 + *vary * rng.random_range(-1.0..=1.0));
+        let tilted = rng.random_bool(*self.tilted);
         let [least, most] = self.tilt;
-        let tilt = if tilted { (least + (most - least) * rng.random::<f64>()).to_radians() } else { 0.0 };
+        let tilt = if tilted { (*least + (*most - *least) * rng.random::<f64>()).to_radians() } else { 0.0 };
         let (yaw, towards) = (rng.random::<f64>() * TAU, rng.random::<f64>() * TAU);
         let lean = So3::exp(&(Vector3::new(towards.cos(), towards.sin(), 0.0) * tilt));
         let rotation = lean.compose(&So3::exp(&Vector3::new(0.0, 0.0, yaw)));
@@ -125,7 +126,7 @@ impl SceneSettings {
         let (lowest, radius) =
             turned.iter().fold((0.0_f64, 0.0_f64), |(z, r), p| (z.min(p.z), r.max(p.xy().norm())));
         let place = self.place(radius, placed, rng).ok_or(SimulationError::NoRoom { object: id })?;
-        let translation = place + Vector3::z() * (self.height - lowest);
+        let translation = place + Vector3::z() * (*self.height - lowest);
         placed.push((place, radius));
         let world_from_object = Se3::new(rotation, translation);
         let around = Box3::enclosing(turned.iter().map(|corner| corner + translation));
@@ -148,10 +149,10 @@ impl SceneSettings {
         rng: &mut Pcg64,
     ) -> Option<Vector3<f64>> {
         const TRIES: usize = 2000;
-        let [x, y] = self.area.map(|extent| extent / 2.0);
+        let [x, y] = self.area.map(|extent| *extent / 2.0);
         let anywhere =
             |rng: &mut Pcg64| Vector3::new(rng.random_range(-x..=x), rng.random_range(-y..=y), 0.0);
-        let free = |p: &Vector3<f64>| placed.iter().all(|(q, r)| (p - q).norm() >= radius + r + self.gap);
+        let free = |p: &Vector3<f64>| placed.iter().all(|(q, r)| (p - q).norm() >= radius + r + *self.gap);
         (0..TRIES).map(|_| anywhere(rng)).find(free)
     }
 }

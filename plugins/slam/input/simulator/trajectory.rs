@@ -1,5 +1,6 @@
 //! How the camera moves: on an arc around the scene, up and down, in and out, its eye on the objects.
 use manifactor_geometry::{Se3, So3};
+use manifactor_graph::checked::{Count, Finite, NotNegative, Positive};
 use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
@@ -14,32 +15,32 @@ pub struct TrajectorySettings {
     /// What the trajectory depends on, and nothing else does.
     pub seed: u64,
     /// Number of images.
-    pub frames: usize,
+    pub frames: Count<2, 1_000_000>,
     /// Time between two images, in seconds.
-    pub interval: f64,
+    pub interval: Positive,
     /// How far around it goes, in degrees.
-    pub sweep: f64,
+    pub sweep: Finite,
     /// Mean distance from the vertical axis, in metres.
-    pub radius: f64,
+    pub radius: Positive,
     /// Mean height over the plane, in metres.
-    pub height: f64,
+    pub height: Finite,
     /// By how much distance and height vary, in metres.
-    pub waves: [f64; 2],
+    pub waves: [NotNegative; 2],
     /// How far from the scene's centre the eye wanders, in metres.
-    pub wander: f64,
+    pub wander: NotNegative,
 }
 
 impl Default for TrajectorySettings {
     fn default() -> Self {
         Self {
             seed: 1,
-            frames: 200,
-            interval: 0.1,
-            sweep: 300.0,
-            radius: 2.2,
-            height: 1.1,
-            waves: [0.3, 0.3],
-            wander: 0.3,
+            frames: Count::literal(200),
+            interval: Positive::literal(0.1),
+            sweep: Finite::literal(300.0),
+            radius: Positive::literal(2.2),
+            height: Finite::literal(1.1),
+            waves: [NotNegative::literal(0.3), NotNegative::literal(0.3)],
+            wander: NotNegative::literal(0.3),
         }
     }
 }
@@ -53,19 +54,19 @@ impl TrajectorySettings {
             move |t: f64| size * (turns * TAU * t + phase).sin()
         };
         let [out, up] = self.waves;
-        let (out, up, x, y) = (wave(out), wave(up), wave(self.wander), wave(self.wander));
+        let (out, up, x, y) = (wave(*out), wave(*up), wave(*self.wander), wave(*self.wander));
         let pose = |i: usize| {
-            let t = i as f64 / (self.frames.max(2) - 1) as f64;
+            let t = i as f64 / (*self.frames - 1) as f64;
             let angle = start + self.sweep.to_radians() * t;
-            let radius = (self.radius + out(t)).max(0.1);
+            let radius = (*self.radius + out(t)).max(0.1);
             let eye = Vector3::new(
                 radius * angle.cos(),
                 radius * angle.sin(),
-                ground + (self.height + up(t)).max(0.1),
+                ground + (*self.height + up(t)).max(0.1),
             );
             looking(eye, Vector3::new(x(t), y(t), ground + 0.1))
         };
-        (0..self.frames).map(pose).collect()
+        (0..*self.frames).map(pose).collect()
     }
 }
 

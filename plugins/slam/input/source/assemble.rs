@@ -8,7 +8,7 @@ use crate::input::sequence::{
 use manifactor_config::{Document, Errors};
 use manifactor_formats::tum::{StampedPose, Trajectory};
 use manifactor_formats::{detections, tum};
-use manifactor_graph::checked::Positive;
+use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_quadric::BoundingBox;
 use std::path::Path;
 
@@ -19,19 +19,19 @@ pub(super) type Matched = (Vec<Frame>, Vec<Detection>, Vec<UnusedDetection>);
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Matching {
     /// Largest difference in time, in seconds.
-    pub within: f64,
+    pub within: NotNegative,
     /// Largest share of the detections that may be without a frame.
-    pub without_pose: f64,
+    pub without_pose: Share,
 }
 
 /// A tenth of the detections may be made where the odometry has no pose, as at the beginning of a recording.
-pub(super) fn a_tenth() -> f64 {
-    0.1
+pub(super) fn a_tenth() -> Share {
+    Share::literal(0.1)
 }
 
 /// The default is not written: fingerprints of settings stay.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-pub(super) fn is_a_tenth(share: &f64) -> bool {
+pub(super) fn is_a_tenth(share: &Share) -> bool {
     *share == a_tenth()
 }
 
@@ -41,7 +41,7 @@ pub(super) fn is_a_tenth(share: &f64) -> bool {
 /// # Errors
 /// Files that cannot be read; detections of which none has a frame.
 pub(super) fn read_matched(odometry: &Path, file: &Path, by: Matching) -> Result<Matched, SourceError> {
-    let within = by.within;
+    let within = *by.within;
     let frames = read_poses(odometry)?.into_iter();
     let frames = frames.map(|StampedPose { timestamp, pose }| Frame { timestamp, world_from_camera: pose });
     let frames: Vec<Frame> = frames.collect();
@@ -68,9 +68,9 @@ pub(super) fn read_matched(odometry: &Path, file: &Path, by: Matching) -> Result
 fn without_frame(frames: &[Frame], rows: &[detections::Detection], by: Matching) -> Option<WithoutPose> {
     let Matching { within, without_pose: allowed } = by;
     let away = |row: &detections::Detection| Some((row.timestamp, nearest(frames, row.timestamp)?.1));
-    let far: Vec<(f64, f64)> = rows.iter().filter_map(away).filter(|(_, away)| *away > within).collect();
+    let far: Vec<(f64, f64)> = rows.iter().filter_map(away).filter(|(_, away)| *away > *within).collect();
     let nearest = far.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(WithoutPose { rows: far.len(), of: rows.len(), allowed, within, nearest })
+    Some(WithoutPose { rows: far.len(), of: rows.len(), allowed: *allowed, within: *within, nearest })
 }
 
 /// The poses of a file; what had to be repaired is logged.

@@ -9,7 +9,7 @@ use crate::input::stream::Stream;
 use indexmap::IndexMap;
 use manifactor_formats::FormatError;
 use manifactor_geometry::Se3;
-use manifactor_graph::checked::within;
+use manifactor_graph::checked::Share;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::BoundingBox;
 use nalgebra::Vector3;
@@ -72,8 +72,8 @@ struct LineBox {
     bounding_box: BoundingBox,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     class: Option<String>,
-    #[serde(default = "sure", deserialize_with = "within::<0, 1, _>", skip_serializing_if = "is_sure")]
-    score: f64,
+    #[serde(default = "sure", skip_serializing_if = "is_sure")]
+    score: Share,
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     scores: IndexMap<String, f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -92,24 +92,24 @@ struct Reading {
     acceleration: Vector3<f64>,
 }
 
-fn sure() -> f64 {
-    1.0
+fn sure() -> Share {
+    Share::literal(1.0)
 }
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
-fn is_sure(score: &f64) -> bool {
-    *score >= 1.0
+fn is_sure(score: &Share) -> bool {
+    **score >= 1.0
 }
 
 /// A frame as a line that this source reads, without its end.
 pub fn line(observation: &Observation) -> String {
     let of_box = |detection: &Detection| {
         let scores: IndexMap<String, f64> = detection.scores.iter().map(|(c, s)| (c.to_owned(), s)).collect();
-        let single =
-            scores.first().filter(|_| scores.len() == 1).map(|(class, score)| (class.clone(), *score));
+        let first = scores.first().filter(|_| scores.len() == 1);
+        let single = first.and_then(|(class, score)| Some((class.clone(), Share::new(*score).ok()?)));
         LineBox {
             bounding_box: detection.bounding_box,
             scores: if single.is_some() { IndexMap::new() } else { scores },
-            score: single.as_ref().map_or(1.0, |(_, score)| *score),
+            score: single.as_ref().map_or_else(sure, |(_, score)| *score),
             class: single.map(|(class, _)| class),
             object: detection.object,
             quantities: detection.quantities.to_fields().collect(),
@@ -196,7 +196,7 @@ impl LineBox {
     }
 
     fn into_detection(self) -> Result<Detection, String> {
-        let single = self.class.map(|class| (class, self.score));
+        let single = self.class.map(|class| (class, self.score.get()));
         let scores: ClassScores = self.scores.into_iter().chain(single).collect();
         let quantities = Quantities::read(self.quantities, &FIELDS)?;
         Ok(Detection { frame: 0, object: self.object, scores, bounding_box: self.bounding_box, quantities })
@@ -336,7 +336,7 @@ impl Iterator for Lines {
 mod tests {
     use super::*;
     use crate::input::simulator::Simulated;
-    use manifactor_graph::checked::Positive;
+    use manifactor_graph::checked::{Count, Positive};
     use serde_json::json;
     use std::path::Path;
 
@@ -350,7 +350,7 @@ mod tests {
     #[test]
     fn what_is_written_as_lines_is_read_back() {
         let mut settings = Simulated::default();
-        settings.trajectory.frames = 20;
+        settings.trajectory.frames = Count::literal(20);
         settings.detector.depth_error = Some(Positive::literal(0.02));
         let sequence = settings.simulate().unwrap();
         let lines: Vec<String> = sequence.observations().map(|o| line(&o)).collect();

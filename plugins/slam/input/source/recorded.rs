@@ -3,7 +3,7 @@ use super::camera::CameraChoice;
 use super::rectification::{Distortion, Rectification};
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::Sequence;
-use manifactor_graph::checked::{not_negative, within};
+use manifactor_graph::checked::{NotNegative, Share};
 use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -45,13 +45,11 @@ pub struct Recorded {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<Direction>,
     /// How far apart in time a detection and its pose may be, in seconds.
-    #[serde(default = "exact", deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub max_time_difference: f64,
+    #[serde(default = "exact")]
+    pub max_time_difference: NotNegative,
     /// Largest expected share of detections without a pose at their time, from 0 to 1. With more, the run ends with exit code 1.
-    #[serde(default = "a_tenth", deserialize_with = "within::<0, 1, _>", skip_serializing_if = "is_a_tenth")]
-    #[schemars(range(min = 0, max = 1))]
-    pub max_without_pose: f64,
+    #[serde(default = "a_tenth", skip_serializing_if = "is_a_tenth")]
+    pub max_without_pose: Share,
 }
 
 fn odometry() -> PathBuf {
@@ -60,8 +58,8 @@ fn odometry() -> PathBuf {
 fn detections() -> PathBuf {
     "detections.csv".into()
 }
-fn exact() -> f64 {
-    1e-6
+fn exact() -> NotNegative {
+    NotNegative::literal(1e-6)
 }
 
 #[typetag::serialize(name = "recorded")]

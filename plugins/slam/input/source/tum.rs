@@ -4,7 +4,7 @@ use super::rectification::{Distortion, Rectification};
 use super::{Folders, Source, SourceError};
 use crate::input::sequence::{Acceleration, Sequence};
 use manifactor_formats::accelerometer;
-use manifactor_graph::checked::{not_negative, within};
+use manifactor_graph::checked::{NotNegative, Share};
 use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -41,20 +41,18 @@ pub struct TumRgbd {
     pub distortion: Option<Distortion>,
     /// How far apart in time a detection and its pose may be, in seconds. Time stamps are written to the
     /// microsecond: as it stands, only equal ones match.
-    #[serde(default = "exact", deserialize_with = "not_negative")]
-    #[schemars(extend("minimum" = 0))]
-    pub max_time_difference: f64,
+    #[serde(default = "exact")]
+    pub max_time_difference: NotNegative,
     /// Largest expected share of detections without a pose at their time, from 0 to 1. With more, the run ends with exit code 1.
-    #[serde(default = "a_tenth", deserialize_with = "within::<0, 1, _>", skip_serializing_if = "is_a_tenth")]
-    #[schemars(range(min = 0, max = 1))]
-    pub max_without_pose: f64,
+    #[serde(default = "a_tenth", skip_serializing_if = "is_a_tenth")]
+    pub max_without_pose: Share,
 }
 
 fn detections() -> PathBuf {
     "detections_yolov3_associated.csv".into()
 }
-fn exact() -> f64 {
-    1e-6
+fn exact() -> NotNegative {
+    NotNegative::literal(1e-6)
 }
 
 #[typetag::serialize(name = "tum")]

@@ -78,7 +78,7 @@ impl Mapper {
         // in the look that goes on
         let mut is_seen = BTreeSet::new();
         let border = self.settings.detections.border_px;
-        sights(&objects, poses, &self.camera, border, |sight| {
+        sights(&objects, poses, &self.camera, *border, |sight| {
             let Some(object) = map.object(sight.id) else { return };
             if sight.begins {
                 expected += object.looks.rate();

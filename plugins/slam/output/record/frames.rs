@@ -114,7 +114,7 @@ impl Errors {
         settings: &EvaluationSettings,
     ) -> Option<Self> {
         let truth = estimate.sequence.ground_truth.as_ref()?;
-        let pairs = associate(&truth.trajectory, poses, settings.max_time_difference).ok()?;
+        let pairs = associate(&truth.trajectory, poses, *settings.max_time_difference).ok()?;
         let (_, aligned) = align(&pairs, alignment).ok()?;
         let distance = |p: &PosePair| (p.timestamp, (p.truth.translation - p.estimate.translation).norm());
         let over = settings.relative_over.get();

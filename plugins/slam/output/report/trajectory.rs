@@ -89,7 +89,7 @@ fn aligned(
     alignment: Alignment,
     settings: &EvaluationSettings,
 ) -> Result<Vec<PosePair>, MetricsError> {
-    let pairs = associate(&truth.trajectory, estimate, settings.max_time_difference)?;
+    let pairs = associate(&truth.trajectory, estimate, *settings.max_time_difference)?;
     Ok(align(&pairs, alignment)?.1)
 }
 
@@ -97,7 +97,7 @@ fn aligned(
 fn few(report: &TrajectoryReport, settings: &EvaluationSettings) -> Option<Warning> {
     let [covered, poses] = report.covered;
     let truth = report.truth_poses;
-    let within = settings.max_time_difference;
+    let within = *settings.max_time_difference;
     (2 * covered < poses.min(truth)).then_some(Warning::FewPoses { covered, poses, truth, within })
 }
 
