@@ -2,9 +2,11 @@
 use super::{assert_alike, is_finite, temporary, third};
 use manifactor::config::{Document, Format};
 use manifactor::geometry::{Se3, So3};
+use manifactor::graph::checked::Positive;
 use manifactor::nalgebra::Vector3;
 use manifactor::online::Session;
 use manifactor::quadric::BoundingBox;
+use manifactor::slam::measurement::{Depth, Quantities};
 use manifactor::slam::online::Mapper;
 use manifactor::slam::prior_map::PriorMap;
 use manifactor::slam::run_document::RunDocument;
@@ -108,7 +110,11 @@ fn observations(text: &str) -> Vec<Observation> {
                     object: word(1).parse().ok().map(ObjectId),
                     scores: ClassScores::single(word(7), number(6)),
                     bounding_box: BoundingBox { xmin, ymin, xmax, ymax },
-                    depth: word(8).parse().ok(),
+                    quantities: word(8)
+                        .parse()
+                        .ok()
+                        .and_then(|depth| Positive::new(depth).ok())
+                        .map_or(Quantities::NONE, |depth| Quantities::one(Depth(depth))),
                 });
             }
             ("feel", Some(last)) => {
