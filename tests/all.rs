@@ -14,4 +14,3 @@ mod expression;
 mod fuzz;
 mod numbers;
 mod rooms;
-mod tables;

@@ -82,8 +82,13 @@ fn the_python_package_knows_the_facade_and_the_command_line_and_is_known_to_noth
 }
 
 #[test]
+fn the_programs_that_measure_are_known_to_nothing() {
+    assert!(users_of("manifactor-bench").is_empty());
+}
+
+#[test]
 fn every_package_has_its_place() {
-    let tops = ["cli", "manifactor", "python"];
+    let tops = ["cli", "manifactor", "python", "bench"];
     let known: Vec<_> = FOR_PLUGINS.iter().chain(&PLUGINS).chain(&tops).copied().collect();
     for (package, _) in arrows() {
         assert!(known.contains(&package.as_str()), "{package} is new: say in this test where it stands");

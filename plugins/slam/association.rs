@@ -3,11 +3,10 @@
 //! An [`Associator`] names the boxes of a frame, and learns from it once the frame is in the map. What it names wrongly at first
 //! it may mend later: two objects that turn out to be one are [merged](Merge), boxes that turn out to show another object [move](Move)
 //! to it, and [`Names`] has the name that counts.
-pub(crate) mod assignment;
+mod assignment;
 mod given;
 mod likelihood;
 mod names;
-mod overlap;
 
 use crate::input::class::Aliases;
 use crate::input::prior_map::PriorObject;
@@ -17,10 +16,10 @@ use manifactor_quadric::{Camera, DualQuadric};
 use std::fmt::Debug;
 use std::sync::Arc;
 
+pub use assignment::best_assignment;
 pub use given::Given;
 pub use likelihood::Likelihood;
 pub use names::{Merge, Move, Names};
-pub use overlap::{Iou, Projection};
 
 /// A way to associate boxes with objects.
 #[typetag::serialize(tag = "type")]

@@ -43,7 +43,6 @@ pub use crate::metrics::{Interval, bootstrap};
 pub(crate) use document::ExperimentDocument;
 pub use document::{Documents, Experiment};
 pub use journal::{Journal, JournalError};
-pub use markdown::{PageTable, page_tables, put_into};
 pub use measures::measures;
 pub use output::write;
 pub use runner::{Progress, alone, run};

@@ -16,7 +16,7 @@ use manifactor::solve::{Interrupt, Observer};
 use manifactor::viz::{experiment_page, experiment_pictures};
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Run a base config once for each cell of a grid, and put what is measured into tables.
@@ -49,10 +49,6 @@ pub(crate) struct Experiment {
     /// done, runs what is left, and writes the tables.
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// Put the table of summary.md into a page, in place of the one before: between `<!-- experiment: PATH -->`, PATH that of the document
-    /// from the page, and `<!-- end of experiment -->`. What the table was made of is noted there.
-    #[arg(long, value_name = "PAGE", conflicts_with = "shard")]
-    markdown: Option<PathBuf>,
     /// Print JSON: the summary that is also written.
     #[arg(long)]
     pub(crate) json: bool,
@@ -68,10 +64,6 @@ impl Experiment {
         }
         if let Some(shard) = self.shard {
             sweep.keep(shard);
-        }
-        // before hours are spent on what has no place
-        if let Some(page) = &self.markdown {
-            self.put_into(page, "", "")?;
         }
         let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
@@ -110,26 +102,7 @@ impl Experiment {
                 "interrupted: pictures are missing, or those of an earlier run; the same command draws them",
             );
         }
-        if let Some(page) = self.markdown.as_ref().filter(|_| summary.open == 0) {
-            write_whole(page, self.put_into(page, &sweep.digest(), &summary.markdown())?)?;
-        }
         Ok(status)
-    }
-
-    /// The page as it is now, with this table in its place.
-    fn put_into(&self, page: &Path, digest: &str, table: &str) -> Result<String, Failure> {
-        let text = std::fs::read_to_string(page)
-            .map_err(|source| Failure::File { path: page.to_owned(), source })?;
-        let beside = page.parent().unwrap_or(Path::new(""));
-        let own = self.config.canonicalize().ok();
-        let is_meant = |experiment: &str| own.is_some() && beside.join(experiment).canonicalize().ok() == own;
-        experiment::put_into(&text, is_meant, digest, table).ok_or_else(|| Failure::Input {
-            message: format!("{} has no place for the table of {}", page.display(), self.config.display()),
-            help: Some(
-                "put a line `<!-- experiment: PATH -->` there, PATH from that page to the document"
-                    .to_owned(),
-            ),
-        })
     }
 
     fn tell(&self, sweep: &Sweep, summary: &Summary) {

@@ -1,12 +1,22 @@
-//! Who goes with whom.
+//! Assignment of boxes to objects.
 use pathfinding::prelude::{Matrix, kuhn_munkres};
 
 /// Gains are compared in units of this.
 const UNIT: f64 = 1e-6;
 
-/// Matches each row with one column at most, and each column with one row, so that the sum of the gains is largest (the Hungarian
-/// method). `gains` are (row, column, gain); what is not listed, or gains nothing, is not matched.
-pub(crate) fn best(rows: usize, columns: usize, gains: &[(usize, usize, f64)]) -> Vec<Option<usize>> {
+/// Matches each row with at most one column, and each column with at most one row, so that the sum of the gains is largest
+/// (the Hungarian method).
+///
+/// `gains` are (row, column, gain), such as box, object and overlap. A pair that is not listed, or whose gain is not
+/// positive, is not matched. Gains count in units of 1e-6. Returns the column of each row.
+///
+/// ```
+/// use manifactor_slam::association::best_assignment;
+///
+/// let gains = [(0, 0, 3.0), (0, 1, 2.5), (1, 0, 2.8)];
+/// assert_eq!(best_assignment(2, 2, &gains), [Some(1), Some(0)]);
+/// ```
+pub fn best_assignment(rows: usize, columns: usize, gains: &[(usize, usize, f64)]) -> Vec<Option<usize>> {
     if rows == 0 {
         return vec![];
     }
@@ -30,9 +40,9 @@ mod tests {
 
     #[test]
     fn the_sum_counts_and_not_the_first_best() {
-        assert_eq!(best(2, 2, &[(0, 0, 3.0), (0, 1, 2.5), (1, 0, 2.8)]), [Some(1), Some(0)]);
-        assert_eq!(best(2, 1, &[(0, 0, 1.0), (1, 0, 2.0)]), [None, Some(0)]);
-        assert_eq!(best(1, 3, &[(0, 2, -1.0)]), [None]);
-        assert!(best(0, 2, &[]).is_empty());
+        assert_eq!(best_assignment(2, 2, &[(0, 0, 3.0), (0, 1, 2.5), (1, 0, 2.8)]), [Some(1), Some(0)]);
+        assert_eq!(best_assignment(2, 1, &[(0, 0, 1.0), (1, 0, 2.0)]), [None, Some(0)]);
+        assert_eq!(best_assignment(1, 3, &[(0, 2, -1.0)]), [None]);
+        assert!(best_assignment(0, 2, &[]).is_empty());
     }
 }

@@ -4,8 +4,8 @@ use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
 use manifactor_graph::checked::Positive;
 use manifactor_quadric::Camera;
-use manifactor_slam::association::{Association, Associator, Given, Image, Iou, Learned, Likelihood};
-use manifactor_slam::association::{Map, Merge, Move, Projection};
+use manifactor_slam::association::{Association, Associator, Given, Image, Learned, Likelihood};
+use manifactor_slam::association::{Map, Merge, Move};
 use manifactor_slam::class::Aliases;
 use manifactor_slam::fusion::FusedClass;
 use manifactor_slam::measurement::{Depth, Quantities};
@@ -75,16 +75,6 @@ fn objects_without_names_are_mapped_as_those_with_names() {
     let ate = |report: &VariantReport| report.trajectory[0].estimate.ate.rmse;
     assert!(ate(&found) < 1.1 * ate(&known), "{} {}", ate(&found), ate(&known));
     assert!(found.counts.objects >= known.counts.objects, "{:?} {:?}", found.counts, known.counts);
-}
-
-#[test]
-fn the_likelihood_does_better_than_overlap() {
-    let (settings, sequence) = scene(&[]);
-    let of = |settings: Settings| scores(&estimate(&settings, &sequence)).f1;
-    let (likelihood, iou, projection) =
-        (of(settings.clone()), of(by(&settings, Iou::default())), of(by(&settings, Projection::default())));
-    assert!(likelihood > iou + 0.05 && likelihood > projection + 0.05, "{likelihood} {iou} {projection}");
-    assert!(iou > 0.3 && projection > 0.3, "{iou} {projection}");
 }
 
 #[test]
@@ -272,20 +262,13 @@ fn what_the_last_frame_teaches_is_corrected_in_the_end() {
 #[test]
 fn real_boxes_without_names_are_put_to_their_objects() {
     let Some(data) = data() else { return };
-    let score = |association: &str| {
-        let run = document("fr1_desk.toml", &[&format!("association={association}")]);
-        let variant = run.variants.iter().find(|v| v.name == "Q C").unwrap();
-        let (_, report) = Run::new(&run, Some(data.clone())).variant(variant, &mut Silent).unwrap();
-        (scores(&report), report.trajectory[0].estimate.ate.rmse)
-    };
-    let (likelihood, ate) = score("{ type = 'likelihood' }");
+    let run = document("fr1_desk.toml", &["association={ type = 'likelihood' }"]);
+    let variant = run.variants.iter().find(|v| v.name == "Q C").unwrap();
+    let (_, report) = Run::new(&run, Some(data)).variant(variant, &mut Silent).unwrap();
+    let (likelihood, ate) = (scores(&report), report.trajectory[0].estimate.ate.rmse);
     assert!(likelihood.f1 > 0.9 && likelihood.objects < 39, "{likelihood:?}");
     assert_eq!((likelihood.true_objects, likelihood.boxes), (26, 2177));
     assert!(ate < 0.0165, "{ate}");
-    for other in ["{ type = 'iou' }", "{ type = 'projection' }"] {
-        let (found, _) = score(other);
-        assert!(found.f1 > 0.5 && found.f1 < 0.8, "{other}: {found:?}");
-    }
 }
 
 #[test]

@@ -147,32 +147,3 @@ fn parts_of_a_sweep_end_with_the_same_tables_when_they_are_put_together() {
         ran.stderr
     );
 }
-
-#[test]
-fn a_table_is_put_into_the_page_that_has_a_place_for_it() {
-    let page = "# Results\n<!-- experiment: ./sweep.toml -->\n\nsaid of it\n";
-    let folder =
-        folder(&[("base.toml", BASE), ("sweep.toml", SWEEP), ("page.md", page), ("other.md", "# Other\n")]);
-    let (out, page) = (path(&folder, "out"), path(&folder, "page.md"));
-    let into = |page: &str| {
-        let sweep = path(&folder, "sweep.toml");
-        manifactor(&format!("experiment {sweep} --out {out} --markdown {page}"))
-    };
-    into(&page).ended(0);
-    let written = std::fs::read_to_string(&page).unwrap();
-    let table = std::fs::read_to_string(Path::new(&out).join("summary.md")).unwrap();
-    assert!(
-        written.starts_with("# Results\n<!-- experiment: ./sweep.toml ") && written.contains(&table),
-        "{written}"
-    );
-    assert!(written.ends_with("<!-- end of experiment -->\n\nsaid of it\n"), "{written}");
-    // again, and nothing changes
-    into(&page).ended(0);
-    assert_eq!(std::fs::read_to_string(&page).unwrap(), written);
-
-    // told before the work
-    let other = path(&folder, "other.md");
-    let told = into(&other).ended(2).stderr;
-    assert!(told.contains("has no place for the table of") && !told.contains("trials done"), "{told}");
-    assert_eq!(std::fs::read_to_string(&other).unwrap(), "# Other\n");
-}

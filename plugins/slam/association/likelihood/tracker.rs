@@ -1,5 +1,5 @@
 //! All objects: boxes are put to them, and they learn from boxes.
-use super::super::{Associator, Image, Learned, Map, assignment};
+use super::super::{Associator, Image, Learned, Map, best_assignment};
 use super::Likelihood;
 use super::fit::Belief;
 use super::second_look::Past;
@@ -136,7 +136,7 @@ impl Tracker {
         let Some(pose) = map.pose(image.frame) else { return names };
         let looked_at = best_scores(image.detections);
         let (gains, tracks) = self.gains(image, &looked_at, &pose);
-        let matched = assignment::best(looked_at.len(), tracks.len(), &gains);
+        let matched = best_assignment(looked_at.len(), tracks.len(), &gains);
         for (i, column) in looked_at.iter().zip(matched) {
             names[*i] = column.map(|column| self.tracks[tracks[column]].id);
         }

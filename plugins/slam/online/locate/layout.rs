@@ -3,7 +3,7 @@
 //! Two pairs of objects of like classes, as far apart in the one map as in the other, make a hypothesis where up is known; three, where it
 //! is not. What else fits under it, and what should and does not, is its score; it is believed where no other one comes near.
 use super::agreement::Agreement;
-use crate::association::assignment;
+use crate::association::best_assignment;
 use crate::input::fusion::Fusion;
 use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::ObjectId;
@@ -322,7 +322,7 @@ impl Layout {
             .iter()
             .filter_map(|pair| Some((pair.local, pair.known, self.gain(place, pair)?)))
             .collect();
-        let matched = assignment::best(self.local.len(), self.known.len(), &gains);
+        let matched = best_assignment(self.local.len(), self.known.len(), &gains);
         let is_match = |pair: &&Pair| matched[pair.local] == Some(pair.known);
         self.pairs.iter().filter(is_match).copied().collect()
     }

@@ -1,7 +1,7 @@
 //! Replays pose graphs through a session, pose by pose: latencies, and how far the estimate is from the optimum of what was
 //! known so far.
 //!
-//! `cargo run --release -p manifactor-formats --example replay -- [--gaps N] [--clamp] [--json] GRAPH.g2o…`. Each pose starts from its
+//! `cargo run --release -p manifactor-bench --example replay -- [--gaps N] [--clamp] [--json] GRAPH.g2o…`. Each pose starts from its
 //! odometry, never from the file's vertices. CPU time of one
 //! thread, in milliseconds; the gap is (cost − optimum) / optimum, every N poses.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]

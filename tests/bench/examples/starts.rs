@@ -1,7 +1,7 @@
 //! Pose graphs from different starts: what the start costs, how long it takes, and where a solve gets from it;
 //! then, whether that is the global minimum.
 //!
-//! `cargo run --release -p manifactor-formats --example starts -- FILE...`
+//! `cargo run --release -p manifactor-bench --example starts -- FILE...`
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};

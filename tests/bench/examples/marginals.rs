@@ -1,6 +1,6 @@
 //! How long covariances take: of all variables, of one after them, and of one that is asked for first.
 //!
-//! `cargo run --release -p manifactor-formats --example marginals -- GRAPH.g2o…`: milliseconds, medians of nine.
+//! `cargo run --release -p manifactor-bench --example marginals -- GRAPH.g2o…`: milliseconds, medians of nine.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_solve::{Auto, Problem, Silent, solve};

@@ -1,5 +1,5 @@
 //! What it costs to linearise a bounding-box factor, analytically and by automatic differentiation:
-//! `cargo run --release -p manifactor-quadric --example linearise_boxes`
+//! `cargo run --release -p manifactor-bench --example linearise_boxes`
 #![allow(clippy::print_stdout)]
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::{Residual, Variables};

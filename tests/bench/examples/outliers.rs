@@ -1,6 +1,6 @@
 //! Replays pose graphs with false loop closures among the true ones: what a session rejects, beside batch graduated non-convexity.
 //!
-//! `cargo run --release -p manifactor-formats --example outliers -- [--share PERCENT]… [--seeds N] [--first SEED] [--clusters N] [--batch] GRAPH.g2o…`.
+//! `cargo run --release -p manifactor-bench --example outliers -- [--share PERCENT]… [--seeds N] [--first SEED] [--clusters N] [--batch] GRAPH.g2o…`.
 //! False closures are so many for each hundred true ones; they lie between poses drawn at random, and say that these are up to
 //! 10 m and 3.1 rad apart. With `--clusters N` they come in runs of N that agree with each other, as where two places look alike. Precision and
 //! recall are of rejections: how many of those rejected are false, and how many of the false are rejected. CPU time of one thread, in

@@ -1,5 +1,5 @@
 //! What it costs to linearise a factor that is a formula, beside the same factor in Rust:
-//! `cargo run --release -p manifactor-expression --example formulas`
+//! `cargo run --release -p manifactor-bench --example formulas`
 #![allow(clippy::print_stdout)]
 use manifactor_expression::{Constant, Expression};
 use manifactor_geometry::{Between, Coordinates, Landmark, Point3, Se3, So3};

@@ -1,7 +1,7 @@
 //! What the default solver costs beside plain Gauss-Newton from the same start, whatever the unit of the noise: a table
 //! in Markdown.
 //!
-//! `RAYON_NUM_THREADS=1 cargo run --release -p manifactor-formats --example auto -- FILE...`
+//! `RAYON_NUM_THREADS=1 cargo run --release -p manifactor-bench --example auto -- FILE...`
 //!
 //! Each pose graph is solved with its information times 1, 2, 4 and 100, by `gauss_newton`, `auto`, and Gauss-Newton from a
 //! chordal start, in turns; each solve is a whole one, compilation included. Times are the least of at least nine turns,

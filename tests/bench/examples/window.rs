@@ -1,6 +1,6 @@
 //! A pose graph over and over, through a window that moves: what memory and time do.
 //!
-//! `cargo run --release -p manifactor-formats --example window -- [--passes N] [--poses N] GRAPH.g2o`. Each pass drives the graph
+//! `cargo run --release -p manifactor-bench --example window -- [--passes N] [--poses N] GRAPH.g2o`. Each pass drives the graph
 //! again from where the last one ended, with new names; factors to poses that have left are left out. CPU time of one
 //! thread, in milliseconds.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]

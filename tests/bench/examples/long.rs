@@ -1,6 +1,6 @@
 //! A robot that drives for hours through streets: what memory and time do.
 //!
-//! `cargo run --release -p manifactor-formats --example long -- [--poses N] [--step METRES] [--seconds S] [--seed N]`. Streets cross
+//! `cargo run --release -p manifactor-bench --example long -- [--poses N] [--step METRES] [--seconds S] [--seed N]`. Streets cross
 //! every ten metres, twenty one way and twenty the other; at each crossing the robot goes on in a direction drawn at random. It makes ten
 //! poses a second, one for each step. At a crossing where it has been before, a factor closes the loop to the pose of its last visit. With
 //! `--seconds`, a window: closures to poses that have left are left out. A row for each tenth of the way. CPU time of one thread, in

@@ -1,20 +1,20 @@
-//! Boxes go to the objects that they overlap with most: what others do, to compare with.
-use super::{Association, Associator, Image, Learned, Map, assignment};
-use crate::input::class::Aliases;
-use crate::input::prior_map::PriorObject;
-use crate::input::sequence::{Detection, ObjectId};
-use manifactor_geometry::Se3;
-use manifactor_graph::checked::Share;
-use manifactor_graph::register;
-use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
+//! Data association by overlap: each box goes to the object that it overlaps with most, as other systems do it.
+use manifactor::geometry::Se3;
+use manifactor::graph::checked::Share;
+use manifactor::quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
+use manifactor::slam::association::{Association, Associator, Image, Learned, Map, best_assignment};
+use manifactor::slam::class::Aliases;
+use manifactor::slam::prior_map::PriorObject;
+use manifactor::slam::sequence::{Detection, ObjectId};
+use manifactor::{register, typetag};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// By overlap with the box before, or with the outline of the object in the map, whatever the class (as quadricslam does).
+/// Association by overlap with the last box of an object or with its outline in the map, for any class (as in quadricslam).
 ///
-/// Objects that are matched best in sum get the boxes; a box that overlaps with none enough begins an object.
+/// The assignment has the largest sum of overlaps. A box that overlaps too little with all objects begins a new one.
 ///
 /// ```toml
 /// association = { type = "iou", least = 0.2 }
@@ -22,13 +22,13 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Iou {
-    /// Intersection over union, at least.
+    /// Smallest intersection over union of a match.
     pub least: Share,
-    /// A box is compared with the one before for so many frames.
+    /// Number of frames for which the last box of an object is compared.
     pub frames: usize,
 }
 
-/// By overlap with the box before or with the outline in the map, within a class (as OA-SLAM does, without its points).
+/// Association by overlap within a class (as in OA-SLAM, without its points).
 ///
 /// ```toml
 /// association = { type = "projection", least = 0.3, visible = 0.3 }
@@ -36,13 +36,13 @@ pub struct Iou {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Projection {
-    /// Intersection over union with the outline in the map, at least.
+    /// Smallest intersection over union with the outline in the map.
     pub least: Share,
-    /// The same with the box before.
+    /// Smallest intersection over union with the last box.
     pub least_before: Share,
-    /// A box is compared with the one before for so many frames.
+    /// Number of frames for which the last box of an object is compared.
     pub frames: usize,
-    /// The share of the outline that is inside of the image, at least.
+    /// Smallest share of the outline inside the image.
     pub visible: Share,
 }
 
@@ -81,7 +81,7 @@ impl Association for Projection {
 }
 register!(dyn Association, "projection", Projection);
 
-/// What both share.
+/// The associator of both.
 #[derive(Debug)]
 struct Overlap {
     rule: Projection,
@@ -92,10 +92,10 @@ struct Overlap {
     next: u32,
 }
 
-/// An object when it was seen last.
+/// The last detection of an object.
 #[derive(Debug)]
 struct Last {
-    /// Where; `None` where an earlier map has it.
+    /// Frame and box; `None` for an object of the prior map that no frame has shown yet.
     seen: Option<(usize, BoundingBox)>,
     class: Option<String>,
 }
@@ -109,7 +109,7 @@ impl Overlap {
         known: &[Arc<PriorObject>],
     ) -> Self {
         let last = |object: &Arc<PriorObject>| {
-            let class = object.classes.leading().map(|(class, _)| class.to_owned());
+            let class = object.classes.best().map(|class| class.name);
             (object.id, Last { seen: None, class })
         };
         let objects: BTreeMap<_, _> = known.iter().map(last).collect();
@@ -121,11 +121,11 @@ impl Overlap {
         detection.scores.best().map(|(class, _)| self.aliases.canonical(class))
     }
 
-    /// The outline of an object in the image, if enough of it is inside.
+    /// Outline of an object, if enough of it is inside the image.
     fn outline(&self, pose: Option<Se3>, quadric: Option<DualQuadric>) -> Option<BoundingBox> {
         let (pose, quadric) = (pose?, quadric?);
         let predict = |model| {
-            // what was measured makes no difference to what is predicted
+            // the prediction does not depend on the measured box
             let bounding_box = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 0.0, ymax: 0.0 };
             BoundingBoxFactor { bounding_box, camera: self.camera, model }.predict(&pose, &quadric)
         };
@@ -154,7 +154,7 @@ impl Associator for Overlap {
                 overlaps.extend(most.map(|iou| (row, column, iou)));
             }
         }
-        let matched = assignment::best(image.detections.len(), self.objects.len(), &overlaps);
+        let matched = best_assignment(image.detections.len(), self.objects.len(), &overlaps);
         let known: Vec<ObjectId> = self.objects.keys().copied().collect();
         let mut new = (self.next..).map(ObjectId);
         matched.into_iter().map(|column| column.map(|column| known[column]).or_else(|| new.next())).collect()
@@ -169,7 +169,7 @@ impl Associator for Overlap {
                 self.next = self.next.max(id.0.saturating_add(1));
             }
         }
-        // what is in no map, and was not seen lately, is never found again
+        // without a place in the map and a recent box, no later box can match
         let since = image.frame.saturating_sub(self.rule.frames);
         let is_recent = |last: &Last| last.seen.is_some_and(|(frame, _)| frame >= since);
         self.objects.retain(|id, last| is_recent(last) || map.object(*id).is_some());
