@@ -10,6 +10,7 @@ pub mod bal;
 pub mod detections;
 mod error;
 mod graph_format;
+pub mod journal;
 mod lines;
 pub mod pose_graph;
 pub mod replay;
