@@ -23,4 +23,4 @@ pub use groups::{
     Se3, So2, So3, atan2, wrap,
 };
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
-pub use procrustes::{NearestRotation, nearest_rotation};
+pub use procrustes::{NearestRotation, PointPairs, Similarity, nearest_rotation};
