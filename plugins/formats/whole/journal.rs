@@ -2,7 +2,7 @@
 //!
 //! A program that is killed leaves at most one line without an end, the last: it is dropped when the file is opened again. A file
 //! that is no journal of these records, that of another key, or has a damaged line is refused and not touched.
-use crate::whole::{CHECKED, checked_line, open_regular, read_checked_line, read_regular};
+use super::{CHECKED, checked_line, open_regular, read_checked_line, read_regular};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Write};
 use std::marker::PhantomData;
