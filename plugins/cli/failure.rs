@@ -1,9 +1,8 @@
 //! What keeps a command from doing what it was asked to do, and how it is shown.
 use crate::output::{self, text};
 use manifactor::config::{Diagnostic, Diagnostics, Fault, SourceText};
+use manifactor::formats::journal::JournalError;
 use manifactor::formats::{FormatError, Malformed};
-use manifactor::slam::experiment::JournalError;
-use manifactor::slam::journal::JournalError as FrameJournalError;
 use manifactor::slam::output::{FolderError, OutputError};
 use manifactor::slam::run::RunError;
 use manifactor::slam::source::SourceError;
@@ -143,7 +142,7 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
             RunError::Source(error) => error.into(),
-            RunError::Journal(FrameJournalError::File(error)) => error.into(),
+            RunError::Journal(error) => error.into(),
             other => Self::input(other),
         }
     }

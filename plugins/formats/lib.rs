@@ -23,6 +23,7 @@ pub use error::{BadLine, FormatError, Malformed, Mistake};
 pub use graph_format::{GraphFormat, GraphRead, GraphWriter, Reading, Repair};
 pub use pose_graph::g2o;
 pub use text::{STDIN, plausible, read_text, words};
+pub use whole::journal;
 
 #[doc(hidden)]
 pub mod __private {

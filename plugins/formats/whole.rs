@@ -1,4 +1,6 @@
 //! Files that are written whole or not at all: the one place that writes files.
+pub mod journal;
+
 use std::fs::{File, Metadata, OpenOptions};
 use std::hash::Hasher;
 use std::io::{self, ErrorKind, Write};

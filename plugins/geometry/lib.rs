@@ -33,4 +33,4 @@ pub use groups::{
     So2, So3, Twist, atan2, wrap,
 };
 pub use initialise::{Chordal, SpanningTree, Tree, spanning_tree};
-pub use procrustes::{NearestRotation, nearest_rotation};
+pub use procrustes::{NearestRotation, PointPairs, Similarity, nearest_rotation};

@@ -1,5 +1,5 @@
-//! The rotation closest to a matrix: orthogonal Procrustes.
-use crate::So3;
+//! The rotation closest to a matrix, and the similarity closest to pairs of points: orthogonal Procrustes.
+use crate::{Se3, So3};
 use nalgebra::{Matrix3, Vector3};
 
 /// The rotation R for which tr(Rᵀ M) is largest, and the singular values of M.
@@ -65,6 +65,90 @@ fn across(direction: &Vector3<f64>, wanted: &Vector3<f64>) -> Vector3<f64> {
     candidates.into_iter().find_map(|c| c.try_normalize(0.1)).unwrap_or_else(Vector3::z)
 }
 
+/// A change of frames that may change lengths: y = scale · R x + t.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Similarity {
+    /// Factor of lengths.
+    pub scale: f64,
+    /// R
+    pub rotation: So3,
+    /// t
+    pub translation: Vector3<f64>,
+}
+
+impl Similarity {
+    /// Lengths as they are, then the pose.
+    pub fn rigid(pose: Se3) -> Self {
+        Self { scale: 1.0, rotation: pose.rotation, translation: pose.translation }
+    }
+    /// A point in the other frame.
+    pub fn act(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation.act(point) * self.scale + self.translation
+    }
+    /// A pose in the other frame: its position is scaled, its rotation is not.
+    pub fn act_on_pose(&self, pose: &Se3) -> Se3 {
+        Se3::new(self.rotation.compose(&pose.rotation), self.act(&pose.translation))
+    }
+}
+
+/// Sums over pairs of points (x, y), from which the similarity follows that brings x closest to y in the mean square (Umeyama,
+/// Least-Squares Estimation of Transformation Parameters Between Two Point Patterns, 1991).
+#[derive(Debug, Clone, Copy)]
+pub struct PointPairs {
+    means: [Vector3<f64>; 2],
+    /// Σ w (y - ȳ)(x - x̄)ᵀ
+    products: Matrix3<f64>,
+    /// Σ w ‖x - x̄‖²
+    spread: f64,
+}
+
+impl PointPairs {
+    /// The sums over points x, y and their weights. Without a pair no similarity is determined.
+    pub fn new(pairs: impl Iterator<Item = (Vector3<f64>, Vector3<f64>, f64)> + Clone) -> Self {
+        let zero = Vector3::zeros();
+        let add = |(x, y, w): (_, _, f64), (a, b, v): (Vector3<f64>, Vector3<f64>, f64)| {
+            (x + a * v, y + b * v, w + v)
+        };
+        let (x_sum, y_sum, weight) = pairs.clone().fold((zero, zero, 0.0), add);
+        let means = [x_sum / weight, y_sum / weight];
+        let mut all = Self { means, products: Matrix3::zeros(), spread: 0.0 };
+        for (x, y, weight) in pairs {
+            let (x, y) = (x - means[0], y - means[1]);
+            all.products += y * x.transpose() * weight;
+            all.spread += x.norm_squared() * weight;
+        }
+        all
+    }
+
+    /// Adds a direction that is x in the one frame and y in the other, with a share of the weight of all points.
+    pub fn add_direction(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, share: f64) {
+        self.products += y * x.transpose() * (share * self.spread);
+    }
+
+    /// The closest rotation and translation; `None` if the second singular value is this share of the first or less. Then the points lie
+    /// on a line, and the rotation about it is arbitrary.
+    pub fn rigid(&self, flat: f64) -> Option<Similarity> {
+        self.closest(flat, |_| 1.0)
+    }
+
+    /// The closest rotation, translation and scale, under the same condition.
+    pub fn similarity(&self, flat: f64) -> Option<Similarity> {
+        self.closest(flat, |singular_values| singular_values.iter().sum::<f64>() / self.spread)
+    }
+
+    fn closest(&self, flat: f64, scale: impl Fn([f64; 3]) -> f64) -> Option<Similarity> {
+        let NearestRotation { rotation, singular_values } = nearest_rotation(&self.products);
+        // NaN, if there is no pair, is not determined either
+        let is_determined = singular_values[1] > flat * singular_values[0];
+        if !is_determined {
+            return None;
+        }
+        let scale = scale(singular_values);
+        let translation = self.means[1] - rotation.act(&self.means[0]) * scale;
+        Some(Similarity { scale, rotation, translation })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,6 +183,28 @@ mod tests {
             prop_assert!((found.singular_values[2] / (least * least) - 1.0).abs() < 1e-12);
             prop_assert!(found.rotation.local(&u).norm() < 1e-12);
         }
+    }
+
+    proptest! {
+        #[test]
+        fn a_similarity_is_found_again(rotation in any_so3(), translation in vector::<3>(3.0), scale in 0.1..10.0, seed in prop::collection::vec((vector::<3>(1.0), 0.1..3.0), 4..9)) {
+            let truth = Similarity { scale, rotation, translation };
+            let found = PointPairs::new(seed.iter().map(|(x, w)| (*x, truth.act(x), *w))).similarity(1e-6);
+            prop_assume!(found.is_some());
+            let found = found.unwrap();
+            prop_assert!((found.scale / scale - 1.0).abs() < 1e-9 && found.rotation.local(&rotation).norm() < 1e-6);
+            prop_assert!((found.translation - translation).norm() < 1e-6 * (1.0 + scale));
+        }
+    }
+
+    #[test]
+    fn points_on_a_line_determine_a_rotation_with_a_direction_across_it() {
+        let line = (0..4).map(|i| (Vector3::x() * f64::from(i), Vector3::x() * f64::from(i), 1.0));
+        let mut pairs = PointPairs::new(line);
+        assert_eq!(pairs.rigid(1e-12), None);
+        assert_eq!(PointPairs::new(std::iter::empty()).rigid(1e-12), None);
+        pairs.add_direction(&Vector3::z(), &Vector3::z(), 10.0);
+        assert!(pairs.rigid(1e-3).unwrap().rotation.log().norm() < 1e-12);
     }
 
     #[test]

@@ -3,7 +3,7 @@ use crate::errors;
 use crate::solution::Watch;
 use crate::threads::detach;
 use manifactor::config::{Diagnostics, Document, Format};
-use manifactor::slam::experiment::{self, Experiment, Journal, Progress, Shard, Trial};
+use manifactor::slam::experiment::{self, Experiment, Progress, Shard, Trial, TrialLog};
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::record::{RunRecord, VariantRecord};
 use manifactor::slam::run::Run;
@@ -109,7 +109,7 @@ fn experiment_of(
     };
     let done = detach(py, || {
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &config, force)?;
-        let mut journal = Journal::open(claimed)?;
+        let mut journal = TrialLog::open(claimed)?;
         journal.take_over_shards()?;
         if retry_failed {
             journal.retry_failed();
@@ -135,7 +135,7 @@ struct Sweep {
     /// Its document.
     text: String,
     folders: Folders,
-    journal: Option<Journal>,
+    journal: Option<TrialLog>,
 }
 
 #[pymethods]
@@ -160,7 +160,7 @@ impl Sweep {
         let journal = is_driver.then(|| {
             let claimed =
                 OutputFolder::claim(&sweep.output, "experiment", &config, force).map_err(errors::failure)?;
-            let mut journal = Journal::open(claimed).map_err(errors::failure)?;
+            let mut journal = TrialLog::open(claimed).map_err(errors::failure)?;
             journal.take_over_shards().map_err(errors::failure)?;
             Ok::<_, PyErr>(journal)
         });
@@ -169,7 +169,7 @@ impl Sweep {
 
     /// Opens the trials again that failed before.
     fn retry_failed(&mut self) {
-        self.journal.iter_mut().for_each(Journal::retry_failed);
+        self.journal.iter_mut().for_each(TrialLog::retry_failed);
     }
 
     /// Numbers of the trials that are not done yet.

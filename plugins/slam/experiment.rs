@@ -23,7 +23,7 @@
 //! metrics = ["position", "shape", "quality"]
 //! ```
 //! All combinations of all axes are run. Each [`Trial`] is solved on one thread, so that it is the same whatever else
-//! runs; it is written to a [`Journal`] once it is done, and not run again. The tables are made of the journal.
+//! runs; it is written to a [`TrialLog`] once it is done, and not run again. The tables are made of the journal.
 mod axis;
 mod check;
 mod document;
@@ -42,7 +42,7 @@ mod trial;
 pub use crate::metrics::{Interval, bootstrap};
 pub(crate) use document::ExperimentDocument;
 pub use document::{Documents, Experiment};
-pub use journal::{Journal, JournalError};
+pub use journal::TrialLog;
 pub use measures::measures;
 pub use output::write;
 pub use runner::{Progress, alone, run};

@@ -13,12 +13,13 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 
-pub use align::{Alignment, Similarity, align};
+pub use align::{Alignment, align};
 pub use associate::{PosePair, associate};
 pub use bootstrap::{Interval, bootstrap, change_of_error};
 pub(crate) use error::relative_errors;
 pub use error::{Pairing, RelativeError, absolute_error, relative_error};
 pub use identity::{ENOUGH, IdentityScores, identity};
+pub use manifactor_geometry::Similarity;
 pub use pairing::pair_boxes;
 pub use statistics::Statistics;
 

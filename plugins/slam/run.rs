@@ -1,6 +1,6 @@
 //! A run from its document to its report.
 use crate::estimate::{Estimate, EstimateError};
-use crate::input::journal::{JournalError, journaled};
+use crate::input::journal::journaled;
 use crate::input::sequence::{Detection, Sequence};
 use crate::input::source::{Folders, SourceError};
 use crate::mapping::{Mapping, MappingError};
@@ -10,6 +10,7 @@ use crate::settings::Settings;
 use crate::settings::run_document::{RunDocument, Variant};
 use association::{Associated, associated};
 use location::find;
+use manifactor_formats::journal::JournalError;
 use manifactor_solve::{Observer, Termination};
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -38,6 +39,20 @@ pub enum RunError {
     /// Frames that cannot be kept.
     #[error(transparent)]
     Journal(#[from] JournalError),
+    /// A journal among files that the run writes.
+    #[error(
+        "the journal {} lies in {}, where the run writes its results: name a file outside of that folder",
+        path.display(), output.display()
+    )]
+    JournalAmongResults {
+        /// The journal.
+        path: PathBuf,
+        /// The folder of the results.
+        output: PathBuf,
+    },
+    /// A journal of a run with several variants.
+    #[error("a journal is that of one variant: name another document, or leave all others out")]
+    JournalOfVariants,
     /// A map that came frame by frame has no end.
     #[error(transparent)]
     Finish(#[from] FinishError),
@@ -181,7 +196,7 @@ impl<'a> Run<'a> {
             None => self.sequence(variant)?.into(),
         };
         let stream = match &self.journal {
-            Some(_) if self.document.variants.len() > 1 => return Err(JournalError::Variants.into()),
+            Some(_) if self.document.variants.len() > 1 => return Err(RunError::JournalOfVariants),
             Some(path) => journaled(stream, path, &variant.settings.fingerprint())?,
             None => stream,
         };

@@ -9,7 +9,7 @@ use crate::status::Status;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use manifactor::slam::experiment::{self, Experiment as Sweep, Journal, Progress, Shard, Summary};
+use manifactor::slam::experiment::{self, Experiment as Sweep, Progress, Shard, Summary, TrialLog};
 use manifactor::slam::output::{OutputFolder, write_whole};
 use manifactor::slam::source::Folders;
 use manifactor::solve::{Interrupt, Observer};
@@ -67,7 +67,7 @@ impl Experiment {
         }
         let folders = Folders { data: self.data.clone(), document: sweep.folder.clone() };
         let claimed = OutputFolder::claim(&sweep.output, "experiment", &self.config, self.force)?;
-        let mut journal = Journal::open(claimed)?;
+        let mut journal = TrialLog::open(claimed)?;
         journal.take_over_shards()?;
         if self.retry_failed {
             journal.retry_failed();
@@ -123,7 +123,7 @@ impl Experiment {
 ///
 /// # Errors
 /// If one cannot be written; those before it are there.
-pub fn write_experiment(sweep: &Sweep, journal: &Journal, text: &str) -> Result<Summary, Failure> {
+pub fn write_experiment(sweep: &Sweep, journal: &TrialLog, text: &str) -> Result<Summary, Failure> {
     write_until(sweep, journal, text, |_| ControlFlow::Continue(())).map(|(summary, _)| summary)
 }
 
@@ -131,7 +131,7 @@ pub fn write_experiment(sweep: &Sweep, journal: &Journal, text: &str) -> Result<
 /// whether all pictures are written.
 fn write_until(
     sweep: &Sweep,
-    journal: &Journal,
+    journal: &TrialLog,
     text: &str,
     goes_on: impl FnMut(&str) -> ControlFlow<()>,
 ) -> Result<(Summary, bool), Failure> {

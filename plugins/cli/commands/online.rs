@@ -8,7 +8,6 @@ use crate::output::watch::Watch as Progress;
 use crate::status::Status;
 use crate::view::{Solve, View, address};
 use clap::Args;
-use manifactor::slam::journal::JournalError;
 use manifactor::slam::online::{FrameError, FrameReport, Mapper};
 use manifactor::slam::run::{RunError, Watch};
 use manifactor::slam::sequence::Observation;
@@ -99,9 +98,7 @@ fn check_journal(journal: &Path, output: &Path) -> Result<(), RunError> {
         _ => false,
     };
     match is_inside {
-        true => {
-            Err(JournalError::AmongResults { path: journal.to_owned(), output: output.to_owned() }.into())
-        }
+        true => Err(RunError::JournalAmongResults { path: journal.to_owned(), output: output.to_owned() }),
         false => Ok(()),
     }
 }

@@ -25,6 +25,7 @@ use manifactor_graph::prelude::*;
 #[serde(deny_unknown_fields)]
 pub struct BearingRange2 {
     bearing: Angle,
+    /// A finite number above zero.
     range: Positive,
 }
 

@@ -1,6 +1,6 @@
 //! The files that an experiment leaves.
 use super::document::Documents;
-use super::{Comparison, Experiment, Interval, Journal, Summary, times_table, trials_table};
+use super::{Comparison, Experiment, Interval, Summary, TrialLog, times_table, trials_table};
 use crate::output::{OutputError, results, write_document, write_whole};
 use manifactor_config::to_toml;
 use manifactor_formats::table::{Column, Table, TableError, to_parquet};
@@ -10,7 +10,7 @@ use std::fmt;
 ///
 /// # Errors
 /// Where one cannot be written; those before it are there.
-pub fn write(experiment: &Experiment, journal: &Journal) -> Result<Summary, OutputError> {
+pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<Summary, OutputError> {
     let file = |name: &str| experiment.output.join(name);
     let write = |name: &str, content: Result<Vec<u8>, TableError>| {
         let content = content.map_err(|source| OutputError::Table { path: file(name), source })?;

@@ -1,6 +1,7 @@
 //! Trials on all cores, each on one thread.
-use super::{Experiment, Journal, JournalError, Trial, TrialOutcome, TrialRecord};
+use super::{Experiment, Trial, TrialLog, TrialOutcome, TrialRecord};
 use crate::input::source::Folders;
+use manifactor_formats::journal::JournalError;
 use manifactor_solve::{Interrupt, Observer};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -25,7 +26,7 @@ pub struct Progress {
 pub fn run(
     experiment: &Experiment,
     folders: &Folders,
-    journal: &mut Journal,
+    journal: &mut TrialLog,
     threads: usize,
     interrupt: &Interrupt,
     mut progress: impl FnMut(Progress),

@@ -1,6 +1,6 @@
 //! Means over trials, and how far variants are apart.
 use super::table::records;
-use super::{Experiment, Interval, Journal, TrialRecord, bootstrap};
+use super::{Experiment, Interval, TrialLog, TrialRecord, bootstrap};
 use indexmap::{IndexMap, IndexSet};
 use serde::Serialize;
 
@@ -59,7 +59,7 @@ impl Comparison {
 
 impl Summary {
     /// Over the trials that are done.
-    pub fn new(experiment: &Experiment, journal: &Journal) -> Self {
+    pub fn new(experiment: &Experiment, journal: &TrialLog) -> Self {
         let settings = &experiment.summary;
         let records: Vec<&TrialRecord> = records(experiment, journal).collect();
         let place = |name: &String| experiment.columns.iter().position(|column| column == name);

@@ -1,5 +1,5 @@
 //! All trials that are done, in the order of the experiment.
-use super::{Experiment, Journal, TrialOutcome, TrialRecord};
+use super::{Experiment, TrialLog, TrialOutcome, TrialRecord};
 use indexmap::IndexSet;
 use manifactor_formats::table::{Column, Table};
 
@@ -8,7 +8,7 @@ use manifactor_formats::table::{Column, Table};
 ///
 /// The order is that of the experiment, and no time is in it: it is the same however often the experiment was
 /// interrupted, and whatever number of threads it ran on.
-pub fn trials_table(experiment: &Experiment, journal: &Journal) -> Table {
+pub fn trials_table(experiment: &Experiment, journal: &TrialLog) -> Table {
     let records: Vec<&TrialRecord> = records(experiment, journal).collect();
     let measures: IndexSet<&str> =
         records.iter().flat_map(|r| r.outcome.measures()).map(|(name, _)| name).collect();
@@ -26,7 +26,7 @@ pub fn trials_table(experiment: &Experiment, journal: &Journal) -> Table {
 }
 
 /// How long each trial took, in seconds.
-pub(crate) fn times_table(experiment: &Experiment, journal: &Journal) -> Table {
+pub(crate) fn times_table(experiment: &Experiment, journal: &TrialLog) -> Table {
     let records: Vec<&TrialRecord> = records(experiment, journal).collect();
     let mut columns = labels(experiment, &records);
     let seconds = records.iter().map(|record| Some(record.seconds)).collect();
@@ -37,7 +37,7 @@ pub(crate) fn times_table(experiment: &Experiment, journal: &Journal) -> Table {
 /// The trials that are done, in the order of the experiment.
 pub(super) fn records<'a>(
     experiment: &'a Experiment,
-    journal: &'a Journal,
+    journal: &'a TrialLog,
 ) -> impl Iterator<Item = &'a TrialRecord> {
     experiment.trials.iter().filter_map(|trial| journal.find(trial))
 }

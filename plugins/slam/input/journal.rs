@@ -1,119 +1,38 @@
 //! Frames on disk as they come, so that a stream that was cut off goes on.
 //!
-//! The first line says for which settings; each other is a frame, as the source `json_lines` has it, and its checksum. The same
-//! frames give the same bits: a program that was killed reads them again, and has the map that it had. A last line without an end is
-//! dropped. A file that is no journal, that of other settings, or has a damaged line is refused and not touched.
+//! The journal's key is the fingerprint of the settings; each record is a frame, as the source `json_lines` has it. The same
+//! frames give the same bits: a program that was killed reads them again, and has the map that it had.
 //!
 //! A frame that cannot be written, on a full disk, is mapped all the same. The journal ends there, and the run reports it.
 use crate::input::sequence::Observation;
 use crate::input::source::{line, parse};
 use crate::input::stream::Stream;
-use manifactor_formats::FormatError;
-use manifactor_formats::whole::{checked_line, open_regular, read_checked_line};
+use manifactor_formats::journal::{Journal, JournalError, Record};
 use manifactor_graph::Manifold;
 use std::collections::HashSet;
-use std::fs::{File, TryLockError};
-use std::io::{self, Read, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Why frames cannot be kept.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum JournalError {
-    /// A file that cannot be read or written.
-    #[error(transparent)]
-    File(#[from] FormatError),
-    /// Somebody else's.
-    #[error("{}: another program writes to this journal", path.display())]
-    InUse {
-        /// Which.
-        path: PathBuf,
-    },
-    /// A file of something else.
-    #[error("{} is no journal of frames: name another file", path.display())]
-    NoJournal {
-        /// Which.
-        path: PathBuf,
-    },
-    /// A map that cannot be had again.
-    #[error("{} is the journal of other settings, or of another version: name another file to begin anew", path.display())]
-    OtherSettings {
-        /// Which.
-        path: PathBuf,
-    },
-    /// A journal among files that the run writes.
-    #[error(
-        "the journal {} lies in {}, where the run writes its results: name a file outside of that folder",
-        path.display(), output.display()
-    )]
-    AmongResults {
-        /// The journal.
-        path: PathBuf,
-        /// The folder of the results.
-        output: PathBuf,
-    },
-    /// A run that is several.
-    #[error("a journal is that of one variant: name another document, or leave all others out")]
-    Variants,
-    /// A whole line that is no frame.
-    #[error(
-        "{}:{line} is no frame: {message}; move the file away to begin anew, or keep its lines before {line} to go on from there",
-        path.display()
-    )]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// From 1.
-        line: usize,
-        /// What is wrong.
-        message: String,
-    },
+impl Record for Observation {
+    const NAME: &'static str = "frame";
+    const BEGINNINGS: &'static [&'static str] = &[r#"{"checked_frames_for":""#, r#"{"frames_for":""#];
+
+    fn write(&self) -> io::Result<String> {
+        Ok(line(self))
+    }
+
+    fn read(line: &[u8]) -> Result<Self, String> {
+        parse(line)
+    }
 }
 
-/// How the first line begins; a fingerprint of the settings follows.
-const BEGINNING: &str = r#"{"checked_frames_for":""#;
-/// The same of journals without checksums.
-const EARLIER: &str = r#"{"frames_for":""#;
-
-/// The frames of a journal, which is begun where it is not there, then those of the stream that come after them, which are added to it.
+/// The frames of a journal, then those of the stream that come after them, which are added to it. A journal that is not there is begun.
 ///
 /// # Errors
-/// Where the file cannot be read or written, is a link, or is not the journal of these settings; it is unchanged then.
+/// A file that cannot be read or written, is a link, or is not the journal of these settings; it is unchanged then.
 pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Stream, JournalError> {
-    let io = |source| FormatError::Io { path: path.to_owned(), source };
-    let mut file = open_regular(path).map_err(io)?;
-    file.try_lock().map_err(|error| match error {
-        TryLockError::WouldBlock => JournalError::InUse { path: path.to_owned() },
-        TryLockError::Error(source) => io(source).into(),
-    })?;
-    let mut bytes = vec![];
-    file.read_to_end(&mut bytes).map_err(io)?;
-    let header = format!("{BEGINNING}{fingerprint}\"}}\n");
-    if header.as_bytes().starts_with(&bytes) {
-        file.set_len(0).and_then(|()| file.write_all(header.as_bytes())).map_err(io)?;
-        bytes.clear();
-    } else if !bytes.starts_with(header.as_bytes()) {
-        let path = path.to_owned();
-        let is_ours = [BEGINNING, EARLIER].iter().any(|beginning| bytes.starts_with(beginning.as_bytes()));
-        return Err(if is_ours {
-            JournalError::OtherSettings { path }
-        } else {
-            JournalError::NoJournal { path }
-        });
-    }
-    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
-    let lines =
-        bytes[..whole].split(|byte| *byte == b'\n').enumerate().skip(1).filter(|(_, line)| !line.is_empty());
-    let frame = |(i, line): (usize, &[u8])| {
-        let text = read_checked_line(line).map_err(str::to_owned);
-        let frame = text.and_then(|text| parse(&text));
-        frame.map_err(|message| JournalError::Line { path: path.to_owned(), line: i + 1, message })
-    };
-    let before = lines.map(frame).collect::<Result<Vec<Observation>, _>>()?;
-    if whole < bytes.len() {
-        file.set_len(whole as u64).map_err(io)?;
-    }
+    let (mut journal, before) = Journal::<Observation>::open(path, fingerprint)?;
     let past = before.iter().map(|frame| frame.frame.timestamp).fold(f64::NEG_INFINITY, f64::max);
     let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
     let is_new = move |frame: &Result<Observation, _>| {
@@ -129,7 +48,7 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
             counted.add(&path, None);
             return Ok(frame);
         }
-        Ok(keep(&mut file, &frame).unwrap_or_else(|source| {
+        Ok(keep(&mut journal, &frame).unwrap_or_else(|source| {
             counted.add(&path, Some(source));
             frame
         }))
@@ -169,21 +88,11 @@ impl Lost {
 
 /// Adds a frame, and returns it as it will be read: a rotation that is written and read may differ in its last digit. One that is not finite, which
 /// no map takes, cannot be written either.
-fn keep(file: &mut File, frame: &Observation) -> io::Result<Observation> {
+fn keep(journal: &mut Journal<Observation>, frame: &Observation) -> io::Result<Observation> {
     if !(frame.frame.timestamp.is_finite() && frame.frame.world_from_camera.is_finite()) {
         return Ok(frame.clone());
     }
-    let line = line(frame);
-    // what cannot be read again is not written
-    let mut read = parse(line.as_bytes()).map_err(io::Error::other)?;
-    read.unused.clone_from(&frame.unused);
-    let length = file.metadata()?.len();
-    if let Err(error) = file.write_all(checked_line(&line).as_bytes()) {
-        // half a line would end the journal
-        file.set_len(length)?;
-        return Err(error);
-    }
-    Ok(read)
+    Ok(Observation { unused: frame.unused.clone(), ..journal.append(frame)? })
 }
 
 #[cfg(test)]

@@ -145,7 +145,7 @@ fn a_sweep_touches_only_a_log_of_its_own() {
     }
     into(&folder, COMMANDS[2], &out, "").ended(2).complains("has not written");
     let refused = into(&folder, COMMANDS[2], &out, "--force").ended(2);
-    refused.complains("trials.jsonl:1 is not a record of a trial");
+    refused.complains("trials.jsonl:1 is no record of a trial");
     assert_eq!(fs::read_to_string(out.join("trials.jsonl")).unwrap(), "notes");
     fs::remove_file(out.join("trials.jsonl")).unwrap();
     into(&folder, COMMANDS[2], &out, "").ended(0);

@@ -2,7 +2,7 @@
 use super::stream::sealed_lines;
 use super::temporary;
 use manifactor::config::{Document, Format};
-use manifactor::slam::experiment::{Experiment, Journal, Shard, Trial, TrialOutcome, TrialRecord};
+use manifactor::slam::experiment::{Experiment, Shard, Trial, TrialLog, TrialOutcome, TrialRecord};
 use manifactor::slam::output::OutputFolder;
 use manifactor::slam::run_document::RunDocument;
 use std::path::Path;
@@ -76,7 +76,7 @@ pub fn trials(data: &[u8]) {
         std::fs::write(&path, bytes).unwrap_or_else(|e| panic!("{e}"));
         let open = || {
             let claimed = OutputFolder::claim(folder.path(), "experiment", Path::new("sweep.toml"), true);
-            Journal::open(claimed.unwrap_or_else(|e| panic!("{e}")))
+            TrialLog::open(claimed.unwrap_or_else(|e| panic!("{e}")))
         };
         let Ok(mut journal) = open() else {
             assert_eq!(std::fs::read(&path).unwrap_or_default(), bytes, "a refused journal has changed");

@@ -54,7 +54,7 @@ fn kept(bytes: &[u8]) {
         let new: Vec<_> = new.iter().cloned().map(Ok).collect();
         let stream = journaled(Stream::new(Opening::new(camera()), new.into_iter()), &path, FINGERPRINT)?;
         let frames = stream.observations.map(|frame| frame.unwrap_or_else(|e| panic!("{e}")));
-        Ok::<_, manifactor::slam::journal::JournalError>(frames.collect::<Vec<_>>())
+        Ok::<_, manifactor::formats::journal::JournalError>(frames.collect::<Vec<_>>())
     };
     let Ok(before) = read(&[]) else {
         assert_eq!(std::fs::read(&path).unwrap_or_default(), bytes, "a refused journal has changed");

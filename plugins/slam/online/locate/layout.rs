@@ -7,7 +7,7 @@ use crate::association::best_assignment;
 use crate::input::fusion::Fusion;
 use crate::input::prior_map::{PriorMap, PriorObject};
 use crate::input::sequence::ObjectId;
-use manifactor_geometry::{NearestRotation, Se3, nearest_rotation};
+use manifactor_geometry::{PointPairs, Se3};
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{Direction, Noise};
 use manifactor_quadric::DualQuadric;
@@ -259,28 +259,14 @@ impl Layout {
         if pairs.len() < 2 {
             return None;
         }
-        let weight = |pair: &Pair| pair.sigma.powi(-2);
-        let all: f64 = pairs.iter().map(weight).sum();
-        let mean = |of: &dyn Fn(&Pair) -> Vector3<f64>| {
-            pairs.iter().map(|p| of(p) * weight(p)).sum::<Vector3<f64>>() / all
-        };
-        let local = mean(&|pair| self.local[pair.local].centre);
-        let known = mean(&|pair| self.known[pair.known].centre);
-        let (mut products, mut spread) = (Matrix3::zeros(), 0.0);
-        for pair in pairs {
-            let (x, y) = (self.local[pair.local].centre - local, self.known[pair.known].centre - known);
-            products += y * x.transpose() * weight(pair);
-            spread += x.norm_squared() * weight(pair);
-        }
+        let centres = |pair: &Pair| (self.local[pair.local].centre, self.known[pair.known].centre);
+        let weighted = |pair: &Pair| (centres(pair).0, centres(pair).1, pair.sigma.powi(-2));
+        let mut points = PointPairs::new(pairs.iter().map(weighted));
         if let Some([u, v]) = self.up {
             // up is known better than any mark
-            products += *v * u.transpose() * (UP * spread);
+            points.add_direction(&u, &v, UP);
         }
-        let NearestRotation { rotation, singular_values } = nearest_rotation(&products);
-        if singular_values[1] <= FLAT * singular_values[0] {
-            return None;
-        }
-        Some(Se3::new(rotation, known - rotation.act(&local)))
+        points.rigid(FLAT).map(|found| Se3::new(found.rotation, found.translation))
     }
 
     /// What speaks for a pair at a place, in nats; `None` where the two are too far apart.
