@@ -22,7 +22,6 @@ mod error;
 mod factor_id;
 mod fronts;
 mod gone;
-mod landmarks;
 mod model;
 mod report;
 mod saved;
@@ -32,8 +31,7 @@ mod tree;
 
 pub use error::{ChangeError, UpdateError};
 pub use factor_id::FactorId;
-pub use landmarks::{LandmarkSettings, Landmarks, Named, Sighting, SightingError};
 pub use report::{Rejection, Report, Shared};
 pub use saved::{LoadError, SaveError};
-pub use session::{CovarianceError, Finished, Given, Innovation, InnovationError, Misfit, Session};
+pub use session::{CovarianceError, Finished, Session};
 pub use settings::{ManifoldType, NotOneSpan, Outliers, Settings, Span, UnknownManifold, Window};

@@ -1,4 +1,4 @@
-//! A session, and landmarks, as text: a line that says what it is, and a JSON document.
+//! A session as text: a line that says what it is, and a JSON document.
 //!
 //! ```text
 //! manifactor session 3 90b4b1a3c2f0d7e1
@@ -10,20 +10,13 @@
 use crate::gone::{GoneKeys, Runs};
 use crate::settings::Settings;
 use manifactor_graph::{FactorEntry, GraphError, Key, Variable};
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// What a text is of, and the version of its form.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Form {
-    pub(crate) what: &'static str,
-    pub(crate) version: u32,
-}
+/// The version of the format that this program writes and reads.
+const VERSION: u32 = 3;
 
-const SESSION: Form = Form { what: "session", version: 3 };
-
-/// Why a session or landmarks cannot be saved.
+/// Why a session cannot be saved.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SaveError {
@@ -35,15 +28,13 @@ pub enum SaveError {
     Write(String),
 }
 
-/// Why a text is not what was saved.
+/// Why a text is no saved session.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
     /// Something else.
-    #[error("no saved {what}: expected a first line `manifactor {what} {version} …`")]
+    #[error("no saved session: expected a first line `manifactor session {version} …`")]
     Foreign {
-        /// What is expected.
-        what: &'static str,
         /// The version that this program reads.
         version: u32,
     },
@@ -67,9 +58,6 @@ pub enum LoadError {
     /// Something else that no session can be.
     #[error("the saved session contradicts itself: {0}")]
     Inconsistent(&'static str),
-    /// Landmarks of another session, or of another time.
-    #[error("the saved landmarks do not fit the session: {0}")]
-    Landmarks(&'static str),
 }
 
 /// What is saved.
@@ -173,33 +161,20 @@ pub(crate) struct SavedFront {
 
 impl Saved {
     pub(crate) fn write(&self) -> Result<String, SaveError> {
-        SESSION.write(self)
+        let json = serde_json::to_string(self).map_err(|e| SaveError::Write(e.to_string()))?;
+        Ok(format!("manifactor session {VERSION} {:016x}\n{json}\n", checksum(json.as_bytes())))
     }
 
     pub(crate) fn read(text: &str) -> Result<Self, LoadError> {
-        SESSION.read(text)
-    }
-}
-
-impl Form {
-    /// A text of this form.
-    pub(crate) fn write(self, content: &impl Serialize) -> Result<String, SaveError> {
-        let Self { what, version } = self;
-        let json = serde_json::to_string(content).map_err(|e| SaveError::Write(e.to_string()))?;
-        Ok(format!("manifactor {what} {version} {:016x}\n{json}\n", checksum(json.as_bytes())))
-    }
-
-    pub(crate) fn read<T: DeserializeOwned>(self, text: &str) -> Result<T, LoadError> {
-        let Self { what, version } = self;
-        let foreign = || LoadError::Foreign { what, version };
+        let foreign = || LoadError::Foreign { version: VERSION };
         let (first, json) = text.split_once('\n').unwrap_or((text, ""));
         let mut words = first.split_ascii_whitespace();
-        if words.next() != Some("manifactor") || words.next() != Some(what) {
+        if words.next() != Some("manifactor") || words.next() != Some("session") {
             return Err(foreign());
         }
         let found = words.next().ok_or_else(foreign)?;
-        if found != version.to_string() {
-            return Err(LoadError::Version { found: found.to_owned(), version });
+        if found != VERSION.to_string() {
+            return Err(LoadError::Version { found: found.to_owned(), version: VERSION });
         }
         let json = json.strip_suffix('\n').ok_or(LoadError::Damaged)?;
         let stated = words.next().and_then(|word| u64::from_str_radix(word, 16).ok());

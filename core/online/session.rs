@@ -2,7 +2,6 @@
 mod changes;
 mod covariance;
 mod finish;
-mod innovation;
 mod outliers;
 mod parking;
 mod relinearization;
@@ -30,8 +29,6 @@ use window::Held;
 
 pub use covariance::CovarianceError;
 pub use finish::Finished;
-pub(crate) use innovation::Linearized;
-pub use innovation::{Given, Innovation, InnovationError, Misfit};
 
 /// A factor graph that grows while it is solved. See the [crate](crate).
 ///

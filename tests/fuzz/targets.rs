@@ -22,7 +22,7 @@ pub use files::{prior_map, record};
 pub use history::history;
 pub use mapper::mapper;
 pub use replay::replay;
-pub use smoother::{landmarks, session};
+pub use smoother::session;
 pub use stream::{frame_journal, json_lines};
 pub use view::view;
 
@@ -43,7 +43,7 @@ use std::sync::{Arc, LazyLock};
 pub type Target = (&'static str, fn(&[u8]), usize);
 
 /// All targets.
-pub const TARGETS: [Target; 21] = [
+pub const TARGETS: [Target; 20] = [
     ("pose_graph", pose_graph, 2000),
     ("bundle", bundle, 2000),
     ("trajectory", trajectory, 2000),
@@ -58,7 +58,6 @@ pub const TARGETS: [Target; 21] = [
     ("prior_map", prior_map, 500),
     ("record", record, 300),
     ("session", session, 500),
-    ("landmarks", landmarks, 500),
     ("mapper", mapper, 100),
     ("replay", replay, 500),
     ("experiment", experiment, 200),

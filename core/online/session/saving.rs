@@ -1,6 +1,5 @@
 //! A session that goes on after a restart.
 use super::Session;
-use crate::factor_id::FactorId;
 use crate::model::{Model, NewNumber, Prior};
 use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
 use crate::tree::{Couplings, Tree};
@@ -112,16 +111,6 @@ impl Session {
         let fits = session.put_times(saved.time, &saved.times);
         fits.then_some(()).ok_or(LoadError::Inconsistent("times"))?;
         Ok(session)
-    }
-
-    /// Whether there is, or was, a variable of this name.
-    pub(crate) fn has_had(&self, key: &str) -> bool {
-        self.find(key).is_some() || self.gone.contains(key)
-    }
-
-    /// Whether there is, or was, a factor of this number.
-    pub(crate) fn has_given(&self, factor: FactorId) -> bool {
-        factor.0 < self.model.next_factor()
     }
 
     fn save_prior(&self, number: u32) -> Option<SavedPrior> {

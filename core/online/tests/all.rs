@@ -5,7 +5,6 @@ mod errors;
 mod failures;
 mod history;
 mod idle;
-mod landmarks;
 mod outliers;
 mod parking;
 mod saving;

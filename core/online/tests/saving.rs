@@ -46,7 +46,7 @@ fn session(window: Option<Window>) -> Session {
 #[test]
 fn what_is_no_session_is_refused_with_a_reason() {
     let text = session(None).save().unwrap();
-    let foreign = LoadError::Foreign { what: "session", version: 3 };
+    let foreign = LoadError::Foreign { version: 3 };
     assert_eq!(Session::load("").unwrap_err(), foreign);
     assert_eq!(Session::load("{\"factors\": []}").unwrap_err(), foreign);
     let later = text.replacen("session 3 ", "session 4 ", 1);

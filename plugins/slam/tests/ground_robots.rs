@@ -1,4 +1,4 @@
-//! Robots in the plane that see landmarks, with their names and without.
+//! Robots in the plane that measure landmarks with known ids.
 mod mr_clam;
 mod victoria_park;
 
@@ -8,8 +8,7 @@ use manifactor_graph::loss::Loss;
 use manifactor_graph::{
     Factor, FactorEntry, Graph, Key, Lifted, Manifold, Noise, Residual, Scalar, Values, register_factor,
 };
-use manifactor_online::{LandmarkSettings, Landmarks, Named, Session, Settings, Sighting};
-use manifactor_slam::metrics::{IdentityScores, identity};
+use manifactor_online::{Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 use nalgebra::{U3, Vector2, Vector3};
 use schemars::JsonSchema;
@@ -50,11 +49,6 @@ fn data(path: &str) -> Option<PathBuf> {
     file.exists().then_some(file)
 }
 
-/// Whether all rows of the tables in `docs/decisions/association.md` are asked for: that takes minutes.
-fn is_for_tables() -> bool {
-    std::env::var_os("MANIFACTOR_TABLES").is_some()
-}
-
 /// The rows of a table of numbers, without comments.
 fn rows(path: PathBuf) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(path).unwrap();
@@ -69,9 +63,10 @@ struct Step {
     seen: Vec<Seen>,
 }
 
-/// What it sees of a landmark.
+/// A measurement of a landmark.
+#[derive(Clone)]
 struct Seen {
-    /// The landmark's true name.
+    /// The landmark's id.
     id: usize,
     /// Where it is from the robot, in metres.
     place: Vector2<f64>,
@@ -86,8 +81,6 @@ struct Driven {
     /// Where the newest pose was after its update, and where odometry alone leads.
     newest: Vec<Vector2<f64>>,
     odometry: Vec<Vector2<f64>>,
-    /// The true name and the key of each landmark that was seen.
-    names: Vec<(usize, Option<Key>)>,
     /// CPU time of the steps, in milliseconds.
     times: Vec<f64>,
     /// By what share the estimate costs more than a batch solve from it, now and then.
@@ -99,12 +92,10 @@ fn cpu_seconds() -> f64 {
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Maps landmarks: by their true names, or without.
-fn drive(steps: &[Step], nameless: Option<LandmarkSettings>, steering: Option<&Noise>) -> Driven {
-    let mut landmarks = nameless.map(|settings| Landmarks::new("l", settings).unwrap());
+/// Maps landmarks by their ids.
+fn drive(steps: &[Step], steering: Option<&Noise>) -> Driven {
     let session = Session::new(Settings::default()).unwrap();
-    let (newest, odometry, names, times, gaps) = (vec![], vec![], vec![], vec![], vec![]);
-    let mut driven = Driven { session, newest, odometry, names, times, gaps };
+    let mut driven = Driven { session, newest: vec![], odometry: vec![], times: vec![], gaps: vec![] };
     let (mut pose, mut alone) = (Se2::identity(), Se2::identity());
     for (i, Step { odometry, seen }) in steps.iter().enumerate() {
         let session = &mut driven.session;
@@ -135,34 +126,15 @@ fn drive(steps: &[Step], nameless: Option<LandmarkSettings>, steering: Option<&N
         }
         values.insert(here.clone(), pose);
         let begin = cpu_seconds();
-        let seen_ids = seen.iter().map(|seen| seen.id);
-        match &mut landmarks {
-            Some(landmarks) => {
-                session.push(&graph, &values).unwrap();
-                session.update().unwrap();
-                let pose: Se2 = session.get(here.as_str()).unwrap();
-                let seen: Vec<Sighting> = seen.iter().map(|seen| seen.sighting(&pose)).collect();
-                let Named { names, merged } = landmarks.see(session, &here, &seen).unwrap();
-                driven.names.extend(seen_ids.zip(names));
-                for (from, into) in merged {
-                    let of_it = driven.names.iter_mut().filter(|(_, name)| name.as_ref() == Some(&from));
-                    of_it.for_each(|(_, name)| *name = Some(into.clone()));
-                }
+        for seen in seen {
+            let key = Key::indexed("l", seen.id);
+            if session.estimate(key.as_str()).is_none() && !values.contains(key.as_str()) {
+                values.insert(key.clone(), Point2::new(pose.act(&seen.place)));
             }
-            None => {
-                let names: Vec<Key> = seen.iter().map(|seen| Key::indexed("l", seen.id)).collect();
-                for (seen, key) in seen.iter().zip(&names) {
-                    let Sighting { factor, noise, loss, landmark } = seen.sighting(&pose);
-                    if session.estimate(key.as_str()).is_none() && !values.contains(key.as_str()) {
-                        values.insert_boxed(key.clone(), landmark);
-                    }
-                    let keys = vec![here.clone(), key.clone()];
-                    graph.push(FactorEntry { keys, name: None, factor, noise, loss });
-                }
-                session.push(&graph, &values).unwrap();
-                driven.names.extend(seen_ids.zip(names.into_iter().map(Some)));
-            }
+            let Seen { factor, noise, loss, .. } = seen.clone();
+            graph.push(FactorEntry { keys: vec![here.clone(), key], name: None, factor, noise, loss });
         }
+        session.push(&graph, &values).unwrap();
         let report = driven.session.update().unwrap();
         driven.times.push(1e3 * (cpu_seconds() - begin));
         assert!(report.parked.is_empty() && report.undetermined.is_empty(), "{report:?}");
@@ -176,17 +148,6 @@ fn drive(steps: &[Step], nameless: Option<LandmarkSettings>, steering: Option<&N
         }
     }
     driven
-}
-
-impl Seen {
-    fn sighting(&self, pose: &Se2) -> Sighting {
-        Sighting {
-            factor: self.factor.clone(),
-            noise: self.noise.clone(),
-            loss: self.loss.clone(),
-            landmark: Box::new(Point2::new(pose.act(&self.place))),
-        }
-    }
 }
 
 impl Driven {
@@ -203,16 +164,6 @@ impl Driven {
 
     fn latencies(&self) -> Latencies {
         Latencies::of(&self.times)
-    }
-
-    /// Of sightings whose true name counts, by what is the same of it.
-    fn scores(&self, counts: impl Fn(usize) -> bool, same: impl Fn(usize) -> usize) -> IdentityScores {
-        let counting = self.names.iter().filter(|(id, _)| counts(*id));
-        identity(counting.map(|(id, key)| (same(*id), key.as_ref())))
-    }
-
-    fn unclear(&self) -> usize {
-        self.names.iter().filter(|(_, key)| key.is_none()).count()
     }
 }
 

@@ -3,13 +3,11 @@
 //! Noises are what the sensors are, not what fits the truth. Odometry is the commanded speed: its error is a random walk, so that
 //! its variance grows with the way, the turn and the time, however often the robot looks. A camera tells ranges by a barcode's
 //! size, so their error grows with the range. Some barcodes are read as others: hence a robust loss.
-use super::{Seen, Step, aligned_errors, data, drive, errors, is_for_tables};
+use super::{Seen, Step, aligned_errors, data, drive, errors};
 use manifactor_geometry::{BearingRange2, Point2, Se2, So2};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Key, Noise};
-use manifactor_online::LandmarkSettings;
-use manifactor_slam::metrics::IdentityScores;
 use nalgebra::{Vector2, Vector3};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -52,14 +50,13 @@ impl Odometry {
     }
 }
 
-/// What is seen, by time: landmarks, and other robots (subjects 1 to 5) where these are asked for. Barcodes that none has are left out.
-fn sightings(measurements: &[Vec<f64>], barcodes: &[Vec<f64>], with_robots: bool) -> Vec<(f64, Vec<Seen>)> {
+/// Measurements of landmarks by time, without other robots and unknown barcodes.
+fn measurements(rows: &[Vec<f64>], barcodes: &[Vec<f64>]) -> Vec<(f64, Vec<Seen>)> {
     let subjects: HashMap<usize, usize> =
         barcodes.iter().map(|row| (row[1] as usize, row[0] as usize)).collect();
     let mut all: Vec<(f64, Vec<Seen>)> = vec![];
-    for row in measurements {
-        let Some(id) = subjects.get(&(row[1] as usize)).copied().filter(|id| with_robots || *id > ROBOTS)
-        else {
+    for row in rows {
+        let Some(id) = subjects.get(&(row[1] as usize)).copied().filter(|id| *id > ROBOTS) else {
             continue;
         };
         let (range, bearing) = (row[2], So2::exp(row[3]));
@@ -84,20 +81,19 @@ fn truth_at(truth: &[Vec<f64>], time: f64) -> Vector2<f64> {
     Vector2::new(a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
 }
 
-/// The stream, from the first sighting on, and where Vicon saw the robot and the landmarks.
+/// The stream from the first measurement on, and where Vicon saw the robot and the landmarks.
 struct Recording {
     steps: Vec<Step>,
     truth: Vec<Vector2<f64>>,
     landmarks: Vec<Vec<f64>>,
 }
 
-/// Robots are those with the numbers 1 to 5.
-fn recording(with_robots: bool) -> Option<Recording> {
-    let sightings = sightings(&table("Robot3_Measurement")?, &table("Barcodes")?, with_robots);
-    let mut odometry = Odometry { rows: table("Robot3_Odometry")?, next: 0, time: sightings[0].0 };
+fn recording() -> Option<Recording> {
+    let measurements = measurements(&table("Robot3_Measurement")?, &table("Barcodes")?);
+    let mut odometry = Odometry { rows: table("Robot3_Odometry")?, next: 0, time: measurements[0].0 };
     let truth = table("Robot3_Groundtruth")?;
-    let truth = sightings.iter().map(|(time, _)| truth_at(&truth, *time)).collect();
-    let steps = sightings
+    let truth = measurements.iter().map(|(time, _)| truth_at(&truth, *time)).collect();
+    let steps = measurements
         .into_iter()
         .enumerate()
         .map(|(i, (time, seen))| Step { odometry: (i > 0).then(|| odometry.until(time)), seen });
@@ -106,8 +102,8 @@ fn recording(with_robots: bool) -> Option<Recording> {
 
 #[test]
 fn a_robot_finds_its_way_among_barcodes() {
-    let Some(Recording { steps, truth, landmarks }) = recording(false) else { return };
-    let driven = drive(&steps, None, None);
+    let Some(Recording { steps, truth, landmarks }) = recording() else { return };
+    let driven = drive(&steps, None);
     let (ate, motion) = driven.path_errors(&truth);
     let of_newest = aligned_errors(&driven.newest, &truth);
     let of_odometry = aligned_errors(&driven.odometry, &truth);
@@ -126,48 +122,4 @@ fn a_robot_finds_its_way_among_barcodes() {
     assert!(known.len() == 15 && of_landmarks.1 < 0.4);
     // what is left goes with `Settings.bend`: at a tenth of its default, the gap is a tenth
     assert!(driven.gaps.iter().all(|gap| *gap < 0.05) && driven.gaps.last().unwrap() < &0.02);
-}
-
-/// Landmarks stand in groups, side by side at 0.18 m.
-fn group(id: usize) -> usize {
-    [6, 9, 11, 14, 16, 19].iter().filter(|first| id >= **first).count()
-}
-
-/// Without names, among other robots or not.
-fn compare(with_robots: bool, settings: LandmarkSettings) -> Option<(IdentityScores, (f64, f64))> {
-    let Recording { steps, truth, .. } = recording(with_robots)?;
-    let driven = drive(&steps, Some(settings), None);
-    let (ate, _) = driven.path_errors(&truth);
-    let of_groups = driven.scores(|id| id > ROBOTS, group);
-    println!(
-        "{:?}\ngroups {:.3}, {:.3}",
-        driven.scores(|id| id > ROBOTS, |id| id),
-        of_groups.precision,
-        of_groups.f1
-    );
-    println!(
-        "ATE {ate:?}, newest {:?} m, {} unclear",
-        aligned_errors(&driven.newest, &truth),
-        driven.unclear()
-    );
-    println!("{:?} ms", driven.latencies());
-    Some((of_groups, ate))
-}
-
-#[test]
-fn barcodes_that_nobody_reads_are_told_apart_by_groups() {
-    // one landmark in a hundred poses is new, anywhere in a radian and five metres
-    let settings = LandmarkSettings { density: 0.002, ..LandmarkSettings::default() };
-    let Some((of_groups, ate)) = compare(false, settings) else { return };
-    // Odometry alone is off by 1.88 m. The landmark within a group stays in doubt, and one wrong name leads to others: small
-    // changes of the smoother gave an ATE from 0.13 to 0.70 m, and a precision from 0.84 to 1.
-    assert!(ate.0 < 1.0 && of_groups.precision > 0.8, "{ate:?} {of_groups:?}");
-    for with_robots in [false, true].into_iter().filter(|_| is_for_tables()) {
-        for density in [0.02, 0.002, 0.0002] {
-            for odds in [1.0, 3.0, 10.0] {
-                println!("robots {with_robots}, density {density}, odds {odds}");
-                compare(with_robots, LandmarkSettings { density, odds });
-            }
-        }
-    }
 }
