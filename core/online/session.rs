@@ -1,6 +1,6 @@
 //! A session: what is known so far, and the estimate.
 mod changes;
-mod covariance;
+mod factorization;
 mod finish;
 mod outliers;
 mod parking;
@@ -12,22 +12,24 @@ mod substitution;
 mod update;
 mod window;
 
-use crate::fronts::{Fronts, Scalar};
+use crate::fronts::Scalar;
 use crate::gone::{GoneKeys, Runs};
 use crate::model::Model;
 use crate::report::{Report, Shared};
 use crate::saved::Suspect;
 use crate::settings::Settings;
-use crate::tree::{Couplings, Tree};
+use crate::tree::Couplings;
 use changes::Pending;
+use factorization::Factorization;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
 use manifactor_solve::SettingError;
+use nalgebra::DMatrix;
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
 use window::Held;
 
-pub use covariance::CovarianceError;
+pub use factorization::CovarianceError;
 pub use finish::Finished;
 
 /// A factor graph that grows while it is solved. See the [crate](crate).
@@ -37,8 +39,7 @@ pub use finish::Finished;
 pub struct Session {
     settings: Settings,
     model: Model,
-    tree: Tree,
-    fronts: Fronts,
+    factorization: Factorization,
     pending: Pending,
     /// By scalar of all variables: their steps, as they were last passed on.
     delta: Vec<f64>,
@@ -62,8 +63,7 @@ pub struct Session {
     before: Vec<f64>,
     /// Variables whose steps are damped.
     damped: BTreeSet<u32>,
-    /// Directions that nothing constrains, and variables that are parked.
-    open: BTreeSet<Scalar>,
+    /// Variables that are parked.
     parked: BTreeSet<u32>,
     inactive: BTreeSet<u32>,
     /// Parked variables whose factors were linearized anew since they were judged.
@@ -99,8 +99,7 @@ impl Session {
         Ok(Self {
             settings,
             model: Model::default(),
-            tree: Tree::default(),
-            fronts: Fronts::default(),
+            factorization: Factorization::default(),
             pending: Pending::default(),
             delta: vec![],
             changed: vec![],
@@ -115,7 +114,6 @@ impl Session {
             moved: vec![],
             before: vec![],
             damped: BTreeSet::new(),
-            open: BTreeSet::new(),
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),
             doubtful: vec![],
@@ -180,9 +178,23 @@ impl Session {
         self.model.all_factors().map(|(f, ..)| f).filter(|f| self.model.is_whole(*f))
     }
 
+    /// The joint covariance of a few variables, in the order of `keys` and of their tangent directions, in the units of the
+    /// noise; what is held has zeros. It is that of the last linearization points, robust weights included.
+    ///
+    /// # Errors
+    /// Where a variable is not there or parked, or something that it hangs on is undetermined; if a covariance is too large for a number.
+    pub fn covariance(&self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
+        let mut variables = vec![];
+        for key in keys {
+            let missing = || CovarianceError::NoVariable { key: Key::from(*key) };
+            variables.push(self.model.variable(key).ok_or_else(missing)?);
+        }
+        self.factorization.covariance(&self.model, &variables)
+    }
+
     /// Bytes of the factorization.
     pub fn bytes(&self) -> usize {
-        self.fronts.bytes()
+        self.factorization.bytes()
     }
 
     fn dim(&self, variable: u32) -> usize {
@@ -196,8 +208,8 @@ impl Session {
     /// What is parked, undetermined and inactive, for a report.
     fn tell(&self, report: &mut Report) {
         report.parked = self.waiting_keys.clone();
-        let name = |(v, d): &Scalar| Some((self.key(*v), *self.model.place(*v).tangent.get(*d as usize)?));
-        report.undetermined = self.open.iter().filter_map(name).collect();
+        let name = |(v, d): Scalar| Some((self.key(v), *self.model.place(v).tangent.get(d as usize)?));
+        report.undetermined = self.factorization.open().filter_map(name).collect();
         report.inactive = self.inactive.len();
         report.postponed = self.postponed;
     }

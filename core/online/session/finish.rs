@@ -7,7 +7,6 @@ use super::parking::Moves;
 use crate::factor_id::FactorId;
 use crate::model::Overflow;
 use crate::report::Report;
-use crate::tree::NONE;
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Noise, Values};
 use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 
@@ -115,7 +114,7 @@ impl Session {
         let (before, mut held) = (self.delta.clone(), vec![]);
         for (v, step) in points
             .into_iter()
-            .filter(|(v, _)| self.tree.front_of(*v) != NONE && self.model.place(*v).sealed == 0)
+            .filter(|(v, _)| self.factorization.contains(*v) && self.model.place(*v).sealed == 0)
         {
             let range = self.model.blocks.range(v);
             self.delta[range].copy_from_slice(&step);

@@ -6,7 +6,7 @@
 //! A robust loss adds a second error: its weights are those of the linearization points. New weights change the gradient by
 //! Δg = Σ (w/w₀ − 1) w₀Jᵀr. About ½ (Δgᵢ σᵢ)² nats could be gained with them, and at most ½ nat is left, however short the step is.
 use super::Session;
-use crate::tree::{Affected, Couplings, NONE};
+use crate::tree::{Affected, Couplings};
 use smallvec::SmallVec;
 
 /// Variables at new points.
@@ -140,24 +140,21 @@ impl Session {
         let mut variables = vec![];
         by_excess.sort_unstable_by(|(a, v), (b, u)| b.total_cmp(a).then(v.cmp(u)));
         let first = affected.0.len();
-        let cost = |session: &Self, from: usize, affected: &Affected| -> f64 {
-            affected.0[from..].iter().map(|f| session.tree.fronts[*f as usize].operations).sum()
-        };
-        let mut left = budget - cost(self, 0, affected);
+        let mut left = budget - self.factorization.operations(&affected.0);
         let mut must_take = is_alone && first == 0;
         for (_, v) in by_excess {
             let before = affected.0.len();
-            self.touch_around(v, affected);
-            let needed = cost(self, before, affected);
+            self.factorization.touch_around(&self.model, v, affected);
+            let needed = self.factorization.operations(&affected.0[before..]);
             if needed <= left || must_take {
                 left -= needed;
                 must_take = false;
                 variables.push(v);
             } else {
-                self.tree.untouch(affected, before);
+                self.factorization.untouch(affected, before);
             }
         }
-        self.tree.untouch(affected, first);
+        self.factorization.untouch(affected, first);
         variables
     }
 
@@ -173,7 +170,7 @@ impl Session {
 
     /// Whether a variable may be linearized anew: it is solved for, and no prior holds its point.
     fn may_move(&self, variable: u32) -> bool {
-        self.tree.front_of(variable) != NONE && self.model.place(variable).sealed == 0
+        self.factorization.contains(variable) && self.model.place(variable).sealed == 0
     }
 
     /// Linearizes the factors of these variables, which ascend, where the variables are estimated to be; their steps are

@@ -1,8 +1,9 @@
 //! A session that goes on after a restart.
 use super::Session;
+use super::factorization::Factorization;
 use crate::model::{Model, NewNumber, Prior};
 use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
-use crate::tree::{Couplings, Tree};
+use crate::tree::Couplings;
 
 impl Session {
     /// The session as text. [`load`](Self::load) makes a session of it that goes on with the same bits, on a processor of the
@@ -36,7 +37,7 @@ impl Session {
             next_factor: self.model.next_factor(),
             variables,
             factors: factors.collect(),
-            fronts: self.tree.save(),
+            fronts: self.factorization.save(),
             born: self.model.born(),
             ordinals: self.model.ordinals(),
             unused: self.model.unused(),
@@ -95,9 +96,10 @@ impl Session {
         is_young.then_some(()).ok_or(LoadError::Inconsistent("its counters"))?;
         session.put_priors(&saved.priors, saved.next_factor)?;
         session.put_factors(&saved.factors, saved.next_factor)?;
-        session.tree = Tree::load(saved.fronts, &session.model, |v| session.model.place(v).is_in_tree())
+        session.factorization = Factorization::load(saved.fronts, &session.model)
+            .map_err(|_| LoadError::Inconsistent("the linear system overflows"))?
             .ok_or(LoadError::Inconsistent("its fronts do not fit its factors"))?;
-        session.put_fronts()?;
+        session.put_parked();
         let n = session.model.variables() as u32;
         let lists = [&saved.waiting, &saved.urgent, &saved.doubtful].into_iter().flatten();
         if lists.chain(&saved.shaken).any(|v| *v >= n) {
@@ -180,19 +182,11 @@ impl Session {
         Ok(())
     }
 
-    /// The numbers of all fronts, and what hangs on them.
-    fn put_fronts(&mut self) -> Result<(), LoadError> {
-        let all: Vec<u32> = (0..self.tree.fronts.len() as u32).collect();
-        self.fronts
-            .build(&self.tree, &self.model.blocks, &all)
-            .map_err(|_| LoadError::Inconsistent("the linear system overflows"))?;
-        for f in &all {
-            self.open.extend(self.fronts.open(*f));
-        }
+    /// Lists the variables that are parked.
+    fn put_parked(&mut self) {
         let parked = |v: &u32| self.model.place(*v).parked && self.model.place(*v).is_there;
         self.parked = (0..self.model.variables() as u32).filter(parked).collect();
         self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
-        Ok(())
     }
 }
 

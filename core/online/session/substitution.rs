@@ -11,15 +11,15 @@ impl Session {
         let mut solved = 0;
         let mut open: Vec<u32> = vec![];
         if self.is_idle {
-            open.extend(self.tree.roots());
+            open.extend(self.factorization.roots());
         } else {
             solved += redone.new.iter().rev().map(|f| self.solve_front(*f)).sum::<usize>();
             open.extend(redone.kept.iter().map(|(kept, _)| *kept));
         }
         while let Some(f) = open.pop() {
-            let front = &self.tree.fronts[f as usize];
-            if self.is_idle || front.rows.iter().any(|row| self.changed[*row as usize] == self.pass) {
-                open.extend_from_slice(&front.children);
+            let (rows, children) = self.factorization.below(f);
+            if self.is_idle || rows.iter().any(|row| self.changed[*row as usize] == self.pass) {
+                open.extend_from_slice(children);
                 solved += self.solve_front(f);
             }
         }
@@ -28,11 +28,10 @@ impl Session {
 
     fn solve_front(&mut self, f: u32) -> usize {
         let deviation = self.deviation();
-        let Self { tree, fronts, model, delta, changed, moved, before, .. } = self;
-        let front = &tree.fronts[f as usize];
-        let mut x = fronts.solve(front, f, &model.blocks, delta);
+        let Self { factorization, model, delta, changed, moved, before, .. } = self;
+        let (variables, mut x) = factorization.solve(model, f, delta);
         let first = moved.len();
-        for v in &front.blocks {
+        for v in variables {
             let range = model.blocks.range(*v);
             let (step, rest) = x.split_at(range.len());
             x = rest;
@@ -47,7 +46,7 @@ impl Session {
                 changed[*v as usize] = self.pass;
             }
         }
-        let solved = front.blocks.len();
+        let solved = variables.len();
         if !self.suspects.is_empty() {
             self.shaken.extend(self.moved[first..].iter().map(|(v, _)| *v));
         }

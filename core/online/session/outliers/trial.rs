@@ -10,7 +10,6 @@ use super::fit::Surprise;
 use crate::factor_id::FactorId;
 use crate::report::Report;
 use crate::saved::Suspect;
-use crate::tree::NONE;
 use manifactor_graph::Values;
 use std::collections::BTreeSet;
 
@@ -237,7 +236,7 @@ impl Session {
         for v in std::mem::take(&mut self.shaken) {
             let (key, point) = (&self.model.place(v).key, self.model.point(v));
             let step = point.zip(old.variable(key.as_str())).and_then(|(p, x)| p.erased().local(x));
-            let Some(step) = step.filter(|_| self.tree.front_of(v) != NONE) else { continue };
+            let Some(step) = step.filter(|_| self.factorization.contains(v)) else { continue };
             let range = self.model.blocks.range(v);
             self.delta[range].copy_from_slice(&step);
             if self.model.place(v).sealed == 0 {
