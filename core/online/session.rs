@@ -6,9 +6,10 @@ mod outliers;
 mod parking;
 mod relinearization;
 mod saving;
+mod schedule;
 mod sealing;
 mod step_control;
-mod substitution;
+mod steps;
 mod update;
 mod window;
 
@@ -24,9 +25,11 @@ use factorization::Factorization;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
 use manifactor_solve::SettingError;
 use nalgebra::DMatrix;
+use schedule::Schedule;
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
+use steps::Steps;
 use window::Held;
 
 pub use factorization::CovarianceError;
@@ -37,20 +40,11 @@ pub use finish::Finished;
 /// Changes are checked when they are asked for, and made by the next [`update`](Self::update). The estimate of a variable
 /// is its linearization point, moved by a step δ that the factorization gives.
 pub struct Session {
-    settings: Settings,
+    schedule: Schedule,
     model: Model,
     factorization: Factorization,
+    steps: Steps,
     pending: Pending,
-    /// By scalar of all variables: their steps, as they were last passed on.
-    delta: Vec<f64>,
-    /// By variable: the pass in which its step last changed.
-    changed: Vec<u64>,
-    pass: u64,
-    updates: usize,
-    /// Whether the last update had no changes.
-    is_quiet: bool,
-    /// Whether the current update and the one before it have no changes.
-    is_idle: bool,
     /// Variables to examine at the next turn: they have left the region of their linearization, or moved in a graph with losses.
     waiting: Vec<u32>,
     /// How many of them the budget has put off.
@@ -58,11 +52,6 @@ pub struct Session {
     is_waiting: Vec<bool>,
     /// Those that have left it so far that they cannot wait; some may be back, or be named twice.
     urgent: Vec<u32>,
-    /// Steps that the last pass changed, as they were before: to go back half the way.
-    moved: Vec<(u32, usize)>,
-    before: Vec<f64>,
-    /// Variables whose steps are damped.
-    damped: BTreeSet<u32>,
     /// Variables that are parked.
     parked: BTreeSet<u32>,
     inactive: BTreeSet<u32>,
@@ -85,7 +74,7 @@ pub struct Session {
 
 impl fmt::Debug for Session {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Session({} variables, {} updates)", self.variables(), self.updates)
+        write!(f, "Session({} variables, {} updates)", self.variables(), self.schedule.updates())
     }
 }
 
@@ -97,23 +86,15 @@ impl Session {
     pub fn new(settings: Settings) -> Result<Self, SettingError> {
         settings.check()?;
         Ok(Self {
-            settings,
+            schedule: Schedule::new(settings),
             model: Model::default(),
             factorization: Factorization::default(),
             pending: Pending::default(),
-            delta: vec![],
-            changed: vec![],
-            pass: 0,
-            updates: 0,
-            is_quiet: false,
-            is_idle: false,
+            steps: Steps::default(),
             waiting: vec![],
             postponed: 0,
             is_waiting: vec![],
             urgent: vec![],
-            moved: vec![],
-            before: vec![],
-            damped: BTreeSet::new(),
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),
             doubtful: vec![],
@@ -132,7 +113,7 @@ impl Session {
     pub fn estimate(&self, key: &str) -> Option<Box<dyn Variable>> {
         let variable = self.model.variable(key)?;
         let point = self.model.point(variable)?;
-        point.erased().retract(&self.delta[self.model.blocks.range(variable)])
+        point.erased().retract(self.steps.of(&self.model, variable))
     }
 
     /// The same, of a type that is known.
@@ -170,7 +151,7 @@ impl Session {
     /// parked; of variables that have left, what their linear priors say. It looks at every factor.
     pub fn cost(&mut self) -> f64 {
         let factors: Vec<u32> = self.counted().chain(self.model.priors()).collect();
-        self.cost_of(&factors).cost
+        self.steps.cost_of(&mut self.model, &factors).cost
     }
 
     /// The factors that count: none of their variables is parked.

@@ -18,11 +18,11 @@ impl Session {
         let mut variables = vec![];
         for v in 0..self.model.variables() as u32 {
             let Some(point) = self.model.point(v) else { continue };
-            let step = self.delta[self.model.blocks.range(v)].iter().map(|d| d.to_bits()).collect();
+            let step = self.steps.of(&self.model, v).iter().map(|d| d.to_bits()).collect();
             let place = self.model.place(v);
             let (key, born) = (place.key.clone(), place.is_there.then_some([place.born, place.ordinal]));
             let (held, parked) = (place.held, place.parked);
-            let damping = (self.model.blocks.damping(v).to_bits(), self.damped.contains(&v));
+            let damping = (self.model.blocks.damping(v).to_bits(), self.steps.is_damped(v));
             variables.push(SavedVariable { key, born, point, step, damping, held, parked });
         }
         let factors = self.model.all_factors().map(|(number, factor, entry)| {
@@ -30,9 +30,9 @@ impl Session {
             SavedFactor { number, weight: factor.weight, entry, suspect: self.suspects.get(&number).copied() }
         });
         let saved = Saved {
-            settings: self.settings.clone(),
-            updates: self.updates,
-            is_quiet: self.is_quiet,
+            settings: self.schedule.settings().clone(),
+            updates: self.schedule.updates(),
+            is_quiet: self.schedule.is_quiet(),
             postponed: self.postponed,
             next_factor: self.model.next_factor(),
             variables,
@@ -62,8 +62,8 @@ impl Session {
     pub fn load(text: &str) -> Result<Self, LoadError> {
         let saved = Saved::read(text)?;
         let mut session = Session::new(saved.settings).map_err(|e| LoadError::Read(e.to_string()))?;
-        (session.updates, session.postponed) = (saved.updates, saved.postponed);
-        session.is_quiet = saved.is_quiet;
+        session.schedule.restore(saved.updates, saved.is_quiet);
+        session.postponed = saved.postponed;
         for variable in &saved.variables {
             insert(&mut session.model, variable)?;
         }
@@ -73,21 +73,24 @@ impl Session {
         fits.then_some(()).ok_or(LoadError::Inconsistent("variables that are gone"))?;
         session.resize();
         let steps = saved.variables.iter().flat_map(|variable| &variable.step);
-        session.delta.iter_mut().zip(steps).for_each(|(to, step)| *to = f64::from_bits(*step));
+        session.steps.restore(steps.map(|step| f64::from_bits(*step)).collect());
         for (v, variable) in saved.variables.iter().enumerate() {
             let (damping, takes_steps) = (f64::from_bits(variable.damping.0), variable.damping.1);
             if !(damping >= 0.0 && damping.is_finite()) {
                 return Err(LoadError::Inconsistent("what steps are damped by"));
             }
-            let estimate = session.model.point(v as u32).and_then(|point| {
-                point.erased().retract(&session.delta[session.model.blocks.range(v as u32)])
-            });
+            let estimate = session
+                .model
+                .point(v as u32)
+                .and_then(|point| point.erased().retract(session.steps.of(&session.model, v as u32)));
             // the sum of a finite point and a finite step may be infinite
             if !estimate.is_some_and(|estimate| estimate.erased().is_finite()) {
                 return Err(LoadError::Inconsistent("a variable's key, point or step"));
             }
             session.model.blocks.damp(v as u32, damping);
-            session.damped.extend(takes_steps.then_some(v as u32));
+            if takes_steps {
+                session.steps.note_damped(v as u32);
+            }
         }
         // counters that go on from there must not wrap around
         let is_young = saved.ordinals.iter().chain([&saved.born]).all(|count| *count < 1 << 62)

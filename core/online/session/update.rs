@@ -7,7 +7,7 @@ use crate::error::UpdateError;
 use crate::factor_id::FactorId;
 use crate::model::{NewNumber, Overflow};
 use crate::report::Report;
-use crate::tree::{Affected, Couplings};
+use crate::tree::{Affected, Couplings, Redone};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -36,7 +36,7 @@ impl Session {
     pub fn update(&mut self) -> Result<Report, UpdateError> {
         let pending = std::mem::take(&mut self.pending);
         let is_quiet = pending.is_empty();
-        self.is_idle = is_quiet && self.is_quiet;
+        self.schedule.begin(is_quiet);
         let mut report = Report::default();
         let mut touched = Touched { steps: true, ..Touched::default() };
         let mut undo = Undo::default();
@@ -72,9 +72,7 @@ impl Session {
         }
         self.doubt_inactive(&mut touched);
         undo.moves = self.park(&mut touched);
-        let is_turn = self.is_idle
-            || self.postponed > 0
-            || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.max(1));
+        let is_turn = self.postponed > 0 || self.schedule.is_turn();
         let moves = std::mem::take(&mut undo.moves);
         if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);
@@ -82,8 +80,7 @@ impl Session {
             self.take_back(undo);
             return Err(UpdateError::Overflow { key });
         }
-        self.updates += 1;
-        self.is_quiet = is_quiet;
+        self.schedule.complete(is_quiet);
         self.follow_up(&mut report);
         let new = self.enter(suspects, &touched.removed);
         self.test_outliers(&new, &mut report);
@@ -103,7 +100,7 @@ impl Session {
     /// that fails leaves that as it is.
     pub(super) fn follow_up(&mut self, report: &mut Report) {
         self.control_step(report);
-        for _ in 0..self.settings.passes {
+        for _ in 0..self.schedule.settings().passes {
             if !self.is_urgent() || self.pass(&Touched::default(), &Moves::default(), true, report).is_err() {
                 return;
             }
@@ -115,8 +112,7 @@ impl Session {
     pub(super) fn resize(&mut self) {
         let n = self.model.variables();
         self.factorization.resize(n);
-        self.delta.resize(self.model.blocks.scalars(), 0.0);
-        self.changed.resize(n, 0);
+        self.steps.resize(&self.model, n);
         self.is_waiting.resize(n, false);
     }
 
@@ -188,7 +184,6 @@ impl Session {
         is_turn: bool,
         report: &mut Report,
     ) -> Result<(), Overflow> {
-        self.pass += 1;
         report.passes += 1;
         let mut affected = Affected::default();
         touched.variables.iter().for_each(|v| self.factorization.touch(*v, &mut affected));
@@ -198,7 +193,7 @@ impl Session {
         let last = self.last(touched, &moves.entering);
         let postponed = self.postponed;
         let mut due = touched.held.clone();
-        if touched.steps && self.settings.budget.is_none() {
+        if touched.steps && self.schedule.settings().budget.is_none() {
             due.extend(self.damped_now());
         }
         let Choice { chosen, waiting } = self.choose(due, is_turn, &mut affected, report.operations);
@@ -206,7 +201,11 @@ impl Session {
         for v in &relinearized.variables {
             self.factorization.touch_around(&self.model, *v, &mut affected);
         }
-        let damping = if touched.steps || is_turn { self.relax(&relinearized.variables) } else { vec![] };
+        let damping = if touched.steps || is_turn {
+            self.steps.relax(&mut self.model, &relinearized.variables)
+        } else {
+            vec![]
+        };
         self.model.sum_up();
         let redone = match self.factorization.rebuild(&self.model, &affected, moves, &last) {
             Ok(redone) => redone,
@@ -214,7 +213,7 @@ impl Session {
                 self.take_back_points(&relinearized);
                 for (v, damping) in damping {
                     self.model.blocks.damp(v, damping);
-                    self.damped.insert(v);
+                    self.steps.note_damped(v);
                 }
                 self.postponed = postponed;
                 self.model.sum_up();
@@ -252,6 +251,20 @@ impl Session {
             last.sort_unstable();
         }
         last
+    }
+
+    /// Solves for the steps, and notes variables that have moved. An idle update solves for all. Returns the number of variables.
+    fn solve(&mut self, redone: &Redone) -> usize {
+        let redone = (!self.schedule.is_idle()).then_some(redone);
+        let Self { steps, model, factorization, .. } = self;
+        let solved = steps.solve(model, factorization, redone, self.schedule.deviation());
+        if !self.suspects.is_empty() {
+            self.shaken.extend(self.steps.moved());
+        }
+        for v in self.steps.moved().collect::<Vec<_>>() {
+            self.note_excess(v);
+        }
+        solved
     }
 
     /// Notes which of the variables that were judged are parked.

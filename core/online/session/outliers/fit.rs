@@ -78,7 +78,7 @@ impl Session {
         let mut first = 0;
         for v in variables {
             let dim = self.dim(*v);
-            let from = &self.delta[self.model.blocks.range(*v)];
+            let from = self.steps.of(&self.model, *v);
             let step: Vec<f64> = from.iter().zip(step.rows(first, dim).iter()).map(|(a, b)| a + b).collect();
             self.model.try_step(*v, &step);
             first += dim;
