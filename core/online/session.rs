@@ -1,32 +1,37 @@
 //! A session: what is known so far, and the estimate.
 mod changes;
-mod covariance;
+mod factorization;
 mod finish;
 mod outliers;
 mod parking;
 mod relinearization;
 mod saving;
+mod schedule;
 mod sealing;
 mod step_control;
-mod substitution;
+mod steps;
 mod update;
 mod window;
 
-use crate::fronts::{Fronts, Scalar};
+use crate::fronts::Scalar;
 use crate::gone::{GoneKeys, Runs};
 use crate::model::Model;
 use crate::report::{Report, Shared};
 use crate::saved::Suspect;
 use crate::settings::Settings;
-use crate::tree::{Couplings, Tree};
+use crate::tree::Couplings;
 use changes::Pending;
+use factorization::Factorization;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
+use nalgebra::DMatrix;
+use schedule::Schedule;
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
+use steps::Steps;
 use window::Held;
 
-pub use covariance::CovarianceError;
+pub use factorization::CovarianceError;
 pub use finish::Finished;
 
 /// A factor graph that grows while it is solved. See the [crate](crate).
@@ -34,21 +39,11 @@ pub use finish::Finished;
 /// Changes are checked when they are asked for, and made by the next [`update`](Self::update). The estimate of a variable
 /// is its linearization point, moved by a step δ that the factorization gives.
 pub struct Session {
-    settings: Settings,
+    schedule: Schedule,
     model: Model,
-    tree: Tree,
-    fronts: Fronts,
+    factorization: Factorization,
+    steps: Steps,
     pending: Pending,
-    /// By scalar of all variables: their steps, as they were last passed on.
-    delta: Vec<f64>,
-    /// By variable: the pass in which its step last changed.
-    changed: Vec<u64>,
-    pass: u64,
-    updates: usize,
-    /// Whether the last update had no changes.
-    is_quiet: bool,
-    /// Whether the current update and the one before it have no changes.
-    is_idle: bool,
     /// Variables to examine at the next turn: they have left the region of their linearization, or moved in a graph with losses.
     waiting: Vec<u32>,
     /// How many of them the budget has put off.
@@ -56,13 +51,7 @@ pub struct Session {
     is_waiting: Vec<bool>,
     /// Those that have left it so far that they cannot wait; some may be back, or be named twice.
     urgent: Vec<u32>,
-    /// Steps that the last pass changed, as they were before: to go back half the way.
-    moved: Vec<(u32, usize)>,
-    before: Vec<f64>,
-    /// Variables whose steps are damped.
-    damped: BTreeSet<u32>,
-    /// Directions that nothing constrains, and variables that are parked.
-    open: BTreeSet<Scalar>,
+    /// Variables that are parked.
     parked: BTreeSet<u32>,
     inactive: BTreeSet<u32>,
     /// Parked variables whose factors were linearized anew since they were judged.
@@ -84,7 +73,7 @@ pub struct Session {
 
 impl fmt::Debug for Session {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Session({} variables, {} updates)", self.variables(), self.updates)
+        write!(f, "Session({} variables, {} updates)", self.variables(), self.schedule.updates())
     }
 }
 
@@ -92,25 +81,15 @@ impl Session {
     /// An empty session.
     pub fn new(settings: Settings) -> Self {
         Self {
-            settings,
+            schedule: Schedule::new(settings),
             model: Model::default(),
-            tree: Tree::default(),
-            fronts: Fronts::default(),
+            factorization: Factorization::default(),
             pending: Pending::default(),
-            delta: vec![],
-            changed: vec![],
-            pass: 0,
-            updates: 0,
-            is_quiet: false,
-            is_idle: false,
+            steps: Steps::default(),
             waiting: vec![],
             postponed: 0,
             is_waiting: vec![],
             urgent: vec![],
-            moved: vec![],
-            before: vec![],
-            damped: BTreeSet::new(),
-            open: BTreeSet::new(),
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),
             doubtful: vec![],
@@ -129,7 +108,7 @@ impl Session {
     pub fn estimate(&self, key: &str) -> Option<Box<dyn Variable>> {
         let variable = self.model.variable(key)?;
         let point = self.model.point(variable)?;
-        point.erased().retract(&self.delta[self.model.blocks.range(variable)])
+        point.erased().retract(self.steps.of(&self.model, variable))
     }
 
     /// The same, of a type that is known.
@@ -167,7 +146,7 @@ impl Session {
     /// parked; of variables that have left, what their linear priors say. It looks at every factor.
     pub fn cost(&mut self) -> f64 {
         let factors: Vec<u32> = self.counted().chain(self.model.priors()).collect();
-        self.cost_of(&factors).cost
+        self.steps.cost_of(&mut self.model, &factors).cost
     }
 
     /// The factors that count: none of their variables is parked.
@@ -175,9 +154,23 @@ impl Session {
         self.model.all_factors().map(|(f, ..)| f).filter(|f| self.model.is_whole(*f))
     }
 
+    /// The joint covariance of a few variables, in the order of `keys` and of their tangent directions, in the units of the
+    /// noise; what is held has zeros. It is that of the last linearization points, robust weights included.
+    ///
+    /// # Errors
+    /// Where a variable is not there or parked, or something that it hangs on is undetermined; if a covariance is too large for a number.
+    pub fn covariance(&self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
+        let mut variables = vec![];
+        for key in keys {
+            let missing = || CovarianceError::NoVariable { key: Key::from(*key) };
+            variables.push(self.model.variable(key).ok_or_else(missing)?);
+        }
+        self.factorization.covariance(&self.model, &variables)
+    }
+
     /// Bytes of the factorization.
     pub fn bytes(&self) -> usize {
-        self.fronts.bytes()
+        self.factorization.bytes()
     }
 
     fn dim(&self, variable: u32) -> usize {
@@ -191,8 +184,8 @@ impl Session {
     /// What is parked, undetermined and inactive, for a report.
     fn tell(&self, report: &mut Report) {
         report.parked = self.waiting_keys.clone();
-        let name = |(v, d): &Scalar| Some((self.key(*v), *self.model.place(*v).tangent.get(*d as usize)?));
-        report.undetermined = self.open.iter().filter_map(name).collect();
+        let name = |(v, d): Scalar| Some((self.key(v), *self.model.place(v).tangent.get(d as usize)?));
+        report.undetermined = self.factorization.open().filter_map(name).collect();
         report.inactive = self.inactive.len();
         report.postponed = self.postponed;
     }

@@ -7,7 +7,6 @@ use super::parking::Moves;
 use crate::factor_id::FactorId;
 use crate::model::Overflow;
 use crate::report::Report;
-use crate::tree::NONE;
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Noise, Values};
 use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 
@@ -111,19 +110,18 @@ impl Session {
             let step = point.zip(values.variable(key.as_str())).and_then(|(p, x)| p.erased().local(x));
             points.extend(step.map(|step| (v, step)));
         }
-        let (before, mut held) = (self.delta.clone(), vec![]);
+        let (before, mut held) = (self.steps.all().to_vec(), vec![]);
         for (v, step) in points
             .into_iter()
-            .filter(|(v, _)| self.tree.front_of(*v) != NONE && self.model.place(*v).sealed == 0)
+            .filter(|(v, _)| self.factorization.contains(*v) && self.model.place(*v).sealed == 0)
         {
-            let range = self.model.blocks.range(v);
-            self.delta[range].copy_from_slice(&step);
+            self.steps.set(&self.model, v, &step);
             held.push(v);
         }
         let all = Touched { variables: held.clone(), held, ..Touched::default() };
         let passed = self.pass(&all, &Moves::default(), false, report);
         if passed.is_err() {
-            self.delta = before;
+            self.steps.restore(before);
         }
         passed
     }

@@ -38,7 +38,7 @@ impl Session {
     /// best. It counts as odometry if the variables are neighbours; the order of the factors does not matter.
     pub(super) fn best_between(&self, changes: &[Change]) -> BTreeMap<Vec<u32>, u32> {
         let mut all: BTreeMap<Vec<u32>, Vec<(u32, &FactorEntry)>> = BTreeMap::new();
-        if self.settings.outliers.is_some() {
+        if self.schedule.settings().outliers.is_some() {
             for change in changes {
                 let Change::Insert { number, entry, resolved, .. } = change else { continue };
                 all.entry(ascending(&resolved.variables)).or_default().push((*number, entry));
@@ -63,7 +63,7 @@ impl Session {
         number: u32,
         best: &BTreeMap<Vec<u32>, u32>,
     ) -> Option<Suspect> {
-        let outliers = self.settings.outliers.as_ref()?;
+        let outliers = self.schedule.settings().outliers.as_ref()?;
         let name = entry.factor.typetag_name();
         let is_named = outliers.types.is_empty() || outliers.types.iter().any(|t| t.as_str() == name);
         let variables = &resolved.variables;
@@ -72,7 +72,7 @@ impl Session {
                 || !self.is_odometry(variables));
         let rows = entry.factor.erased().signature().rows.filter(|rows| *rows > 0)?;
         let (bound, gain) = (outliers.probability.chi_squared(rows), *outliers.gain * rows as f64);
-        (is_named && couples).then_some(Suspect { bound, gain, since: Some(self.updates + 1) })
+        (is_named && couples).then_some(Suspect { bound, gain, since: Some(self.schedule.updates() + 1) })
     }
 
     /// Whether a new factor between these variables is odometry: they are neighbours, and no trusted factor connects them yet.
@@ -191,7 +191,7 @@ impl Session {
             if excess <= 1.0 || self.turn_over(rejected, Touched::default(), false, report).is_err() {
                 return;
             }
-            self.note(&[worst], Some(self.updates));
+            self.note(&[worst], Some(self.schedule.updates()));
             report.rejected.push(FactorId(worst));
             around.retain(|f| *f != worst);
             self.follow_up(report);
@@ -200,7 +200,8 @@ impl Session {
 
     /// Returns the factor with the largest share of its bound at the estimate, and that share.
     fn worst(&mut self, factors: &[u32]) -> Option<(u32, f64)> {
-        let share = |f: &u32| (*f, 2.0 * self.cost_of(&[*f]).cost / self.suspects[f].bound);
+        let share =
+            |f: &u32| (*f, 2.0 * self.steps.cost_of(&mut self.model, &[*f]).cost / self.suspects[f].bound);
         factors.iter().map(share).max_by(|(f, a), (g, b)| a.total_cmp(b).then(g.cmp(f)))
     }
 

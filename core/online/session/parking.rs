@@ -61,7 +61,7 @@ impl Session {
         }
         let looked_at = touched.variables.iter().chain(&candidates).chain(&parked);
         for v in looked_at.copied().collect::<BTreeSet<u32>>() {
-            let is_in = self.tree.front_of(v) != crate::tree::NONE;
+            let is_in = self.factorization.contains(v);
             match (is_in, self.model.place(v).is_in_tree()) {
                 (false, true) => moves.entering.push(v),
                 (true, false) => moves.leaving.push(v),

@@ -6,7 +6,7 @@
 //! A robust loss adds a second error: its weights are those of the linearization points. New weights change the gradient by
 //! Δg = Σ (w/w₀ − 1) w₀Jᵀr. About ½ (Δgᵢ σᵢ)² nats could be gained with them, and at most ½ nat is left, however short the step is.
 use super::Session;
-use crate::tree::{Affected, Couplings, NONE};
+use crate::tree::{Affected, Couplings};
 use smallvec::SmallVec;
 
 /// Variables at new points.
@@ -23,8 +23,6 @@ pub(super) struct Choice {
     pub(super) waiting: Option<Vec<u32>>,
 }
 
-/// Limits of an idle update, as shares of the limits of other updates.
-const FINE: f64 = 1e-8;
 /// Most halvings of a step that leaves the domain of a factor; after them the variable keeps its point.
 const HALVINGS: u32 = 4;
 /// Rounds of such halvings, each of some variables, before all of them stay.
@@ -33,24 +31,12 @@ const ROUNDS: usize = 16;
 impl Session {
     /// The error of a variable's linearization by the length of its step, as a share of its limit.
     pub(super) fn excess(&self, variable: u32) -> f64 {
-        let blocks = &self.model.blocks;
-        let steps = self.delta[blocks.range(variable)].iter().zip(blocks.precision(variable));
-        steps.map(|(step, precision)| step * step * precision / *self.settings.bend).fold(0.0, f64::max)
-    }
-
-    /// The largest share that is left: an idle update leaves far less.
-    fn most(&self) -> f64 {
-        if self.is_idle { FINE } else { 1.0 }
-    }
-
-    /// The largest change of a step that is not passed on, in σ.
-    pub(super) fn deviation(&self) -> f64 {
-        if self.is_idle { FINE * *self.settings.deviation } else { *self.settings.deviation }
+        self.steps.excess(&self.model, variable, *self.schedule.settings().bend)
     }
 
     /// Whether something cannot wait for the next turn: after a large loop closure, a step is no estimate of anything.
     pub(super) fn is_urgent(&mut self) -> bool {
-        let most = self.settings.urgent.powi(2);
+        let most = self.schedule.urgent_excess();
         let mut urgent = std::mem::take(&mut self.urgent);
         urgent.retain(|v| self.excess(*v) > most && self.may_move(*v));
         urgent.sort_unstable();
@@ -71,7 +57,7 @@ impl Session {
         let mut out = vec![];
         if is_turn {
             out = self.out();
-            if let Some(budget) = self.settings.budget {
+            if let Some(budget) = self.schedule.settings().budget {
                 let mut wanted = out.clone();
                 wanted.extend(self.damped_now().map(|v| (self.excess(v), v)));
                 wanted.sort_unstable_by(|(a, v), (b, u)| v.cmp(u).then(b.total_cmp(a)));
@@ -93,8 +79,10 @@ impl Session {
     /// The variables outside of the regions of their linearizations, ascending, each with its excess: by the length of its step,
     /// or by new weights of losses.
     fn out(&mut self) -> Vec<(f64, u32)> {
-        let mut moved: Vec<u32> = match self.is_idle {
-            true => (0..self.model.variables() as u32).filter(|v| self.has_step(*v)).collect(),
+        let mut moved: Vec<u32> = match self.schedule.is_idle() {
+            true => {
+                (0..self.model.variables() as u32).filter(|v| self.steps.has_step(&self.model, *v)).collect()
+            }
             false => self.waiting.clone(),
         };
         moved.retain(|v| self.may_move(*v));
@@ -106,20 +94,17 @@ impl Session {
                 *excess = excess.max(by_weight);
             }
         }
-        out.retain(|(excess, _)| *excess > self.most());
+        out.retain(|(excess, _)| *excess > self.schedule.largest_excess());
         out
-    }
-
-    fn has_step(&self, variable: u32) -> bool {
-        self.model.place(variable).is_there
-            && self.delta[self.model.blocks.range(variable)].iter().any(|step| *step != 0.0)
     }
 
     /// The gain in cost that new weights of losses promise at each variable, as a share of ½ nat. A short step can change the
     /// weights of a robust loss much.
     fn excesses_by_weight(&mut self, variables: &[u32]) -> Vec<f64> {
         let around = self.model.factors_of(variables);
-        let changes = self.at_estimate(&around, |model, delta| model.reweighed(variables, delta));
+        let changes = self
+            .steps
+            .at_estimate(&mut self.model, &around, |model, delta| model.reweighed(variables, delta));
         let share = |(v, change): (&u32, SmallVec<[f64; 9]>)| {
             let precision = self.model.blocks.precision(*v);
             let shares = change.iter().zip(precision).map(|(g, p)| (g / p).powi(2));
@@ -140,40 +125,37 @@ impl Session {
         let mut variables = vec![];
         by_excess.sort_unstable_by(|(a, v), (b, u)| b.total_cmp(a).then(v.cmp(u)));
         let first = affected.0.len();
-        let cost = |session: &Self, from: usize, affected: &Affected| -> f64 {
-            affected.0[from..].iter().map(|f| session.tree.fronts[*f as usize].operations).sum()
-        };
-        let mut left = budget - cost(self, 0, affected);
+        let mut left = budget - self.factorization.operations(&affected.0);
         let mut must_take = is_alone && first == 0;
         for (_, v) in by_excess {
             let before = affected.0.len();
-            self.touch_around(v, affected);
-            let needed = cost(self, before, affected);
+            self.factorization.touch_around(&self.model, v, affected);
+            let needed = self.factorization.operations(&affected.0[before..]);
             if needed <= left || must_take {
                 left -= needed;
                 must_take = false;
                 variables.push(v);
             } else {
-                self.tree.untouch(affected, before);
+                self.factorization.untouch(affected, before);
             }
         }
-        self.tree.untouch(affected, first);
+        self.factorization.untouch(affected, first);
         variables
     }
 
     /// Whether a variable is out of the region of its linearization, and solved for.
     pub(super) fn is_out(&self, variable: u32) -> bool {
-        self.excess(variable) > self.most() && self.may_move(variable)
+        self.excess(variable) > self.schedule.largest_excess() && self.may_move(variable)
     }
 
     /// Variables whose steps are damped: such a step is none to the minimum, however short, and another has to follow.
     pub(super) fn damped_now(&self) -> impl Iterator<Item = u32> {
-        self.damped.iter().copied().filter(|v| self.may_move(*v))
+        self.steps.damped().filter(|v| self.may_move(*v))
     }
 
     /// Whether a variable may be linearized anew: it is solved for, and no prior holds its point.
     fn may_move(&self, variable: u32) -> bool {
-        self.tree.front_of(variable) != NONE && self.model.place(variable).sealed == 0
+        self.factorization.contains(variable) && self.model.place(variable).sealed == 0
     }
 
     /// Linearizes the factors of these variables, which ascend, where the variables are estimated to be; their steps are
@@ -218,7 +200,7 @@ impl Session {
             return;
         }
         let share = 0.5_f64.powi(halvings as i32);
-        let step = self.delta[self.model.blocks.range(variable)].iter().map(|d| d * share);
+        let step = self.steps.of(&self.model, variable).iter().map(|d| d * share);
         let step: SmallVec<[f64; 9]> = step.collect();
         self.model.try_point(variable, &step);
     }
@@ -248,7 +230,7 @@ impl Session {
     pub(super) fn accept_points(&mut self, relinearized: &Relinearized, waiting: Option<&[u32]>) {
         for v in &relinearized.variables {
             self.model.accept(*v);
-            self.delta[self.model.blocks.range(*v)].fill(0.0);
+            self.steps.clear(&self.model, *v);
             self.is_waiting[*v as usize] = false;
         }
         if waiting.is_some() || !relinearized.variables.is_empty() {
@@ -265,11 +247,11 @@ impl Session {
     /// Notes a variable for the next turn if its step is too long for its linearization, or may have changed weights of losses.
     pub(super) fn note_excess(&mut self, variable: u32) {
         let excess = self.excess(variable);
-        let is_out = excess > self.most() || self.model.has_losses();
+        let is_out = excess > self.schedule.largest_excess() || self.model.has_losses();
         if is_out && !std::mem::replace(&mut self.is_waiting[variable as usize], true) {
             self.waiting.push(variable);
         }
-        if excess > self.settings.urgent.powi(2) {
+        if excess > self.schedule.urgent_excess() {
             self.urgent.push(variable);
         }
     }

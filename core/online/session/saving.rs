@@ -1,8 +1,9 @@
 //! A session that goes on after a restart.
 use super::Session;
+use super::factorization::Factorization;
 use crate::model::{Model, NewNumber, Prior};
 use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
-use crate::tree::{Couplings, Tree};
+use crate::tree::Couplings;
 
 impl Session {
     /// The session as text. [`load`](Self::load) makes a session of it that goes on with the same bits, on a processor of the
@@ -17,11 +18,11 @@ impl Session {
         let mut variables = vec![];
         for v in 0..self.model.variables() as u32 {
             let Some(point) = self.model.point(v) else { continue };
-            let step = self.delta[self.model.blocks.range(v)].iter().map(|d| d.to_bits()).collect();
+            let step = self.steps.of(&self.model, v).iter().map(|d| d.to_bits()).collect();
             let place = self.model.place(v);
             let (key, born) = (place.key.clone(), place.is_there.then_some([place.born, place.ordinal]));
             let (held, parked) = (place.held, place.parked);
-            let damping = (self.model.blocks.damping(v).to_bits(), self.damped.contains(&v));
+            let damping = (self.model.blocks.damping(v).to_bits(), self.steps.is_damped(v));
             variables.push(SavedVariable { key, born, point, step, damping, held, parked });
         }
         let factors = self.model.all_factors().map(|(number, factor, entry)| {
@@ -29,14 +30,14 @@ impl Session {
             SavedFactor { number, weight: factor.weight, entry, suspect: self.suspects.get(&number).copied() }
         });
         let saved = Saved {
-            settings: self.settings.clone(),
-            updates: self.updates,
-            is_quiet: self.is_quiet,
+            settings: self.schedule.settings().clone(),
+            updates: self.schedule.updates(),
+            is_quiet: self.schedule.is_quiet(),
             postponed: self.postponed,
             next_factor: self.model.next_factor(),
             variables,
             factors: factors.collect(),
-            fronts: self.tree.save(),
+            fronts: self.factorization.save(),
             born: self.model.born(),
             ordinals: self.model.ordinals(),
             unused: self.model.unused(),
@@ -61,8 +62,8 @@ impl Session {
     pub fn load(text: &str) -> Result<Self, LoadError> {
         let saved = Saved::read(text)?;
         let mut session = Session::new(saved.settings);
-        (session.updates, session.postponed) = (saved.updates, saved.postponed);
-        session.is_quiet = saved.is_quiet;
+        session.schedule.restore(saved.updates, saved.is_quiet);
+        session.postponed = saved.postponed;
         for variable in &saved.variables {
             insert(&mut session.model, variable)?;
         }
@@ -72,21 +73,24 @@ impl Session {
         fits.then_some(()).ok_or(LoadError::Inconsistent("variables that are gone"))?;
         session.resize();
         let steps = saved.variables.iter().flat_map(|variable| &variable.step);
-        session.delta.iter_mut().zip(steps).for_each(|(to, step)| *to = f64::from_bits(*step));
+        session.steps.restore(steps.map(|step| f64::from_bits(*step)).collect());
         for (v, variable) in saved.variables.iter().enumerate() {
             let (damping, takes_steps) = (f64::from_bits(variable.damping.0), variable.damping.1);
             if !(damping >= 0.0 && damping.is_finite()) {
                 return Err(LoadError::Inconsistent("what steps are damped by"));
             }
-            let estimate = session.model.point(v as u32).and_then(|point| {
-                point.erased().retract(&session.delta[session.model.blocks.range(v as u32)])
-            });
+            let estimate = session
+                .model
+                .point(v as u32)
+                .and_then(|point| point.erased().retract(session.steps.of(&session.model, v as u32)));
             // the sum of a finite point and a finite step may be infinite
             if !estimate.is_some_and(|estimate| estimate.erased().is_finite()) {
                 return Err(LoadError::Inconsistent("a variable's key, point or step"));
             }
             session.model.blocks.damp(v as u32, damping);
-            session.damped.extend(takes_steps.then_some(v as u32));
+            if takes_steps {
+                session.steps.note_damped(v as u32);
+            }
         }
         // counters that go on from there must not wrap around
         let is_young = saved.ordinals.iter().chain([&saved.born]).all(|count| *count < 1 << 62)
@@ -95,9 +99,10 @@ impl Session {
         is_young.then_some(()).ok_or(LoadError::Inconsistent("its counters"))?;
         session.put_priors(&saved.priors, saved.next_factor)?;
         session.put_factors(&saved.factors, saved.next_factor)?;
-        session.tree = Tree::load(saved.fronts, &session.model, |v| session.model.place(v).is_in_tree())
+        session.factorization = Factorization::load(saved.fronts, &session.model)
+            .map_err(|_| LoadError::Inconsistent("the linear system overflows"))?
             .ok_or(LoadError::Inconsistent("its fronts do not fit its factors"))?;
-        session.put_fronts()?;
+        session.put_parked();
         let n = session.model.variables() as u32;
         let lists = [&saved.waiting, &saved.urgent, &saved.doubtful].into_iter().flatten();
         if lists.chain(&saved.shaken).any(|v| *v >= n) {
@@ -180,19 +185,11 @@ impl Session {
         Ok(())
     }
 
-    /// The numbers of all fronts, and what hangs on them.
-    fn put_fronts(&mut self) -> Result<(), LoadError> {
-        let all: Vec<u32> = (0..self.tree.fronts.len() as u32).collect();
-        self.fronts
-            .build(&self.tree, &self.model.blocks, &all)
-            .map_err(|_| LoadError::Inconsistent("the linear system overflows"))?;
-        for f in &all {
-            self.open.extend(self.fronts.open(*f));
-        }
+    /// Lists the variables that are parked.
+    fn put_parked(&mut self) {
         let parked = |v: &u32| self.model.place(*v).parked && self.model.place(*v).is_there;
         self.parked = (0..self.model.variables() as u32).filter(parked).collect();
         self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
-        Ok(())
     }
 }
 

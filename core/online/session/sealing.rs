@@ -225,14 +225,13 @@ impl Session {
 
     /// Forgets a variable that is out of the tree.
     fn forget(&mut self, variable: u32) {
-        self.delta[self.model.blocks.range(variable)].fill(0.0);
+        self.steps.forget(&self.model, variable);
         self.is_waiting[variable as usize] = false;
         for list in [&mut self.waiting, &mut self.urgent, &mut self.doubtful] {
             list.retain(|v| *v != variable);
         }
         self.parked.remove(&variable);
         self.shaken.remove(&variable);
-        self.damped.remove(&variable);
         self.model.blocks.damp(variable, 0.0);
         self.model.forget(variable);
     }

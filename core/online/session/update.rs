@@ -36,7 +36,7 @@ impl Session {
     pub fn update(&mut self) -> Result<Report, UpdateError> {
         let pending = std::mem::take(&mut self.pending);
         let is_quiet = pending.is_empty();
-        self.is_idle = is_quiet && self.is_quiet;
+        self.schedule.begin(is_quiet);
         let mut report = Report::default();
         let mut touched = Touched { steps: true, ..Touched::default() };
         let mut undo = Undo::default();
@@ -72,9 +72,7 @@ impl Session {
         }
         self.doubt_inactive(&mut touched);
         undo.moves = self.park(&mut touched);
-        let is_turn = self.is_idle
-            || self.postponed > 0
-            || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.get());
+        let is_turn = self.postponed > 0 || self.schedule.is_turn();
         let moves = std::mem::take(&mut undo.moves);
         if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);
@@ -82,8 +80,7 @@ impl Session {
             self.take_back(undo);
             return Err(UpdateError::Overflow { key });
         }
-        self.updates += 1;
-        self.is_quiet = is_quiet;
+        self.schedule.complete(is_quiet);
         self.follow_up(&mut report);
         let new = self.enter(suspects, &touched.removed);
         self.test_outliers(&new, &mut report);
@@ -103,7 +100,7 @@ impl Session {
     /// that fails leaves that as it is.
     pub(super) fn follow_up(&mut self, report: &mut Report) {
         self.control_step(report);
-        for _ in 0..self.settings.passes {
+        for _ in 0..self.schedule.settings().passes {
             if !self.is_urgent() || self.pass(&Touched::default(), &Moves::default(), true, report).is_err() {
                 return;
             }
@@ -114,10 +111,8 @@ impl Session {
     /// Room for as many variables as the model has.
     pub(super) fn resize(&mut self) {
         let n = self.model.variables();
-        self.tree.resize(n);
-        self.fronts.resize(n);
-        self.delta.resize(self.model.blocks.scalars(), 0.0);
-        self.changed.resize(n, 0);
+        self.factorization.resize(n);
+        self.steps.resize(&self.model, n);
         self.is_waiting.resize(n, false);
     }
 
@@ -189,48 +184,49 @@ impl Session {
         is_turn: bool,
         report: &mut Report,
     ) -> Result<(), Overflow> {
-        self.pass += 1;
         report.passes += 1;
         let mut affected = Affected::default();
-        touched.variables.iter().for_each(|v| self.tree.touch(*v, &mut affected));
+        touched.variables.iter().for_each(|v| self.factorization.touch(*v, &mut affected));
         for v in &moves.leaving {
-            self.touch_around(*v, &mut affected);
+            self.factorization.touch_around(&self.model, *v, &mut affected);
         }
         let last = self.last(touched, &moves.entering);
         let postponed = self.postponed;
         let mut due = touched.held.clone();
-        if touched.steps && self.settings.budget.is_none() {
+        if touched.steps && self.schedule.settings().budget.is_none() {
             due.extend(self.damped_now());
         }
         let Choice { chosen, waiting } = self.choose(due, is_turn, &mut affected, report.operations);
         let relinearized = self.relinearize(chosen, &touched.held);
         for v in &relinearized.variables {
-            self.touch_around(*v, &mut affected);
+            self.factorization.touch_around(&self.model, *v, &mut affected);
         }
-        let damping = if touched.steps || is_turn { self.relax(&relinearized.variables) } else { vec![] };
+        let damping = if touched.steps || is_turn {
+            self.steps.relax(&mut self.model, &relinearized.variables)
+        } else {
+            vec![]
+        };
         self.model.sum_up();
-        let redone = self.redo(&affected, moves, &last);
-        let finite = self.check_finite(&redone);
-        let built = finite.and_then(|()| self.fronts.build(&self.tree, &self.model.blocks, &redone.new));
-        if let Err(overflow) = built {
-            self.tree.drop_new(&affected, &redone);
-            self.take_back_points(&relinearized);
-            for (v, damping) in damping {
-                self.model.blocks.damp(v, damping);
-                self.damped.insert(v);
+        let redone = match self.factorization.rebuild(&self.model, &affected, moves, &last) {
+            Ok(redone) => redone,
+            Err(overflow) => {
+                self.take_back_points(&relinearized);
+                for (v, damping) in damping {
+                    self.model.blocks.damp(v, damping);
+                    self.steps.note_damped(v);
+                }
+                self.postponed = postponed;
+                self.model.sum_up();
+                return Err(overflow);
             }
-            self.postponed = postponed;
-            self.model.sum_up();
-            return Err(overflow);
-        }
-        self.exchange(&affected, &redone, moves);
+        };
+        self.note_parked(moves);
         self.doubt_parked(&relinearized.factors);
         report.relinearized += relinearized.variables.len();
         self.accept_points(&relinearized, waiting.as_deref());
         for f in &redone.new {
-            let front = &self.tree.fronts[*f as usize];
-            report.operations += front.operations;
-            report.redone += front.blocks.len();
+            report.operations += self.factorization.operations(&[*f]);
+            report.redone += self.factorization.width(*f);
         }
         report.solved += self.solve(&redone);
         Ok(())
@@ -257,39 +253,22 @@ impl Session {
         last
     }
 
-    /// Touches a variable's front and those of its neighbours: all fronts that have it among their rows are above those.
-    pub(super) fn touch_around(&mut self, variable: u32, affected: &mut Affected) {
-        self.tree.touch(variable, affected);
-        for other in self.model.coupled(variable) {
-            self.tree.touch(other, affected);
+    /// Solves for the steps, and notes variables that have moved. An idle update solves for all. Returns the number of variables.
+    fn solve(&mut self, redone: &Redone) -> usize {
+        let redone = (!self.schedule.is_idle()).then_some(redone);
+        let Self { steps, model, factorization, .. } = self;
+        let solved = steps.solve(model, factorization, redone, self.schedule.deviation());
+        if !self.suspects.is_empty() {
+            self.shaken.extend(self.steps.moved());
         }
+        for v in self.steps.moved().collect::<Vec<_>>() {
+            self.note_excess(v);
+        }
+        solved
     }
 
-    fn redo(&mut self, affected: &Affected, moves: &Moves, last: &[u32]) -> Redone {
-        let leaves = |v: u32| moves.leaving.binary_search(&v).is_ok();
-        let is_last = |v: u32| last.binary_search(&v).is_ok();
-        self.tree.redo(affected, &moves.entering, leaves, is_last, &self.model)
-    }
-
-    /// H and g of the fronts that are to be built: a number that is not finite would spread.
-    fn check_finite(&self, redone: &Redone) -> Result<(), Overflow> {
-        let blocks = redone.new.iter().flat_map(|f| &self.tree.fronts[*f as usize].blocks);
-        let bad = blocks.copied().find(|v| !self.model.blocks.is_finite(*v));
-        bad.map_or(Ok(()), |v| Err(Overflow(v)))
-    }
-
-    /// Puts the new fronts in the place of the affected ones.
-    fn exchange(&mut self, affected: &Affected, redone: &Redone, moves: &Moves) {
-        for f in &affected.0 {
-            for scalar in self.fronts.open(*f) {
-                self.open.remove(scalar);
-            }
-        }
-        self.tree.swap(affected, redone);
-        self.fronts.drop_all(affected);
-        for f in &redone.new {
-            self.open.extend(self.fronts.open(*f));
-        }
+    /// Notes which of the variables that were judged are parked.
+    fn note_parked(&mut self, moves: &Moves) {
         self.doubtful.retain(|v| moves.judged.binary_search(v).is_err());
         let mut has_changed = false;
         for v in &moves.judged {

@@ -42,7 +42,7 @@ impl Session {
 
     /// How far a window by seconds reaches back.
     fn seconds(&self) -> Option<Positive> {
-        match self.settings.window.as_ref()?.span {
+        match self.schedule.settings().window.as_ref()?.span {
             Span::Seconds(seconds) => Some(seconds),
             Span::Poses(_) => None,
         }
@@ -57,7 +57,7 @@ impl Session {
 
     /// Whether a variable is of a type that leaves a window.
     fn leaves(&self, variable: u32) -> bool {
-        let Some(window) = &self.settings.window else { return false };
+        let Some(window) = &self.schedule.settings().window else { return false };
         let name = self.model.point(variable).map_or("", |point| point.typetag_name());
         !window.keep.iter().any(|keep| keep.as_str() == name)
     }
@@ -66,7 +66,7 @@ impl Session {
     pub(super) fn leaving(&mut self, asked: &[Key]) -> Vec<u32> {
         let mut leaving: Vec<u32> =
             asked.iter().filter_map(|key| self.model.variable(key.as_str())).collect();
-        if let Some(window) = &self.settings.window {
+        if let Some(window) = &self.schedule.settings().window {
             let model = &self.model;
             self.ages.retain(|held| {
                 let place = model.place(held.variable);

@@ -30,9 +30,7 @@ impl Session {
     /// that cannot be told: a variable is parked, nothing constrains one of its directions, or a factor is not defined.
     pub(super) fn surprise(&mut self, factors: &[u32]) -> Option<Surprise> {
         let variables = self.look_at(factors);
-        let is_open = |v: &u32| {
-            self.model.place(*v).parked || self.open.range((*v, 0)..=(*v, u32::MAX)).next().is_some()
-        };
+        let is_open = |v: &u32| self.model.place(*v).parked || self.factorization.is_open(*v);
         if variables.iter().any(is_open) {
             return None;
         }
@@ -44,7 +42,7 @@ impl Session {
     }
 
     fn descend(&mut self, factors: &[u32], variables: &[u32], square: f64) -> Option<Surprise> {
-        let sigma = self.joint(variables);
+        let sigma = self.factorization.gauged_covariance(&self.model, variables);
         let n = sigma.nrows();
         // δ = Σy throughout: no inverse of Σ, which need not have one, and δᵀΣ⁻¹δ = yᵀδ
         let (mut least, mut y, mut gain) = (square, DVector::zeros(n), 0.0);
@@ -80,7 +78,7 @@ impl Session {
         let mut first = 0;
         for v in variables {
             let dim = self.dim(*v);
-            let from = &self.delta[self.model.blocks.range(*v)];
+            let from = self.steps.of(&self.model, *v);
             let step: Vec<f64> = from.iter().zip(step.rows(first, dim).iter()).map(|(a, b)| a + b).collect();
             self.model.try_step(*v, &step);
             first += dim;

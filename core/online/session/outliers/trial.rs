@@ -10,7 +10,6 @@ use super::fit::Surprise;
 use crate::factor_id::FactorId;
 use crate::report::Report;
 use crate::saved::Suspect;
-use crate::tree::NONE;
 use manifactor_graph::Values;
 use std::collections::BTreeSet;
 
@@ -116,7 +115,7 @@ impl Session {
             for (f, since) in sides {
                 // as before, unless that could not be taken back
                 let is_out = self.model.factor(f).is_some_and(|factor| factor.rejected);
-                self.note(&[f], is_out.then(|| since.unwrap_or(self.updates)));
+                self.note(&[f], is_out.then(|| since.unwrap_or(self.schedule.updates())));
             }
             self.shaken.clear();
         }
@@ -178,7 +177,7 @@ impl Session {
     /// ‖r‖² of a factor that counts, whatever its share.
     fn full_square(&mut self, factor: u32) -> f64 {
         let share = self.model.factor(factor).map_or(1.0, |factor| factor.share);
-        2.0 * self.cost_of(&[factor]).cost / share
+        2.0 * self.steps.cost_of(&mut self.model, &[factor]).cost / share
     }
 
     /// The derivative of ρ by ½r².
@@ -208,7 +207,7 @@ impl Session {
         }
         for change in &changes {
             match change {
-                Change::Reject { number } => self.note(&[*number], Some(self.updates)),
+                Change::Reject { number } => self.note(&[*number], Some(self.schedule.updates())),
                 Change::Readmit { number } => self.note(&[*number], None),
                 _ => {}
             }
@@ -237,9 +236,8 @@ impl Session {
         for v in std::mem::take(&mut self.shaken) {
             let (key, point) = (&self.model.place(v).key, self.model.point(v));
             let step = point.zip(old.variable(key.as_str())).and_then(|(p, x)| p.erased().local(x));
-            let Some(step) = step.filter(|_| self.tree.front_of(v) != NONE) else { continue };
-            let range = self.model.blocks.range(v);
-            self.delta[range].copy_from_slice(&step);
+            let Some(step) = step.filter(|_| self.factorization.contains(v)) else { continue };
+            self.steps.set(&self.model, v, &step);
             if self.model.place(v).sealed == 0 {
                 touched.held.push(v);
                 touched.variables.push(v);

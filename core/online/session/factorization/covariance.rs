@@ -1,6 +1,7 @@
 //! Covariances from the fronts at hand: along paths of the tree, without a factorization.
-use super::Session;
-use crate::tree::NONE;
+use super::Factorization;
+use crate::model::Model;
+use crate::tree::{Couplings, NONE};
 use manifactor_graph::Key;
 use nalgebra::DMatrix;
 use std::cmp::Reverse;
@@ -37,56 +38,46 @@ pub enum CovarianceError {
     },
 }
 
-impl Session {
-    /// The joint covariance of a few variables, in the order of `keys` and of their tangent directions, in the units of the
-    /// noise; what is held has zeros. It is that of the last linearization points, robust weights included.
-    ///
-    /// # Errors
-    /// Where a variable is not there or parked, or something that it hangs on is undetermined; if a covariance is too large for a number.
-    pub fn covariance(&self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
-        let mut variables = vec![];
-        for key in keys {
-            let missing = || CovarianceError::NoVariable { key: Key::from(*key) };
-            variables.push(self.model.variable(key).ok_or_else(missing)?);
-        }
-        self.covariance_of(&variables)
-    }
-
-    /// The same of variables by their numbers.
-    pub(crate) fn covariance_of(&self, variables: &[u32]) -> Result<DMatrix<f64>, CovarianceError> {
-        if let Some(v) = variables.iter().find(|v| self.model.place(**v).parked) {
-            return Err(CovarianceError::Parked { key: self.key(*v) });
+impl Factorization {
+    /// The joint covariance of variables; see [`Session::covariance`](crate::Session::covariance).
+    pub(in crate::session) fn covariance(
+        &self,
+        model: &Model,
+        variables: &[u32],
+    ) -> Result<DMatrix<f64>, CovarianceError> {
+        if let Some(v) = variables.iter().find(|v| model.place(**v).parked) {
+            return Err(CovarianceError::Parked { key: model.place(*v).key.clone() });
         }
         // Σᵢⱼ = (L⁻¹eᵢ)ᵀ(L⁻¹eⱼ), and such a column is zero but on the path from its front to the root
-        let path = self.path(variables);
+        let path = self.path(model, variables);
         for step in &path.steps {
             if let Some((v, direction)) = self.fronts.open(step.front).first() {
-                let direction = self.model.place(*v).tangent[*direction as usize];
-                return Err(CovarianceError::Undetermined { key: self.key(*v), direction });
+                let direction = model.place(*v).tangent[*direction as usize];
+                return Err(CovarianceError::Undetermined { key: model.place(*v).key.clone(), direction });
             }
         }
-        let covariance = self.along(&path, variables);
+        let covariance = self.along(model, &path, variables);
         let mut ends = variables.iter().scan(0, |end, v| {
-            *end += self.dim(*v);
+            *end += model.dim(*v);
             Some((*v, *end))
         });
         let bad = covariance.column_iter().position(|column| column.iter().any(|x| !x.is_finite()));
         match bad.and_then(|bad| ends.find(|(_, end)| bad < *end)) {
-            Some((v, _)) => Err(CovarianceError::Overflow { key: self.key(v) }),
+            Some((v, _)) => Err(CovarianceError::Overflow { key: model.place(v).key.clone() }),
             None => Ok(covariance),
         }
     }
 
-    /// The same of variables by their numbers, where directions that nothing constrains are held: a gauge, as a rule.
-    pub(super) fn joint(&self, variables: &[u32]) -> DMatrix<f64> {
-        self.along(&self.path(variables), variables)
+    /// The joint covariance of variables, with directions held that no factor constrains: a gauge, as a rule.
+    pub(in crate::session) fn gauged_covariance(&self, model: &Model, variables: &[u32]) -> DMatrix<f64> {
+        self.along(model, &self.path(model, variables), variables)
     }
 
-    fn along(&self, path: &Path, variables: &[u32]) -> DMatrix<f64> {
+    fn along(&self, model: &Model, path: &Path, variables: &[u32]) -> DMatrix<f64> {
         let mut columns = vec![];
         for v in variables {
-            let held = self.model.place(*v).held;
-            for d in 0..self.dim(*v) {
+            let held = model.place(*v).held;
+            for d in 0..model.dim(*v) {
                 let is_free = held >> d & 1 == 0;
                 columns.push(if is_free { self.column(path, *v, d) } else { vec![0.0; path.scalars] });
             }
@@ -96,7 +87,7 @@ impl Session {
     }
 
     /// The fronts on the way from variables to their roots.
-    fn path(&self, variables: &[u32]) -> Path {
+    fn path(&self, model: &Model, variables: &[u32]) -> Path {
         let mut fronts = vec![];
         for v in variables {
             let first = fronts.len();
@@ -117,14 +108,14 @@ impl Session {
             path.steps.push(Step { front, first: at, rows: vec![] });
             for v in &self.tree.fronts[front as usize].blocks {
                 path.first.push((*v, at));
-                at += self.dim(*v) as u32;
+                at += model.dim(*v) as u32;
             }
             path.scalars = at as usize;
         }
         path.first.sort_unstable();
         for i in 0..path.steps.len() {
             let rows = &self.tree.fronts[path.steps[i].front as usize].rows;
-            path.steps[i].rows = rows.iter().map(|v| (path.first(*v), self.dim(*v) as u32)).collect();
+            path.steps[i].rows = rows.iter().map(|v| (path.first(*v), model.dim(*v) as u32)).collect();
         }
         path.of_front = path.steps.iter().enumerate().map(|(i, step)| (step.front, i as u32)).collect();
         path.of_front.sort_unstable();

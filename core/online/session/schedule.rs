@@ -1,0 +1,106 @@
+//! The settings, and the updates that were made: when to relinearize, and how exactly.
+use crate::settings::Settings;
+
+/// Limits of an idle update, as shares of the limits of other updates.
+const FINE: f64 = 1e-8;
+
+/// The settings of a smoother, and the count of its updates.
+#[derive(Debug)]
+pub(super) struct Schedule {
+    settings: Settings,
+    updates: usize,
+    /// Whether the last update had no changes.
+    is_quiet: bool,
+    /// Whether the current update and the one before it have no changes.
+    is_idle: bool,
+}
+
+impl Schedule {
+    /// A schedule without updates.
+    pub(super) fn new(settings: Settings) -> Self {
+        Self { settings, updates: 0, is_quiet: false, is_idle: false }
+    }
+
+    /// The schedule of a saved smoother.
+    pub(super) fn restore(&mut self, updates: usize, is_quiet: bool) {
+        self.updates = updates;
+        self.is_quiet = is_quiet;
+    }
+
+    pub(super) fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Number of updates that have succeeded.
+    pub(super) fn updates(&self) -> usize {
+        self.updates
+    }
+
+    /// Whether the last update had no changes.
+    pub(super) fn is_quiet(&self) -> bool {
+        self.is_quiet
+    }
+
+    /// Whether the current update and the one before it have no changes.
+    pub(super) fn is_idle(&self) -> bool {
+        self.is_idle
+    }
+
+    /// Begins an update, with changes or without.
+    pub(super) fn begin(&mut self, is_quiet: bool) {
+        self.is_idle = is_quiet && self.is_quiet;
+    }
+
+    /// Counts the update that has begun: it has succeeded.
+    pub(super) fn complete(&mut self, is_quiet: bool) {
+        self.updates += 1;
+        self.is_quiet = is_quiet;
+    }
+
+    /// Whether the update that has begun relinearizes by its turn.
+    pub(super) fn is_turn(&self) -> bool {
+        self.is_idle || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.get())
+    }
+
+    /// The largest error of a linearization that stays, as a share of the setting `bend`: an idle update leaves far less.
+    pub(super) fn largest_excess(&self) -> f64 {
+        if self.is_idle { FINE } else { 1.0 }
+    }
+
+    /// The same share from which on a variable does not wait for its turn.
+    pub(super) fn urgent_excess(&self) -> f64 {
+        self.settings.urgent.powi(2)
+    }
+
+    /// The largest change of a step that is not passed on, in σ.
+    pub(super) fn deviation(&self) -> f64 {
+        if self.is_idle { FINE * *self.settings.deviation } else { *self.settings.deviation }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::num::NonZeroUsize;
+
+    fn update(schedule: &mut Schedule, is_quiet: bool) -> bool {
+        schedule.begin(is_quiet);
+        let is_turn = schedule.is_turn();
+        schedule.complete(is_quiet);
+        is_turn
+    }
+
+    #[test]
+    fn every_third_update_relinearizes_and_each_idle_one() {
+        let mut schedule = Schedule::new(Settings {
+            relinearize_every: NonZeroUsize::new(3).unwrap(),
+            ..Settings::default()
+        });
+        let turns: Vec<bool> = (0..6).map(|_| update(&mut schedule, false)).collect();
+        assert_eq!(turns, [false, false, true, false, false, true]);
+        assert!(!update(&mut schedule, true) && update(&mut schedule, true));
+        assert!(schedule.is_idle() && schedule.largest_excess() < 1e-6);
+        assert!(!update(&mut schedule, false));
+        assert!(schedule.largest_excess() == 1.0 && schedule.updates() == 9);
+    }
+}

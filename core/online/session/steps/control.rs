@@ -1,0 +1,160 @@
+//! The cost at the estimate, and shorter steps where it has risen.
+use super::Steps;
+use crate::model::Model;
+use manifactor_graph::batch::Evaluation;
+use smallvec::SmallVec;
+use std::collections::BTreeMap;
+
+/// Halvings of a step.
+const HALVINGS: usize = 6;
+/// The least damping of a variable, as a share of the largest entry of its diagonal of H; and by how much it grows.
+const LEAST_DAMPING: f64 = 1e-3;
+const STRONGER: f64 = 10.0;
+/// What becomes of it each time that the variable is linearized anew.
+const WEAKER: f64 = 0.1;
+/// Damping that is as good as none, as a share of that entry. It stays where a direction has less of H than that: an axis that has all
+/// but vanished has next to no derivative, and without damping its steps would be as long as ever.
+const WEAK: f64 = 1e-5;
+/// A rise of the cost by less than this share of it is rounding, or what was not passed on.
+const RISE: f64 = 1e-3;
+
+impl Steps {
+    /// The steps before the last pass, of the variables that it has moved.
+    pub(in crate::session) fn before(&self, model: &Model) -> impl Iterator<Item = (u32, &[f64])> {
+        self.moved.iter().map(|(v, first)| (*v, &self.before[*first..*first + model.blocks.dim(*v)]))
+    }
+
+    /// Whether the factors around some variables cost more than with these steps.
+    pub(in crate::session) fn has_risen(
+        &mut self,
+        model: &mut Model,
+        before: &BTreeMap<u32, SmallVec<[f64; 9]>>,
+    ) -> bool {
+        let moved: Vec<u32> = before.keys().copied().collect();
+        let mut factors = model.factors_of(&moved);
+        factors.retain(|f| model.is_whole(*f));
+        let after = self.cost_of(model, &factors);
+        let mut now = before.clone();
+        self.exchange(model, &mut now);
+        let cost = self.cost_of(model, &factors);
+        self.exchange(model, &mut now);
+        rises(&cost, &after)
+    }
+
+    fn exchange(&mut self, model: &Model, steps: &mut BTreeMap<u32, SmallVec<[f64; 9]>>) {
+        for (v, step) in steps {
+            self.delta[model.blocks.range(*v)].swap_with_slice(step);
+        }
+    }
+
+    /// Halves the last step until it lowers the cost of the factors around. Returns the number of halvings.
+    pub(in crate::session) fn shorten(&mut self, model: &mut Model) -> usize {
+        let (factors, before, after) = self.last_step(model);
+        if !rises(&before, &after) {
+            return 0;
+        }
+        for halvings in 1..=HALVINGS {
+            for (v, first) in &self.moved {
+                let range = model.blocks.range(*v);
+                let old = &self.before[*first..*first + range.len()];
+                self.delta[range].iter_mut().zip(old).for_each(|(new, old)| *new = 0.5 * (*new + old));
+            }
+            let after = self.cost_of(model, &factors);
+            if !rises(&before, &after) {
+                return halvings;
+            }
+        }
+        HALVINGS
+    }
+
+    /// The factors around the variables that the last pass has moved, and their cost before and after it.
+    pub(in crate::session) fn last_step(&mut self, model: &mut Model) -> (Vec<u32>, Evaluation, Evaluation) {
+        let moved: Vec<u32> = self.moved().collect();
+        let mut factors = model.factors_of(&moved);
+        factors.retain(|f| model.is_whole(*f));
+        let after = self.cost_of(model, &factors);
+        self.exchange_steps(model);
+        let before = self.cost_of(model, &factors);
+        self.exchange_steps(model);
+        (factors, before, after)
+    }
+
+    /// Exchanges the steps of the last pass and those before it.
+    fn exchange_steps(&mut self, model: &Model) {
+        for (v, first) in &self.moved {
+            let range = model.blocks.range(*v);
+            let old = &mut self.before[*first..*first + range.len()];
+            self.delta[range].swap_with_slice(old);
+        }
+    }
+
+    /// The cost of factors at the estimate.
+    pub(in crate::session) fn cost_of(&self, model: &mut Model, factors: &[u32]) -> Evaluation {
+        self.at_estimate(model, factors, |model, delta| model.cost(factors, Some(delta)))
+    }
+
+    /// Evaluates the model while the trial points of these factors' variables are at the estimate.
+    pub(in crate::session) fn at_estimate<T>(
+        &self,
+        model: &mut Model,
+        factors: &[u32],
+        evaluate: impl FnOnce(&Model, &[f64]) -> T,
+    ) -> T {
+        let mut variables: Vec<u32> =
+            factors.iter().filter_map(|f| model.factor(*f)).flat_map(|f| f.variables()).collect();
+        variables.sort_unstable();
+        variables.dedup();
+        for v in &variables {
+            model.try_step(*v, &self.delta[model.blocks.range(*v)]);
+        }
+        let result = evaluate(model, &self.delta);
+        variables.iter().for_each(|v| model.reset_trial(*v));
+        result
+    }
+
+    /// Damps some variables more.
+    pub(in crate::session) fn damp(&mut self, model: &mut Model, variables: &[u32]) {
+        for v in variables {
+            let least = LEAST_DAMPING * largest(model, *v);
+            model.blocks.damp(*v, (STRONGER * model.blocks.damping(*v)).max(least));
+            self.damped.insert(*v);
+        }
+    }
+
+    /// Damps less those variables that are linearized anew; what they were damped by.
+    pub(in crate::session) fn relax(&mut self, model: &mut Model, variables: &[u32]) -> Vec<(u32, f64)> {
+        let damped = variables.iter().filter(|v| self.damped.contains(v));
+        let before: Vec<(u32, f64)> = damped.map(|v| (*v, model.blocks.damping(*v))).collect();
+        for (v, damping) in &before {
+            let (weak, weaker) = (WEAK * largest(model, *v), WEAKER * damping);
+            if weaker > weak {
+                model.blocks.damp(*v, weaker);
+            } else {
+                self.damped.remove(v);
+                model.blocks.damp(*v, if smallest(model, *v) < weak { weak } else { 0.0 });
+            }
+        }
+        before
+    }
+}
+
+fn rises(before: &Evaluation, after: &Evaluation) -> bool {
+    let is_lower = after.cost <= before.cost * (1.0 + RISE);
+    // not a number is not lower either
+    after.left > before.left || !is_lower
+}
+
+/// The largest entry of a variable's diagonal of H.
+fn largest(model: &Model, variable: u32) -> f64 {
+    let precision = model.blocks.precision(variable).iter().copied().fold(0.0, f64::max);
+    precision * precision
+}
+
+/// The smallest entry of those directions that are not held.
+fn smallest(model: &Model, variable: u32) -> f64 {
+    let held = model.place(variable).held;
+    let precision = model.blocks.precision(variable).iter().enumerate();
+    let free = precision.filter(|(d, _)| held >> d & 1 == 0).map(|(_, precision)| *precision);
+    let least = free.fold(f64::INFINITY, f64::min);
+    least * least
+}
