@@ -4,6 +4,7 @@ mod factorization;
 mod finish;
 mod outliers;
 mod parking;
+mod queue;
 mod relinearization;
 mod saving;
 mod schedule;
@@ -24,6 +25,7 @@ use changes::Pending;
 use factorization::Factorization;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
 use nalgebra::DMatrix;
+use queue::RelinearizationQueue;
 use schedule::Schedule;
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -44,13 +46,7 @@ pub struct Session {
     factorization: Factorization,
     steps: Steps,
     pending: Pending,
-    /// Variables to examine at the next turn: they have left the region of their linearization, or moved in a graph with losses.
-    waiting: Vec<u32>,
-    /// How many of them the budget has put off.
-    postponed: usize,
-    is_waiting: Vec<bool>,
-    /// Those that have left it so far that they cannot wait; some may be back, or be named twice.
-    urgent: Vec<u32>,
+    queue: RelinearizationQueue,
     /// Variables that are parked.
     parked: BTreeSet<u32>,
     inactive: BTreeSet<u32>,
@@ -86,10 +82,7 @@ impl Session {
             factorization: Factorization::default(),
             pending: Pending::default(),
             steps: Steps::default(),
-            waiting: vec![],
-            postponed: 0,
-            is_waiting: vec![],
-            urgent: vec![],
+            queue: RelinearizationQueue::default(),
             parked: BTreeSet::new(),
             inactive: BTreeSet::new(),
             doubtful: vec![],
@@ -187,6 +180,6 @@ impl Session {
         let name = |(v, d): Scalar| Some((self.key(v), *self.model.place(v).tangent.get(d as usize)?));
         report.undetermined = self.factorization.open().filter_map(name).collect();
         report.inactive = self.inactive.len();
-        report.postponed = self.postponed;
+        report.postponed = self.queue.postponed();
     }
 }

@@ -37,12 +37,10 @@ impl Session {
     /// Whether something cannot wait for the next turn: after a large loop closure, a step is no estimate of anything.
     pub(super) fn is_urgent(&mut self) -> bool {
         let most = self.schedule.urgent_excess();
-        let mut urgent = std::mem::take(&mut self.urgent);
-        urgent.retain(|v| self.excess(*v) > most && self.may_move(*v));
-        urgent.sort_unstable();
-        urgent.dedup();
-        self.urgent = urgent;
-        !self.urgent.is_empty()
+        let mut queue = std::mem::take(&mut self.queue);
+        let is_urgent = queue.retain_urgent(|v| self.excess(v) > most && self.may_move(v));
+        self.queue = queue;
+        is_urgent
     }
 
     /// Chooses the variables to relinearize: `chosen`, and at a turn those outside of their regions, within the budget. `spent` is
@@ -62,9 +60,9 @@ impl Session {
                 wanted.extend(self.damped_now().map(|v| (self.excess(v), v)));
                 wanted.sort_unstable_by(|(a, v), (b, u)| v.cmp(u).then(b.total_cmp(a)));
                 wanted.dedup_by_key(|(_, v)| *v);
-                self.postponed = wanted.len();
+                let count = wanted.len();
                 let taken = self.afford(wanted, *budget - spent, spent == 0.0 && chosen.is_empty(), affected);
-                self.postponed -= taken.len();
+                self.queue.set_postponed(count - taken.len());
                 chosen.extend(taken);
             } else {
                 chosen.extend(out.iter().map(|(_, v)| *v));
@@ -83,7 +81,7 @@ impl Session {
             true => {
                 (0..self.model.variables() as u32).filter(|v| self.steps.has_step(&self.model, *v)).collect()
             }
-            false => self.waiting.clone(),
+            false => self.queue.waiting().to_vec(),
         };
         moved.retain(|v| self.may_move(*v));
         moved.sort_unstable();
@@ -231,28 +229,19 @@ impl Session {
         for v in &relinearized.variables {
             self.model.accept(*v);
             self.steps.clear(&self.model, *v);
-            self.is_waiting[*v as usize] = false;
         }
-        if waiting.is_some() || !relinearized.variables.is_empty() {
-            let stays = |v: &u32| waiting.is_none_or(|waiting| waiting.binary_search(v).is_ok());
-            let is_waiting = &mut self.is_waiting;
-            self.waiting.retain(|v| {
-                let stays = is_waiting[*v as usize] && stays(v);
-                is_waiting[*v as usize] = stays;
-                stays
-            });
-        }
+        self.queue.relinearized(&relinearized.variables, waiting);
     }
 
     /// Notes a variable for the next turn if its step is too long for its linearization, or may have changed weights of losses.
     pub(super) fn note_excess(&mut self, variable: u32) {
         let excess = self.excess(variable);
         let is_out = excess > self.schedule.largest_excess() || self.model.has_losses();
-        if is_out && !std::mem::replace(&mut self.is_waiting[variable as usize], true) {
-            self.waiting.push(variable);
+        if is_out {
+            self.queue.push(variable);
         }
         if excess > self.schedule.urgent_excess() {
-            self.urgent.push(variable);
+            self.queue.push_urgent(variable);
         }
     }
 }

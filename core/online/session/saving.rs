@@ -1,6 +1,7 @@
 //! A session that goes on after a restart.
 use super::Session;
 use super::factorization::Factorization;
+use super::queue::RelinearizationQueue;
 use crate::model::{Model, NewNumber, Prior};
 use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
 use crate::tree::Couplings;
@@ -33,7 +34,7 @@ impl Session {
             settings: self.schedule.settings().clone(),
             updates: self.schedule.updates(),
             is_quiet: self.schedule.is_quiet(),
-            postponed: self.postponed,
+            postponed: self.queue.postponed(),
             next_factor: self.model.next_factor(),
             variables,
             factors: factors.collect(),
@@ -44,8 +45,8 @@ impl Session {
             priors: self.model.priors().filter_map(|f| self.save_prior(f)).collect(),
             gone: self.gone.clone(),
             gone_factors: self.gone_factors.clone(),
-            waiting: sorted(&self.waiting),
-            urgent: sorted(&self.urgent),
+            waiting: sorted(self.queue.waiting()),
+            urgent: sorted(self.queue.urgent()),
             doubtful: self.doubtful.clone(),
             time: self.time.map(f64::to_bits),
             times: self.times(),
@@ -63,7 +64,6 @@ impl Session {
         let saved = Saved::read(text)?;
         let mut session = Session::new(saved.settings);
         session.schedule.restore(saved.updates, saved.is_quiet);
-        session.postponed = saved.postponed;
         for variable in &saved.variables {
             insert(&mut session.model, variable)?;
         }
@@ -108,9 +108,8 @@ impl Session {
         if lists.chain(&saved.shaken).any(|v| *v >= n) {
             return Err(LoadError::Inconsistent("a number that no variable has"));
         }
-        saved.waiting.iter().for_each(|v| session.is_waiting[*v as usize] = true);
-        (session.waiting, session.urgent, session.doubtful) = (saved.waiting, saved.urgent, saved.doubtful);
-        session.waiting.dedup();
+        session.queue = RelinearizationQueue::load(saved.waiting, saved.urgent, saved.postponed, n as usize);
+        session.doubtful = saved.doubtful;
         session.shaken = saved.shaken;
         (session.gone, session.gone_factors) = (saved.gone, saved.gone_factors);
         let fits = session.put_times(saved.time, &saved.times);

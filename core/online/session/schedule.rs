@@ -100,7 +100,7 @@ mod tests {
         assert_eq!(turns, [false, false, true, false, false, true]);
         assert!(!update(&mut schedule, true) && update(&mut schedule, true));
         assert!(schedule.is_idle() && schedule.largest_excess() < 1e-6);
-        assert!(!update(&mut schedule, false));
-        assert!(schedule.largest_excess() == 1.0 && schedule.updates() == 9);
+        assert!(update(&mut schedule, false) && !update(&mut schedule, false));
+        assert!(schedule.largest_excess() == 1.0 && schedule.updates() == 10);
     }
 }

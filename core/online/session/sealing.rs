@@ -226,10 +226,8 @@ impl Session {
     /// Forgets a variable that is out of the tree.
     fn forget(&mut self, variable: u32) {
         self.steps.forget(&self.model, variable);
-        self.is_waiting[variable as usize] = false;
-        for list in [&mut self.waiting, &mut self.urgent, &mut self.doubtful] {
-            list.retain(|v| *v != variable);
-        }
+        self.queue.forget(variable);
+        self.doubtful.retain(|v| *v != variable);
         self.parked.remove(&variable);
         self.shaken.remove(&variable);
         self.model.blocks.damp(variable, 0.0);

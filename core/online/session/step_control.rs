@@ -37,7 +37,8 @@ impl Session {
 
     /// Shortens long steps that have raised the cost; whether it has ceased to rise.
     pub(super) fn steady(&mut self, report: &mut Report) -> bool {
-        !self.is_urgent() || if self.urgent.len() > FEW { self.halve(report) } else { self.damp(report) }
+        !self.is_urgent()
+            || if self.queue.urgent().len() > FEW { self.halve(report) } else { self.damp(report) }
     }
 
     /// Halves the last step, and linearizes there.
@@ -72,7 +73,7 @@ impl Session {
             if !self.is_urgent() || !self.steps.has_risen(&mut self.model, &before) {
                 return true;
             }
-            let urgent = self.urgent.clone();
+            let urgent = self.queue.urgent().to_vec();
             self.steps.damp(&mut self.model, &urgent);
             report.damped += urgent.len();
             let touched = Touched { variables: urgent, ..Touched::default() };

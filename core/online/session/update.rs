@@ -72,7 +72,7 @@ impl Session {
         }
         self.doubt_inactive(&mut touched);
         undo.moves = self.park(&mut touched);
-        let is_turn = self.postponed > 0 || self.schedule.is_turn();
+        let is_turn = self.queue.postponed() > 0 || self.schedule.is_turn();
         let moves = std::mem::take(&mut undo.moves);
         if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);
@@ -113,7 +113,7 @@ impl Session {
         let n = self.model.variables();
         self.factorization.resize(n);
         self.steps.resize(&self.model, n);
-        self.is_waiting.resize(n, false);
+        self.queue.resize(n);
     }
 
     /// The factors of a list that are there, each once.
@@ -191,7 +191,7 @@ impl Session {
             self.factorization.touch_around(&self.model, *v, &mut affected);
         }
         let last = self.last(touched, &moves.entering);
-        let postponed = self.postponed;
+        let postponed = self.queue.postponed();
         let mut due = touched.held.clone();
         if touched.steps && self.schedule.settings().budget.is_none() {
             due.extend(self.damped_now());
@@ -215,7 +215,7 @@ impl Session {
                     self.model.blocks.damp(v, damping);
                     self.steps.note_damped(v);
                 }
-                self.postponed = postponed;
+                self.queue.set_postponed(postponed);
                 self.model.sum_up();
                 return Err(overflow);
             }

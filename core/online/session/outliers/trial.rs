@@ -218,7 +218,7 @@ impl Session {
                 return Err(Failed);
             }
             // what is far out says nothing of who is right
-            if !self.waiting.iter().any(|v| self.is_out(*v)) {
+            if !self.queue.waiting().iter().any(|v| self.is_out(*v)) {
                 break;
             }
             self.turn_over(vec![], Touched::default(), true, report)?;
