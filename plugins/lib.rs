@@ -71,10 +71,10 @@
 //! ```
 //!
 //! # A graph that grows
-//! A [`Session`](online::Session) keeps the estimate up to date while variables and factors come and go.
+//! A [`Session`](smoother::Session) keeps the estimate up to date while variables and factors come and go.
 //! ```
 //! use manifactor::geometry::{Between, LieGroup, Se2};
-//! use manifactor::online::{Session, Settings};
+//! use manifactor::smoother::{Session, Settings};
 //! use manifactor::prelude::*;
 //!
 //! let mut session = Session::new(Settings::default());
@@ -110,7 +110,7 @@
 //! The book, `docs/SUMMARY.md`: concepts, the author's guide, graphs from documents, how other libraries say the same.
 pub use manifactor_config as config;
 pub use manifactor_graph as graph;
-pub use manifactor_online as online;
+pub use manifactor_smoother as smoother;
 pub use manifactor_solve as solve;
 pub use nalgebra;
 

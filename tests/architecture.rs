@@ -6,7 +6,7 @@ use std::path::Path;
 /// From the bottom up: a plugin may build on those before it.
 const PLUGINS: [&str; 7] = ["geometry", "quadric", "semantic", "formats", "slam", "viz", "expression"];
 /// What a plugin may take from the core.
-const FOR_PLUGINS: [&str; 6] = ["tree", "graph", "solve", "online", "config", "testing"];
+const FOR_PLUGINS: [&str; 6] = ["document", "graph", "solve", "smoother", "config", "testing"];
 
 fn packages() -> Vec<Package> {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
@@ -41,21 +41,21 @@ fn users_of(package: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_tree_knows_nothing_of_ours_and_the_graph_the_tree() {
-    only("tree", &[]);
-    only("graph", &["tree"]);
+fn documents_know_nothing_of_ours_and_the_graph_knows_documents() {
+    only("document", &[]);
+    only("graph", &["document"]);
 }
 
 #[test]
-fn solve_config_and_testing_know_tree_and_graph_and_not_each_other() {
+fn solve_config_and_testing_know_documents_and_graph_and_not_each_other() {
     for part in ["solve", "config", "testing"] {
-        only(part, &["tree", "graph"]);
+        only(part, &["document", "graph"]);
     }
 }
 
 #[test]
-fn online_builds_on_solve() {
-    only("online", &["tree", "graph", "solve"]);
+fn the_smoother_builds_on_solve() {
+    only("smoother", &["document", "graph", "solve"]);
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! A document that was read from a file or a text.
 use crate::format::{Format, MAX_BYTES};
 use crate::overrides::apply;
-use manifactor_tree::Fault;
-use manifactor_tree::Node;
-use manifactor_tree::Section;
-use manifactor_tree::SourceText;
-use manifactor_tree::merge;
-use manifactor_tree::{Diagnostic, Diagnostics, Errors};
+use manifactor_document::Fault;
+use manifactor_document::Node;
+use manifactor_document::Section;
+use manifactor_document::SourceText;
+use manifactor_document::merge;
+use manifactor_document::{Diagnostic, Diagnostics, Errors};
 use std::io::Read;
 use std::path::Path;
 

@@ -3,10 +3,10 @@ mod json;
 pub(crate) mod toml;
 mod yaml;
 
-use manifactor_tree::Fault;
-use manifactor_tree::{Diagnostic, Diagnostics};
-use manifactor_tree::{MAX_DEPTH, Node};
-use manifactor_tree::{Place, SourceText};
+use manifactor_document::Fault;
+use manifactor_document::{Diagnostic, Diagnostics};
+use manifactor_document::{MAX_DEPTH, Node};
+use manifactor_document::{Place, SourceText};
 use std::fmt;
 use std::path::Path;
 

@@ -16,7 +16,7 @@ mod write;
 pub use document::Document;
 pub use format::{Format, MAX_BYTES};
 pub use graph_document::{read_graph, read_graph_section, write_graph};
-pub use manifactor_tree::{
+pub use manifactor_document::{
     Diagnostic, Diagnostics, Errors, Fault, Field, MAX_DEPTH, Node, Place, Placed, ReadError, Reader,
     Section, SourceText, Table, Value, deserialize_with, merge, nearest, quoted_list,
 };

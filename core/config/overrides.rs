@@ -1,10 +1,10 @@
 //! Single values set from outside, as `--set solver.max_iterations=50` does.
 use crate::format::toml::parse_value;
 use crate::format::too_deep;
-use manifactor_tree::Errors;
-use manifactor_tree::Fault;
-use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
-use manifactor_tree::{Place, SourceText};
+use manifactor_document::Errors;
+use manifactor_document::Fault;
+use manifactor_document::{Field, MAX_DEPTH, Node, Table, Value};
+use manifactor_document::{Place, SourceText};
 use std::ops::Range;
 
 /// One step into a document.

@@ -23,7 +23,7 @@ pub use algebra::{
 pub use factor::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows, batch, invariance};
 pub use factor::{ErasedResidual, Factor, FactorEntry, Linearization, signature};
 pub use graph::{Fixed, Graph, GraphError, Resolved, VariableIndices, Version};
-pub use manifactor_tree::TextError;
+pub use manifactor_document::TextError;
 pub use noise::Noise;
 pub use registry::{catalogue, checked};
 pub use residual::{Jacobians, Lifted, List, Many, Refs, Residual, Variables, normal_equations};
@@ -32,5 +32,5 @@ pub use variable::{Key, Manifold, Tangent, ValueError, Values};
 
 #[doc(hidden)]
 pub mod __private {
-    pub use {inventory, manifactor_tree, schemars, serde, typetag};
+    pub use {inventory, manifactor_document, schemars, serde, typetag};
 }

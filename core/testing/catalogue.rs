@@ -6,11 +6,11 @@ use crate::error::LawError;
 use crate::example::{example_fields, problem};
 use crate::factor_check::{FactorCheck, FactorReport, Subject};
 use crate::manifold_check::{ManifoldCheck, ManifoldReport};
+use manifactor_document::Reader;
 use manifactor_graph::catalogue::{self, Entry, Kind};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, Variable};
-use manifactor_tree::Reader;
 
 pub use crate::example::example;
 

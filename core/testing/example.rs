@@ -1,8 +1,8 @@
 //! The examples in the docs of registered types.
 use crate::error::LawError;
+use manifactor_document::Node;
 use manifactor_graph::Variable;
 use manifactor_graph::catalogue::{self, Entry, Kind};
-use manifactor_tree::Node;
 use serde_json::Value;
 use std::any::TypeId;
 

@@ -7,7 +7,7 @@ use crate::solution::Watch;
 use crate::threads::detach;
 use manifactor::config::Errors;
 use manifactor::graph::Key;
-use manifactor::online::{FactorId as InnerId, Session as Inner, Settings};
+use manifactor::smoother::{FactorId as InnerId, Session as Inner, Settings};
 use manifactor::solve::{Auto, Optimizer};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;

@@ -84,7 +84,7 @@ pub struct Settings {
     pub solver: Arc<dyn Optimizer>,
     /// How the graph is kept up to date while frames come in, by `manifactor online`.
     #[serde(default)]
-    pub online: manifactor_online::Settings,
+    pub online: manifactor_smoother::Settings,
     /// What the estimate is compared with, and how.
     #[serde(default)]
     pub evaluation: EvaluationSettings,

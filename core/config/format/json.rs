@@ -4,10 +4,10 @@ use indexmap::map::Entry;
 use jsonc_parser::ast::{Object, Value as Ast};
 use jsonc_parser::common::{Range, Ranged};
 use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
-use manifactor_tree::Fault;
-use manifactor_tree::{Diagnostic, Diagnostics};
-use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
-use manifactor_tree::{Place, SourceText};
+use manifactor_document::Fault;
+use manifactor_document::{Diagnostic, Diagnostics};
+use manifactor_document::{Field, MAX_DEPTH, Node, Table, Value};
+use manifactor_document::{Place, SourceText};
 
 /// Parses a document.
 pub(crate) fn parse(source: &SourceText) -> Result<Node, Diagnostics> {

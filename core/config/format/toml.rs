@@ -2,10 +2,10 @@
 use crate::format::too_deep;
 use ::toml::Spanned;
 use ::toml::de::{DeInteger, DeTable, DeValue};
-use manifactor_tree::Fault;
-use manifactor_tree::{Diagnostic, Diagnostics};
-use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
-use manifactor_tree::{Place, SourceText};
+use manifactor_document::Fault;
+use manifactor_document::{Diagnostic, Diagnostics};
+use manifactor_document::{Field, MAX_DEPTH, Node, Table, Value};
+use manifactor_document::{Place, SourceText};
 use std::ops::Range;
 
 /// One bracket that is missing makes a dozen errors: no more than these are told.

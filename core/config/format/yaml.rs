@@ -4,10 +4,10 @@
 //! file and keys that are not scalars are refused.
 use crate::format::too_deep;
 use indexmap::map::Entry;
-use manifactor_tree::Fault;
-use manifactor_tree::{Diagnostic, Diagnostics};
-use manifactor_tree::{Field, MAX_DEPTH, Node, Table, Value};
-use manifactor_tree::{Place, SourceText};
+use manifactor_document::Fault;
+use manifactor_document::{Diagnostic, Diagnostics};
+use manifactor_document::{Field, MAX_DEPTH, Node, Table, Value};
+use manifactor_document::{Place, SourceText};
 use saphyr_parser::{Event, Parser, ScalarStyle, Span, Tag};
 use std::borrow::Cow;
 use std::collections::HashMap;

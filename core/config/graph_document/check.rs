@@ -1,7 +1,7 @@
 //! What is wrong between the factors and the variables of a document, at its place.
 use super::read::Read;
+use manifactor_document::{Diagnostic, Errors, Fault, Node, Place, Value, nearest, quoted_list};
 use manifactor_graph::{GraphError, Key};
-use manifactor_tree::{Diagnostic, Errors, Fault, Node, Place, Value, nearest, quoted_list};
 
 /// Up to this many variables are listed for a key that is none of them.
 const LISTED: usize = 12;

@@ -2,9 +2,9 @@
 use super::check::check;
 use crate::document::Document;
 use indexmap::IndexMap;
+use manifactor_document::{Diagnostic, Diagnostics, Errors, Fault, Node, Section, Value};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Factor, FactorEntry, Fixed, Graph, Key, Noise, Values, Variable};
-use manifactor_tree::{Diagnostic, Diagnostics, Errors, Fault, Node, Section, Value};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;

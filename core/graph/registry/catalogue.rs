@@ -4,7 +4,7 @@
 //! enters an implementation. The catalogue takes a type's summary, explanation and example from its
 //! doc comment, which travels in its JSON Schema: the first paragraph is the summary, the first
 //! `toml` block the example.
-use manifactor_tree::{Fault, Node, ReadError, Reader};
+use manifactor_document::{Fault, Node, ReadError, Reader};
 use schemars::Schema;
 use serde_json::Value;
 use std::any::{Any, TypeId};
@@ -162,7 +162,7 @@ macro_rules! kind {
             where
                 D: $crate::__private::serde::Deserializer<'de>,
             {
-                $crate::__private::manifactor_tree::deserialize_with(deserializer, |node| {
+                $crate::__private::manifactor_document::deserialize_with(deserializer, |node| {
                     let read: Self = $crate::catalogue::read::<$kind>(node)?;
                     Ok(::std::boxed::Box::new(read))
                 })

@@ -1,6 +1,6 @@
 //! Trait objects that a document chooses by name: `solver = { type = "gauss_newton", max_iterations = 20 }`.
 use crate::registry::catalogue::{Entry, Kind, TAG, all, entries, find};
-use manifactor_tree::{Fault, Field, Node, Place, ReadError, Value, advice, nearest};
+use manifactor_document::{Fault, Field, Node, Place, ReadError, Value, advice, nearest};
 
 /// Reads a table as the registered type of kind `K` that its `type` names.
 ///

@@ -5,7 +5,7 @@ use manifactor_geometry::{Between, Point2, Range, Se2, Se3};
 use manifactor_graph::checked::{NotNegative, Positive};
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
-use manifactor_online::{Report, Session, Settings, Span, Window};
+use manifactor_smoother::{Report, Session, Settings, Span, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{Vector2, Vector3};
 use std::num::NonZeroUsize;

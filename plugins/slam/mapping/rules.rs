@@ -7,8 +7,8 @@ use crate::input::sequence::ObjectId;
 use crate::semantics::{Applied, Candidate, Connected, Judge, LeftOut, RuleError, Verdict};
 use crate::settings::Settings;
 use manifactor_graph::{Direction, FactorEntry, Key};
-use manifactor_online::FactorId;
 use manifactor_quadric::DualQuadric;
+use manifactor_smoother::FactorId;
 use std::collections::{BTreeMap, HashMap};
 
 /// All semantic factors that count.

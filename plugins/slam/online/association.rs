@@ -11,8 +11,8 @@ use crate::settings::Settings;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Graph, Key, Values};
-use manifactor_online::{FactorId, Session};
 use manifactor_quadric::DualQuadric;
+use manifactor_smoother::{FactorId, Session};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// An object begins again when more of its boxes than this part are others at once.

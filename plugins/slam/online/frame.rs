@@ -11,7 +11,7 @@ use crate::semantics::RuleError;
 use crate::settings::Settings;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, Graph, Key, Manifold, Values};
-use manifactor_online::{ChangeError, FactorId, Report};
+use manifactor_smoother::{ChangeError, FactorId, Report};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -1,8 +1,8 @@
 //! An object from its first box to its birth, and after.
 use crate::mapping::measurements::{Measured, ObjectBox};
 use manifactor_geometry::Se3;
-use manifactor_online::FactorId;
 use manifactor_quadric::{Camera, DualQuadric};
+use manifactor_smoother::FactorId;
 use nalgebra::Vector3;
 
 /// What is known of an object besides its boxes.

@@ -10,8 +10,8 @@ use crate::mapping::rules::Ledger;
 use crate::mapping::{Rejection, as_candidate, object_key, rejection, view_entries};
 use crate::semantics::Candidate;
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_online::FactorId;
 use manifactor_quadric::DualQuadric;
+use manifactor_smoother::FactorId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

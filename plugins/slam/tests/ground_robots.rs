@@ -8,7 +8,7 @@ use manifactor_graph::loss::Loss;
 use manifactor_graph::{
     Factor, FactorEntry, Graph, Key, Lifted, Manifold, Noise, Residual, Scalar, Values, register_factor,
 };
-use manifactor_online::{Session, Settings};
+use manifactor_smoother::{Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 use nalgebra::{U3, Vector2, Vector3};
 use schemars::JsonSchema;

@@ -10,7 +10,7 @@ use manifactor_formats::replay::Latencies;
 use manifactor_geometry::{Between, Se2, So2};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::{Graph, Key, Noise, Values};
-use manifactor_online::{Session, Settings, Span};
+use manifactor_smoother::{Session, Settings, Span};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 use nalgebra::{Vector2, Vector3};
 use rand::{RngExt, SeedableRng};

@@ -10,7 +10,7 @@ use manifactor_formats::pose_graph::{self, Options};
 use manifactor_formats::replay::{Latencies, Replay};
 use manifactor_geometry::{Between, Se2, Se3};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_online::{FactorId, Outliers, Session, Settings};
+use manifactor_smoother::{FactorId, Outliers, Session, Settings};
 use manifactor_solve::{Gnc, LevenbergMarquardt, Problem, Silent, solve};
 use nalgebra::{Vector3, Vector6};
 use rand::{RngExt, SeedableRng};

@@ -7,7 +7,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options, PoseGraph, Repair};
 use manifactor_formats::replay::{Latencies, Replay};
-use manifactor_online::{Session, Settings};
+use manifactor_smoother::{Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 
 /// Of this thread: what others do on the machine has no part in it.

@@ -7,7 +7,7 @@
 use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use manifactor_formats::replay::{Latencies, Replay};
 use manifactor_graph::{FactorEntry, Graph, Key, Values};
-use manifactor_online::{Session, Settings, Span, Window};
+use manifactor_smoother::{Session, Settings, Span, Window};
 use std::num::NonZeroUsize;
 
 /// Of this thread: what others do on the machine has no part in it.

@@ -3,8 +3,8 @@ use super::{is_finite, third};
 use manifactor::geometry::{BearingRange2, Between, Point2, Prior, Range, Se2, So2};
 use manifactor::graph::checked::Positive;
 use manifactor::graph::{Fixed, Variable};
-use manifactor::online::{FactorId, Session, Settings};
 use manifactor::prelude::*;
+use manifactor::smoother::{FactorId, Session, Settings};
 
 /// Longer histories are cut off here, to keep each input fast.
 const LONGEST: usize = 120;

@@ -4,7 +4,6 @@ use manifactor::config::{Document, Format};
 use manifactor::geometry::{Se3, So3};
 use manifactor::graph::checked::Positive;
 use manifactor::nalgebra::Vector3;
-use manifactor::online::Session;
 use manifactor::quadric::BoundingBox;
 use manifactor::slam::measurement::{Depth, Quantities};
 use manifactor::slam::online::Mapper;
@@ -14,6 +13,7 @@ use manifactor::slam::sequence::{
     Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening,
 };
 use manifactor::slam::settings::Settings;
+use manifactor::smoother::Session;
 use std::sync::{Arc, LazyLock};
 
 /// Longer streams are cut off here, to keep each input fast.

@@ -3,8 +3,8 @@ use super::{SOLVED, is_finite, third};
 use manifactor::formats::pose_graph::{self, Options};
 use manifactor::formats::replay::Replay;
 use manifactor::graph::GraphError;
-use manifactor::online::{ChangeError, Session, Settings};
 use manifactor::prelude::*;
+use manifactor::smoother::{ChangeError, Session, Settings};
 use std::collections::HashSet;
 
 /// Replays g2o and TORO files pose by pose. Each factor and each variable comes once, and all estimates are finite.

@@ -1,6 +1,6 @@
 //! Saved sessions, with a checksum that fits the damaged document.
 use super::is_finite;
-use manifactor::online::Session;
+use manifactor::smoother::Session;
 
 /// Loads saved sessions, unchanged and with a checksum that fits. A session that is loaded is finite, and goes on with equal bits after
 /// a second restart.

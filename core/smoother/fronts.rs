@@ -1,0 +1,125 @@
+//! The numbers of fronts: panels of the factor, and the updates that fronts hand up, which are kept.
+//!
+//! The right-hand side −g is the last row of each front: elimination solves for it on the way, and a front that is kept has
+//! its part of it at hand.
+mod assembly;
+mod elimination;
+mod pool;
+mod substitution;
+
+use crate::elimination_tree::{Affected, Front, Tree};
+use crate::model::{Blocks, Overflow};
+use assembly::Run;
+use elimination::Build;
+use manifactor_solve::front::Scratch;
+use pool::Pool;
+use pulp::Arch;
+use substitution::Backward;
+
+/// A scalar unknown: a variable, and a direction of its tangent space.
+pub(crate) type Scalar = (u32, u32);
+
+/// What a front has computed.
+#[derive(Debug, Default)]
+struct Numbers {
+    /// Column-major, `width` columns of `width + below + 1` rows.
+    panel: Vec<f64>,
+    /// The lower triangle of a square of `below + 1` columns.
+    update: Vec<f64>,
+    /// Directions that nothing constrains, as far as f64 can tell, once what is eliminated before is gone.
+    open: Vec<Scalar>,
+}
+
+/// The numbers of all fronts of a tree.
+#[derive(Debug)]
+pub(crate) struct Fronts {
+    numbers: Vec<Numbers>,
+    pool: Pool,
+    /// By variable, its first row in the front that has this stamp.
+    place: Vec<(u64, u32)>,
+    stamp: u64,
+    runs: Vec<Run>,
+    x: Vec<f64>,
+    scratch: Scratch,
+    arch: Arch,
+}
+
+/// Widest front that needs less room of the dense kernels than any wider one.
+const WIDEST: usize = 1 << 10;
+
+impl Default for Fronts {
+    fn default() -> Self {
+        Self {
+            numbers: vec![],
+            pool: Pool::default(),
+            place: vec![],
+            stamp: 0,
+            runs: vec![],
+            x: vec![],
+            scratch: Scratch::new(WIDEST),
+            arch: Arch::new(),
+        }
+    }
+}
+
+impl Fronts {
+    /// Makes room for so many variables.
+    pub(crate) fn resize(&mut self, variables: usize) {
+        self.place.resize(variables, (0, 0));
+    }
+
+    /// Assembles and factorizes new fronts, children before parents.
+    ///
+    /// # Errors
+    /// Where a sum is not finite. The fronts are dropped then.
+    pub(crate) fn build(&mut self, tree: &Tree, blocks: &Blocks, new: &[u32]) -> Result<(), Overflow> {
+        self.numbers.resize_with(tree.fronts.len(), Numbers::default);
+        let arch = self.arch;
+        let built = arch.dispatch(Build { fronts: self, tree, blocks, new });
+        if built.is_err() {
+            self.release(new);
+        }
+        built
+    }
+
+    /// Gives back the memory of fronts that are gone.
+    pub(crate) fn drop_all(&mut self, affected: &Affected) {
+        self.release(&affected.0);
+    }
+
+    fn release(&mut self, fronts: &[u32]) {
+        for f in fronts {
+            let Numbers { panel, update, .. } = std::mem::take(&mut self.numbers[*f as usize]);
+            self.pool.give(panel);
+            self.pool.give(update);
+        }
+    }
+
+    /// Directions of a front's variables that nothing constrains.
+    pub(crate) fn open(&self, front: u32) -> &[Scalar] {
+        &self.numbers[front as usize].open
+    }
+
+    /// The steps of a front's variables, one after the other, from those of its rows: `delta` by scalar of all variables.
+    pub(crate) fn solve(&mut self, front: &Front, number: u32, blocks: &Blocks, delta: &[f64]) -> &[f64] {
+        self.x.resize(front.width, 0.0);
+        for row in &front.rows {
+            self.x.extend_from_slice(&delta[blocks.range(*row)]);
+        }
+        let panel = &self.numbers[number as usize].panel[..front.width * (front.width + front.below + 1)];
+        self.arch.dispatch(Backward { panel, width: front.width, x: &mut self.x });
+        self.x.truncate(front.width);
+        &self.x
+    }
+
+    /// x ← L⁻¹ x of one front: see [`substitution::forward`].
+    pub(crate) fn forward(&self, front: &Front, number: u32, x: &mut [f64], below: &mut [f64]) {
+        let panel = &self.numbers[number as usize].panel[..front.width * (front.width + front.below + 1)];
+        substitution::forward(panel, x, below);
+    }
+
+    /// Bytes of all fronts, and of memory that waits for others.
+    pub(crate) fn bytes(&self) -> usize {
+        self.pool.bytes()
+    }
+}

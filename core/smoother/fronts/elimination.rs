@@ -1,0 +1,184 @@
+//! How a front comes about: what factors say, what its children hand up, and the elimination of its columns.
+use super::assembly::{Open, Run, assemble};
+use super::{Fronts, Numbers, Scalar};
+use crate::elimination_tree::{Front, Tree};
+use crate::model::{Blocks, Overflow};
+use manifactor_solve::front::eliminate;
+use pulp::{Simd, WithSimd};
+
+/// A pivot below this share of a diagonal entry of H is rounding: nothing constrains the direction. It is held at its
+/// linearization point, as a direction without a gradient is left alone by a batch solver.
+const OPEN: f64 = 1e-14;
+/// The assembly and elimination of new fronts.
+pub(super) struct Build<'a> {
+    pub(super) fronts: &'a mut Fronts,
+    pub(super) tree: &'a Tree,
+    pub(super) blocks: &'a Blocks,
+    /// Children before parents.
+    pub(super) new: &'a [u32],
+}
+
+impl WithSimd for Build<'_> {
+    type Output = Result<(), Overflow>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        // a loop: a closure would be compiled for the least processor
+        for f in self.new {
+            build(simd, self.fronts, self.tree, self.blocks, *f)?;
+        }
+        Ok(())
+    }
+}
+
+/// Assembles and factorizes one front. Where a direction turns out to be open, once more, with that direction held.
+#[inline(always)]
+fn build<S: Simd>(
+    simd: S,
+    fronts: &mut Fronts,
+    tree: &Tree,
+    blocks: &Blocks,
+    f: u32,
+) -> Result<(), Overflow> {
+    let front = &tree.fronts[f as usize];
+    let height = front.width + front.below + 1;
+    let (entries, below) = (front.width * height, front.below + 1);
+    let (mut panel, mut update) = (fronts.pool.take(entries), fronts.pool.take(below * below));
+    let mut held: Vec<usize> = vec![];
+    let built = loop {
+        let (panel, update) = (&mut panel[..entries], &mut update[..below * below]);
+        fill(fronts, blocks, front, panel);
+        for c in &held {
+            let precision = precision_of(blocks, front, *c);
+            panel[c * (height + 1)] += if precision > 0.0 { precision * precision } else { 1.0 };
+        }
+        let mut open = Open { panel, update, width: front.width, height };
+        take_children::<true>(fronts, tree, blocks, front, &mut open);
+        let eliminated =
+            eliminate::<S, true>(simd, open.panel, open.update, front.width, &mut fronts.scratch);
+        let failed = eliminated.err().or_else(|| first_open(blocks, front, open.panel, &held));
+        match failed {
+            None => {
+                let is_finite = (0..front.width).all(|c| open.panel[(c + 1) * height - 1].is_finite());
+                take_children::<false>(fronts, tree, blocks, front, &mut open);
+                break if is_finite { Ok(()) } else { Err(front.width - 1) };
+            }
+            Some(column) if held.contains(&column) => break Err(column),
+            Some(column) => held.push(column),
+        }
+    };
+    // even a front that failed owns its memory, so that dropping it gives that back
+    held.sort_unstable();
+    let open = held.iter().map(|c| scalar_of(blocks, front, *c)).collect();
+    fronts.numbers[f as usize] = Numbers { panel, update, open };
+    built.map_err(|column| Overflow(scalar_of(blocks, front, column).0))
+}
+
+/// The variable and direction of a front's column.
+fn scalar_of(blocks: &Blocks, front: &Front, column: usize) -> Scalar {
+    let mut first = 0;
+    for v in &front.blocks {
+        let dim = blocks.dim(*v);
+        if column < first + dim {
+            return (*v, (column - first) as u32);
+        }
+        first += dim;
+    }
+    (0, 0)
+}
+
+fn precision_of(blocks: &Blocks, front: &Front, column: usize) -> f64 {
+    let (variable, direction) = scalar_of(blocks, front, column);
+    blocks.precision(variable)[direction as usize]
+}
+
+/// The first column of a factorized panel whose pivot is rounding.
+#[inline(always)]
+fn first_open(blocks: &Blocks, front: &Front, panel: &[f64], held: &[usize]) -> Option<usize> {
+    let height = front.width + front.below + 1;
+    let mut column = 0;
+    for v in &front.blocks {
+        for precision in blocks.precision(*v) {
+            let pivot = panel[column * (height + 1)];
+            if pivot * pivot < OPEN * precision * precision && !held.contains(&column) {
+                return Some(column);
+            }
+            column += 1;
+        }
+    }
+    None
+}
+
+/// Fills a panel with what factors say, and notes where the front's variables have their rows.
+#[inline(always)]
+fn fill(fronts: &mut Fronts, blocks: &Blocks, front: &Front, panel: &mut [f64]) {
+    let height = front.width + front.below + 1;
+    fronts.stamp += 1;
+    let stamp = fronts.stamp;
+    let mut row = 0;
+    for v in front.blocks.iter().chain(&front.rows) {
+        fronts.place[*v as usize] = (stamp, row as u32);
+        row += blocks.dim(*v);
+    }
+    panel.fill(0.0);
+    let mut first = 0;
+    for v in &front.blocks {
+        let dim = blocks.dim(*v);
+        let columns = &mut panel[first * height..(first + dim) * height];
+        let (own, gradient) = (blocks.diagonal(*v), blocks.gradient(*v));
+        for (c, column) in columns.chunks_exact_mut(height).enumerate() {
+            column[first + c..first + dim].copy_from_slice(&own[c * dim + c..(c + 1) * dim]);
+            column[height - 1] = -gradient[c];
+        }
+        for coupling in blocks.coupled(*v) {
+            let (found, at) = fronts.place[coupling.other as usize];
+            let at = at as usize;
+            if found != stamp || at <= first {
+                continue;
+            }
+            let (block, rows) = (blocks.block(coupling.pair), blocks.dim(coupling.other));
+            for (c, column) in columns.chunks_exact_mut(height).enumerate() {
+                let to = &mut column[at..at + rows];
+                if *v < coupling.other {
+                    to.copy_from_slice(&block[c * rows..(c + 1) * rows]);
+                } else {
+                    to.iter_mut().zip(block[c..].iter().step_by(dim)).for_each(|(to, x)| *to = *x);
+                }
+            }
+        }
+        first += dim;
+    }
+}
+
+/// Adds what a front's children hand up to its panel, before elimination; or to its update, after it, so that the update
+/// need not be filled with zeros.
+#[inline(always)]
+fn take_children<const PANEL: bool>(
+    fronts: &mut Fronts,
+    tree: &Tree,
+    blocks: &Blocks,
+    front: &Front,
+    open: &mut Open<'_>,
+) {
+    for c in &front.children {
+        let child = &tree.fronts[*c as usize];
+        fronts.runs.clear();
+        let mut row = 0;
+        for v in &child.rows {
+            add_run(&mut fronts.runs, row, fronts.place[*v as usize].1 as usize, blocks.dim(*v));
+            row += blocks.dim(*v);
+        }
+        add_run(&mut fronts.runs, row, open.height - 1, 1);
+        let n = child.below + 1;
+        assemble::<PANEL>(&fronts.numbers[*c as usize].update[..n * n], n, &fronts.runs, open);
+    }
+}
+
+/// Appends rows to the last run, where they follow it.
+#[inline(always)]
+fn add_run(runs: &mut Vec<Run>, row: usize, place: usize, rows: usize) {
+    match runs.last_mut() {
+        Some(run) if run.place + (run.end - run.start) == place => run.end += rows,
+        _ => runs.push(Run { start: row, end: row + rows, place }),
+    }
+}

@@ -1,0 +1,236 @@
+//! Variables that leave: their factors are sealed into a linear prior of their neighbours, which keep their linearization
+//! points from then on.
+//!
+//! Points that stay are what makes it consistent: a prior that is evaluated at one point and factors that are linearized at
+//! another would tell the estimate of directions that nothing has measured (first estimates; Huang, Mourikis and Roumeliotis,
+//! 2008).
+use super::Session;
+use super::changes::{Change, Touched};
+use super::parking::Moves;
+use crate::elimination_tree::Couplings;
+use crate::error::ChangeError;
+use crate::factor_id::FactorId;
+use crate::model::{Overflow, Prior};
+use crate::report::Report;
+use manifactor_graph::Key;
+
+/// Changes of the model by a sealing, so that they can be taken back. Factors are gone once it succeeds.
+#[derive(Default)]
+struct Sealing {
+    steps: Vec<Step>,
+    gone: Vec<u32>,
+    dropped: Vec<u32>,
+}
+
+/// A step that takes one change of the model back.
+enum Step {
+    /// Inserts a factor again, with the share of its weight.
+    Factor(Change, u32, f64),
+    /// Inserts a linear prior again.
+    Prior(u32, Prior),
+    /// Removes a new linear prior.
+    Remove(u32),
+    /// Restores whether a variable was parked.
+    Parked(u32, bool),
+}
+
+impl Session {
+    /// Has variables leave, at the end of the next [`update`](Self::update): what their factors say of others stays, as a linear
+    /// prior, and those others keep their linearization points until they leave as well. Estimates and covariances of what
+    /// stays are what they were. Factors that do not count where they are left, as they are not defined there or hang
+    /// on something that is parked, are dropped, and the report names them. If a prior overflows, all of these variables stay, and the
+    /// report names them as well. One that has no factors then leaves nothing behind: another may have
+    /// its key.
+    ///
+    /// # Errors
+    /// Where a variable is not there, or gone already. None leaves then.
+    pub fn marginalize<K: AsRef<str>>(&mut self, keys: &[K]) -> Result<(), ChangeError> {
+        for key in keys.iter().map(AsRef::as_ref) {
+            if self.find(key).is_none() {
+                return Err(self.no_variable(&Key::from(key)));
+            }
+        }
+        self.pending.leaving.extend(keys.iter().map(|key| Key::from(key.as_ref())));
+        Ok(())
+    }
+
+    /// Why a key is none of a variable.
+    pub(super) fn no_variable(&self, key: &Key) -> ChangeError {
+        match self.gone.contains(key.as_str()) {
+            true => ChangeError::Gone { key: key.clone() },
+            false => ChangeError::NoVariable { key: key.clone() },
+        }
+    }
+
+    /// Why an id is none of a factor.
+    pub(super) fn no_factor(&self, factor: FactorId) -> ChangeError {
+        match self.gone_factors.contains(u64::from(factor.0)) {
+            true => ChangeError::GoneFactor { factor },
+            false => ChangeError::NoFactor { factor },
+        }
+    }
+
+    /// Seals what these variables leave behind, one after the other, and solves again. If that fails, all of them stay, with their
+    /// factors.
+    pub(super) fn seal(&mut self, leaving: &[u32], report: &mut Report) -> Result<(), Overflow> {
+        if leaving.is_empty() {
+            return Ok(());
+        }
+        // what is frozen should not be far off; where it cannot be linearized anew, it stays as it is
+        let is_stale = |v: &u32| self.is_out(*v) || self.model.coupled(*v).any(|u| self.is_out(u));
+        if leaving.iter().any(is_stale) {
+            let _ = self.pass(&Touched::default(), &Moves::default(), true, report);
+        }
+        let mut touched = Touched::default();
+        let is_bare = |v: &u32| self.model.factors_of(&[*v]).is_empty();
+        let bare: Vec<u32> = leaving.iter().copied().filter(is_bare).collect();
+        let mut sealing = Sealing::default();
+        for v in leaving {
+            if let Err(overflow) = self.seal_one(*v, &mut touched, &mut sealing) {
+                self.take_back_sealing(sealing);
+                return Err(overflow);
+            }
+        }
+        // those that leave one after the other are each other's neighbours
+        let is_there = |session: &Self, v: u32| !leaving.contains(&v) && session.model.place(v).is_there;
+        touched.doubtful.retain(|v| is_there(self, *v));
+        let moves = self.park(&mut touched);
+        if let Err(overflow) = self.pass(&touched, &moves, false, report) {
+            self.unpark(&moves);
+            self.take_back_sealing(sealing);
+            return Err(overflow);
+        }
+        for f in sealing.gone {
+            // the numbers of priors too: no one holds them, and the runs have no gaps
+            self.gone_factors.insert(u64::from(f));
+            self.inactive.remove(&f);
+            self.forget_suspect(f);
+        }
+        report.dropped.extend(sealing.dropped.into_iter().map(FactorId));
+        for v in leaving {
+            let key = self.key(*v);
+            self.gone.insert(key.as_str(), !bare.contains(v));
+            report.sealed.push(key);
+            self.forget(*v);
+        }
+        self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
+        Ok(())
+    }
+
+    /// Takes a sealing back that failed, the last step first.
+    fn take_back_sealing(&mut self, sealing: Sealing) {
+        let (mut touched, mut factors) = (Touched::default(), vec![]);
+        for step in sealing.steps.into_iter().rev() {
+            match step {
+                Step::Factor(change, number, share) => {
+                    change.apply(&mut self.model, &mut touched);
+                    if share != 1.0 {
+                        self.model.attenuate(number, share);
+                    }
+                    factors.push(number);
+                }
+                Step::Prior(number, prior) => {
+                    self.model.insert_prior(number, &prior);
+                    factors.push(number);
+                }
+                Step::Remove(number) => {
+                    self.model.remove(number);
+                    self.gone_factors.insert(u64::from(number));
+                }
+                Step::Parked(variable, parked) => self.model.place_mut(variable).parked = parked,
+            }
+        }
+        self.sort(&mut factors);
+        // at the same points, they have the same bits
+        self.model.linearize(&factors);
+        for f in factors {
+            self.model.count(f, self.model.is_whole(f));
+        }
+        self.model.sum_up();
+    }
+
+    /// Puts a prior in the place of a variable's factors. It is in the tree until the next pass.
+    fn seal_one(
+        &mut self,
+        variable: u32,
+        touched: &mut Touched,
+        sealing: &mut Sealing,
+    ) -> Result<(), Overflow> {
+        let mut factors = self.model.factors_of(&[variable]);
+        let counts = |f: &u32| self.model.is_whole(*f) && self.model.takes_part(*f);
+        let (mut sealed, dropped): (Vec<u32>, Vec<u32>) = factors.iter().partition(|f| counts(f));
+        sealed.extend(self.covered(&sealed, variable));
+        sealed.sort_unstable();
+        let prior = self.model.without(variable, &sealed)?;
+        factors.extend(&sealed);
+        factors.sort_unstable();
+        factors.dedup();
+        let rejected = self.rejected_of(variable);
+        for f in factors {
+            touched.variables.extend(self.model.factor(f).into_iter().flat_map(|f| f.variables()));
+            self.remove_sealed(f, sealing);
+        }
+        touched.variables.push(variable);
+        for f in &rejected {
+            self.remove_sealed(*f, sealing);
+        }
+        sealing.dropped.extend(dropped.into_iter().chain(rejected));
+        if let Some(prior) = prior {
+            let number = self.model.next_factor();
+            self.model.insert_prior(number, &prior);
+            sealing.steps.push(Step::Remove(number));
+        }
+        touched.doubtful.extend(&touched.variables);
+        // out of the tree
+        let parked = std::mem::replace(&mut self.model.place_mut(variable).parked, true);
+        sealing.steps.push(Step::Parked(variable, parked));
+        Ok(())
+    }
+
+    /// Removes a factor or a linear prior, and notes the step that takes that back.
+    fn remove_sealed(&mut self, number: u32, sealing: &mut Sealing) {
+        let Some(factor) = self.model.factor(number) else { return };
+        let share = factor.share;
+        let step = match self.model.prior(number) {
+            Some(prior) => {
+                self.model.remove(number);
+                Some(Step::Prior(number, prior))
+            }
+            None => {
+                let change = Change::Remove { number }.apply(&mut self.model, &mut Touched::default());
+                change.map(|change| Step::Factor(change, number, share))
+            }
+        };
+        sealing.steps.extend(step);
+        sealing.gone.push(number);
+    }
+
+    /// Priors of some of the others: they become part of the new one, so that there are no more of them than have to be.
+    fn covered(&self, factors: &[u32], variable: u32) -> Vec<u32> {
+        let variables = factors.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables());
+        let mut around: Vec<u32> = variables.collect();
+        around.sort_unstable();
+        around.dedup();
+        let with_priors =
+            around.iter().copied().filter(|v| *v != variable && self.model.place(*v).sealed > 0);
+        let of_these = self.model.factors_of(&with_priors.collect::<Vec<_>>());
+        let is_covered = |f: &u32| {
+            let prior = self.model.factor(*f).filter(|factor| factor.entry.is_none());
+            prior.is_some_and(|prior| {
+                prior.variables().all(|v| v != variable && around.binary_search(&v).is_ok())
+            })
+        };
+        of_these.into_iter().filter(is_covered).collect()
+    }
+
+    /// Forgets a variable that is out of the tree.
+    fn forget(&mut self, variable: u32) {
+        self.steps.forget(&self.model, variable);
+        self.queue.forget(variable);
+        self.doubtful.retain(|v| *v != variable);
+        self.parked.remove(&variable);
+        self.shaken.remove(&variable);
+        self.model.blocks.damp(variable, 0.0);
+        self.model.forget(variable);
+    }
+}

@@ -1,0 +1,284 @@
+//! One update: changes, the part of the tree that they touch, and the steps that follow from it.
+use super::Session;
+use super::changes::{Change, NewVariable, Touched};
+use super::parking::Moves;
+use super::relinearization::Choice;
+use crate::elimination_tree::{Affected, Couplings, Redone};
+use crate::error::UpdateError;
+use crate::factor_id::FactorId;
+use crate::model::{NewNumber, Overflow};
+use crate::report::Report;
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+
+/// What takes changes back.
+#[derive(Default)]
+pub(super) struct Undo {
+    pub(super) variables: Vec<NewNumber>,
+    pub(super) changes: Vec<Change>,
+    pub(super) moves: Moves,
+}
+
+/// Touched variables that are eliminated last; where there are more, so many of them.
+const MANY: usize = 32;
+const NEWEST: usize = 8;
+
+impl Session {
+    /// Makes the changes since the last update, and brings the estimate up to date. Then variables leave
+    /// that are to; those whose linear prior overflows stay, and the report names them in [`stayed`](Report::stayed).
+    ///
+    /// From the second update without changes on, updates are *idle*: their limits are 1e-8 of [`bend`](crate::Settings::bend) and
+    /// [`deviation`](crate::Settings::deviation), so that repeated updates lead to the minimum.
+    ///
+    /// # Errors
+    /// Where a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last
+    /// update are taken back then, and the session is as that left it; ids of the pushed factors are void.
+    pub fn update(&mut self) -> Result<Report, UpdateError> {
+        let pending = std::mem::take(&mut self.pending);
+        let is_quiet = pending.is_empty();
+        self.schedule.begin(is_quiet);
+        let mut report = Report::default();
+        let mut touched = Touched { steps: true, ..Touched::default() };
+        let mut undo = Undo::default();
+        let mut came = vec![];
+        for (key, NewVariable { value, held, at, time }) in pending.variables {
+            self.model.push_variable(key, &*value, held, at);
+            came.push((at.number, time));
+            undo.variables.push(at);
+            touched.doubtful.push(at.number);
+        }
+        touched.doubtful.extend(&self.doubtful);
+        self.resize();
+        let mut suspects = BTreeMap::new();
+        let best = self.best_between(&pending.changes);
+        for mut change in pending.changes {
+            if let Change::Insert { number, entry, resolved, rejected, .. } = &mut change {
+                // one that replaces another has its number
+                suspects.remove(number);
+                if let Some(suspect) = self.suspect(entry, resolved, *number, &best) {
+                    *rejected = true;
+                    suspects.insert(*number, suspect);
+                }
+            }
+            undo.changes.extend(change.apply(&mut self.model, &mut touched));
+        }
+        self.sort(&mut touched.factors);
+        let evaluation = self.model.linearize(&touched.factors);
+        if let Some(factor) = evaluation.not_finite {
+            let entry = self.model.factor(factor as u32).and_then(|factor| factor.entry.as_ref());
+            let keys = entry.map_or(vec![], |entry| entry.keys.clone());
+            self.take_back(undo);
+            return Err(UpdateError::NonFinite { factor: FactorId(factor as u32), keys });
+        }
+        self.doubt_inactive(&mut touched);
+        undo.moves = self.park(&mut touched);
+        let is_turn = self.queue.postponed() > 0 || self.schedule.is_turn();
+        let moves = std::mem::take(&mut undo.moves);
+        if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
+            let key = self.key(overflow.0);
+            undo.moves = moves;
+            self.take_back(undo);
+            return Err(UpdateError::Overflow { key });
+        }
+        self.schedule.complete(is_quiet);
+        self.follow_up(&mut report);
+        let new = self.enter(suspects, &touched.removed);
+        self.test_outliers(&new, &mut report);
+        self.time = pending.time.or(self.time);
+        came.into_iter().for_each(|(variable, time)| self.note_age(variable, time));
+        let ages = self.ages.clone();
+        let leaving = self.leaving(&pending.leaving);
+        if self.seal(&leaving, &mut report).is_err() {
+            self.ages = ages;
+            report.stayed = leaving.iter().map(|v| self.key(*v)).collect();
+        }
+        self.tell(&mut report);
+        Ok(report)
+    }
+
+    /// Shortens steps that are too long, and takes those passes that cannot wait. What the changes need has been done: a pass
+    /// that fails leaves that as it is.
+    pub(super) fn follow_up(&mut self, report: &mut Report) {
+        self.control_step(report);
+        for _ in 0..self.schedule.settings().passes {
+            if !self.is_urgent() || self.pass(&Touched::default(), &Moves::default(), true, report).is_err() {
+                return;
+            }
+            self.control_step(report);
+        }
+    }
+
+    /// Room for as many variables as the model has.
+    pub(super) fn resize(&mut self) {
+        let n = self.model.variables();
+        self.factorization.resize(n);
+        self.steps.resize(&self.model, n);
+        self.queue.resize(n);
+    }
+
+    /// The factors of a list that are there, each once.
+    pub(super) fn sort(&self, factors: &mut Vec<u32>) {
+        factors.retain(|f| self.model.factor(*f).is_some());
+        factors.sort_unstable();
+        factors.dedup();
+    }
+
+    /// Takes changes back, the last first.
+    pub(super) fn take_back(&mut self, undo: Undo) {
+        self.unpark(&undo.moves);
+        let mut touched = Touched::default();
+        for change in undo.changes.into_iter().rev() {
+            change.apply(&mut self.model, &mut touched);
+        }
+        self.sort(&mut touched.factors);
+        self.model.linearize(&touched.factors);
+        for f in touched.factors {
+            self.model.count(f, self.model.is_whole(f));
+            self.note_activity(f);
+        }
+        self.forget_inactive(&touched.removed);
+        self.model.sum_up();
+        undo.variables.into_iter().rev().for_each(|at| self.model.take_out(at));
+        self.resize();
+    }
+
+    /// Notes which factors take no part; variables that lose one may not be determined any more.
+    pub(super) fn doubt_inactive(&mut self, touched: &mut Touched) {
+        self.forget_inactive(&touched.removed);
+        for f in &touched.factors {
+            if self.note_activity(*f) {
+                touched.doubtful.extend(self.model.factor(*f).into_iter().flat_map(|f| f.variables()));
+            }
+        }
+    }
+
+    fn forget_inactive(&mut self, removed: &[u32]) {
+        for f in removed.iter().filter(|f| self.model.factor(**f).is_none()) {
+            self.inactive.remove(f);
+        }
+    }
+
+    pub(super) fn note_activities(&mut self, factors: &[u32]) {
+        for f in factors {
+            self.note_activity(*f);
+        }
+    }
+
+    /// Notes whether a factor takes part where it was linearized; whether it has just ceased to.
+    pub(super) fn note_activity(&mut self, factor: u32) -> bool {
+        let is_rejected = self.model.factor(factor).is_some_and(|factor| factor.rejected);
+        match is_rejected || self.model.takes_part(factor) {
+            true => {
+                self.inactive.remove(&factor);
+                false
+            }
+            false => self.inactive.insert(factor),
+        }
+    }
+
+    /// Redoes what is touched and what is relinearized, and solves.
+    pub(super) fn pass(
+        &mut self,
+        touched: &Touched,
+        moves: &Moves,
+        is_turn: bool,
+        report: &mut Report,
+    ) -> Result<(), Overflow> {
+        report.passes += 1;
+        let mut affected = Affected::default();
+        touched.variables.iter().for_each(|v| self.factorization.touch(*v, &mut affected));
+        for v in &moves.leaving {
+            self.factorization.touch_around(&self.model, *v, &mut affected);
+        }
+        let last = self.last(touched, &moves.entering);
+        let postponed = self.queue.postponed();
+        let mut due = touched.held.clone();
+        if touched.steps && self.schedule.settings().budget.is_none() {
+            due.extend(self.damped_now());
+        }
+        let Choice { chosen, waiting } = self.choose(due, is_turn, &mut affected, report.operations);
+        let relinearized = self.relinearize(chosen, &touched.held);
+        for v in &relinearized.variables {
+            self.factorization.touch_around(&self.model, *v, &mut affected);
+        }
+        let damping = if touched.steps || is_turn {
+            self.steps.relax(&mut self.model, &relinearized.variables)
+        } else {
+            vec![]
+        };
+        self.model.sum_up();
+        let redone = match self.factorization.rebuild(&self.model, &affected, moves, &last) {
+            Ok(redone) => redone,
+            Err(overflow) => {
+                self.take_back_points(&relinearized);
+                for (v, damping) in damping {
+                    self.model.blocks.damp(v, damping);
+                    self.steps.note_damped(v);
+                }
+                self.queue.set_postponed(postponed);
+                self.model.sum_up();
+                return Err(overflow);
+            }
+        };
+        self.note_parked(moves);
+        self.doubt_parked(&relinearized.factors);
+        report.relinearized += relinearized.variables.len();
+        self.accept_points(&relinearized, waiting.as_deref());
+        for f in &redone.new {
+            report.operations += self.factorization.operations(&[*f]);
+            report.redone += self.factorization.width(*f);
+        }
+        report.solved += self.solve(&redone);
+        Ok(())
+    }
+
+    /// The variables to eliminate last: those that are touched will be touched again. Where there are new ones, that is said of these and
+    /// of what they are coupled with: an old pose whose factor was removed or replaced is done with. Where all that is many, an object with all
+    /// poses that have seen it, they would fill the root: then the newest of them.
+    fn last(&self, touched: &Touched, new: &[u32]) -> Vec<u32> {
+        let mut last = touched.variables.clone();
+        last.sort_unstable();
+        last.dedup();
+        if !new.is_empty() {
+            let mut near: Vec<u32> = new.iter().flat_map(|v| self.model.coupled(*v)).collect();
+            near.extend(new);
+            near.sort_unstable();
+            last.retain(|v| near.binary_search(v).is_ok());
+        }
+        if last.len() > MANY {
+            last.sort_unstable_by_key(|v| Reverse(self.model.place(*v).born));
+            last.truncate(NEWEST);
+            last.sort_unstable();
+        }
+        last
+    }
+
+    /// Solves for the steps, and notes variables that have moved. An idle update solves for all. Returns the number of variables.
+    fn solve(&mut self, redone: &Redone) -> usize {
+        let redone = (!self.schedule.is_idle()).then_some(redone);
+        let Self { steps, model, factorization, .. } = self;
+        let solved = steps.solve(model, factorization, redone, self.schedule.deviation());
+        if !self.suspects.is_empty() {
+            self.shaken.extend(self.steps.moved());
+        }
+        for v in self.steps.moved().collect::<Vec<_>>() {
+            self.note_excess(v);
+        }
+        solved
+    }
+
+    /// Notes which of the variables that were judged are parked.
+    fn note_parked(&mut self, moves: &Moves) {
+        self.doubtful.retain(|v| moves.judged.binary_search(v).is_err());
+        let mut has_changed = false;
+        for v in &moves.judged {
+            has_changed |= match self.model.place(*v).parked {
+                true => self.parked.insert(*v),
+                false => self.parked.remove(v),
+            };
+        }
+        if has_changed {
+            self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! An update that failed leaves no trace, also not in what comes after it.
+use crate::history::{Change, History, allowed, bits, change, outliers, window};
+use crate::toy::{At, Careless, Plane};
+use crate::world::{Shadow, Space};
+use manifactor_graph::checked::NotNegative;
+use manifactor_graph::{Fixed, Graph, Noise, Values};
+use manifactor_smoother::{Report, Session, Settings};
+use proptest::prelude::*;
+use std::num::NonZeroUsize;
+
+/// Pushes, removes, re-weights and holds, and fails at last: by a residual that is not finite, or a sum that overflows.
+fn fail(history: &mut History, n: usize, overflows: bool) {
+    let session = &mut history.session;
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("new", Plane { x: -4.0, y: 1.0 });
+    if n.is_multiple_of(3) {
+        // of a type that the session may not have had before
+        values.insert("space", Space { at: [1.0, 2.0, 3.0] });
+        graph.add(["new", "space"], Shadow { by: [0.0, 0.0] });
+    }
+    for _ in 0..3 {
+        graph.add(["new"], At { at: [3.0, 0.0] }).noise(Noise::sigma(1e-154).unwrap());
+    }
+    if !overflows {
+        graph.add(["new"], Careless {});
+    }
+    for key in history.keys.iter().take(n % 5) {
+        allowed(session.fix(key, &Fixed::Whole(n.is_multiple_of(2))));
+        if key.as_str().starts_with('p') && session.estimate(key.as_str()).is_some() {
+            graph.add([key.clone(), "new".into()], crate::toy::Apart { by: [1.0, 0.0] });
+        }
+    }
+    session.push(&graph, &values).unwrap();
+    for id in history.ids.iter().skip(n % 7).take(n % 4) {
+        allowed(session.set_weight(*id, 0.5));
+    }
+    for id in history.ids.iter().skip(n % 3).step_by(3).take(n % 6) {
+        allowed(session.remove(&[*id]));
+    }
+    session.update().unwrap_err();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::default())]
+    #[test]
+    fn a_failed_update_leaves_no_trace(
+        before in prop::collection::vec(change(), 0..40),
+        after in prop::collection::vec(change(), 1..40),
+        n in 0..1000usize,
+        overflows in any::<bool>(),
+        every in (1..4usize).prop_filter_map("zero", NonZeroUsize::new),
+        budget in prop_oneof![Just(None), Just(Some(NotNegative::literal(300.0)))],
+        window in prop_oneof![Just(None), window().prop_map(Some)],
+        outliers in outliers(),
+    ) {
+        let settings = Settings { relinearize_every: every, budget, window, outliers, ..Settings::default() };
+        let [mut one, mut other] = std::array::from_fn(|_| History::new(settings.clone()));
+        for history in [&mut one, &mut other] {
+            history.apply_all(&before);
+            history.apply(&Change::Update);
+        }
+        fail(&mut one, n, overflows);
+        prop_assert_eq!(one.session.cost().to_bits(), other.session.cost().to_bits());
+        prop_assert_eq!(bits(&one.session), bits(&other.session));
+        let loaded = Session::load(&one.session.save().unwrap());
+        prop_assert!(loaded.is_ok(), "{}", loaded.err().map(|error| error.to_string()).unwrap_or_default());
+        prop_assert_eq!(bits(&loaded.unwrap()), bits(&other.session));
+        for change in after.iter().chain(&[Change::Update]) {
+            // ids go on where the failed update left them
+            let [one, other] = [&mut one, &mut other].map(|history| {
+                history.apply(change).map(|report| Report { dropped: vec![], rejected: vec![], readmitted: vec![], ..report })
+            });
+            prop_assert_eq!(one, other);
+        }
+        prop_assert_eq!(bits(&one.session), bits(&other.session));
+        let keys = one.present();
+        prop_assert_eq!(one.session.covariance(&keys), other.session.covariance(&keys));
+    }
+}

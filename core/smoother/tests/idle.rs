@@ -1,0 +1,116 @@
+//! Updates without changes lead to the minimum that the estimate is nearest to.
+use crate::toy::{Apart, At, Distance, Plane};
+use manifactor_graph::checked::NotNegative;
+use manifactor_graph::loss::{Cauchy, Dcs, Fair, GemanMcClure, Huber, L1, Loss, Tukey, Welsch};
+use manifactor_graph::{Graph, Key, Noise, Values};
+use manifactor_smoother::{Session, Settings};
+use manifactor_solve::{LevenbergMarquardt, Silent, Stopping};
+use proptest::prelude::*;
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+/// Nats that may be left.
+const LEFT: f64 = 1e-3;
+
+/// The cost of the session above the cost that a batch solver reaches from its estimate with this number of iterations. It ends by
+/// that number, and so does not leave a saddle.
+fn left(session: &mut Session, iterations: usize) -> f64 {
+    let stop = Stopping {
+        max_iterations: iterations,
+        relative_cost: if iterations == 1 { NotNegative::literal(1.0) } else { NotNegative::literal(0.0) },
+        absolute_cost: NotNegative::literal(0.0),
+        gradient: NotNegative::literal(0.0),
+        step: NotNegative::literal(0.0),
+    };
+    let batch = LevenbergMarquardt { stop, ..LevenbergMarquardt::default() };
+    session.cost() - session.finish(&batch, &mut Silent).unwrap().outcome.final_cost
+}
+
+#[test]
+fn a_step_too_short_for_a_new_linearization_still_changes_robust_weights() {
+    let mut session = Session::new(Settings { relinearize_every: NonZeroUsize::MIN, ..Settings::default() });
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: 0.0, y: 0.0 });
+    graph.add(["p"], At { at: [0.0, 0.0] });
+    session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    for (x, sigma, k) in [(-1.3, 1.0, 2.0), (1.4, 0.16, 2.0), (-1.3, 0.2, 2.4)] {
+        let mut graph = Graph::new();
+        let loss = Huber { scale: k.try_into().unwrap() };
+        graph.add(["p"], At { at: [x, 0.0] }).noise(Noise::sigma(sigma).unwrap()).loss(loss);
+        session.push(&graph, &Values::new()).unwrap();
+        session.update().unwrap();
+    }
+    for _ in 0..100 {
+        session.update().unwrap();
+    }
+    let p: Plane = session.get("p").unwrap();
+    assert!(left(&mut session, 100) < LEFT, "{p:?}");
+}
+
+/// All losses; the first [`CONVEX`] of them are convex.
+fn losses() -> Vec<Option<Arc<dyn Loss>>> {
+    vec![
+        None,
+        Some(Arc::new(Huber::default())),
+        Some(Arc::new(Fair::default())),
+        Some(Arc::new(L1::default())),
+        Some(Arc::new(Cauchy::default())),
+        Some(Arc::new(Tukey::default())),
+        Some(Arc::new(Welsch::default())),
+        Some(Arc::new(GemanMcClure::default())),
+        Some(Arc::new(Dcs::default())),
+    ]
+}
+const CONVEX: usize = 4;
+
+/// A factor of a random graph: its variables, what it says, its σ.
+type Link = (usize, usize, f64, f64, f64);
+
+fn link() -> impl Strategy<Value = Link> {
+    (0..5usize, 0..5usize, -3.0..3.0, -3.0..3.0, 0.05..1.0)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn an_idle_session_comes_to_the_minimum(
+        links in prop::collection::vec(link(), 1..24),
+        loss in 0..9usize,
+        every in prop_oneof![Just(1usize), Just(10)],
+        ranges in any::<bool>(),
+    ) {
+        let (is_convex, is_l1) = (loss < CONVEX && !ranges, loss == 3);
+        let loss = losses()[loss].clone();
+        let mut session = Session::new(Settings { relinearize_every: NonZeroUsize::new(every).unwrap(), ..Settings::default() });
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        for v in 0..5 {
+            let x = v as f64;
+            values.insert(Key::indexed("p", v), Plane { x, y: -x });
+            graph.add([Key::indexed("p", v)], At { at: [x, -x] });
+        }
+        session.push(&graph, &values).unwrap();
+        session.update().unwrap();
+        for (i, (a, b, x, y, sigma)) in links.into_iter().enumerate() {
+            let (mut graph, noise) = (Graph::new(), Noise::sigma(sigma).unwrap());
+            let (a, b) = (Key::indexed("p", a), Key::indexed("p", b));
+            let added = match (a == b, ranges && i % 3 == 0) {
+                (true, _) => graph.add([a], At { at: [x, y] }),
+                (false, true) => graph.add([a, b], Distance { by: 1.0 + x.abs() }),
+                (false, false) => graph.add([a, b], Apart { by: [x, y] }),
+            };
+            let added = added.noise(noise);
+            added.loss.clone_from(&loss);
+            session.push(&graph, &Values::new()).unwrap();
+            session.update().unwrap();
+        }
+        for _ in 0..300 {
+            session.update().unwrap();
+        }
+        // with several minima, one iteration shows whether the estimate is at one of them
+        let left = left(&mut session, if is_convex { 100 } else { 1 });
+        // reweighting approaches the kinks of L1 ever more slowly
+        let most = if is_l1 { 10.0 * LEFT } else { LEFT };
+        prop_assert!(left < most, "{left} nats");
+    }
+}

@@ -1,0 +1,110 @@
+//! Variables that nothing determines.
+use crate::toy::{At, Distance, Logarithm, Plane};
+use crate::world::Ahead;
+use manifactor_graph::{Graph, Key, Noise, Values};
+use manifactor_smoother::{CovarianceError, Session, Settings};
+use std::num::NonZeroUsize;
+
+fn session(priors: &[&str]) -> Session {
+    let mut session = Session::new(Settings::default());
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    for (i, key) in priors.iter().enumerate() {
+        let x = i as f64;
+        values.insert(*key, Plane { x: x + 0.1, y: x * x });
+        graph.add([*key], At { at: [x, x * x] });
+    }
+    session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    session
+}
+
+#[test]
+fn a_point_that_ranges_do_not_determine_waits_for_another() {
+    let mut session = session(&["a", "b", "c"]);
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("point", Plane { x: 3.0, y: 0.5 });
+    graph.add(["a", "point"], Distance { by: 3.0 });
+    session.push(&graph, &values).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!(report.parked[..], [Key::from("point")]);
+    assert!(report.undetermined.is_empty());
+    assert!(matches!(session.covariance(&["point"]), Err(CovarianceError::Parked { .. })));
+    // its range says nothing of `a`
+    assert!(session.get::<Plane>("a").unwrap().x.abs() < 1e-12);
+    let mut graph = Graph::new();
+    graph.add(["b", "point"], Distance { by: 2.0 });
+    let ids = session.push(&graph, &Values::new()).unwrap();
+    assert!(session.update().unwrap().parked.is_empty());
+    assert!(session.covariance(&["point", "a"]).is_ok());
+    session.remove(&ids).unwrap();
+    assert_eq!(session.update().unwrap().parked[..], [Key::from("point")]);
+}
+
+#[test]
+fn a_covariance_that_is_too_large_for_a_number_is_an_error() {
+    let mut session = session(&["a"]);
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    for i in 0..6usize {
+        let (key, before) =
+            (Key::indexed("p", i), i.checked_sub(1).map_or("a".into(), |i| Key::indexed("p", i)));
+        values.insert(key.clone(), Plane { x: 0.0, y: 0.0 });
+        // information just above the least number with all its digits
+        graph.add([before, key], crate::toy::Apart { by: [0.0, 0.0] }).noise(Noise::sigma(6.5e153).unwrap());
+    }
+    session.push(&graph, &values).unwrap();
+    assert!(session.update().unwrap().parked.is_empty());
+    assert!(session.covariance(&["a", "p1"]).is_ok());
+    let error = session.covariance(&["a", "p5"]).unwrap_err();
+    assert_eq!(error, CovarianceError::Overflow { key: "p5".into() });
+}
+
+#[test]
+fn what_is_tied_to_itself_alone_is_undetermined_and_named() {
+    let mut session = session(&["a"]);
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: 0.0, y: 0.0 });
+    values.insert("q", Plane { x: 0.0, y: 0.0 });
+    graph.add(["p", "q"], crate::toy::Apart { by: [1.0, 2.0] });
+    session.push(&graph, &values).unwrap();
+    let report = session.update().unwrap();
+    assert!(report.parked.is_empty());
+    let names: Vec<&str> = report.undetermined.iter().map(|(_, name)| *name).collect();
+    assert_eq!(names, ["x", "y"]);
+    let (p, q) = (session.get::<Plane>("p").unwrap(), session.get::<Plane>("q").unwrap());
+    assert!((q.x - p.x - 1.0).abs() < 1e-12 && (q.y - p.y - 2.0).abs() < 1e-12);
+    assert!(matches!(session.covariance(&["p"]), Err(CovarianceError::Undetermined { .. })));
+    let mut graph = Graph::new();
+    graph.add(["p"], At { at: [5.0, 5.0] });
+    session.push(&graph, &Values::new()).unwrap();
+    assert!(session.update().unwrap().undetermined.is_empty());
+    assert!((session.get::<Plane>("q").unwrap().y - 7.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_factor_that_is_not_defined_parks_what_hangs_on_it_alone() {
+    let mut session = session(&["a"]);
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("p", Plane { x: -1.0, y: 0.0 });
+    graph.add(["p"], Logarithm { to: 2.0 });
+    session.push(&graph, &values).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!((&report.parked[..], report.inactive), (&[Key::from("p")][..], 1));
+}
+
+#[test]
+fn a_parked_variable_enters_when_its_factors_become_defined_elsewhere() {
+    let mut session =
+        Session::new(Settings { relinearize_every: NonZeroUsize::MIN, passes: 0, ..Settings::default() });
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    values.insert("a", Plane { x: 3.0, y: 0.0 });
+    values.insert("b", Plane { x: 1.0, y: 0.0 });
+    graph.add(["a"], At { at: [0.0, 0.0] });
+    graph.add(["a", "b"], Ahead { by: [1.0, 0.0] });
+    session.push(&graph, &values).unwrap();
+    // there is no logarithm of b − a, until `a` is linearized at its estimate
+    let report = session.update().unwrap();
+    assert_eq!((&report.parked[..], report.inactive), (&[Key::from("b")][..], 1));
+    session.update().unwrap();
+    let report = session.update().unwrap();
+    assert!(report.parked.is_empty() && report.inactive == 0, "{report:?}");
+}

@@ -1,0 +1,253 @@
+//! Variables that leave, and what they leave behind.
+use crate::history::{Change, History, change};
+use crate::toy::{Apart, At, Distance, Logarithm, Plane};
+use crate::world::Ahead;
+use manifactor_graph::checked::NotNegative;
+use manifactor_graph::{Fixed, Graph, Key, Values, Variable};
+use manifactor_smoother::{ChangeError, Session, Settings, Span, Window};
+use manifactor_solve::{LevenbergMarquardt, Problem, Silent};
+use proptest::prelude::*;
+use std::num::NonZeroUsize;
+
+/// Nothing is linearized anew, and every change passed on: what is solved is one linear system.
+fn linear() -> Settings {
+    Settings {
+        relinearize_every: NonZeroUsize::MAX,
+        bend: NotNegative::literal(1e30),
+        deviation: NotNegative::literal(0.0),
+        passes: 0,
+        ..Settings::default()
+    }
+}
+
+fn numbers(session: &Session, keys: &[&str]) -> Vec<f64> {
+    let origin = |key: &str| session.estimate(key).unwrap();
+    let plane = |key: &str| origin(key).erased().as_any().downcast_ref::<Plane>().map(|p| vec![p.x, p.y]);
+    let space = |key: &str| crate::world::Space { at: [0.0; 3] }.erased().local(&*origin(key)).unwrap();
+    keys.iter().flat_map(|key| plane(key).unwrap_or_else(|| space(key))).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { max_global_rejects: 1 << 16, ..ProptestConfig::default() })]
+    #[test]
+    fn what_stays_is_where_it_was_and_as_sure(
+        changes in prop::collection::vec(change(), 1..60),
+        leaving in prop::collection::vec(any::<prop::sample::Index>(), 1..5),
+    ) {
+        let mut history = History::new(linear());
+        history.apply_all(&changes);
+        let before = history.apply(&Change::Update).unwrap();
+        prop_assume!(before.undetermined.is_empty() && before.parked.is_empty() && !history.keys.is_empty());
+        let gone: Vec<&str> = leaving.iter().map(|i| i.get(&history.keys).as_str()).collect();
+        let stay: Vec<&str> = history.keys.iter().map(Key::as_str).filter(|key| !gone.contains(key)).collect();
+        let session = &mut history.session;
+        let (estimate, covariance) = (numbers(session, &stay), session.covariance(&stay).unwrap());
+        let cost = session.cost();
+        session.marginalize(&gone).unwrap();
+        let report = session.update().unwrap();
+        prop_assert!(report.undetermined.is_empty() && report.parked.is_empty(), "{report:?}");
+        prop_assert!(gone.iter().all(|key| session.estimate(key).is_none()));
+        prop_assert_eq!(session.variables(), stay.len());
+        let scale = 1.0 + estimate.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        for (one, other) in numbers(session, &stay).iter().zip(&estimate) {
+            prop_assert!((one - other).abs() < 1e-9 * scale, "{one} {other}");
+        }
+        let after = session.covariance(&stay).unwrap();
+        prop_assert!((&after - &covariance).amax() <= 1e-9 * covariance.amax().max(1.0), "{after} {covariance}");
+        // what a prior costs is the least that those who left could cost; the rest is linear here, or nearly
+        prop_assert!(session.cost().is_finite() && cost.is_finite());
+    }
+}
+
+/// x0 at the origin, and steps of one.
+pub(crate) fn step(i: usize) -> (Graph, Values) {
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    let key = Key::indexed("x", i);
+    values.insert(key.clone(), Plane { x: i as f64 + 0.1, y: 0.0 });
+    match i {
+        0 => graph.add([key], At { at: [0.0, 0.0] }),
+        _ => graph.add([Key::indexed("x", i - 1), key], Apart { by: [1.0, 0.0] }),
+    };
+    (graph, values)
+}
+
+fn windowed(poses: usize, keep: &[&str]) -> Session {
+    let keep = keep.iter().map(|name| (*name).to_owned().try_into().unwrap()).collect();
+    let window = Some(Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep });
+    Session::new(Settings { window, ..Settings::default() })
+}
+
+#[test]
+fn the_newest_pose_is_as_sure_as_in_a_batch_of_all() {
+    let mut session = windowed(5, &[]);
+    let (mut all, mut values) = (Graph::new(), Values::new());
+    for i in 0..40 {
+        let (graph, new) = step(i);
+        session.push(&graph, &new).unwrap();
+        let report = session.update().unwrap();
+        assert_eq!(report.sealed.len(), usize::from(i >= 5), "{report:?}");
+        for entry in graph.factors() {
+            all.push(entry.clone());
+        }
+        values.insert(Key::indexed("x", i), *new.get::<Plane>(format!("x{i}")).unwrap());
+    }
+    assert_eq!(session.variables(), 5);
+    let mut batch = Problem::compile(&all, &values).unwrap();
+    let keys = ["x39", "x37"];
+    let (expected, found) = (batch.joint_covariance(&keys).unwrap(), session.covariance(&keys).unwrap());
+    assert!((&found - &expected).amax() < 1e-9 * expected.amax(), "{found} {expected}");
+    assert!((session.get::<Plane>("x39").unwrap().x - 39.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_is_gone_is_named_and_nothing_can_be_added_to_it() {
+    let mut session = windowed(2, &[]);
+    let mut ids = vec![];
+    for i in 0..5 {
+        let (graph, values) = step(i);
+        ids.extend(session.push(&graph, &values).unwrap());
+        session.update().unwrap();
+    }
+    let gone = |key: &str| ChangeError::Gone { key: key.into() };
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    graph.add(["x0", "x4"], Apart { by: [4.0, 0.0] });
+    assert_eq!(session.push(&graph, &values).unwrap_err(), gone("x0"));
+    values.insert("x1", Plane { x: 0.0, y: 0.0 });
+    assert_eq!(session.push(&Graph::new(), &values).unwrap_err(), gone("x1"));
+    assert_eq!(session.fix(&"x0".into(), &Fixed::Whole(true)).unwrap_err(), gone("x0"));
+    assert_eq!(session.marginalize(&["x0"]).unwrap_err(), gone("x0"));
+    assert_eq!(session.remove(&[ids[1]]).unwrap_err(), ChangeError::GoneFactor { factor: ids[1] });
+    assert!(session.entry(ids[0]).is_none() && session.estimate("x0").is_none());
+    let held = session.fix(&"x3".into(), &Fixed::Whole(true)).unwrap_err();
+    assert_eq!(held, ChangeError::Sealed { key: "x3".into() });
+    // what has left nothing behind is gone as well, but another may have its name
+    let bare = |at: f64| {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        graph.add(["b7"], At { at: [at, 0.0] });
+        values.insert("b7", Plane { x: 0.0, y: 0.0 });
+        (graph, values)
+    };
+    let (graph, values) = bare(3.0);
+    let of_bare = session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    session.remove(&of_bare).unwrap();
+    session.marginalize(&["b7"]).unwrap();
+    session.update().unwrap();
+    let (graph, values) = bare(5.0);
+    assert_eq!(session.push(&graph, &Values::new()).unwrap_err(), gone("b7"));
+    session = Session::load(&session.save().unwrap()).unwrap();
+    session.push(&graph, &values).unwrap();
+    session.update().unwrap();
+    session = Session::load(&session.save().unwrap()).unwrap();
+    assert!((session.get::<Plane>("b7").unwrap().x - 5.0).abs() < 1e-9);
+    session.marginalize(&["b7"]).unwrap();
+    session.update().unwrap();
+    assert_eq!(session.push(&graph, &values).unwrap_err(), gone("b7"));
+    session.update().unwrap();
+}
+
+#[test]
+fn types_that_are_kept_never_leave() {
+    let mut session = windowed(3, &["toy_space"]);
+    let mut values = Values::new();
+    values.insert("lamp", crate::world::Space { at: [0.0; 3] });
+    let mut graph = Graph::new();
+    graph.add(["lamp"], crate::world::Near { at: [1.0, 2.0, 3.0] });
+    session.push(&graph, &values).unwrap();
+    for i in 0..20 {
+        let (mut graph, values) = step(i);
+        graph.add([Key::indexed("x", i), "lamp".into()], crate::world::Shadow { by: [i as f64, 0.0] });
+        session.push(&graph, &values).unwrap();
+        session.update().unwrap();
+    }
+    assert_eq!(session.variables(), 4);
+    assert!(session.estimate("lamp").is_some());
+}
+
+#[test]
+fn a_factor_that_takes_no_part_is_dropped_and_named() {
+    let mut session = Session::new(Settings::default());
+    let (mut graph, mut values) = (Graph::new(), Values::new());
+    for (key, x) in [("a", 2.0), ("b", 1.0), ("c", 4.0)] {
+        values.insert(key, Plane { x, y: 0.0 });
+        graph.add([key], At { at: [x, 0.0] });
+    }
+    // b is not ahead of a, and c's own logarithm is that of a negative number
+    graph.add(["a", "b"], Ahead { by: [1.0, 0.0] });
+    graph.add(["a", "c"], Distance { by: 2.0 });
+    values.insert("d", Plane { x: -1.0, y: 0.0 });
+    graph.add(["d"], Logarithm { to: 1.0 });
+    graph.add(["a", "d"], Distance { by: 3.0 });
+    let ids = session.push(&graph, &values).unwrap();
+    assert_eq!(session.update().unwrap().parked[..], [Key::from("d")]);
+    session.marginalize(&["a"]).unwrap();
+    let report = session.update().unwrap();
+    assert_eq!((&report.sealed[..], &report.dropped[..]), (&[Key::from("a")][..], &[ids[3], ids[6]][..]));
+    assert_eq!(report.inactive, 1);
+}
+
+#[test]
+fn memory_stays_and_a_window_goes_on_after_a_restart() {
+    let mut session = windowed(10, &[]);
+    let mut bytes = vec![];
+    for i in 0..600 {
+        let (graph, values) = step(i);
+        session.push(&graph, &values).unwrap();
+        session.update().unwrap();
+        if i % 100 == 99 {
+            bytes.push((session.bytes(), session.save().unwrap().len()));
+            session = Session::load(&session.save().unwrap()).unwrap();
+        }
+    }
+    let (first, last) = (bytes[1], bytes[5]);
+    assert!(last.0 <= first.0 + first.0 / 10 && last.1 <= first.1 + first.1 / 10, "{bytes:?}");
+}
+
+#[test]
+fn a_batch_solve_knows_what_has_left() {
+    let mut session = windowed(4, &[]);
+    for i in 0..20 {
+        let (mut graph, mut values) = step(i);
+        values.insert(Key::indexed("x", i), Plane { x: 1.1 * i as f64 + 0.05, y: 0.0 });
+        if i > 0 {
+            graph.add([Key::indexed("x", i - 1), Key::indexed("x", i)], Distance { by: 1.2 });
+        }
+        session.push(&graph, &values).unwrap();
+        session.update().unwrap();
+    }
+    for _ in 0..20 {
+        session.update().unwrap();
+    }
+    let finished = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap();
+    let (cost, best) = (session.cost(), finished.outcome.final_cost);
+    assert!((cost - best).abs() < 1e-6 * best, "{cost} {best}");
+    let (x, batch): (Plane, &Plane) = (session.get("x19").unwrap(), finished.values.get("x19").unwrap());
+    assert!((x.x - batch.x).abs() < 1e-6, "{x:?} {batch:?}");
+    // 19 distances of 1.2 and 19 steps of 1 along a line, and the origin
+    assert!((x.x - 19.0 * 1.1).abs() < 1e-6, "{x:?}");
+}
+
+#[test]
+fn a_name_that_is_used_again_is_saved_once() {
+    let mut session = Session::new(Settings::default());
+    let push = |session: &mut Session, key: &str| {
+        let (mut graph, mut values) = (Graph::new(), Values::new());
+        graph.add([key], At { at: [1.0, 2.0] });
+        values.insert(key, Plane { x: 0.0, y: 0.0 });
+        let ids = session.push(&graph, &values).unwrap();
+        session.update().unwrap();
+        ids
+    };
+    let ids = ["b1", "b2", "stays"].map(|key| push(&mut session, key));
+    for (key, ids) in ["b1", "b2"].into_iter().zip(&ids) {
+        session.remove(ids).unwrap();
+        session.marginalize(&[key]).unwrap();
+        session.update().unwrap();
+    }
+    for key in ["b1", "b3", "b2"] {
+        push(&mut session, key);
+        let mut loaded = Session::load(&session.save().unwrap()).unwrap();
+        assert_eq!(loaded.variables(), session.variables());
+        assert_eq!(loaded.cost().to_bits(), session.cost().to_bits());
+    }
+}
