@@ -20,7 +20,7 @@ use manifactor_graph::{FactorEntry, Key, Resolved, Variable, VariableIndices};
 use regions::{Region, Regions};
 use smallvec::SmallVec;
 use std::any::TypeId;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// A sum that is not finite, though its terms are: at this variable.
 #[derive(Debug)]
@@ -75,8 +75,6 @@ pub(crate) struct Factor {
     pub share: f64,
     /// What a prior costs at the linearization points.
     pub constant: f64,
-    /// Whether it is left out as an outlier: it couples nothing, and is in no sum.
-    pub rejected: bool,
 }
 
 impl Factor {
@@ -92,7 +90,6 @@ impl Factor {
             weight: 1.0,
             share: 1.0,
             constant,
-            rejected: false,
         }
     }
     /// Its variables and its noise, as they were looked up; `None` where that is not possible any more.
@@ -129,6 +126,8 @@ pub(crate) struct Model {
     listed: Vec<Vec<u32>>,
     /// How many factors have a loss.
     robust: usize,
+    /// Factors that are left out as outliers: they couple nothing, and are in no sum.
+    rejected: BTreeSet<u32>,
 }
 
 impl Couplings for Model {
@@ -255,7 +254,7 @@ impl Model {
     /// Takes a factor out.
     pub(crate) fn remove(&mut self, number: u32) -> Option<Factor> {
         let factor = self.factors.remove(number)?;
-        if !factor.rejected {
+        if !self.rejected.remove(&number) {
             self.blocks.disconnect(number, &factor.members);
         }
         self.regions.give(factor.region);

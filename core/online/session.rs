@@ -18,7 +18,6 @@ use crate::fronts::Scalar;
 use crate::gone::{GoneKeys, Runs};
 use crate::model::Model;
 use crate::report::{Report, Shared};
-use crate::saved::Suspect;
 use crate::settings::Settings;
 use crate::tree::Couplings;
 use changes::Pending;
@@ -26,10 +25,11 @@ use factorization::Factorization;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
 use manifactor_solve::SettingError;
 use nalgebra::DMatrix;
+use outliers::OutlierCandidates;
 use queue::RelinearizationQueue;
 use schedule::Schedule;
 use std::any::TypeId;
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeSet, VecDeque};
 use std::fmt;
 use steps::Steps;
 use window::Held;
@@ -57,11 +57,7 @@ pub struct Session {
     time: Option<f64>,
     /// Of a window: the variables that it holds, the oldest first.
     ages: VecDeque<Held>,
-    /// Factors that may be wrong, by number; and those of them that are rejected.
-    suspects: BTreeMap<u32, Suspect>,
-    rejected: BTreeSet<u32>,
-    /// Variables that this update has moved, where there are such factors.
-    shaken: BTreeSet<u32>,
+    candidates: OutlierCandidates,
     gone: GoneKeys,
     gone_factors: Runs,
     /// The keys of those that are parked, for reports.
@@ -93,9 +89,7 @@ impl Session {
             doubtful: vec![],
             time: None,
             ages: VecDeque::new(),
-            suspects: BTreeMap::new(),
-            rejected: BTreeSet::new(),
-            shaken: BTreeSet::new(),
+            candidates: OutlierCandidates::default(),
             gone: GoneKeys::default(),
             gone_factors: Runs::default(),
             waiting_keys: Shared::default(),

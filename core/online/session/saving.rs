@@ -28,7 +28,12 @@ impl Session {
         }
         let factors = self.model.all_factors().map(|(number, factor, entry)| {
             let entry = entry.clone();
-            SavedFactor { number, weight: factor.weight, entry, suspect: self.suspects.get(&number).copied() }
+            SavedFactor {
+                number,
+                weight: factor.weight,
+                entry,
+                suspect: self.candidates.saved(&self.model, number),
+            }
         });
         let saved = Saved {
             settings: self.schedule.settings().clone(),
@@ -50,7 +55,7 @@ impl Session {
             doubtful: self.doubtful.clone(),
             time: self.time.map(f64::to_bits),
             times: self.times(),
-            shaken: self.shaken.clone(),
+            shaken: self.candidates.shaken().clone(),
         };
         saved.write()
     }
@@ -110,7 +115,7 @@ impl Session {
         }
         session.queue = RelinearizationQueue::load(saved.waiting, saved.urgent, saved.postponed, n as usize);
         session.doubtful = saved.doubtful;
-        session.shaken = saved.shaken;
+        session.candidates.restore_shaken(saved.shaken);
         (session.gone, session.gone_factors) = (saved.gone, saved.gone_factors);
         let fits = session.put_times(saved.time, &saved.times);
         fits.then_some(()).ok_or(LoadError::Inconsistent("times"))?;
@@ -161,9 +166,8 @@ impl Session {
                 self.model.insert(*number, entry, &resolved, *weight);
             }
             if let Some(suspect) = suspect {
-                self.suspects.insert(*number, *suspect);
+                self.candidates.restore(*number, *suspect);
                 if suspect.since.is_some() {
-                    self.rejected.insert(*number);
                     self.model.reject(*number);
                 }
             }

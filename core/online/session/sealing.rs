@@ -104,7 +104,7 @@ impl Session {
             // the numbers of priors too: no one holds them, and the runs have no gaps
             self.gone_factors.insert(u64::from(f));
             self.inactive.remove(&f);
-            self.forget_suspect(f);
+            self.candidates.forget(f);
         }
         report.dropped.extend(sealing.dropped.into_iter().map(FactorId));
         for v in leaving {
@@ -165,7 +165,7 @@ impl Session {
         factors.extend(&sealed);
         factors.sort_unstable();
         factors.dedup();
-        let rejected = self.rejected_of(variable);
+        let rejected = self.model.rejected_of(variable);
         for f in factors {
             touched.variables.extend(self.model.factor(f).into_iter().flat_map(|f| f.variables()));
             self.remove_sealed(f, sealing);
@@ -229,7 +229,7 @@ impl Session {
         self.queue.forget(variable);
         self.doubtful.retain(|v| *v != variable);
         self.parked.remove(&variable);
-        self.shaken.remove(&variable);
+        self.candidates.forget_variable(variable);
         self.model.blocks.damp(variable, 0.0);
         self.model.forget(variable);
     }

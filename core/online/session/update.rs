@@ -166,8 +166,7 @@ impl Session {
 
     /// Notes whether a factor takes part where it was linearized; whether it has just ceased to.
     pub(super) fn note_activity(&mut self, factor: u32) -> bool {
-        let is_rejected = self.model.factor(factor).is_some_and(|factor| factor.rejected);
-        match is_rejected || self.model.takes_part(factor) {
+        match self.model.is_rejected(factor) || self.model.takes_part(factor) {
             true => {
                 self.inactive.remove(&factor);
                 false
@@ -258,9 +257,7 @@ impl Session {
         let redone = (!self.schedule.is_idle()).then_some(redone);
         let Self { steps, model, factorization, .. } = self;
         let solved = steps.solve(model, factorization, redone, self.schedule.deviation());
-        if !self.suspects.is_empty() {
-            self.shaken.extend(self.steps.moved());
-        }
+        self.candidates.shake(self.steps.moved());
         for v in self.steps.moved().collect::<Vec<_>>() {
             self.note_excess(v);
         }

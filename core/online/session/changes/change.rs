@@ -76,12 +76,13 @@ impl Change {
                 Some(Self::Remove { number })
             }
             Self::Remove { number } => {
+                let rejected = model.is_rejected(number);
                 let factor = model.remove(number)?;
                 touched.variables.extend(factor.variables());
                 touched.doubtful.extend(factor.variables());
                 touched.removed.push(number);
                 let resolved = factor.resolved()?;
-                let (weight, rejected) = (factor.weight, factor.rejected);
+                let weight = factor.weight;
                 Some(Self::Insert { number, entry: Box::new(factor.entry?), resolved, weight, rejected })
             }
             Self::Weigh { number, weight } => {

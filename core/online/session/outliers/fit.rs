@@ -1,5 +1,9 @@
 //! What factors cost on top of what is known.
-use super::super::Session;
+use crate::model::Model;
+use crate::session::Session;
+use crate::session::factorization::Factorization;
+use crate::session::steps::Steps;
+use crate::tree::Couplings;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of Gauss-Newton at most: the first is the innovation's, others follow what is not linear.
@@ -16,11 +20,26 @@ pub(super) struct Surprise {
     pub(super) gain: f64,
 }
 
+/// The model at the estimate, where rejected factors are evaluated.
+pub(super) struct Fit<'a> {
+    model: &'a mut Model,
+    steps: &'a Steps,
+    factorization: &'a Factorization,
+}
+
 impl Session {
+    /// The fit of rejected factors to the estimate.
+    pub(super) fn fit(&mut self) -> Fit<'_> {
+        let Self { model, steps, factorization, .. } = self;
+        Fit { model, steps, factorization }
+    }
+}
+
+impl Fit<'_> {
     /// ‖r‖² of a rejected factor at the estimate; `None` where it is not defined or finite there.
     pub(super) fn square(&mut self, factor: u32) -> Option<f64> {
         let variables = self.look_at(&[factor]);
-        let zeros = DVector::zeros(variables.iter().map(|v| self.dim(*v)).sum());
+        let zeros = DVector::zeros(variables.iter().map(|v| self.model.dim(*v)).sum());
         let square = self.square_at(&[factor], &variables, &zeros);
         variables.iter().for_each(|v| self.model.reset_trial(*v));
         square
@@ -34,7 +53,7 @@ impl Session {
         if variables.iter().any(is_open) {
             return None;
         }
-        let zeros = DVector::zeros(variables.iter().map(|v| self.dim(*v)).sum());
+        let zeros = DVector::zeros(variables.iter().map(|v| self.model.dim(*v)).sum());
         let square = self.square_at(factors, &variables, &zeros);
         let least = square.and_then(|square| self.descend(factors, &variables, square));
         variables.iter().for_each(|v| self.model.reset_trial(*v));
@@ -42,7 +61,7 @@ impl Session {
     }
 
     fn descend(&mut self, factors: &[u32], variables: &[u32], square: f64) -> Option<Surprise> {
-        let sigma = self.factorization.gauged_covariance(&self.model, variables);
+        let sigma = self.factorization.gauged_covariance(self.model, variables);
         let n = sigma.nrows();
         // δ = Σy throughout: no inverse of Σ, which need not have one, and δᵀΣ⁻¹δ = yᵀδ
         let (mut least, mut y, mut gain) = (square, DVector::zeros(n), 0.0);
@@ -77,8 +96,8 @@ impl Session {
     fn square_at(&mut self, factors: &[u32], variables: &[u32], step: &DVector<f64>) -> Option<f64> {
         let mut first = 0;
         for v in variables {
-            let dim = self.dim(*v);
-            let from = self.steps.of(&self.model, *v);
+            let dim = self.model.dim(*v);
+            let from = self.steps.of(self.model, *v);
             let step: Vec<f64> = from.iter().zip(step.rows(first, dim).iter()).map(|(a, b)| a + b).collect();
             self.model.try_step(*v, &step);
             first += dim;
