@@ -3,10 +3,12 @@ mod blocks;
 mod counting;
 mod evaluation;
 mod factors;
+mod parked;
 mod regions;
 mod sealing;
 mod variables;
 
+use crate::report::Shared;
 use crate::tree::Couplings;
 pub(crate) use blocks::Blocks;
 pub(crate) use sealing::Prior;
@@ -17,6 +19,7 @@ use manifactor_graph::batch::{Batches, Member};
 use manifactor_graph::column::{Columns, FIXED};
 use manifactor_graph::normal_equations::Slot;
 use manifactor_graph::{FactorEntry, Key, Resolved, Variable, VariableIndices};
+use parked::Parked;
 use regions::{Region, Regions};
 use smallvec::SmallVec;
 use std::any::TypeId;
@@ -40,8 +43,6 @@ pub(crate) struct Place {
     pub tangent: &'static [&'static str],
     /// A bit for each direction that is held.
     pub held: u32,
-    /// Whether it waits, outside of the tree, for factors that determine it.
-    pub parked: bool,
     /// Linear priors that it is part of: it keeps its linearization point, as they do.
     pub sealed: u32,
 }
@@ -50,10 +51,6 @@ impl Place {
     /// Whether all of it is held.
     pub(crate) fn is_held(&self) -> bool {
         self.held.count_ones() as usize == self.tangent.len()
-    }
-    /// Whether it is solved for.
-    pub(crate) fn is_in_tree(&self) -> bool {
-        !self.parked && !self.is_held()
     }
 }
 
@@ -128,6 +125,7 @@ pub(crate) struct Model {
     robust: usize,
     /// Factors that are left out as outliers: they couple nothing, and are in no sum.
     rejected: BTreeSet<u32>,
+    parked: Parked,
 }
 
 impl Couplings for Model {
@@ -166,6 +164,24 @@ impl Model {
     }
     pub(crate) fn place_mut(&mut self, variable: u32) -> &mut Place {
         &mut self.places[variable as usize]
+    }
+    /// Whether a variable waits, outside of the tree, for factors that determine it.
+    pub(crate) fn is_parked(&self, variable: u32) -> bool {
+        self.parked.contains(variable)
+    }
+    /// Parks or unparks a variable. Returns whether it was parked.
+    pub(crate) fn set_parked(&mut self, variable: u32, is_parked: bool) -> bool {
+        self.parked.set(variable, is_parked)
+    }
+    /// The keys of all parked variables; `None` if these are the same as at the last call.
+    pub(crate) fn changed_parked_keys(&mut self) -> Option<Shared<Key>> {
+        let has_changed = self.parked.has_changed();
+        has_changed.then(|| self.parked.iter().map(|v| self.places[v as usize].key.clone()).collect())
+    }
+    /// Whether a variable is to be solved for.
+    pub(crate) fn is_in_tree(&self, variable: u32) -> bool {
+        let place = self.place(variable);
+        place.is_there && !self.is_parked(variable) && !place.is_held()
     }
     /// Number of variables that are there.
     pub(crate) fn present(&self) -> usize {

@@ -3,7 +3,6 @@ mod changes;
 mod factorization;
 mod finish;
 mod outliers;
-mod parking;
 mod queue;
 mod relinearization;
 mod saving;
@@ -11,13 +10,14 @@ mod schedule;
 mod sealing;
 mod step_control;
 mod steps;
+mod undetermined;
 mod update;
 mod window;
 
 use crate::fronts::Scalar;
 use crate::gone::{GoneKeys, Runs};
 use crate::model::Model;
-use crate::report::{Report, Shared};
+use crate::report::Report;
 use crate::settings::Settings;
 use crate::tree::Couplings;
 use changes::Pending;
@@ -29,9 +29,10 @@ use outliers::OutlierCandidates;
 use queue::RelinearizationQueue;
 use schedule::Schedule;
 use std::any::TypeId;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 use std::fmt;
 use steps::Steps;
+use undetermined::Undetermined;
 use window::Held;
 
 pub use factorization::CovarianceError;
@@ -48,11 +49,7 @@ pub struct Session {
     steps: Steps,
     pending: Pending,
     queue: RelinearizationQueue,
-    /// Variables that are parked.
-    parked: BTreeSet<u32>,
-    inactive: BTreeSet<u32>,
-    /// Parked variables whose factors were linearized anew since they were judged.
-    doubtful: Vec<u32>,
+    undetermined: Undetermined,
     /// The time that was set last, by the updates that were made.
     time: Option<f64>,
     /// Of a window: the variables that it holds, the oldest first.
@@ -60,8 +57,6 @@ pub struct Session {
     candidates: OutlierCandidates,
     gone: GoneKeys,
     gone_factors: Runs,
-    /// The keys of those that are parked, for reports.
-    waiting_keys: Shared<Key>,
 }
 
 impl fmt::Debug for Session {
@@ -84,15 +79,12 @@ impl Session {
             pending: Pending::default(),
             steps: Steps::default(),
             queue: RelinearizationQueue::default(),
-            parked: BTreeSet::new(),
-            inactive: BTreeSet::new(),
-            doubtful: vec![],
+            undetermined: Undetermined::default(),
             time: None,
             ages: VecDeque::new(),
             candidates: OutlierCandidates::default(),
             gone: GoneKeys::default(),
             gone_factors: Runs::default(),
-            waiting_keys: Shared::default(),
         })
     }
 
@@ -174,11 +166,11 @@ impl Session {
     }
 
     /// What is parked, undetermined and inactive, for a report.
-    fn tell(&self, report: &mut Report) {
-        report.parked = self.waiting_keys.clone();
+    fn tell(&mut self, report: &mut Report) {
+        report.parked = self.undetermined.list_parked(&mut self.model);
         let name = |(v, d): Scalar| Some((self.key(v), *self.model.place(v).tangent.get(d as usize)?));
         report.undetermined = self.factorization.open().filter_map(name).collect();
-        report.inactive = self.inactive.len();
+        report.inactive = self.undetermined.inactive();
         report.postponed = self.queue.postponed();
     }
 }

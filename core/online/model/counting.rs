@@ -87,7 +87,7 @@ impl Model {
 
     /// Whether a factor is no outlier, and none of its variables is parked.
     pub(crate) fn is_whole(&self, number: u32) -> bool {
-        let is_in = |factor: &Factor| factor.variables().all(|v| !self.place(v).parked);
+        let is_in = |factor: &Factor| factor.variables().all(|v| !self.is_parked(v));
         self.factor(number).is_some_and(|factor| !self.is_rejected(number) && is_in(factor))
     }
 

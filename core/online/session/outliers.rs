@@ -15,6 +15,7 @@ pub(super) use candidates::{Candidate, OutlierCandidates};
 
 use super::Session;
 use super::changes::{Change, Touched};
+use super::undetermined::Moves;
 use super::update::Undo;
 use crate::factor_id::FactorId;
 use crate::report::{Rejection, Report};
@@ -207,8 +208,8 @@ impl Session {
         let is_finite = self.model.linearize(&touched.factors).not_finite.is_none();
         let mut undo = Undo { changes, ..Undo::default() };
         if is_finite {
-            self.doubt_inactive(&mut touched);
-            undo.moves = self.park(&mut touched);
+            self.undetermined.doubt_inactive(&self.model, &mut touched);
+            undo.moves = Moves::of(&mut self.model, &self.factorization, &mut touched);
             if self.pass(&touched, &undo.moves, is_turn, report).is_ok() {
                 return Ok(undo.changes);
             }

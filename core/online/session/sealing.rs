@@ -6,7 +6,7 @@
 //! 2008).
 use super::Session;
 use super::changes::{Change, Touched};
-use super::parking::Moves;
+use super::undetermined::Moves;
 use crate::error::ChangeError;
 use crate::factor_id::FactorId;
 use crate::model::{Overflow, Prior};
@@ -94,16 +94,16 @@ impl Session {
         // those that leave one after the other are each other's neighbours
         let is_there = |session: &Self, v: u32| !leaving.contains(&v) && session.model.place(v).is_there;
         touched.doubtful.retain(|v| is_there(self, *v));
-        let moves = self.park(&mut touched);
+        let moves = Moves::of(&mut self.model, &self.factorization, &mut touched);
         if let Err(overflow) = self.pass(&touched, &moves, false, report) {
-            self.unpark(&moves);
+            moves.take_back(&mut self.model);
             self.take_back_sealing(sealing);
             return Err(overflow);
         }
         for f in sealing.gone {
             // the numbers of priors too: no one holds them, and the runs have no gaps
             self.gone_factors.insert(u64::from(f));
-            self.inactive.remove(&f);
+            self.undetermined.forget_factor(f);
             self.candidates.forget(f);
         }
         report.dropped.extend(sealing.dropped.into_iter().map(FactorId));
@@ -113,7 +113,6 @@ impl Session {
             report.sealed.push(key);
             self.forget(*v);
         }
-        self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
         Ok(())
     }
 
@@ -137,7 +136,7 @@ impl Session {
                     self.model.remove(number);
                     self.gone_factors.insert(u64::from(number));
                 }
-                Step::Parked(variable, parked) => self.model.place_mut(variable).parked = parked,
+                Step::Parked(variable, parked) => _ = self.model.set_parked(variable, parked),
             }
         }
         self.sort(&mut factors);
@@ -182,7 +181,7 @@ impl Session {
         }
         touched.doubtful.extend(&touched.variables);
         // out of the tree
-        let parked = std::mem::replace(&mut self.model.place_mut(variable).parked, true);
+        let parked = self.model.set_parked(variable, true);
         sealing.steps.push(Step::Parked(variable, parked));
         Ok(())
     }
@@ -227,8 +226,7 @@ impl Session {
     fn forget(&mut self, variable: u32) {
         self.steps.forget(&self.model, variable);
         self.queue.forget(variable);
-        self.doubtful.retain(|v| *v != variable);
-        self.parked.remove(&variable);
+        self.undetermined.forget(variable);
         self.candidates.forget_variable(variable);
         self.model.blocks.damp(variable, 0.0);
         self.model.forget(variable);

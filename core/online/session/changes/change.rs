@@ -71,7 +71,7 @@ impl Change {
                     true => _ = model.reject(number),
                     false => touched.variables.extend(&resolved.variables),
                 }
-                let parked = resolved.variables.iter().filter(|v| model.place(**v).parked);
+                let parked = resolved.variables.iter().filter(|v| model.is_parked(**v));
                 touched.doubtful.extend(parked);
                 Some(Self::Remove { number })
             }

@@ -49,7 +49,7 @@ impl Fit<'_> {
     /// that cannot be told: a variable is parked, nothing constrains one of its directions, or a factor is not defined.
     pub(super) fn surprise(&mut self, factors: &[u32]) -> Option<Surprise> {
         let variables = self.look_at(factors);
-        let is_open = |v: &u32| self.model.place(*v).parked || self.factorization.is_open(*v);
+        let is_open = |v: &u32| self.model.is_parked(*v) || self.factorization.is_open(*v);
         if variables.iter().any(is_open) {
             return None;
         }
