@@ -8,6 +8,7 @@ mod regions;
 mod sealing;
 mod variables;
 
+use crate::gone::Removed;
 use crate::report::Shared;
 use crate::tree::Couplings;
 pub(crate) use blocks::Blocks;
@@ -126,6 +127,8 @@ pub(crate) struct Model {
     /// Factors that are left out as outliers: they couple nothing, and are in no sum.
     rejected: BTreeSet<u32>,
     parked: Parked,
+    /// Variables and factors that were removed.
+    pub removed: Removed,
 }
 
 impl Couplings for Model {

@@ -12,10 +12,8 @@ mod step_control;
 mod steps;
 mod undetermined;
 mod update;
-mod window;
 
 use crate::fronts::Scalar;
-use crate::gone::{GoneKeys, Runs};
 use crate::model::Model;
 use crate::report::Report;
 use crate::settings::Settings;
@@ -29,11 +27,9 @@ use outliers::OutlierCandidates;
 use queue::RelinearizationQueue;
 use schedule::Schedule;
 use std::any::TypeId;
-use std::collections::VecDeque;
 use std::fmt;
 use steps::Steps;
 use undetermined::Undetermined;
-use window::Held;
 
 pub use factorization::CovarianceError;
 pub use finish::Finished;
@@ -50,13 +46,7 @@ pub struct Session {
     pending: Pending,
     queue: RelinearizationQueue,
     undetermined: Undetermined,
-    /// The time that was set last, by the updates that were made.
-    time: Option<f64>,
-    /// Of a window: the variables that it holds, the oldest first.
-    ages: VecDeque<Held>,
     candidates: OutlierCandidates,
-    gone: GoneKeys,
-    gone_factors: Runs,
 }
 
 impl fmt::Debug for Session {
@@ -80,11 +70,7 @@ impl Session {
             steps: Steps::default(),
             queue: RelinearizationQueue::default(),
             undetermined: Undetermined::default(),
-            time: None,
-            ages: VecDeque::new(),
             candidates: OutlierCandidates::default(),
-            gone: GoneKeys::default(),
-            gone_factors: Runs::default(),
         })
     }
 

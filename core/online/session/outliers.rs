@@ -19,6 +19,7 @@ use super::undetermined::Moves;
 use super::update::Undo;
 use crate::factor_id::FactorId;
 use crate::report::{Rejection, Report};
+use fit::Fit;
 use manifactor_graph::{FactorEntry, Resolved};
 use manifactor_solve::is_sequential;
 use std::collections::{BTreeMap, BTreeSet};
@@ -192,6 +193,12 @@ impl Session {
         let share =
             |f: &u32| (*f, 2.0 * self.steps.cost_of(&mut self.model, &[*f]).cost / self.candidates.bound(*f));
         factors.iter().map(share).max_by(|(f, a), (g, b)| a.total_cmp(b).then(g.cmp(f)))
+    }
+
+    /// The fit of rejected factors to the estimate.
+    fn fit(&mut self) -> Fit<'_> {
+        let Self { model, steps, factorization, .. } = self;
+        Fit { model, steps, factorization }
     }
 
     /// Applies changes, solves again, and returns the changes that undo them. If that fails, everything is as before.

@@ -2,6 +2,7 @@
 use super::Session;
 use super::factorization::Factorization;
 use super::queue::RelinearizationQueue;
+use crate::gone::Removed;
 use crate::model::{Model, NewNumber, Prior};
 use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
 use crate::tree::Couplings;
@@ -49,13 +50,13 @@ impl Session {
             ordinals: self.model.ordinals(),
             unused: self.model.unused(),
             priors: self.model.priors().filter_map(|f| self.save_prior(f)).collect(),
-            gone: self.gone.clone(),
-            gone_factors: self.gone_factors.clone(),
+            gone: self.model.removed.keys.clone(),
+            gone_factors: self.model.removed.factors.clone(),
             waiting: sorted(self.queue.waiting()),
             urgent: sorted(self.queue.urgent()),
             doubtful: self.undetermined.doubtful().to_vec(),
-            time: self.time.map(f64::to_bits),
-            times: self.times(),
+            time: self.schedule.window().time().map(f64::to_bits),
+            times: self.schedule.times(),
             shaken: self.candidates.shaken().clone(),
         };
         saved.write()
@@ -117,8 +118,8 @@ impl Session {
         session.queue = RelinearizationQueue::load(saved.waiting, saved.urgent, saved.postponed, n as usize);
         session.undetermined.doubt(saved.doubtful);
         session.candidates.restore_shaken(saved.shaken);
-        (session.gone, session.gone_factors) = (saved.gone, saved.gone_factors);
-        let fits = session.put_times(saved.time, &saved.times);
+        session.model.removed = Removed { keys: saved.gone, factors: saved.gone_factors };
+        let fits = session.schedule.load_times(&session.model, saved.time, &saved.times);
         fits.then_some(()).ok_or(LoadError::Inconsistent("times"))?;
         Ok(session)
     }

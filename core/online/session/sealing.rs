@@ -56,7 +56,7 @@ impl Session {
 
     /// Why a key is none of a variable.
     pub(super) fn no_variable(&self, key: &Key) -> ChangeError {
-        match self.gone.contains(key.as_str()) {
+        match self.model.removed.keys.contains(key.as_str()) {
             true => ChangeError::Gone { key: key.clone() },
             false => ChangeError::NoVariable { key: key.clone() },
         }
@@ -64,7 +64,7 @@ impl Session {
 
     /// Why an id is none of a factor.
     pub(super) fn no_factor(&self, factor: FactorId) -> ChangeError {
-        match self.gone_factors.contains(u64::from(factor.0)) {
+        match self.model.removed.factors.contains(u64::from(factor.0)) {
             true => ChangeError::GoneFactor { factor },
             false => ChangeError::NoFactor { factor },
         }
@@ -102,14 +102,14 @@ impl Session {
         }
         for f in sealing.gone {
             // the numbers of priors too: no one holds them, and the runs have no gaps
-            self.gone_factors.insert(u64::from(f));
+            self.model.removed.factors.insert(u64::from(f));
             self.undetermined.forget_factor(f);
             self.candidates.forget(f);
         }
         report.dropped.extend(sealing.dropped.into_iter().map(FactorId));
         for v in leaving {
             let key = self.key(*v);
-            self.gone.insert(key.as_str(), !bare.contains(v));
+            self.model.removed.keys.insert(key.as_str(), !bare.contains(v));
             report.sealed.push(key);
             self.forget(*v);
         }
@@ -134,7 +134,7 @@ impl Session {
                 }
                 Step::Remove(number) => {
                     self.model.remove(number);
-                    self.gone_factors.insert(u64::from(number));
+                    self.model.removed.factors.insert(u64::from(number));
                 }
                 Step::Parked(variable, parked) => _ = self.model.set_parked(variable, parked),
             }

@@ -83,12 +83,12 @@ impl Session {
         self.follow_up(&mut report);
         let new = self.enter(suspects, &touched.removed);
         self.test_outliers(&new, &mut report);
-        self.time = pending.time.or(self.time);
-        came.into_iter().for_each(|(variable, time)| self.note_age(variable, time));
-        let ages = self.ages.clone();
-        let leaving = self.leaving(&pending.leaving);
+        self.schedule.set_time(pending.time);
+        came.into_iter().for_each(|(variable, time)| self.schedule.hold(&self.model, variable, time));
+        let window = self.schedule.window().clone();
+        let leaving = self.schedule.leaving(&self.model, &pending.leaving);
         if self.seal(&leaving, &mut report).is_err() {
-            self.ages = ages;
+            self.schedule.restore_window(window);
             report.stayed = leaving.iter().map(|v| self.key(*v)).collect();
         }
         self.tell(&mut report);

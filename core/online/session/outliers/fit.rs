@@ -1,6 +1,5 @@
 //! What factors cost on top of what is known.
 use crate::model::Model;
-use crate::session::Session;
 use crate::session::factorization::Factorization;
 use crate::session::steps::Steps;
 use crate::tree::Couplings;
@@ -22,17 +21,9 @@ pub(super) struct Surprise {
 
 /// The model at the estimate, where rejected factors are evaluated.
 pub(super) struct Fit<'a> {
-    model: &'a mut Model,
-    steps: &'a Steps,
-    factorization: &'a Factorization,
-}
-
-impl Session {
-    /// The fit of rejected factors to the estimate.
-    pub(super) fn fit(&mut self) -> Fit<'_> {
-        let Self { model, steps, factorization, .. } = self;
-        Fit { model, steps, factorization }
-    }
+    pub(super) model: &'a mut Model,
+    pub(super) steps: &'a Steps,
+    pub(super) factorization: &'a Factorization,
 }
 
 impl Fit<'_> {
