@@ -71,6 +71,13 @@ impl GoneKeys {
     }
 }
 
+/// Variables and factors that were removed, so that an error can say *removed* instead of *unknown*.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Removed {
+    pub keys: GoneKeys,
+    pub factors: Runs,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

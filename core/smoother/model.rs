@@ -3,11 +3,14 @@ mod blocks;
 mod counting;
 mod evaluation;
 mod factors;
+mod parked;
 mod regions;
 mod sealing;
 mod variables;
 
 use crate::elimination_tree::Couplings;
+use crate::gone::Removed;
+use crate::report::Shared;
 pub(crate) use blocks::Blocks;
 pub(crate) use sealing::Prior;
 pub(crate) use variables::{NewNumber, Reserved};
@@ -17,10 +20,11 @@ use manifactor_graph::batch::{Batches, Member};
 use manifactor_graph::column::{Columns, FIXED};
 use manifactor_graph::normal_equations::Slot;
 use manifactor_graph::{FactorEntry, Key, Resolved, Variable, VariableIndices};
+use parked::Parked;
 use regions::{Region, Regions};
 use smallvec::SmallVec;
 use std::any::TypeId;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// A sum that is not finite, though its terms are: at this variable.
 #[derive(Debug)]
@@ -40,8 +44,6 @@ pub(crate) struct Place {
     pub tangent: &'static [&'static str],
     /// A bit for each direction that is held.
     pub held: u32,
-    /// Whether it waits, outside of the tree, for factors that determine it.
-    pub parked: bool,
     /// Linear priors that it is part of: it keeps its linearization point, as they do.
     pub sealed: u32,
 }
@@ -50,10 +52,6 @@ impl Place {
     /// Whether all of it is held.
     pub(crate) fn is_held(&self) -> bool {
         self.held.count_ones() as usize == self.tangent.len()
-    }
-    /// Whether it is solved for.
-    pub(crate) fn is_in_tree(&self) -> bool {
-        !self.parked && !self.is_held()
     }
 }
 
@@ -75,8 +73,6 @@ pub(crate) struct Factor {
     pub share: f64,
     /// What a prior costs at the linearization points.
     pub constant: f64,
-    /// Whether it is left out as an outlier: it couples nothing, and is in no sum.
-    pub rejected: bool,
 }
 
 impl Factor {
@@ -92,7 +88,6 @@ impl Factor {
             weight: 1.0,
             share: 1.0,
             constant,
-            rejected: false,
         }
     }
     /// Its variables and its noise, as they were looked up; `None` where that is not possible any more.
@@ -129,6 +124,11 @@ pub(crate) struct Model {
     listed: Vec<Vec<u32>>,
     /// How many factors have a loss.
     robust: usize,
+    /// Factors that are left out as outliers: they couple nothing, and are in no sum.
+    rejected: BTreeSet<u32>,
+    parked: Parked,
+    /// Variables and factors that were removed.
+    pub removed: Removed,
 }
 
 impl Couplings for Model {
@@ -167,6 +167,24 @@ impl Model {
     }
     pub(crate) fn place_mut(&mut self, variable: u32) -> &mut Place {
         &mut self.places[variable as usize]
+    }
+    /// Whether a variable waits, outside of the tree, for factors that determine it.
+    pub(crate) fn is_parked(&self, variable: u32) -> bool {
+        self.parked.contains(variable)
+    }
+    /// Parks or unparks a variable. Returns whether it was parked.
+    pub(crate) fn set_parked(&mut self, variable: u32, is_parked: bool) -> bool {
+        self.parked.set(variable, is_parked)
+    }
+    /// The keys of all parked variables; `None` if these are the same as at the last call.
+    pub(crate) fn changed_parked_keys(&mut self) -> Option<Shared<Key>> {
+        let has_changed = self.parked.has_changed();
+        has_changed.then(|| self.parked.iter().map(|v| self.places[v as usize].key.clone()).collect())
+    }
+    /// Whether a variable is to be solved for.
+    pub(crate) fn is_in_tree(&self, variable: u32) -> bool {
+        let place = self.place(variable);
+        place.is_there && !self.is_parked(variable) && !place.is_held()
     }
     /// Number of variables that are there.
     pub(crate) fn present(&self) -> usize {
@@ -255,7 +273,7 @@ impl Model {
     /// Takes a factor out.
     pub(crate) fn remove(&mut self, number: u32) -> Option<Factor> {
         let factor = self.factors.remove(number)?;
-        if !factor.rejected {
+        if !self.rejected.remove(&number) {
             self.blocks.disconnect(number, &factor.members);
         }
         self.regions.give(factor.region);

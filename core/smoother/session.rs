@@ -3,7 +3,6 @@ mod changes;
 mod factorization;
 mod finish;
 mod outliers;
-mod parking;
 mod queue;
 mod relinearization;
 mod saving;
@@ -11,27 +10,25 @@ mod schedule;
 mod sealing;
 mod step_control;
 mod steps;
+mod undetermined;
 mod update;
-mod window;
 
 use crate::elimination_tree::Couplings;
 use crate::fronts::Scalar;
-use crate::gone::{GoneKeys, Runs};
 use crate::model::Model;
-use crate::report::{Report, Shared};
-use crate::saved::Suspect;
+use crate::report::Report;
 use crate::settings::Settings;
 use changes::Pending;
 use factorization::Factorization;
 use manifactor_graph::{Key, ValueError, Values, Variable, manifold_name};
 use nalgebra::DMatrix;
+use outliers::OutlierCandidates;
 use queue::RelinearizationQueue;
 use schedule::Schedule;
 use std::any::TypeId;
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
 use steps::Steps;
-use window::Held;
+use undetermined::Undetermined;
 
 pub use factorization::CovarianceError;
 pub use finish::Finished;
@@ -47,24 +44,8 @@ pub struct Session {
     steps: Steps,
     pending: Pending,
     queue: RelinearizationQueue,
-    /// Variables that are parked.
-    parked: BTreeSet<u32>,
-    inactive: BTreeSet<u32>,
-    /// Parked variables whose factors were linearized anew since they were judged.
-    doubtful: Vec<u32>,
-    /// The time that was set last, by the updates that were made.
-    time: Option<f64>,
-    /// Of a window: the variables that it holds, the oldest first.
-    ages: VecDeque<Held>,
-    /// Factors that may be wrong, by number; and those of them that are rejected.
-    suspects: BTreeMap<u32, Suspect>,
-    rejected: BTreeSet<u32>,
-    /// Variables that this update has moved, where there are such factors.
-    shaken: BTreeSet<u32>,
-    gone: GoneKeys,
-    gone_factors: Runs,
-    /// The keys of those that are parked, for reports.
-    waiting_keys: Shared<Key>,
+    undetermined: Undetermined,
+    candidates: OutlierCandidates,
 }
 
 impl fmt::Debug for Session {
@@ -83,17 +64,8 @@ impl Session {
             pending: Pending::default(),
             steps: Steps::default(),
             queue: RelinearizationQueue::default(),
-            parked: BTreeSet::new(),
-            inactive: BTreeSet::new(),
-            doubtful: vec![],
-            time: None,
-            ages: VecDeque::new(),
-            suspects: BTreeMap::new(),
-            rejected: BTreeSet::new(),
-            shaken: BTreeSet::new(),
-            gone: GoneKeys::default(),
-            gone_factors: Runs::default(),
-            waiting_keys: Shared::default(),
+            undetermined: Undetermined::default(),
+            candidates: OutlierCandidates::default(),
         }
     }
 
@@ -175,11 +147,11 @@ impl Session {
     }
 
     /// What is parked, undetermined and inactive, for a report.
-    fn tell(&self, report: &mut Report) {
-        report.parked = self.waiting_keys.clone();
+    fn tell(&mut self, report: &mut Report) {
+        report.parked = self.undetermined.list_parked(&mut self.model);
         let name = |(v, d): Scalar| Some((self.key(v), *self.model.place(v).tangent.get(d as usize)?));
         report.undetermined = self.factorization.open().filter_map(name).collect();
-        report.inactive = self.inactive.len();
+        report.inactive = self.undetermined.inactive();
         report.postponed = self.queue.postponed();
     }
 }

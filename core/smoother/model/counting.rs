@@ -1,5 +1,6 @@
 //! Which factors count, and how much.
 use super::{Factor, Model};
+use std::collections::BTreeSet;
 
 impl Model {
     /// Makes a factor count so many times; returns how many times it did.
@@ -19,24 +20,39 @@ impl Model {
 
     /// Leaves a factor out as an outlier: it couples its variables no more. Returns whether it was in.
     pub(crate) fn reject(&mut self, number: u32) -> bool {
-        let Some(factor) = self.factors.get_mut(number).filter(|factor| !factor.rejected) else {
-            return false;
-        };
-        factor.rejected = true;
-        self.blocks.disconnect(number, &factor.members);
-        true
+        let Some(factor) = self.factors.get(number) else { return false };
+        let is_in = self.rejected.insert(number);
+        if is_in {
+            self.blocks.disconnect(number, &factor.members);
+        }
+        is_in
     }
 
     /// Takes a factor in again that was left out; returns whether it was. It is to be linearized after that.
     pub(crate) fn readmit(&mut self, number: u32) -> bool {
-        let Some(factor) = self.factors.get_mut(number).filter(|factor| factor.rejected) else {
+        let Some(factor) = self.factors.get(number).filter(|_| self.rejected.remove(&number)) else {
             return false;
         };
-        factor.rejected = false;
         self.blocks.connect(number, factor.region, &factor.members);
         // what is held of its variables may have changed since
         self.hold_in(number);
         true
+    }
+
+    /// The factors that are left out as outliers.
+    pub(crate) fn rejected(&self) -> &BTreeSet<u32> {
+        &self.rejected
+    }
+
+    /// Whether a factor is left out as an outlier.
+    pub(crate) fn is_rejected(&self, number: u32) -> bool {
+        self.rejected.contains(&number)
+    }
+
+    /// The rejected factors of a variable.
+    pub(crate) fn rejected_of(&self, variable: u32) -> Vec<u32> {
+        let is_of = |f: &u32| self.factor(*f).is_some_and(|f| f.variables().any(|v| v == variable));
+        self.rejected.iter().copied().filter(is_of).collect()
     }
 
     /// Tells a factor what is held of its variables.
@@ -71,8 +87,8 @@ impl Model {
 
     /// Whether a factor is no outlier, and none of its variables is parked.
     pub(crate) fn is_whole(&self, number: u32) -> bool {
-        let is_in = |factor: &Factor| factor.variables().all(|v| !self.place(v).parked);
-        self.factor(number).is_some_and(|factor| !factor.rejected && is_in(factor))
+        let is_in = |factor: &Factor| factor.variables().all(|v| !self.is_parked(v));
+        self.factor(number).is_some_and(|factor| !self.is_rejected(number) && is_in(factor))
     }
 
     /// Says whether a factor's part counts in the sums.

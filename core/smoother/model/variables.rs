@@ -55,6 +55,7 @@ impl Model {
         self.numbers.insert(key.clone(), at.number);
         self.born += 1;
         self.ordinals[column] += 1;
+        self.parked.set(at.number, true);
         let mut place = Place {
             key,
             born: self.born,
@@ -64,7 +65,6 @@ impl Model {
             index: self.points.column(column).len() as u32,
             tangent,
             held,
-            parked: true,
             sealed: 0,
         };
         if at.is_reused {
@@ -92,6 +92,7 @@ impl Model {
         }
         let Some(place) = self.places.pop() else { return };
         self.numbers.remove(&place.key);
+        self.parked.set(at.number, false);
         for columns in [&mut self.points, &mut self.trial] {
             columns.column_mut(place.column as usize).truncate(place.index as usize);
         }
@@ -101,9 +102,10 @@ impl Model {
     /// Forgets a variable, which has no factors any more.
     pub(crate) fn forget(&mut self, variable: u32) {
         let place = &mut self.places[variable as usize];
-        (place.is_there, place.parked) = (false, true);
+        place.is_there = false;
         self.numbers.remove(&place.key);
         self.unused[place.column as usize].push(variable);
+        self.parked.set(variable, false);
     }
 
     /// The variables that are there, in the order in which they came.
@@ -154,7 +156,6 @@ impl Model {
         }
         for v in unused {
             let column = self.places[*v as usize].column as usize;
-            self.places[*v as usize].parked = true;
             self.unused[column].push(*v);
         }
         true

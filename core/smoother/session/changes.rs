@@ -52,7 +52,7 @@ impl Session {
     /// Where a variable is there already, or factors do not fit: everything that is wrong with them; where the window is by seconds,
     /// and no time is set. Nothing is added then.
     pub fn push(&mut self, factors: &Graph, values: &Values) -> Result<Vec<FactorId>, ChangeError> {
-        let time = self.time_of_new()?;
+        let time = self.schedule.time_of_new(self.pending.time)?;
         let is_known = |key: &Key| {
             self.model.variable(key.as_str()).is_some() || self.pending.variables.contains_key(key)
         };
@@ -61,9 +61,12 @@ impl Session {
         }
         let of_factors = factors.factors().iter().flat_map(|entry| &entry.keys).chain(factors.fixed().keys());
         let is_gone = |key: &&Key| {
-            self.gone.contains(key.as_str()) && values.find(key.as_str()).is_none() && !is_known(key)
+            self.model.removed.keys.contains(key.as_str())
+                && values.find(key.as_str()).is_none()
+                && !is_known(key)
         };
-        let mut taken = values.iter().map(|(key, _)| key).filter(|key| self.gone.is_taken(key.as_str()));
+        let mut taken =
+            values.iter().map(|(key, _)| key).filter(|key| self.model.removed.keys.is_taken(key.as_str()));
         if let Some(key) = taken.next().or_else(|| of_factors.into_iter().find(is_gone)) {
             return Err(ChangeError::Gone { key: key.clone() });
         }
@@ -111,6 +114,18 @@ impl Session {
             self.insert(number, entry.clone(), resolved, 1.0)
         });
         Ok(ids.collect())
+    }
+
+    /// Says what time it is: variables that are pushed from now on come at this time. The unit is a second, the origin is free. A
+    /// window by seconds needs it before the first [`push`](Self::push). Takes effect at the next [`update`](Self::update), and is taken
+    /// back with it where that fails.
+    ///
+    /// # Errors
+    /// Where `time` is not finite, or before the one that was set last.
+    pub fn set_time(&mut self, time: f64) -> Result<(), ChangeError> {
+        self.schedule.check_time(self.pending.time, time)?;
+        self.pending.time = Some(time);
+        Ok(())
     }
 
     fn insert(&mut self, number: u32, entry: FactorEntry, resolved: Resolved, weight: f64) -> FactorId {

@@ -3,7 +3,7 @@ mod covariance;
 
 pub use covariance::CovarianceError;
 
-use super::parking::Moves;
+use super::undetermined::Moves;
 use crate::elimination_tree::{Affected, Couplings, NONE, Redone, Tree};
 use crate::fronts::{Fronts, Scalar};
 use crate::model::{Model, Overflow};
@@ -141,7 +141,7 @@ impl Factorization {
     /// # Errors
     /// If a sum is not finite.
     pub(super) fn load(saved: Vec<SavedFront>, model: &Model) -> Result<Option<Self>, Overflow> {
-        let Some(tree) = Tree::load(saved, model, |v| model.place(v).is_in_tree()) else { return Ok(None) };
+        let Some(tree) = Tree::load(saved, model, |v| model.is_in_tree(v)) else { return Ok(None) };
         let mut loaded = Self { tree, ..Self::default() };
         loaded.resize(model.variables());
         let all: Vec<u32> = (0..loaded.tree.fronts.len() as u32).collect();

@@ -3,7 +3,7 @@ mod prior;
 
 use super::Session;
 use super::changes::Touched;
-use super::parking::Moves;
+use super::undetermined::Moves;
 use crate::factor_id::FactorId;
 use crate::model::Overflow;
 use crate::report::Report;
@@ -38,7 +38,7 @@ impl Session {
             let names = place.tangent.iter().enumerate().filter(|(d, _)| place.held >> d & 1 == 1);
             match place.is_held() {
                 true => graph.fix(key),
-                false if place.held != 0 && !place.parked => {
+                false if place.held != 0 && !self.model.is_parked(v) => {
                     let names = names.map(|(_, name)| (*name).to_owned()).collect();
                     graph.set_fixed(key, Fixed::Directions(names));
                 }
@@ -60,10 +60,7 @@ impl Session {
         let (mut graph, factors) = self.graph();
         self.add_priors(&mut graph);
         let mut values = self.estimates();
-        let is_in = |key: &str| {
-            let place = self.model.variable(key).map(|v| self.model.place(v));
-            place.is_some_and(|place| !place.parked)
-        };
+        let is_in = |key: &str| self.model.variable(key).is_some_and(|v| !self.model.is_parked(v));
         let mut solved_for = Values::new();
         for (key, value) in values.iter().filter(|(key, _)| is_in(key.as_str())) {
             solved_for.insert_boxed(key.clone(), value.erased().clone_box());

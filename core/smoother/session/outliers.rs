@@ -7,15 +7,19 @@
 //!
 //! This rule trusts the factors that came first. If other rejected factors confirm a candidate, or if it fails by little, a
 //! [`trial`] decides whether they are right and the factors that count are wrong.
+mod candidates;
 mod fit;
 mod trial;
 
+pub(super) use candidates::{Candidate, OutlierCandidates};
+
 use super::Session;
 use super::changes::{Change, Touched};
+use super::undetermined::Moves;
 use super::update::Undo;
 use crate::factor_id::FactorId;
 use crate::report::{Rejection, Report};
-use crate::saved::Suspect;
+use fit::Fit;
 use manifactor_graph::{FactorEntry, Resolved};
 use manifactor_solve::is_sequential;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,10 +30,10 @@ const DROPS: usize = 4;
 impl Session {
     /// The factors that are rejected as outliers, in the order of their ids; see [`Outliers`](crate::Outliers).
     pub fn rejections(&mut self) -> Vec<Rejection> {
-        let rejected: Vec<u32> = self.rejected.iter().copied().collect();
+        let rejected: Vec<u32> = self.model.rejected().iter().copied().collect();
         let one = |f: u32| {
-            let cost = self.square(f).map(|square| 0.5 * square);
-            Some(Rejection { factor: FactorId(f), since: self.suspects[&f].since?, cost })
+            let cost = self.fit().square(f).map(|square| 0.5 * square);
+            Some(Rejection { factor: FactorId(f), since: self.candidates.get(f)?.since, cost })
         };
         rejected.into_iter().filter_map(one).collect()
     }
@@ -62,7 +66,7 @@ impl Session {
         resolved: &Resolved,
         number: u32,
         best: &BTreeMap<Vec<u32>, u32>,
-    ) -> Option<Suspect> {
+    ) -> Option<Candidate> {
         let outliers = self.schedule.settings().outliers.as_ref()?;
         let name = entry.factor.typetag_name();
         let is_named = outliers.types.is_empty() || outliers.types.iter().any(|t| t.as_str() == name);
@@ -72,7 +76,7 @@ impl Session {
                 || !self.is_odometry(variables));
         let rows = entry.factor.erased().signature().rows.filter(|rows| *rows > 0)?;
         let (bound, gain) = (outliers.probability.chi_squared(rows), *outliers.gain * rows as f64);
-        (is_named && couples).then_some(Suspect { bound, gain, since: Some(self.schedule.updates() + 1) })
+        (is_named && couples).then_some(Candidate { bound, gain, since: self.schedule.updates() + 1 })
     }
 
     /// Whether a new factor between these variables is odometry: they are neighbours, and no trusted factor connects them yet.
@@ -83,35 +87,39 @@ impl Session {
         }
         let sorted = ascending(variables);
         let is_trusted = |f: &u32| {
-            let factor = self.model.factor(*f).filter(|factor| factor.entry.is_some() && !factor.rejected);
-            !self.suspects.contains_key(f) && factor.is_some_and(|f| f.variables().eq(sorted.iter().copied()))
+            let factor = self.model.factor(*f).filter(|factor| factor.entry.is_some());
+            !self.candidates.contains(*f)
+                && !self.model.is_rejected(*f)
+                && factor.is_some_and(|f| f.variables().eq(sorted.iter().copied()))
         };
         !self.model.factors_of(variables).iter().any(is_trusted)
     }
 
     /// Adds new candidates as rejected, and forgets removed ones. Returns the new candidates that are in the model.
-    pub(super) fn enter(&mut self, mut new: BTreeMap<u32, Suspect>, removed: &[u32]) -> Vec<u32> {
-        removed.iter().for_each(|f| self.forget_suspect(*f));
-        new.retain(|f, _| self.model.factor(*f).is_some());
-        self.rejected.extend(new.keys());
-        let numbers = new.keys().copied().collect();
-        self.suspects.extend(new);
-        numbers
+    pub(super) fn enter(&mut self, new: BTreeMap<u32, Candidate>, removed: &[u32]) -> Vec<u32> {
+        removed.iter().for_each(|f| self.candidates.forget(*f));
+        let new = new.into_iter().filter(|(f, _)| self.model.factor(*f).is_some());
+        let numbers = new.map(|(f, candidate)| {
+            self.candidates.insert(f, candidate);
+            f
+        });
+        numbers.collect()
     }
 
     /// Tests new candidates, and candidates with variables that have moved.
     pub(super) fn test_outliers(&mut self, new: &[u32], report: &mut Report) {
-        if self.suspects.is_empty() {
+        if self.candidates.is_empty() {
             return;
         }
         // a single candidate is trusted more if few were wrong so far: by Bayes' rule, the odds in nats add to the gain
-        let out = self.rejected.len() - new.len();
-        let counted = self.suspects.len() - self.rejected.len();
+        let rejected = self.model.rejected().len();
+        let out = rejected - new.len();
+        let counted = self.candidates.len() - rejected;
         let odds = ((counted + 1) as f64 / (out + 1) as f64).ln();
         let (mut fitting, mut failing) = (vec![], vec![]);
         for f in new {
-            let Suspect { bound, gain, .. } = self.suspects[f];
-            match self.surprise(&[*f]) {
+            let Some(Candidate { bound, gain, .. }) = self.candidates.get(*f) else { continue };
+            match self.fit().surprise(&[*f]) {
                 Some(surprise) if surprise.square > bound || surprise.gain > gain + odds => {
                     failing.push((*f, surprise));
                 }
@@ -123,7 +131,7 @@ impl Session {
             report.rejected.extend(fitting.drain(..).map(FactorId));
         }
         report.rejected.extend(failing.iter().map(|(f, _)| FactorId(*f)));
-        let moved = std::mem::take(&mut self.shaken);
+        let moved = self.candidates.drain_shaken();
         let returning = self.returning(new, &moved);
         if self.admit(&returning, report) {
             report.readmitted.extend(returning.iter().map(|f| FactorId(*f)));
@@ -142,40 +150,22 @@ impl Session {
         if self.turn_over(changes, Touched::default(), false, report).is_err() {
             return false;
         }
-        self.note(factors, None);
         self.follow_up(report);
         true
-    }
-
-    /// Stores the update that rejected these factors; `None` if they count.
-    fn note(&mut self, factors: &[u32], since: Option<usize>) {
-        for f in factors {
-            let Some(suspect) = self.suspects.get_mut(f) else { continue };
-            suspect.since = since;
-            match since {
-                Some(_) => self.rejected.insert(*f),
-                None => self.rejected.remove(f),
-            };
-        }
-    }
-
-    pub(super) fn forget_suspect(&mut self, factor: u32) {
-        self.suspects.remove(&factor);
-        self.rejected.remove(&factor);
     }
 
     /// Returns rejected factors with moved variables that fit the estimate itself. A fit within Σ is not enough: after many tests
     /// a wrong factor would pass one by chance.
     fn returning(&mut self, new: &[u32], moved: &BTreeSet<u32>) -> Vec<u32> {
-        let old = self.rejected.iter().copied().filter(|f| !new.contains(f));
+        let old = self.model.rejected().iter().copied().filter(|f| !new.contains(f));
         let has_moved = |f: u32| {
             let mut variables = self.model.factor(f).into_iter().flat_map(|f| f.variables());
             variables.any(|v| moved.contains(&v))
         };
         let mut old: Vec<u32> = old.filter(|f| has_moved(*f)).collect();
         old.retain(|f| {
-            let bound = self.suspects[f].bound;
-            self.square(*f).is_some_and(|square| square <= bound)
+            let bound = self.candidates.bound(*f);
+            self.fit().square(*f).is_some_and(|square| square <= bound)
         });
         old
     }
@@ -184,14 +174,14 @@ impl Session {
     fn drop_unfit(&mut self, moved: &BTreeSet<u32>, admitted: &[u32], report: &mut Report) {
         let mut around = self.model.factors_of(&moved.iter().copied().collect::<Vec<_>>());
         around.extend(admitted);
-        around.retain(|f| self.suspects.get(f).is_some_and(|suspect| suspect.since.is_none()));
+        around.retain(|f| self.candidates.counts(&self.model, *f));
         for _ in 0..DROPS {
             let Some((worst, excess)) = self.worst(&around) else { return };
             let rejected = vec![Change::Reject { number: worst }];
             if excess <= 1.0 || self.turn_over(rejected, Touched::default(), false, report).is_err() {
                 return;
             }
-            self.note(&[worst], Some(self.schedule.updates()));
+            self.candidates.note_rejection(worst, self.schedule.updates());
             report.rejected.push(FactorId(worst));
             around.retain(|f| *f != worst);
             self.follow_up(report);
@@ -201,16 +191,14 @@ impl Session {
     /// Returns the factor with the largest share of its bound at the estimate, and that share.
     fn worst(&mut self, factors: &[u32]) -> Option<(u32, f64)> {
         let share =
-            |f: &u32| (*f, 2.0 * self.steps.cost_of(&mut self.model, &[*f]).cost / self.suspects[f].bound);
+            |f: &u32| (*f, 2.0 * self.steps.cost_of(&mut self.model, &[*f]).cost / self.candidates.bound(*f));
         factors.iter().map(share).max_by(|(f, a), (g, b)| a.total_cmp(b).then(g.cmp(f)))
     }
 
-    /// Returns the rejected factors of a variable.
-    pub(super) fn rejected_of(&self, variable: u32) -> Vec<u32> {
-        let is_of = |f: &u32| {
-            self.model.factor(*f).is_some_and(|f| f.rejected && f.variables().any(|v| v == variable))
-        };
-        self.rejected.iter().copied().filter(is_of).collect()
+    /// The fit of rejected factors to the estimate.
+    fn fit(&mut self) -> Fit<'_> {
+        let Self { model, steps, factorization, .. } = self;
+        Fit { model, steps, factorization }
     }
 
     /// Applies changes, solves again, and returns the changes that undo them. If that fails, everything is as before.
@@ -227,8 +215,8 @@ impl Session {
         let is_finite = self.model.linearize(&touched.factors).not_finite.is_none();
         let mut undo = Undo { changes, ..Undo::default() };
         if is_finite {
-            self.doubt_inactive(&mut touched);
-            undo.moves = self.park(&mut touched);
+            self.undetermined.doubt_inactive(&self.model, &mut touched);
+            undo.moves = Moves::of(&mut self.model, &self.factorization, &mut touched);
             if self.pass(&touched, &undo.moves, is_turn, report).is_ok() {
                 return Ok(undo.changes);
             }

@@ -171,7 +171,7 @@ impl Session {
             }
             let out = self.linearize_within(&around, &factors, &took_part);
             if out.is_empty() {
-                self.note_activities(&factors);
+                self.undetermined.note_activities(&self.model, &factors);
                 let mut times = halved.iter();
                 variables.retain(|v| times.next().is_some_and(|t| *t < HALVINGS) || held.contains(v));
                 return Relinearized { variables, factors };
@@ -221,7 +221,7 @@ impl Session {
         relinearized.variables.iter().for_each(|v| self.model.reset_trial(*v));
         // at the old points, they have their old bits
         self.model.linearize(&relinearized.factors);
-        self.note_activities(&relinearized.factors);
+        self.undetermined.note_activities(&self.model, &relinearized.factors);
     }
 
     /// Makes the new points those of the session. After a turn, the variables of `waiting` that keep their points still wait.

@@ -3,6 +3,7 @@ use super::Session;
 use super::factorization::Factorization;
 use super::queue::RelinearizationQueue;
 use crate::elimination_tree::Couplings;
+use crate::gone::Removed;
 use crate::model::{Model, NewNumber, Prior};
 use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
 
@@ -22,13 +23,19 @@ impl Session {
             let step = self.steps.of(&self.model, v).iter().map(|d| d.to_bits()).collect();
             let place = self.model.place(v);
             let (key, born) = (place.key.clone(), place.is_there.then_some([place.born, place.ordinal]));
-            let (held, parked) = (place.held, place.parked);
+            let held = place.held;
+            let parked = self.model.is_parked(v) || !place.is_there;
             let damping = (self.model.blocks.damping(v).to_bits(), self.steps.is_damped(v));
             variables.push(SavedVariable { key, born, point, step, damping, held, parked });
         }
         let factors = self.model.all_factors().map(|(number, factor, entry)| {
             let entry = entry.clone();
-            SavedFactor { number, weight: factor.weight, entry, suspect: self.suspects.get(&number).copied() }
+            SavedFactor {
+                number,
+                weight: factor.weight,
+                entry,
+                suspect: self.candidates.saved(&self.model, number),
+            }
         });
         let saved = Saved {
             settings: self.schedule.settings().clone(),
@@ -43,14 +50,14 @@ impl Session {
             ordinals: self.model.ordinals(),
             unused: self.model.unused(),
             priors: self.model.priors().filter_map(|f| self.save_prior(f)).collect(),
-            gone: self.gone.clone(),
-            gone_factors: self.gone_factors.clone(),
+            gone: self.model.removed.keys.clone(),
+            gone_factors: self.model.removed.factors.clone(),
             waiting: sorted(self.queue.waiting()),
             urgent: sorted(self.queue.urgent()),
-            doubtful: self.doubtful.clone(),
-            time: self.time.map(f64::to_bits),
-            times: self.times(),
-            shaken: self.shaken.clone(),
+            doubtful: self.undetermined.doubtful().to_vec(),
+            time: self.schedule.window().time().map(f64::to_bits),
+            times: self.schedule.times(),
+            shaken: self.candidates.shaken().clone(),
         };
         saved.write()
     }
@@ -102,17 +109,17 @@ impl Session {
         session.factorization = Factorization::load(saved.fronts, &session.model)
             .map_err(|_| LoadError::Inconsistent("the linear system overflows"))?
             .ok_or(LoadError::Inconsistent("its fronts do not fit its factors"))?;
-        session.put_parked();
+        session.undetermined.list_parked(&mut session.model);
         let n = session.model.variables() as u32;
         let lists = [&saved.waiting, &saved.urgent, &saved.doubtful].into_iter().flatten();
         if lists.chain(&saved.shaken).any(|v| *v >= n) {
             return Err(LoadError::Inconsistent("a number that no variable has"));
         }
         session.queue = RelinearizationQueue::load(saved.waiting, saved.urgent, saved.postponed, n as usize);
-        session.doubtful = saved.doubtful;
-        session.shaken = saved.shaken;
-        (session.gone, session.gone_factors) = (saved.gone, saved.gone_factors);
-        let fits = session.put_times(saved.time, &saved.times);
+        session.undetermined.doubt(saved.doubtful);
+        session.candidates.restore_shaken(saved.shaken);
+        session.model.removed = Removed { keys: saved.gone, factors: saved.gone_factors };
+        let fits = session.schedule.load_times(&session.model, saved.time, &saved.times);
         fits.then_some(()).ok_or(LoadError::Inconsistent("times"))?;
         Ok(session)
     }
@@ -161,9 +168,8 @@ impl Session {
                 self.model.insert(*number, entry, &resolved, *weight);
             }
             if let Some(suspect) = suspect {
-                self.suspects.insert(*number, *suspect);
+                self.candidates.restore(*number, *suspect);
                 if suspect.since.is_some() {
-                    self.rejected.insert(*number);
                     self.model.reject(*number);
                 }
             }
@@ -179,16 +185,9 @@ impl Session {
         for f in &numbers {
             self.model.count(*f, self.model.is_whole(*f));
         }
-        self.note_activities(&numbers);
+        self.undetermined.note_activities(&self.model, &numbers);
         self.model.sum_up();
         Ok(())
-    }
-
-    /// Lists the variables that are parked.
-    fn put_parked(&mut self) {
-        let parked = |v: &u32| self.model.place(*v).parked && self.model.place(*v).is_there;
-        self.parked = (0..self.model.variables() as u32).filter(parked).collect();
-        self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
     }
 }
 
@@ -207,8 +206,9 @@ fn insert(model: &mut Model, saved: &SavedVariable) -> Result<(), LoadError> {
     let v = model.variables() as u32;
     model.push_variable(key.clone(), &**point, *held, NewNumber { number: v, is_reused: false });
     let place = model.place_mut(v);
-    (place.parked, place.is_there) = (*parked, born.is_some());
+    place.is_there = born.is_some();
     [place.born, place.ordinal] = born.unwrap_or_default();
+    model.set_parked(v, *parked && born.is_some());
     Ok(())
 }
 

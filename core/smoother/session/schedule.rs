@@ -1,10 +1,13 @@
 //! The settings, and the updates that were made: when to relinearize, and how exactly.
+mod window;
+
 use crate::settings::Settings;
+use window::SlidingWindow;
 
 /// Limits of an idle update, as shares of the limits of other updates.
 const FINE: f64 = 1e-8;
 
-/// The settings of a smoother, and the count of its updates.
+/// The settings of a smoother, the count of its updates, and its window.
 #[derive(Debug)]
 pub(super) struct Schedule {
     settings: Settings,
@@ -13,12 +16,13 @@ pub(super) struct Schedule {
     is_quiet: bool,
     /// Whether the current update and the one before it have no changes.
     is_idle: bool,
+    window: SlidingWindow,
 }
 
 impl Schedule {
     /// A schedule without updates.
     pub(super) fn new(settings: Settings) -> Self {
-        Self { settings, updates: 0, is_quiet: false, is_idle: false }
+        Self { settings, updates: 0, is_quiet: false, is_idle: false, window: SlidingWindow::default() }
     }
 
     /// The schedule of a saved smoother.

@@ -6,7 +6,7 @@
 //! 2008).
 use super::Session;
 use super::changes::{Change, Touched};
-use super::parking::Moves;
+use super::undetermined::Moves;
 use crate::elimination_tree::Couplings;
 use crate::error::ChangeError;
 use crate::factor_id::FactorId;
@@ -56,7 +56,7 @@ impl Session {
 
     /// Why a key is none of a variable.
     pub(super) fn no_variable(&self, key: &Key) -> ChangeError {
-        match self.gone.contains(key.as_str()) {
+        match self.model.removed.keys.contains(key.as_str()) {
             true => ChangeError::Gone { key: key.clone() },
             false => ChangeError::NoVariable { key: key.clone() },
         }
@@ -64,7 +64,7 @@ impl Session {
 
     /// Why an id is none of a factor.
     pub(super) fn no_factor(&self, factor: FactorId) -> ChangeError {
-        match self.gone_factors.contains(u64::from(factor.0)) {
+        match self.model.removed.factors.contains(u64::from(factor.0)) {
             true => ChangeError::GoneFactor { factor },
             false => ChangeError::NoFactor { factor },
         }
@@ -94,26 +94,25 @@ impl Session {
         // those that leave one after the other are each other's neighbours
         let is_there = |session: &Self, v: u32| !leaving.contains(&v) && session.model.place(v).is_there;
         touched.doubtful.retain(|v| is_there(self, *v));
-        let moves = self.park(&mut touched);
+        let moves = Moves::of(&mut self.model, &self.factorization, &mut touched);
         if let Err(overflow) = self.pass(&touched, &moves, false, report) {
-            self.unpark(&moves);
+            moves.take_back(&mut self.model);
             self.take_back_sealing(sealing);
             return Err(overflow);
         }
         for f in sealing.gone {
             // the numbers of priors too: no one holds them, and the runs have no gaps
-            self.gone_factors.insert(u64::from(f));
-            self.inactive.remove(&f);
-            self.forget_suspect(f);
+            self.model.removed.factors.insert(u64::from(f));
+            self.undetermined.forget_factor(f);
+            self.candidates.forget(f);
         }
         report.dropped.extend(sealing.dropped.into_iter().map(FactorId));
         for v in leaving {
             let key = self.key(*v);
-            self.gone.insert(key.as_str(), !bare.contains(v));
+            self.model.removed.keys.insert(key.as_str(), !bare.contains(v));
             report.sealed.push(key);
             self.forget(*v);
         }
-        self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
         Ok(())
     }
 
@@ -135,9 +134,9 @@ impl Session {
                 }
                 Step::Remove(number) => {
                     self.model.remove(number);
-                    self.gone_factors.insert(u64::from(number));
+                    self.model.removed.factors.insert(u64::from(number));
                 }
-                Step::Parked(variable, parked) => self.model.place_mut(variable).parked = parked,
+                Step::Parked(variable, parked) => _ = self.model.set_parked(variable, parked),
             }
         }
         self.sort(&mut factors);
@@ -165,7 +164,7 @@ impl Session {
         factors.extend(&sealed);
         factors.sort_unstable();
         factors.dedup();
-        let rejected = self.rejected_of(variable);
+        let rejected = self.model.rejected_of(variable);
         for f in factors {
             touched.variables.extend(self.model.factor(f).into_iter().flat_map(|f| f.variables()));
             self.remove_sealed(f, sealing);
@@ -182,7 +181,7 @@ impl Session {
         }
         touched.doubtful.extend(&touched.variables);
         // out of the tree
-        let parked = std::mem::replace(&mut self.model.place_mut(variable).parked, true);
+        let parked = self.model.set_parked(variable, true);
         sealing.steps.push(Step::Parked(variable, parked));
         Ok(())
     }
@@ -227,9 +226,8 @@ impl Session {
     fn forget(&mut self, variable: u32) {
         self.steps.forget(&self.model, variable);
         self.queue.forget(variable);
-        self.doubtful.retain(|v| *v != variable);
-        self.parked.remove(&variable);
-        self.shaken.remove(&variable);
+        self.undetermined.forget(variable);
+        self.candidates.forget_variable(variable);
         self.model.blocks.damp(variable, 0.0);
         self.model.forget(variable);
     }

@@ -6,7 +6,7 @@
 //! linearizes the variable anew, with less damping.
 use super::Session;
 use super::changes::Touched;
-use super::parking::Moves;
+use super::undetermined::Moves;
 use crate::report::Report;
 use manifactor_solve::{DiagonalLimits, LevenbergMarquardt, Silent};
 use smallvec::SmallVec;

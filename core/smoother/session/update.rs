@@ -1,8 +1,8 @@
 //! One update: changes, the part of the tree that they touch, and the steps that follow from it.
 use super::Session;
 use super::changes::{Change, NewVariable, Touched};
-use super::parking::Moves;
 use super::relinearization::Choice;
+use super::undetermined::Moves;
 use crate::elimination_tree::{Affected, Couplings, Redone};
 use crate::error::UpdateError;
 use crate::factor_id::FactorId;
@@ -47,7 +47,7 @@ impl Session {
             undo.variables.push(at);
             touched.doubtful.push(at.number);
         }
-        touched.doubtful.extend(&self.doubtful);
+        touched.doubtful.extend(self.undetermined.doubtful());
         self.resize();
         let mut suspects = BTreeMap::new();
         let best = self.best_between(&pending.changes);
@@ -70,10 +70,9 @@ impl Session {
             self.take_back(undo);
             return Err(UpdateError::NonFinite { factor: FactorId(factor as u32), keys });
         }
-        self.doubt_inactive(&mut touched);
-        undo.moves = self.park(&mut touched);
+        self.undetermined.doubt_inactive(&self.model, &mut touched);
+        let moves = Moves::of(&mut self.model, &self.factorization, &mut touched);
         let is_turn = self.queue.postponed() > 0 || self.schedule.is_turn();
-        let moves = std::mem::take(&mut undo.moves);
         if let Err(overflow) = self.pass(&touched, &moves, is_turn, &mut report) {
             let key = self.key(overflow.0);
             undo.moves = moves;
@@ -84,12 +83,12 @@ impl Session {
         self.follow_up(&mut report);
         let new = self.enter(suspects, &touched.removed);
         self.test_outliers(&new, &mut report);
-        self.time = pending.time.or(self.time);
-        came.into_iter().for_each(|(variable, time)| self.note_age(variable, time));
-        let ages = self.ages.clone();
-        let leaving = self.leaving(&pending.leaving);
+        self.schedule.set_time(pending.time);
+        came.into_iter().for_each(|(variable, time)| self.schedule.hold(&self.model, variable, time));
+        let window = self.schedule.window().clone();
+        let leaving = self.schedule.leaving(&self.model, &pending.leaving);
         if self.seal(&leaving, &mut report).is_err() {
-            self.ages = ages;
+            self.schedule.restore_window(window);
             report.stayed = leaving.iter().map(|v| self.key(*v)).collect();
         }
         self.tell(&mut report);
@@ -125,7 +124,7 @@ impl Session {
 
     /// Takes changes back, the last first.
     pub(super) fn take_back(&mut self, undo: Undo) {
-        self.unpark(&undo.moves);
+        undo.moves.take_back(&mut self.model);
         let mut touched = Touched::default();
         for change in undo.changes.into_iter().rev() {
             change.apply(&mut self.model, &mut touched);
@@ -134,46 +133,12 @@ impl Session {
         self.model.linearize(&touched.factors);
         for f in touched.factors {
             self.model.count(f, self.model.is_whole(f));
-            self.note_activity(f);
+            self.undetermined.note_activity(&self.model, f);
         }
-        self.forget_inactive(&touched.removed);
+        self.undetermined.forget_inactive(&self.model, &touched.removed);
         self.model.sum_up();
         undo.variables.into_iter().rev().for_each(|at| self.model.take_out(at));
         self.resize();
-    }
-
-    /// Notes which factors take no part; variables that lose one may not be determined any more.
-    pub(super) fn doubt_inactive(&mut self, touched: &mut Touched) {
-        self.forget_inactive(&touched.removed);
-        for f in &touched.factors {
-            if self.note_activity(*f) {
-                touched.doubtful.extend(self.model.factor(*f).into_iter().flat_map(|f| f.variables()));
-            }
-        }
-    }
-
-    fn forget_inactive(&mut self, removed: &[u32]) {
-        for f in removed.iter().filter(|f| self.model.factor(**f).is_none()) {
-            self.inactive.remove(f);
-        }
-    }
-
-    pub(super) fn note_activities(&mut self, factors: &[u32]) {
-        for f in factors {
-            self.note_activity(*f);
-        }
-    }
-
-    /// Notes whether a factor takes part where it was linearized; whether it has just ceased to.
-    pub(super) fn note_activity(&mut self, factor: u32) -> bool {
-        let is_rejected = self.model.factor(factor).is_some_and(|factor| factor.rejected);
-        match is_rejected || self.model.takes_part(factor) {
-            true => {
-                self.inactive.remove(&factor);
-                false
-            }
-            false => self.inactive.insert(factor),
-        }
     }
 
     /// Redoes what is touched and what is relinearized, and solves.
@@ -220,8 +185,8 @@ impl Session {
                 return Err(overflow);
             }
         };
-        self.note_parked(moves);
-        self.doubt_parked(&relinearized.factors);
+        self.undetermined.note_judged(&moves.judged);
+        self.undetermined.doubt_parked(&self.model, &relinearized.factors);
         report.relinearized += relinearized.variables.len();
         self.accept_points(&relinearized, waiting.as_deref());
         for f in &redone.new {
@@ -258,27 +223,10 @@ impl Session {
         let redone = (!self.schedule.is_idle()).then_some(redone);
         let Self { steps, model, factorization, .. } = self;
         let solved = steps.solve(model, factorization, redone, self.schedule.deviation());
-        if !self.suspects.is_empty() {
-            self.shaken.extend(self.steps.moved());
-        }
+        self.candidates.shake(self.steps.moved());
         for v in self.steps.moved().collect::<Vec<_>>() {
             self.note_excess(v);
         }
         solved
-    }
-
-    /// Notes which of the variables that were judged are parked.
-    fn note_parked(&mut self, moves: &Moves) {
-        self.doubtful.retain(|v| moves.judged.binary_search(v).is_err());
-        let mut has_changed = false;
-        for v in &moves.judged {
-            has_changed |= match self.model.place(*v).parked {
-                true => self.parked.insert(*v),
-                false => self.parked.remove(v),
-            };
-        }
-        if has_changed {
-            self.waiting_keys = self.parked.iter().map(|v| self.key(*v)).collect();
-        }
     }
 }

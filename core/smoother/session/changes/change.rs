@@ -71,17 +71,18 @@ impl Change {
                     true => _ = model.reject(number),
                     false => touched.variables.extend(&resolved.variables),
                 }
-                let parked = resolved.variables.iter().filter(|v| model.place(**v).parked);
+                let parked = resolved.variables.iter().filter(|v| model.is_parked(**v));
                 touched.doubtful.extend(parked);
                 Some(Self::Remove { number })
             }
             Self::Remove { number } => {
+                let rejected = model.is_rejected(number);
                 let factor = model.remove(number)?;
                 touched.variables.extend(factor.variables());
                 touched.doubtful.extend(factor.variables());
                 touched.removed.push(number);
                 let resolved = factor.resolved()?;
-                let (weight, rejected) = (factor.weight, factor.rejected);
+                let weight = factor.weight;
                 Some(Self::Insert { number, entry: Box::new(factor.entry?), resolved, weight, rejected })
             }
             Self::Weigh { number, weight } => {

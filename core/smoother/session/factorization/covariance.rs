@@ -45,7 +45,7 @@ impl Factorization {
         model: &Model,
         variables: &[u32],
     ) -> Result<DMatrix<f64>, CovarianceError> {
-        if let Some(v) = variables.iter().find(|v| model.place(**v).parked) {
+        if let Some(v) = variables.iter().find(|v| model.is_parked(**v)) {
             return Err(CovarianceError::Parked { key: model.place(*v).key.clone() });
         }
         // Σᵢⱼ = (L⁻¹eᵢ)ᵀ(L⁻¹eⱼ), and such a column is zero but on the path from its front to the root

@@ -1,5 +1,8 @@
 //! What factors cost on top of what is known.
-use super::super::Session;
+use crate::elimination_tree::Couplings;
+use crate::model::Model;
+use crate::session::factorization::Factorization;
+use crate::session::steps::Steps;
 use nalgebra::{DMatrix, DVector};
 
 /// Steps of Gauss-Newton at most: the first is the innovation's, others follow what is not linear.
@@ -16,11 +19,18 @@ pub(super) struct Surprise {
     pub(super) gain: f64,
 }
 
-impl Session {
+/// The model at the estimate, where rejected factors are evaluated.
+pub(super) struct Fit<'a> {
+    pub(super) model: &'a mut Model,
+    pub(super) steps: &'a Steps,
+    pub(super) factorization: &'a Factorization,
+}
+
+impl Fit<'_> {
     /// ‖r‖² of a rejected factor at the estimate; `None` where it is not defined or finite there.
     pub(super) fn square(&mut self, factor: u32) -> Option<f64> {
         let variables = self.look_at(&[factor]);
-        let zeros = DVector::zeros(variables.iter().map(|v| self.dim(*v)).sum());
+        let zeros = DVector::zeros(variables.iter().map(|v| self.model.dim(*v)).sum());
         let square = self.square_at(&[factor], &variables, &zeros);
         variables.iter().for_each(|v| self.model.reset_trial(*v));
         square
@@ -30,11 +40,11 @@ impl Session {
     /// that cannot be told: a variable is parked, nothing constrains one of its directions, or a factor is not defined.
     pub(super) fn surprise(&mut self, factors: &[u32]) -> Option<Surprise> {
         let variables = self.look_at(factors);
-        let is_open = |v: &u32| self.model.place(*v).parked || self.factorization.is_open(*v);
+        let is_open = |v: &u32| self.model.is_parked(*v) || self.factorization.is_open(*v);
         if variables.iter().any(is_open) {
             return None;
         }
-        let zeros = DVector::zeros(variables.iter().map(|v| self.dim(*v)).sum());
+        let zeros = DVector::zeros(variables.iter().map(|v| self.model.dim(*v)).sum());
         let square = self.square_at(factors, &variables, &zeros);
         let least = square.and_then(|square| self.descend(factors, &variables, square));
         variables.iter().for_each(|v| self.model.reset_trial(*v));
@@ -42,7 +52,7 @@ impl Session {
     }
 
     fn descend(&mut self, factors: &[u32], variables: &[u32], square: f64) -> Option<Surprise> {
-        let sigma = self.factorization.gauged_covariance(&self.model, variables);
+        let sigma = self.factorization.gauged_covariance(self.model, variables);
         let n = sigma.nrows();
         // δ = Σy throughout: no inverse of Σ, which need not have one, and δᵀΣ⁻¹δ = yᵀδ
         let (mut least, mut y, mut gain) = (square, DVector::zeros(n), 0.0);
@@ -77,8 +87,8 @@ impl Session {
     fn square_at(&mut self, factors: &[u32], variables: &[u32], step: &DVector<f64>) -> Option<f64> {
         let mut first = 0;
         for v in variables {
-            let dim = self.dim(*v);
-            let from = self.steps.of(&self.model, *v);
+            let dim = self.model.dim(*v);
+            let from = self.steps.of(self.model, *v);
             let step: Vec<f64> = from.iter().zip(step.rows(first, dim).iter()).map(|(a, b)| a + b).collect();
             self.model.try_step(*v, &step);
             first += dim;

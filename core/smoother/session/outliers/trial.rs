@@ -5,11 +5,10 @@
 //! McClure's. The outcome stays where it lowers the truncated cost ½ Σ min(‖r‖², c²); otherwise all goes back.
 use super::super::Session;
 use super::super::changes::{Change, Touched};
-use super::Failed;
 use super::fit::Surprise;
+use super::{Candidate, Failed};
 use crate::factor_id::FactorId;
 use crate::report::Report;
-use crate::saved::Suspect;
 use manifactor_graph::Values;
 use std::collections::BTreeSet;
 
@@ -40,7 +39,7 @@ impl Session {
     pub(super) fn try_rejected(&mut self, failing: &[(u32, Surprise)], report: &mut Report) {
         let mut best: Option<(f64, Vec<u32>)> = None;
         for (f, surprise) in failing {
-            let Suspect { bound, gain, .. } = self.suspects[f];
+            let Some(Candidate { bound, gain, .. }) = self.candidates.get(*f) else { continue };
             let excess = surprise.square / bound;
             let found = match self.bearing_out(*f, surprise) {
                 Some((other, more)) => Some((more, vec![other, *f])),
@@ -60,21 +59,21 @@ impl Session {
     /// Of the factors that were rejected last, the one that fits best where a factor is taken to be right, if any does and that
     /// narrows it down; and what it costs then, by its bound.
     fn bearing_out(&mut self, factor: u32, surprise: &Surprise) -> Option<(u32, f64)> {
-        let others = self.rejected.iter().filter(|f| **f != factor);
+        let others = self.model.rejected().iter().filter(|f| **f != factor);
         let mut recent: Vec<(usize, u32)> =
-            others.filter_map(|f| Some((self.suspects[f].since?, *f))).collect();
+            others.filter_map(|f| Some((self.candidates.get(*f)?.since, *f))).collect();
         recent.sort_unstable();
         recent.drain(..recent.len().saturating_sub(RECENT));
         let mut best: Option<(u32, f64)> = None;
         for (_, other) in recent {
-            let Suspect { bound, gain, .. } = self.suspects[&other];
-            let Some(alone) = self.surprise(&[other]) else { continue };
+            let Some(Candidate { bound, gain, .. }) = self.candidates.get(other) else { continue };
+            let Some(alone) = self.fit().surprise(&[other]) else { continue };
             let (less, most) = (alone.square.min(surprise.square), alone.square.max(surprise.square));
             // the same fault of the map costs them about as much
             if less < ALIKE * most && most > bound {
                 continue;
             }
-            let Some(both) = self.surprise(&[factor, other]) else { continue };
+            let Some(both) = self.fit().surprise(&[factor, other]) else { continue };
             // less than nothing: a fit that has found no minimum
             let more = both.square - most;
             let fits = (-bound..=bound + BENT * most).contains(&more) && both.gain - surprise.gain <= gain;
@@ -90,18 +89,20 @@ impl Session {
     fn try_factors(&mut self, factors: &[u32], report: &mut Report) {
         report.trials += 1;
         let (before, old) = (self.truncated_cost(), self.estimates());
-        let sides: Vec<(u32, Option<usize>)> = self.suspects.iter().map(|(f, s)| (*f, s.since)).collect();
+        let is_out = |f| self.model.is_rejected(f);
+        let sides = self.candidates.iter().map(|(f, candidate)| (f, is_out(f).then_some(candidate.since)));
+        let sides: Vec<(u32, Option<usize>)> = sides.collect();
         let mut trial = Trial { factors, undo: vec![], attenuated: BTreeSet::new() };
-        let shaken = std::mem::take(&mut self.shaken);
-        let least = factors.iter().map(|f| self.suspects[f].bound).fold(f64::INFINITY, f64::min);
+        let shaken = self.candidates.drain_shaken();
+        let least = factors.iter().map(|f| self.candidates.bound(*f)).fold(f64::INFINITY, f64::min);
         let is_better =
             self.decide(&mut trial, report).is_ok() && self.truncated_cost() < before - 0.5 * least;
         let (mut rejected, mut readmitted) = (vec![], vec![]);
         if is_better {
             for (f, since) in sides {
-                match (since, self.suspects[&f].since) {
-                    (Some(_), None) => readmitted.push(FactorId(f)),
-                    (None, Some(_)) => rejected.push(FactorId(f)),
+                match (since.is_some(), self.model.is_rejected(f)) {
+                    (true, false) => readmitted.push(FactorId(f)),
+                    (false, true) => rejected.push(FactorId(f)),
                     _ => {}
                 }
             }
@@ -113,20 +114,18 @@ impl Session {
         } else {
             self.go_back(trial, &old, report);
             for (f, since) in sides {
-                // as before, unless that could not be taken back
-                let is_out = self.model.factor(f).is_some_and(|factor| factor.rejected);
-                self.note(&[f], is_out.then(|| since.unwrap_or(self.schedule.updates())));
+                self.candidates.note_rejection(f, since.unwrap_or(self.schedule.updates()));
             }
-            self.shaken.clear();
+            self.candidates.drain_shaken();
         }
         report.rejected.append(&mut rejected);
         report.readmitted.append(&mut readmitted);
-        self.shaken.extend(shaken);
+        self.candidates.restore_shaken(shaken);
     }
 
     /// ½ Σ min(‖r‖², c²), c² being the bound of a factor that is rejected.
     fn truncated_cost(&mut self) -> f64 {
-        let bounds: f64 = self.rejected.iter().map(|f| self.suspects[f].bound).sum();
+        let bounds: f64 = self.model.rejected().iter().map(|f| self.candidates.bound(*f)).sum();
         self.cost() + 0.5 * bounds
     }
 
@@ -143,15 +142,14 @@ impl Session {
         for _ in 0..ROUNDS {
             let (mut changes, mut shares) = (vec![], vec![]);
             for f in self.around(trial) {
-                let Suspect { bound, .. } = self.suspects[&f];
-                if self.full_square(f) > bound {
+                if self.full_square(f) > self.candidates.bound(f) {
                     changes.push(Change::Reject { number: f });
                 }
                 shares.push((f, 1.0));
             }
             for f in trial.factors {
-                let Suspect { bound, since, .. } = self.suspects[f];
-                if since.is_some() && self.square(*f).is_some_and(|square| square <= bound) {
+                let bound = self.candidates.bound(*f);
+                if self.model.is_rejected(*f) && self.fit().square(*f).is_some_and(|square| square <= bound) {
                     changes.push(Change::Readmit { number: *f });
                 }
             }
@@ -166,11 +164,11 @@ impl Session {
 
     /// The factors that may be wrong, count, and lie where something has moved.
     fn around(&self, trial: &Trial<'_>) -> Vec<u32> {
-        let mut around = self.model.factors_of(&self.shaken.iter().copied().collect::<Vec<_>>());
+        let mut around = self.model.factors_of(&self.candidates.shaken().iter().copied().collect::<Vec<_>>());
         around.extend(trial.factors.iter().chain(&trial.attenuated));
         around.sort_unstable();
         around.dedup();
-        around.retain(|f| self.suspects.get(f).is_some_and(|suspect| suspect.since.is_none()));
+        around.retain(|f| self.candidates.counts(&self.model, *f));
         around
     }
 
@@ -182,7 +180,7 @@ impl Session {
 
     /// The derivative of ρ by ½r².
     fn share(&mut self, factor: u32, mu: f64) -> f64 {
-        let (square, c2) = (self.full_square(factor), self.suspects[&factor].bound);
+        let (square, c2) = (self.full_square(factor), self.candidates.bound(factor));
         let power = square.powf(mu);
         // above zero, so that the cost can be told from the share of it
         f64::max(1e-12, c2 * (c2 + (1.0 - mu) * power) / (c2 + power).powi(2))
@@ -206,10 +204,8 @@ impl Session {
             }
         }
         for change in &changes {
-            match change {
-                Change::Reject { number } => self.note(&[*number], Some(self.schedule.updates())),
-                Change::Readmit { number } => self.note(&[*number], None),
-                _ => {}
+            if let Change::Reject { number } = change {
+                self.candidates.note_rejection(*number, self.schedule.updates());
             }
         }
         trial.undo.extend(self.turn_over(changes, touched, true, report)?);
@@ -233,7 +229,7 @@ impl Session {
             self.model.attenuate(*f, 1.0);
             touched.change(&self.model, *f);
         }
-        for v in std::mem::take(&mut self.shaken) {
+        for v in self.candidates.drain_shaken() {
             let (key, point) = (&self.model.place(v).key, self.model.point(v));
             let step = point.zip(old.variable(key.as_str())).and_then(|(p, x)| p.erased().local(x));
             let Some(step) = step.filter(|_| self.factorization.contains(v)) else { continue };

@@ -1,0 +1,163 @@
+//! The variables that a window has no room for any more, by their number or by the time when they came.
+use super::Schedule;
+use crate::error::ChangeError;
+use crate::model::Model;
+use crate::settings::Span;
+use manifactor_graph::Key;
+use manifactor_graph::checked::Positive;
+use std::collections::{BTreeSet, VecDeque};
+
+/// A variable that a window holds.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    variable: u32,
+    /// When it came among all variables: its number is used again.
+    born: u64,
+    /// When it came by the clock of the caller; a window by poses does not look at it.
+    time: f64,
+}
+
+/// The clock of the caller, and the variables that a window holds.
+#[derive(Debug, Clone, Default)]
+pub(in crate::session) struct SlidingWindow {
+    /// The time that was set last, by the updates that were made.
+    time: Option<f64>,
+    /// The oldest first.
+    held: VecDeque<Held>,
+}
+
+impl SlidingWindow {
+    /// The time that was set last, by the updates that were made.
+    pub(in crate::session) fn time(&self) -> Option<f64> {
+        self.time
+    }
+
+    /// The variables that leave as the window has no room for them; `leaving` leave anyway.
+    fn overflow(&mut self, span: Span, model: &Model, leaving: &[u32]) -> Vec<u32> {
+        self.held.retain(|held| {
+            let place = model.place(held.variable);
+            place.is_there && place.born == held.born && !leaving.contains(&held.variable)
+        });
+        let more = match span {
+            Span::Poses(poses) => self.held.len().saturating_sub(poses.get()),
+            Span::Seconds(seconds) => {
+                let from = self.time.unwrap_or_default() - seconds.get();
+                let older = self.held.partition_point(|held| held.time < from);
+                older.min(self.held.len().saturating_sub(1))
+            }
+        };
+        self.held.drain(..more).map(|held| held.variable).collect()
+    }
+}
+
+impl Schedule {
+    /// Checks a time that is to be set after `pending`, the one that was set since the last update.
+    pub(in crate::session) fn check_time(&self, pending: Option<f64>, time: f64) -> Result<(), ChangeError> {
+        let last = pending.or(self.window.time);
+        if !time.is_finite() || last.is_some_and(|last| time < last) {
+            return Err(ChangeError::Time { time, last });
+        }
+        Ok(())
+    }
+
+    /// The time at which a variable comes that is pushed now; 0 if no window needs it.
+    pub(in crate::session) fn time_of_new(&self, pending: Option<f64>) -> Result<f64, ChangeError> {
+        match pending.or(self.window.time) {
+            None if self.seconds().is_some() => Err(ChangeError::NoTime),
+            time => Ok(time.unwrap_or_default()),
+        }
+    }
+
+    /// Sets the time, if an update brings one.
+    pub(in crate::session) fn set_time(&mut self, time: Option<f64>) {
+        self.window.time = time.or(self.window.time);
+    }
+
+    /// How far a window by seconds reaches back.
+    fn seconds(&self) -> Option<Positive> {
+        match self.settings.window.as_ref()?.span {
+            Span::Seconds(seconds) => Some(seconds),
+            Span::Poses(_) => None,
+        }
+    }
+
+    /// Adds a variable to the window, unless its type is kept.
+    pub(in crate::session) fn hold(&mut self, model: &Model, variable: u32, time: f64) {
+        if self.leaves(model, variable) {
+            self.window.held.push_back(Held { variable, born: model.place(variable).born, time });
+        }
+    }
+
+    /// Whether a variable is of a type that leaves a window.
+    fn leaves(&self, model: &Model, variable: u32) -> bool {
+        let Some(window) = &self.settings.window else { return false };
+        let name = model.point(variable).map_or("", |point| point.typetag_name());
+        !window.keep.iter().any(|keep| keep.as_str() == name)
+    }
+
+    /// The variables that leave at the end of an update: those of `asked`, and those that the window has no room for.
+    pub(in crate::session) fn leaving(&mut self, model: &Model, asked: &[Key]) -> Vec<u32> {
+        let mut leaving: Vec<u32> = asked.iter().filter_map(|key| model.variable(key.as_str())).collect();
+        if let Some(window) = &self.settings.window {
+            leaving.extend(self.window.overflow(window.span, model, &leaving));
+        }
+        let mut seen = BTreeSet::new();
+        leaving.retain(|v| seen.insert(*v));
+        leaving
+    }
+
+    /// The window, to be restored if variables cannot leave.
+    pub(in crate::session) fn window(&self) -> &SlidingWindow {
+        &self.window
+    }
+
+    /// Restores the window.
+    pub(in crate::session) fn restore_window(&mut self, window: SlidingWindow) {
+        self.window = window;
+    }
+
+    /// The bits of the times of all variables that a window by seconds holds, the oldest first.
+    pub(in crate::session) fn times(&self) -> Vec<u64> {
+        match self.seconds() {
+            Some(_) => self.window.held.iter().map(|held| held.time.to_bits()).collect(),
+            None => vec![],
+        }
+    }
+
+    /// Restores a saved window. Returns whether these can be the times of the variables in the model.
+    pub(in crate::session) fn load_times(&mut self, model: &Model, now: Option<u64>, times: &[u64]) -> bool {
+        let now = now.map(f64::from_bits);
+        self.window.time = now;
+        let held: Vec<u32> = model.by_age().into_iter().filter(|v| self.leaves(model, *v)).collect();
+        let times: Vec<f64> = times.iter().map(|bits| f64::from_bits(*bits)).collect();
+        let expected = if self.seconds().is_some() { held.len() } else { 0 };
+        let is_set = times.is_empty() || now.is_some();
+        let ascending: Vec<f64> = times.iter().copied().chain(now).collect();
+        let is_finite = ascending.iter().all(|time| time.is_finite());
+        if times.len() != expected || !is_set || !is_finite || !ascending.is_sorted() {
+            return false;
+        }
+        for (i, v) in held.into_iter().enumerate() {
+            self.hold(model, v, times.get(i).copied().unwrap_or_default());
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+
+    #[test]
+    fn time_goes_on() {
+        let mut schedule = Schedule::new(Settings::default());
+        assert_eq!(schedule.time_of_new(None), Ok(0.0));
+        schedule.set_time(Some(2.0));
+        schedule.set_time(None);
+        assert_eq!(schedule.time_of_new(None), Ok(2.0));
+        assert_eq!(schedule.time_of_new(Some(3.0)), Ok(3.0));
+        assert!(schedule.check_time(None, 2.0).is_ok() && schedule.check_time(Some(3.0), 2.0).is_err());
+        assert!(schedule.check_time(None, f64::NAN).is_err());
+    }
+}

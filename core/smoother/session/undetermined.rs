@@ -1,0 +1,230 @@
+//! Variables that nothing determines yet: they wait outside of the tree, with all their factors.
+//!
+//! A variable is parked while its own block of H has no full rank: a point that was seen once, or a pose whose only factor
+//! is not defined. Its factors would say nothing of their other variables, so leaving them out is exact. What the own block
+//! cannot show, two poses that are tied to each other alone, is found by pivots: see [`Fronts`](crate::fronts::Fronts).
+use super::changes::Touched;
+use super::factorization::Factorization;
+use crate::elimination_tree::Couplings;
+use crate::model::Model;
+use crate::report::Shared;
+use manifactor_graph::Key;
+use std::collections::{BTreeSet, VecDeque};
+
+/// A block has no full rank where a pivot of it, scaled to a unit diagonal, is smaller.
+const RANK: f64 = 1e-8;
+
+/// Variables that begin or cease to be solved for.
+#[derive(Debug, Default)]
+pub(super) struct Moves {
+    /// Both ascend.
+    pub(super) entering: Vec<u32>,
+    pub(super) leaving: Vec<u32>,
+    /// Those that were looked at, ascending, and those of them whose flag has changed.
+    pub(super) judged: Vec<u32>,
+    pub(super) flipped: Vec<u32>,
+}
+
+impl Moves {
+    /// Decides which of the doubtful variables are parked, and which factors count.
+    pub(super) fn of(model: &mut Model, factorization: &Factorization, touched: &mut Touched) -> Self {
+        let candidates: BTreeSet<u32> = touched.doubtful.iter().copied().collect();
+        let was_parked: Vec<(u32, bool)> = candidates.iter().map(|v| (*v, model.is_parked(*v))).collect();
+        // as many as possible are in; those that cannot be are taken out, and with them what hangs on them
+        candidates.iter().for_each(|v| _ = model.set_parked(*v, false));
+        let mut parked = BTreeSet::new();
+        let mut queue: VecDeque<u32> = candidates.iter().copied().collect();
+        while let Some(v) = queue.pop_front() {
+            let place = model.place(v);
+            // a prior says something of the others, also where it leaves this one open
+            if !model.is_parked(v) && !place.is_held() && place.sealed == 0 && !is_determined(model, v) {
+                model.set_parked(v, true);
+                parked.insert(v);
+                queue.extend(model.coupled(v));
+            }
+        }
+        let others = parked.iter().filter(|v| !candidates.contains(v)).map(|v| (*v, false));
+        let mut before: Vec<(u32, bool)> = was_parked.into_iter().chain(others).collect();
+        before.sort_unstable();
+        let mut moves = Self::default();
+        let mut factors = touched.factors.clone();
+        for (v, was_parked) in before {
+            moves.judged.push(v);
+            if model.is_parked(v) != was_parked {
+                moves.flipped.push(v);
+                factors.extend(model.blocks.factors(v));
+            }
+        }
+        factors.sort_unstable();
+        factors.dedup();
+        for f in factors {
+            let is_whole = model.is_whole(f);
+            model.count(f, is_whole);
+            touched.variables.extend(model.factor(f).into_iter().flat_map(|f| f.variables()));
+        }
+        let looked_at = touched.variables.iter().chain(&candidates).chain(&parked);
+        for v in looked_at.copied().collect::<BTreeSet<u32>>() {
+            let is_in = factorization.contains(v);
+            match (is_in, model.is_in_tree(v)) {
+                (false, true) => moves.entering.push(v),
+                (true, false) => moves.leaving.push(v),
+                _ => {}
+            }
+        }
+        moves
+    }
+
+    /// Takes the decisions back.
+    pub(super) fn take_back(&self, model: &mut Model) {
+        for v in &self.flipped {
+            let is_parked = model.is_parked(*v);
+            model.set_parked(*v, !is_parked);
+        }
+        let factors: BTreeSet<u32> = self.flipped.iter().flat_map(|v| model.blocks.factors(*v)).collect();
+        for f in factors {
+            let is_whole = model.is_whole(f);
+            model.count(f, is_whole);
+        }
+    }
+}
+
+/// Variables and factors that take no part.
+#[derive(Debug, Default)]
+pub(super) struct Undetermined {
+    /// Parked variables whose factors were linearized anew since they were judged.
+    doubtful: Vec<u32>,
+    /// Factors that are not defined where they were linearized, or have no weight.
+    inactive: BTreeSet<u32>,
+    /// The keys of parked variables, for reports.
+    parked_keys: Shared<Key>,
+}
+
+impl Undetermined {
+    /// Parked variables to judge again.
+    pub(super) fn doubtful(&self) -> &[u32] {
+        &self.doubtful
+    }
+
+    /// Sets the parked variables to judge again.
+    pub(super) fn doubt(&mut self, variables: Vec<u32>) {
+        self.doubtful = variables;
+    }
+
+    /// Notes variables that were judged, ascending.
+    pub(super) fn note_judged(&mut self, judged: &[u32]) {
+        self.doubtful.retain(|v| judged.binary_search(v).is_err());
+    }
+
+    /// Number of factors that take no part.
+    pub(super) fn inactive(&self) -> usize {
+        self.inactive.len()
+    }
+
+    /// The keys of parked variables.
+    pub(super) fn list_parked(&mut self, model: &mut Model) -> Shared<Key> {
+        if let Some(keys) = model.changed_parked_keys() {
+            self.parked_keys = keys;
+        }
+        self.parked_keys.clone()
+    }
+
+    /// Forgets a variable.
+    pub(super) fn forget(&mut self, variable: u32) {
+        self.doubtful.retain(|v| *v != variable);
+    }
+
+    /// Forgets a factor.
+    pub(super) fn forget_factor(&mut self, factor: u32) {
+        self.inactive.remove(&factor);
+    }
+
+    /// Has parked variables looked at again by the next update, as their factors say something else now.
+    pub(super) fn doubt_parked(&mut self, model: &Model, factors: &[u32]) {
+        let factors = factors.iter().filter(|f| !model.is_whole(**f)).filter_map(|f| model.factor(*f));
+        let parked = factors.flat_map(|f| f.variables()).filter(|v| model.is_parked(*v));
+        self.doubtful.extend(parked);
+        self.doubtful.sort_unstable();
+        self.doubtful.dedup();
+    }
+
+    /// Notes which factors take no part; variables that lose one may not be determined any more.
+    pub(super) fn doubt_inactive(&mut self, model: &Model, touched: &mut Touched) {
+        self.forget_inactive(model, &touched.removed);
+        for f in &touched.factors {
+            if self.note_activity(model, *f) {
+                touched.doubtful.extend(model.factor(*f).into_iter().flat_map(|f| f.variables()));
+            }
+        }
+    }
+
+    /// Forgets removed factors that took no part.
+    pub(super) fn forget_inactive(&mut self, model: &Model, removed: &[u32]) {
+        for f in removed.iter().filter(|f| model.factor(**f).is_none()) {
+            self.inactive.remove(f);
+        }
+    }
+
+    /// Notes whether factors take part where they were linearized.
+    pub(super) fn note_activities(&mut self, model: &Model, factors: &[u32]) {
+        for f in factors {
+            self.note_activity(model, *f);
+        }
+    }
+
+    /// Notes whether a factor takes part where it was linearized; whether it has just ceased to.
+    pub(super) fn note_activity(&mut self, model: &Model, factor: u32) -> bool {
+        match model.is_rejected(factor) || model.takes_part(factor) {
+            true => {
+                self.inactive.remove(&factor);
+                false
+            }
+            false => self.inactive.insert(factor),
+        }
+    }
+}
+
+/// Whether the factors that could count determine a variable, all others being known.
+fn is_determined(model: &Model, variable: u32) -> bool {
+    let others_are_in = |f: u32| {
+        let mut others = model.factor(f).into_iter().flat_map(|f| f.variables());
+        others.all(|v| v == variable || !model.is_parked(v))
+    };
+    let mut h = model.own_block(variable, others_are_in);
+    has_full_rank(&mut h, model.dim(variable))
+}
+
+/// Whether a symmetric matrix, of which the lower triangle counts, has full rank once it is scaled to a unit diagonal.
+fn has_full_rank(h: &mut [f64], d: usize) -> bool {
+    let scale: Vec<f64> = (0..d).map(|c| 1.0 / h[c * d + c].sqrt()).collect();
+    if !scale.iter().all(|s| s.is_finite()) {
+        return false;
+    }
+    for c in 0..d {
+        (c..d).for_each(|r| h[c * d + r] *= scale[c] * scale[r]);
+    }
+    for c in 0..d {
+        let pivot = h[c * d + c];
+        if pivot.is_nan() || pivot <= RANK {
+            return false;
+        }
+        for k in c + 1..d {
+            let factor = h[c * d + k] / pivot;
+            (k..d).for_each(|r| h[k * d + r] -= factor * h[c * d + r]);
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::has_full_rank;
+
+    #[test]
+    fn units_do_not_matter_for_rank() {
+        assert!(has_full_rank(&mut [1e-12, 0.0, 0.0, 1e12], 2));
+        assert!(has_full_rank(&mut [1e6, 0.5, 0.0, 1e-6], 2));
+        assert!(!has_full_rank(&mut [1e6, 1.0, 0.0, 1e-6], 2));
+        assert!(!has_full_rank(&mut [1.0, 0.0, 0.0, 0.0], 2));
+        assert!(!has_full_rank(&mut [f64::NAN, 0.0, 0.0, 1.0], 2));
+    }
+}
