@@ -19,11 +19,11 @@ pub mod motion;
 pub mod online;
 pub mod output;
 pub mod run;
-pub mod schema;
 pub mod semantics;
 pub mod settings;
 
 pub use estimate::{refine, variance};
+pub use experiment::schema;
 pub use input::{
     class, fusion, journal, measurement, prior_map, recording, sequence, simulator, source, stream,
 };

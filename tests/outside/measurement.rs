@@ -83,6 +83,7 @@ fn run(field: &str, association: &str) -> (usize, usize, String) {
     std::fs::write(folder.path().join("frames.jsonl"), lines(field)).unwrap();
     let text = format!(
         "source = {{ type = 'json_lines', file = 'frames.jsonl', camera = {{ fx = 500, fy = 500, cx = 320, cy = 240, width = 640, height = 480 }} }}
+         objects = {{ initialiser = {{ type = 'rays' }} }}
          association = {{ type = '{association}' }}"
     );
     let name = folder.path().join("run.toml").display().to_string();

@@ -42,6 +42,7 @@ fn run(sigma: f64) -> Result<f64, String> {
     let document = RunDocument::read(&document).unwrap_or_else(|e| panic!("{e}"));
     let done = Run::new(&document, None).variant(&document.variants[0], &mut Silent);
     let (_, report) = done.map_err(|error| error.to_string())?;
+    eprintln!("{:?} {:?} {:?}", report.counts, report.warnings, report.solve);
     Ok(report.trajectory[0].estimate.ate.rmse)
 }
 

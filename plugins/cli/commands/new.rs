@@ -146,7 +146,7 @@ const TAKEN: [&str; 15] = [
 ];
 
 /// Crates that a plugin could not be told from: those of Rust, of the workspace and of a plugin's manifest, and the build script.
-const CRATES: [&str; 25] = [
+const CRATES: [&str; 26] = [
     "alloc",
     "build",
     "core",

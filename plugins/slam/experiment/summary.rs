@@ -1,8 +1,12 @@
 //! Means over trials, and how far variants are apart.
+mod settings;
+
 use super::table::records;
 use super::{Experiment, Interval, TrialLog, TrialRecord, bootstrap};
 use indexmap::{IndexMap, IndexSet};
 use serde::Serialize;
+
+pub use settings::SummarySettings;
 
 /// Means and comparisons, group by group.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -23,8 +23,8 @@ const LONGEST: usize = 60;
 const SETTINGS: [&str; 5] = [
     "",
     "association = { type = \"likelihood\" }",
-    "association = { type = \"iou\" }\nonline = { window = { poses = 3 }, relinearize_every = 1 }",
-    "association = { type = \"projection\" }\nonline = { window = { seconds = 0.5 }, outliers = {} }",
+    "association = { type = \"likelihood\", twin_iou = 0.5 }\nonline = { window = { poses = 3 }, relinearize_every = 1 }",
+    "association = { type = \"likelihood\", lasting = 1.0 }\nonline = { window = { seconds = 0.5 }, outliers = {} }",
     "gravity = { type = \"accelerometer\" }\nsemantics = \"table_one\"",
 ];
 

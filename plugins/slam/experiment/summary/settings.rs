@@ -1,4 +1,4 @@
-use super::measures::measure_names_in_words;
+use crate::experiment::measures::measure_names_in_words;
 use indexmap::IndexMap;
 use manifactor_graph::checked::Count;
 use schemars::JsonSchema;
