@@ -20,18 +20,17 @@ __all__ = [
     "between_point1",
     "between_point2",
     "between_point3",
-    "between_point4",
     "between_se2",
     "between_se3",
     "between_so2",
     "between_so3",
     "bounding_box",
-    "bounding_box_offset",
     "centroid_depth",
     "chordal_between_se2",
     "chordal_between_se3",
     "collinear",
     "conic_distance",
+    "constant_velocity",
     "expression",
     "horizontal_orientation",
     "horizontal_orientation_smooth",
@@ -47,14 +46,15 @@ __all__ = [
     "prior_point1",
     "prior_point2",
     "prior_point3",
-    "prior_point4",
     "prior_quadric",
     "prior_se2",
     "prior_se3",
     "prior_so2",
     "prior_so3",
+    "prior_twist",
     "projection",
     "projection_bal",
+    "projection_radial_tangential",
     "range_se2_point2",
     "range_se2_se2",
     "range_se3_point3",
@@ -110,7 +110,7 @@ def bearing_range_se2(*, bearing: float, range: float) -> Factor:
 
     Args:
         bearing:
-        range:
+        range: A finite number above zero.
     """
     return Factor("bearing_range_se2", {"bearing": bearing, "range": range})
 
@@ -212,24 +212,6 @@ def between_point3(*, relative: variables.Point3 | Fields) -> Factor:
         relative: The second variable in the frame of the first.
     """
     return Factor("between_point3", {"relative": untagged(relative)})
-
-
-def between_point4(*, relative: variables.Point4 | Fields) -> Factor:
-    """The second variable is at `relative`, seen from the first: r = Log(Z⁻¹ Xᵢ⁻¹ Xⱼ).
-
-    One row for each tangent direction (x0, x1, x2, x3). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
-
-    ```toml
-    [[factors]]
-    keys = ["x0", "x1"]
-    factor = { type = "between_point4", relative = { position = [1.0, 0.5, 0.0, 0.5] } }
-    noise = { sigma = 0.1 }
-    ```
-
-    Args:
-        relative: The second variable in the frame of the first.
-    """
-    return Factor("between_point4", {"relative": untagged(relative)})
 
 
 def between_se2(*, relative: variables.Se2 | Fields) -> Factor:
@@ -346,38 +328,6 @@ def bounding_box(
     return Factor("bounding_box", {"box": box, "camera": camera, "model": model})
 
 
-def bounding_box_offset(
-    *,
-    box: Numbers,
-    camera: types.Camera,
-    model: Literal['standard', 'truncated'] | None = None,
-) -> Factor:
-    """The box around an object's outline, shifted by an offset, is the one that was drawn: r = β(x, q) + o - b, in pixels.
-
-    Variables: the pose of the camera, the object, and the offset of each side. Rows and β are those of `bounding_box`, and so is where it
-    is defined. Several boxes share an offset: it stands for what their errors have in common. A side that the border cuts has an offset as
-    well. The boxes alone cannot tell an offset from a larger object: a prior on the offset has to.
-
-    ```toml
-    [[factors]]
-    keys   = ["x0", "q0", "o0"]
-    factor = { type = "bounding_box_offset", box = [120.0, 80.0, 260.0, 310.0], camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
-    noise  = { sigma = 2.0 }
-
-    [[factors]]
-    keys   = ["o0"]
-    factor = { type = "prior_point4", value = { position = [0.0, 0.0, 0.0, 0.0] } }
-    noise  = { sigma = 5.0 }
-    ```
-
-    Args:
-        box: The box that was measured: xmin, ymin, xmax, ymax, in pixels.
-        camera: The camera that saw it.
-        model: What of the object the box goes around. Default: "standard".
-    """
-    return Factor("bounding_box_offset", {"box": box, "camera": camera, "model": model})
-
-
 def centroid_depth(*, depth: float) -> Factor:
     """An object's centre is at this depth: r = (Rᵀ(c - t))ᶻ - depth, c the centroid, R and t the camera's pose.
 
@@ -481,6 +431,25 @@ def conic_distance(
         camera: The camera that saw it.
     """
     return Factor("conic_distance", {"centre": centre, "semi_axes": semi_axes, "camera": camera, "angle": angle})
+
+
+def constant_velocity(*, seconds: float) -> Factor:
+    """A body moves from one pose to the next with a velocity that stays the same: r = (Log(Xᵢ⁻¹ Xⱼ) − vᵢ Δt, vⱼ − vᵢ).
+
+    Velocities are in the frame of the body. The noise of white noise on the acceleration grows with Δt; see Anderson and Barfoot,
+    *Full STEAM Ahead*, 2015. Rows: the change of the pose (rad, m), then that of the velocity (rad/s, m/s).
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "v0", "x1", "v1"]
+    factor = { type = "constant_velocity", seconds = 0.1 }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        seconds: Time from the first pose to the second, in seconds.
+    """
+    return Factor("constant_velocity", {"seconds": seconds})
 
 
 def expression(
@@ -957,24 +926,6 @@ def prior_point3(*, value: variables.Point3 | Fields) -> Factor:
     return Factor("prior_point3", {"value": untagged(value)})
 
 
-def prior_point4(*, value: variables.Point4 | Fields) -> Factor:
-    """The variable is close to `value`: r = Log(Z⁻¹X).
-
-    One row for each tangent direction (x0, x1, x2, x3). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
-
-    ```toml
-    [[factors]]
-    keys = ["x0"]
-    factor = { type = "prior_point4", value = { position = [1.0, 0.5, 0.0, 0.5] } }
-    noise = { sigma = 0.1 }
-    ```
-
-    Args:
-        value: Where the variable is expected.
-    """
-    return Factor("prior_point4", {"value": untagged(value)})
-
-
 def prior_quadric(*, value: variables.DualQuadric | Fields) -> Factor:
     """An object is close to `value`: r = (Log(Z⁻¹X), log(s/s₀)), pose first.
 
@@ -1068,12 +1019,28 @@ def prior_so3(*, value: variables.So3 | Fields) -> Factor:
     return Factor("prior_so3", {"value": untagged(value)})
 
 
+def prior_twist(*, value: variables.Twist | Fields) -> Factor:
+    """The variable is close to `value`: r = Log(Z⁻¹X).
+
+    One row for each tangent direction (wx, wy, wz, vx, vy, vz). Two rotations that are half a turn apart have two shortest ways between them: there the residual jumps.
+
+    ```toml
+    [[factors]]
+    keys = ["x0"]
+    factor = { type = "prior_twist", value = { angular = [0.0, 0.1, 0.0], linear = [0.0, 0.0, 0.5] } }
+    noise = { sigma = 0.1 }
+    ```
+
+    Args:
+        value: Where the variable is expected.
+    """
+    return Factor("prior_twist", {"value": untagged(value)})
+
+
 def projection(*, pixel: Numbers, camera: types.Camera) -> Factor:
     """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 
-    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the
-    pinhole of `camera`. Rows: x to the right and y down. Not defined where the point is not in front of the camera
-    by a millionth of its distance; the factor is inactive there.
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
 
     ```toml
     [[factors]]
@@ -1083,7 +1050,7 @@ def projection(*, pixel: Numbers, camera: types.Camera) -> Factor:
     ```
 
     Args:
-        pixel: Where the point was seen, in pixels, x right and y down.
+        pixel: Pixel of the point, x right and y down.
         camera: The camera that saw it.
     """
     return Factor("projection", {"pixel": pixel, "camera": camera})
@@ -1107,6 +1074,25 @@ def projection_bal(*, pixel: Numbers) -> Factor:
         pixel: Where the point was seen, in pixels from the image's centre, x right and y up.
     """
     return Factor("projection_bal", {"pixel": pixel})
+
+
+def projection_radial_tangential(*, pixel: Numbers, camera: types.RadialTangential) -> Factor:
+    """The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
+
+    Variables: the pose of the camera, from its own frame (z forward) to the world's, and the point. π is the projection of `camera`. Rows: x to the right and y down. Not defined if the camera cannot see the point, for example behind it; the factor is inactive there.
+
+    ```toml
+    [[factors]]
+    keys = ["x0", "l0"]
+    factor = { type = "projection_radial_tangential", pixel = [310.0, 262.5], camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480, distortion = [0.1, 0.02, 0.0, 0.0, 0.0] } }
+    noise = { sigma = 1.0 }
+    ```
+
+    Args:
+        pixel: Pixel of the point, x right and y down.
+        camera: The camera that saw it.
+    """
+    return Factor("projection_radial_tangential", {"pixel": pixel, "camera": camera})
 
 
 def range_se2_point2(*, range: float) -> Factor:

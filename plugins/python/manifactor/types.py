@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any, Literal, Required, TypedDict
 
 from ._native import Noise
-from .chosen import Factor
+from .chosen import Factor, Numbers
 
 
 class Camera(TypedDict, total=False):
@@ -40,6 +40,25 @@ class Component(TypedDict, total=False):
     over: Any
     #: What the factor's residual is measured in.
     noise: Noise
+
+
+class RadialTangential(TypedDict, total=False):
+    """A camera whose lens bends the image along and across the radius, with five coefficients."""
+
+    #: Focal length along x, in pixels.
+    fx: Required[float]
+    #: Focal length along y, in pixels.
+    fy: Required[float]
+    #: Principal point, in pixels.
+    cx: Required[float]
+    #: Principal point, in pixels.
+    cy: Required[float]
+    #: Size of the image, in pixels.
+    width: Required[int]
+    #: Size of the image, in pixels.
+    height: Required[int]
+    #: Coefficients k₁, k₂, p₁, p₂, k₃, in the order of OpenCV.
+    distortion: Required[Numbers]
 
 
 class Stopping(TypedDict, total=False):

@@ -18,12 +18,12 @@ __all__ = [
     "Point1",
     "Point2",
     "Point3",
-    "Point4",
     "S2",
     "Se2",
     "Se3",
     "So2",
     "So3",
+    "Twist",
 ]
 
 
@@ -420,33 +420,6 @@ class Point3(Variable):
         return in_formulas(self, "z")
 
 
-class Point4(Variable):
-    """A point in 4 dimensions.
-
-    Tangent (x0, x1, x2, x3); x ⊞ δ = x + δ.
-
-    ```toml
-    [values]
-    l0 = { type = "point4", position = [1.0, 0.0, 0.5, 0.0] }
-    ```
-
-    Args:
-        position: Its coordinates.
-    """
-
-    TYPE: ClassVar[str] = "point4"
-    SHAPE: ClassVar[str] = ""
-    TANGENT: ClassVar[tuple[str, ...]] = ("x0", "x1", "x2", "x3")
-
-    def __new__(cls, *, position: Numbers) -> Self:
-        return super().__new__(cls, "variable", "point4", {"position": position})
-
-    @property
-    def position(self) -> NDArray[np.float64]:
-        """Its coordinates."""
-        return self.__getattr__("position")  # type: ignore[no-any-return]
-
-
 class S2(Variable):
     """A direction in space, such as gravity's: a point on the unit sphere.
 
@@ -734,6 +707,39 @@ class So3(Variable):
         return in_formulas(self, "z_axis")
 
 
+class Twist(Variable):
+    """The velocity of a rigid body in its own frame: angular in rad/s, then linear in m/s.
+
+    Tangent (wx, wy, wz, vx, vy, vz); x ⊞ δ = x + δ.
+
+    ```toml
+    [values]
+    v0 = { type = "twist", angular = [0.0, 0.1, 0.0], linear = [0.0, 0.0, 0.5] }
+    ```
+
+    Args:
+        angular: Angular velocity about x, y and z, in rad/s.
+        linear: Linear velocity along x, y and z, in m/s.
+    """
+
+    TYPE: ClassVar[str] = "twist"
+    SHAPE: ClassVar[str] = ""
+    TANGENT: ClassVar[tuple[str, ...]] = ("wx", "wy", "wz", "vx", "vy", "vz")
+
+    def __new__(cls, *, angular: Numbers, linear: Numbers) -> Self:
+        return super().__new__(cls, "variable", "twist", {"angular": angular, "linear": linear})
+
+    @property
+    def angular(self) -> NDArray[np.float64]:
+        """Angular velocity about x, y and z, in rad/s."""
+        return self.__getattr__("angular")  # type: ignore[no-any-return]
+
+    @property
+    def linear(self) -> NDArray[np.float64]:
+        """Linear velocity along x, y and z, in m/s."""
+        return self.__getattr__("linear")  # type: ignore[no-any-return]
+
+
 #: The class of each type of variables, by its name in documents.
 BY_TYPE: dict[str, type[Variable]] = {
     "bal_camera": BalCamera,
@@ -742,10 +748,10 @@ BY_TYPE: dict[str, type[Variable]] = {
     "point1": Point1,
     "point2": Point2,
     "point3": Point3,
-    "point4": Point4,
     "s2": S2,
     "se2": Se2,
     "se3": Se3,
     "so2": So2,
     "so3": So3,
+    "twist": Twist,
 }
