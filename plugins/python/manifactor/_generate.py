@@ -58,6 +58,9 @@ class Types:
             if of in schema:
                 return self.union(schema[of], definitions, owner, within)
         match schema.get("type"):
+            case [of, "null"]:
+                # an optional field; its parameter may be None anyway
+                return self.hint({**schema, "type": of}, definitions, owner, within)
             case "number":
                 return "float"
             case "integer":

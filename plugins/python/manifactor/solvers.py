@@ -5,7 +5,7 @@ Written by `python -m manifactor._generate` from the catalogue."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 from . import types
 from .chosen import Numbers, Solver
@@ -47,7 +47,7 @@ def auto(*, stop: types.Stopping | None = None, linear: types.LinearSolver | Non
 
 def dogleg(
     *,
-    initial_radius: Any | None = None,
+    initial_radius: float | None = None,
     stop: types.Stopping | None = None,
     linear: types.LinearSolver | None = None,
 ) -> Solver:
@@ -99,7 +99,7 @@ def gnc(
     *,
     cost: Literal['truncated_least_squares', 'geman_mcclure'] | None = None,
     probability: float | None = None,
-    threshold: Any | None = None,
+    threshold: float | None = None,
     candidates: Literal['loop_closures', 'all'] | None = None,
     types: Sequence[str] | None = None,
     inliers: Numbers | None = None,

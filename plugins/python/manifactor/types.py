@@ -3,7 +3,7 @@
 Written by `python -m manifactor._generate` from the catalogue."""
 
 from __future__ import annotations
-from typing import Any, Literal, Required, TypedDict
+from typing import Literal, Required, TypedDict
 
 from ._native import Noise
 from .chosen import Factor, Numbers
@@ -37,7 +37,7 @@ class Component(TypedDict, total=False):
     factor: Factor | None
     #: Which of the mixture's variables the factor is over, in its order: places among `keys`, from 0.
     #: Default: all of them.
-    over: Any
+    over: Numbers
     #: What the factor's residual is measured in.
     noise: Noise
 
@@ -90,7 +90,7 @@ class LinearSolver(TypedDict, total=False):
     #: When conjugate gradients stop, and what they are preconditioned by.
     conjugate_gradients: ConjugateGradients
     #: Most memory that the factor may take, in GiB; what the system has available, where it is not given.
-    memory_gib: Any
+    memory_gib: float
 
 
 class ConjugateGradients(TypedDict, total=False):
