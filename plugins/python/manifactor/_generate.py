@@ -272,7 +272,7 @@ def module_of_types(types: Types) -> str:
         parts.append("\n".join(lines))
     body = "\n\n\n".join(parts)
     sequences = "\nfrom collections.abc import Sequence\n" if "Sequence[" in body else ""
-    typing = [name for name in ("Any", "Literal", "Required") if f"{name}[" in body or f": {name}" in body]
+    typing = [name for name in ("Any", "Literal", "Required") if f"{name}[" in body or f": {name}" in body or f"| {name}" in body]
     head = HEADER.format(about="Tables of fields within factors, losses and solvers.")
     head += sequences + f"from typing import {', '.join([*typing, 'TypedDict'])}\n"
     if "Noise" in body:

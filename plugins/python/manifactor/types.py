@@ -3,7 +3,7 @@
 Written by `python -m manifactor._generate` from the catalogue."""
 
 from __future__ import annotations
-from typing import Literal, Required, TypedDict
+from typing import Any, Literal, Required, TypedDict
 
 from ._native import Noise
 from .chosen import Factor, Numbers
