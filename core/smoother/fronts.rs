@@ -71,7 +71,7 @@ impl Fronts {
     /// Assembles and factorizes new fronts, children before parents.
     ///
     /// # Errors
-    /// Where a sum is not finite. The fronts are dropped then.
+    /// If a sum is not finite. The fronts are dropped then.
     pub(crate) fn build(&mut self, tree: &Tree, blocks: &Blocks, new: &[u32]) -> Result<(), Overflow> {
         self.numbers.resize_with(tree.fronts.len(), Numbers::default);
         let arch = self.arch;

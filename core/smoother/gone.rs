@@ -52,7 +52,7 @@ impl GoneKeys {
         }
     }
 
-    /// Whether a new variable may not have this name.
+    /// Returns whether a new variable may not have this name.
     pub(crate) fn is_taken(&self, key: &str) -> bool {
         self.contains(key) && !self.free.contains(key)
     }

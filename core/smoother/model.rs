@@ -49,7 +49,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Whether all of it is held.
+    /// Returns whether all of it is held.
     pub(crate) fn is_held(&self) -> bool {
         self.held.count_ones() as usize == self.tangent.len()
     }
@@ -168,7 +168,7 @@ impl Model {
     pub(crate) fn place_mut(&mut self, variable: u32) -> &mut Place {
         &mut self.places[variable as usize]
     }
-    /// Whether a variable waits, outside of the tree, for factors that determine it.
+    /// Returns whether a variable waits, outside of the tree, for factors that determine it.
     pub(crate) fn is_parked(&self, variable: u32) -> bool {
         self.parked.contains(variable)
     }
@@ -181,7 +181,7 @@ impl Model {
         let has_changed = self.parked.has_changed();
         has_changed.then(|| self.parked.iter().map(|v| self.places[v as usize].key.clone()).collect())
     }
-    /// Whether a variable is to be solved for.
+    /// Returns whether a variable is to be solved for.
     pub(crate) fn is_in_tree(&self, variable: u32) -> bool {
         let place = self.place(variable);
         place.is_there && !self.is_parked(variable) && !place.is_held()
@@ -299,7 +299,7 @@ impl Place {
 }
 
 impl Factor {
-    /// Whether it has a loss.
+    /// Returns whether it has a loss.
     pub(super) fn is_robust(&self) -> bool {
         self.entry.as_ref().is_some_and(|entry| entry.loss.is_some())
     }

@@ -24,7 +24,7 @@ pub struct Report {
     pub damped: usize,
     /// Where many variables had to be: steps that were halved.
     pub halved: usize,
-    /// Whether the update ended in a batch solve, as neither helped.
+    /// True if the update ended in a batch solve, as neither helped.
     pub solved_batch: bool,
     /// Variables that wait for factors to determine them. Their own block of H has no full rank, so that they and their
     /// factors take no part yet.

@@ -79,7 +79,7 @@ impl Session {
     /// The same, of a type that is known.
     ///
     /// # Errors
-    /// Where there is no such variable, or it has another type.
+    /// If there is no such variable, or it has another type.
     pub fn get<M: Variable + Clone + 'static>(&self, key: &str) -> Result<M, ValueError> {
         let value = self.estimate(key).ok_or_else(|| ValueError::Missing { key: key.into() })?;
         let found = value.erased().as_any().downcast_ref::<M>();
@@ -123,7 +123,7 @@ impl Session {
     /// noise; what is held has zeros. It is that of the last linearization points, robust weights included.
     ///
     /// # Errors
-    /// Where a variable is not there or parked, or something that it hangs on is undetermined; if a covariance is too large for a number.
+    /// If a variable is not there or parked, or something that it hangs on is undetermined; if a covariance is too large for a number.
     pub fn covariance(&self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
         let mut variables = vec![];
         for key in keys {
@@ -146,7 +146,7 @@ impl Session {
         self.model.place(variable).key.clone()
     }
 
-    /// What is parked, undetermined and inactive, for a report.
+    /// Parked, undetermined and inactive variables and factors, for a report.
     fn tell(&mut self, report: &mut Report) {
         report.parked = self.undetermined.list_parked(&mut self.model);
         let name = |(v, d): Scalar| Some((self.key(v), *self.model.place(v).tangent.get(d as usize)?));

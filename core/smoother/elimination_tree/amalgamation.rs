@@ -1,7 +1,7 @@
 //! Fewer and larger fronts, at the price of some zeros: relaxed amalgamation (Ashcraft and Grimes, 1989).
 use super::order::Group;
 
-/// Whether a front of `width` columns is worth so many zeros among its entries. Wider than where a whole graph is factorized
+/// Returns whether a front of `width` columns is worth so many zeros among its entries. Wider than where a whole graph is factorized
 /// at once: a front that is redone costs its assembly and its structure, too.
 fn is_worth(width: usize, zeros: usize, entries: usize) -> bool {
     let share = zeros as f64 / entries as f64;

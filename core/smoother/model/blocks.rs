@@ -50,7 +50,7 @@ struct Variable {
     diagonal: usize,
     /// A bit for each direction that is held.
     held: u32,
-    /// What is added to the diagonal of its block, so that steps are shorter.
+    /// Damping: a number that is added to the diagonal of its block, so that steps are shorter.
     damping: f64,
     factors: Vec<Part>,
     coupled: Vec<Coupling>,
@@ -211,7 +211,7 @@ impl Blocks {
         }
     }
 
-    /// Has the sums that a factor is part of made anew.
+    /// Marks the sums that a factor is part of for another evaluation.
     pub(crate) fn mark_factor(&mut self, members: &[(u32, u32)]) {
         for (n, &(v, _)) in members.iter().enumerate() {
             self.mark(v);
@@ -293,7 +293,7 @@ impl Blocks {
         }
     }
 
-    /// Whether the diagonal of H and the gradient of a variable are finite: that bounds the rest.
+    /// Returns whether the diagonal of H and the gradient of a variable are finite: that bounds the rest.
     pub(crate) fn is_finite(&self, variable: u32) -> bool {
         let own = self.precision(variable).iter().chain(self.gradient(variable));
         own.into_iter().all(|x| x.is_finite())

@@ -44,7 +44,7 @@ impl Model {
         &self.rejected
     }
 
-    /// Whether a factor is left out as an outlier.
+    /// Returns whether a factor is left out as an outlier.
     pub(crate) fn is_rejected(&self, number: u32) -> bool {
         self.rejected.contains(&number)
     }
@@ -72,7 +72,7 @@ impl Model {
         before
     }
 
-    /// Whether a factor was defined where it was last linearized.
+    /// Returns whether a factor was defined where it was last linearized.
     pub(crate) fn is_defined(&self, number: u32) -> bool {
         self.factor(number).is_some_and(|factor| {
             let batch = || &self.batches.as_slice()[factor.batch as usize];
@@ -80,12 +80,12 @@ impl Model {
         })
     }
 
-    /// Whether a factor takes part: it is defined where it was last linearized, and counts.
+    /// Returns whether a factor takes part: it is defined where it was last linearized, and counts.
     pub(crate) fn takes_part(&self, number: u32) -> bool {
         self.is_defined(number) && self.factor(number).is_some_and(|factor| factor.weight != 0.0)
     }
 
-    /// Whether a factor is no outlier, and none of its variables is parked.
+    /// Returns whether a factor is no outlier, and none of its variables is parked.
     pub(crate) fn is_whole(&self, number: u32) -> bool {
         let is_in = |factor: &Factor| factor.variables().all(|v| !self.is_parked(v));
         self.factor(number).is_some_and(|factor| !self.is_rejected(number) && is_in(factor))

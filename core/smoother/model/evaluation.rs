@@ -31,7 +31,7 @@ impl Model {
         total
     }
 
-    /// Whether a factor's part of H and g is finite.
+    /// Returns whether a factor's part of H and g is finite.
     pub(crate) fn is_finite(&self, factor: u32) -> bool {
         self.factor(factor).is_none_or(|factor| self.regions.is_finite(factor.region))
     }
@@ -56,7 +56,7 @@ impl Model {
         factors.map(one).fold(Evaluation::default(), Evaluation::and)
     }
 
-    /// Whether any factor has a loss.
+    /// Returns whether any factor has a loss.
     pub(crate) fn has_losses(&self) -> bool {
         self.robust > 0
     }

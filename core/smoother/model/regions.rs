@@ -1,4 +1,4 @@
-//! Where each factor adds its part of the normal equations: a region of its own, so that it can be made again, or taken
+//! Regions of the normal equations: each factor adds its part to one of its own, so that it can be made again, or taken
 //! away, without a look at any other.
 use manifactor_graph::normal_equations::NormalEquations;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ pub(crate) struct Region {
     pub h: usize,
     pub g: usize,
     pub scalars: u32,
-    /// Whether its part counts: not where a variable is parked.
+    /// True if its part counts: not where a variable is parked.
     pub counts: bool,
 }
 
@@ -22,7 +22,7 @@ impl Region {
         let n = self.scalars as usize;
         n * (n + 1) / 2
     }
-    /// Where entry (column, column) of the triangle is.
+    /// Index of the entry (column, column) of the triangle.
     #[inline(always)]
     pub(crate) fn column(self, column: usize) -> usize {
         let n = self.scalars as usize;
@@ -77,7 +77,7 @@ impl Regions {
         self.g[region.g..region.g + region.scalars as usize].fill(0.0);
     }
 
-    /// Whether all numbers of a region are finite.
+    /// Returns whether all numbers of a region are finite.
     pub(crate) fn is_finite(&self, place: u32) -> bool {
         let region = self[place];
         let (h, g) =

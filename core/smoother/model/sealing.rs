@@ -1,4 +1,4 @@
-//! What variables that leave say of those that stay: a linear prior at the linearization points.
+//! Marginalization: variables that leave become a linear prior on those that stay, at the linearization points.
 //!
 //! With the quadratic ½ δᵀHδ + gᵀδ + c of the factors of a variable, split into its own part L and the others' part B,
 //! eliminating it leaves the Schur complement H_BB − H_BL H_LL⁻¹ H_LB, and g and c in the same way.

@@ -8,7 +8,7 @@ use std::any::TypeId;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct NewNumber {
     pub number: u32,
-    /// Whether another variable had it before.
+    /// True if another variable had it before.
     pub is_reused: bool,
 }
 

@@ -20,7 +20,7 @@ pub(super) struct NewVariable {
     pub(super) time: f64,
 }
 
-/// What the next update is to do.
+/// Changes that the next update makes.
 #[derive(Default)]
 pub(super) struct Pending {
     pub(super) variables: IndexMap<Key, NewVariable>,
@@ -49,7 +49,7 @@ impl Session {
     /// and the report names it.
     ///
     /// # Errors
-    /// Where a variable is there already, or factors do not fit: everything that is wrong with them; where the window is by seconds,
+    /// If a variable is there already, or factors do not fit: everything that is wrong with them; where the window is by seconds,
     /// and no time is set. Nothing is added then.
     pub fn push(&mut self, factors: &Graph, values: &Values) -> Result<Vec<FactorId>, ChangeError> {
         let time = self.schedule.time_of_new(self.pending.time)?;
@@ -121,7 +121,7 @@ impl Session {
     /// back with it where that fails.
     ///
     /// # Errors
-    /// Where `time` is not finite, or before the one that was set last.
+    /// If `time` is not finite, or before the one that was set last.
     pub fn set_time(&mut self, time: f64) -> Result<(), ChangeError> {
         self.schedule.check_time(self.pending.time, time)?;
         self.pending.time = Some(time);
@@ -139,7 +139,7 @@ impl Session {
     /// is parked.
     ///
     /// # Errors
-    /// Where one of them is not there. None is taken away then.
+    /// If one of them is not there. None is taken away then.
     pub fn remove(&mut self, factors: &[FactorId]) -> Result<(), ChangeError> {
         let mut seen = std::collections::HashSet::new();
         if let Some(factor) = factors.iter().find(|f| self.entry(**f).is_none() || !seen.insert(**f)) {
@@ -156,7 +156,7 @@ impl Session {
     /// counts once. Takes effect at the next [`update`](Self::update).
     ///
     /// # Errors
-    /// Where there is no such factor, or `entry` does not fit, or is between other variables.
+    /// If there is no such factor, or `entry` does not fit, or is between other variables.
     pub fn replace(&mut self, factor: FactorId, entry: FactorEntry) -> Result<(), ChangeError> {
         let before = self.entry(factor).ok_or_else(|| self.no_factor(factor))?;
         if before.keys != entry.keys {
@@ -174,7 +174,7 @@ impl Session {
     /// [`update`](Self::update).
     ///
     /// # Errors
-    /// Where there is no such factor, or the weight is negative or not finite.
+    /// If there is no such factor, or the weight is negative or not finite.
     pub fn set_weight(&mut self, factor: FactorId, weight: f64) -> Result<(), ChangeError> {
         self.entry(factor).ok_or_else(|| self.no_factor(factor))?;
         if !(weight >= 0.0 && weight.is_finite()) {
@@ -188,7 +188,7 @@ impl Session {
     /// `Fixed::Whole(false)`. Takes effect at the next [`update`](Self::update).
     ///
     /// # Errors
-    /// Where there is no such variable, or its tangent space has no such direction.
+    /// If there is no such variable, or its tangent space has no such direction.
     pub fn fix(&mut self, key: &Key, fixed: &Fixed) -> Result<(), ChangeError> {
         let tangent = self.tangent(key.as_str()).ok_or_else(|| self.no_variable(key))?;
         let variable = self.model.variable(key.as_str());

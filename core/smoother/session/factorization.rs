@@ -26,7 +26,7 @@ impl Factorization {
         self.fronts.resize(variables);
     }
 
-    /// Whether a variable is solved for.
+    /// Returns whether a variable is solved for.
     pub(super) fn contains(&self, variable: u32) -> bool {
         self.tree.front_of(variable) != NONE
     }
@@ -36,7 +36,7 @@ impl Factorization {
         self.open.iter().copied()
     }
 
-    /// Whether no factor constrains one of a variable's directions.
+    /// Returns whether no factor constrains one of a variable's directions.
     pub(super) fn is_open(&self, variable: u32) -> bool {
         self.open.range((variable, 0)..=(variable, u32::MAX)).next().is_some()
     }

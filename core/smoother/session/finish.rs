@@ -15,7 +15,7 @@ use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 pub struct Finished {
     /// The estimate of each variable; those that were parked are where they were.
     pub values: Values,
-    /// What the solver has to tell. Its factors count from 0 in the order of `factors`; after these come the rows of linear
+    /// Outcome of the solver. Its factors count from 0 in the order of `factors`; after these come the rows of linear
     /// priors.
     pub outcome: Outcome,
     /// The factors that took part: all, but for those of parked variables.
@@ -51,7 +51,7 @@ impl Session {
     /// Solves all that is there as one batch, from the estimate. The session stays as it is.
     ///
     /// # Errors
-    /// Where there is nothing to solve for, or there is no memory.
+    /// If there is nothing to solve for, or there is no memory.
     pub fn finish(
         &self,
         optimizer: &dyn Optimizer,

@@ -79,7 +79,7 @@ impl Session {
         (is_named && couples).then_some(Candidate { bound, gain, since: self.schedule.updates() + 1 })
     }
 
-    /// Whether a new factor between these variables is odometry: they are neighbours, and no trusted factor connects them yet.
+    /// Returns whether a new factor between these variables is odometry: they are neighbours, and no trusted factor connects them yet.
     fn is_odometry(&self, variables: &[u32]) -> bool {
         let places = variables.iter().map(|v| self.model.place(*v));
         if !is_sequential(places.map(|place| (place.column as usize, place.ordinal))) {

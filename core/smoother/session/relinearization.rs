@@ -34,7 +34,7 @@ impl Session {
         self.steps.excess(&self.model, variable, *self.schedule.settings().bend)
     }
 
-    /// Whether something cannot wait for the next turn: after a large loop closure, a step is no estimate of anything.
+    /// Returns whether something cannot wait for the next turn: after a large loop closure, a step is no estimate of anything.
     pub(super) fn is_urgent(&mut self) -> bool {
         let most = self.schedule.urgent_excess();
         let mut queue = std::mem::take(&mut self.queue);
@@ -141,7 +141,7 @@ impl Session {
         variables
     }
 
-    /// Whether a variable is out of the region of its linearization, and solved for.
+    /// Returns whether a variable is out of the region of its linearization, and solved for.
     pub(super) fn is_out(&self, variable: u32) -> bool {
         self.excess(variable) > self.schedule.largest_excess() && self.may_move(variable)
     }
@@ -151,7 +151,7 @@ impl Session {
         self.steps.damped().filter(|v| self.may_move(*v))
     }
 
-    /// Whether a variable may be linearized anew: it is solved for, and no prior holds its point.
+    /// Returns whether a variable may be linearized anew: it is solved for, and no prior holds its point.
     fn may_move(&self, variable: u32) -> bool {
         self.factorization.contains(variable) && self.model.place(variable).sealed == 0
     }

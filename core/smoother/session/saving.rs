@@ -12,7 +12,7 @@ impl Session {
     /// same kind; on another, estimates are the same until the next update, and then up to rounding.
     ///
     /// # Errors
-    /// Where there are changes that no update has made yet, or a factor or value has no text.
+    /// If there are changes that no update has made yet, or a factor or value has no text.
     pub fn save(&self) -> Result<String, SaveError> {
         if !self.pending.is_empty() {
             return Err(SaveError::Pending);
@@ -65,7 +65,7 @@ impl Session {
     /// A session as it was [saved](Self::save).
     ///
     /// # Errors
-    /// Where the text is none, is damaged, or is of another version; where this program does not have a type of its variables
+    /// If the text is none, is damaged, or is of another version; where this program does not have a type of its variables
     /// or factors; where it contradicts itself.
     pub fn load(text: &str) -> Result<Self, LoadError> {
         let saved = Saved::read(text)?;
@@ -130,7 +130,7 @@ impl Session {
         Some(SavedPrior { number, variables, h: bits(h), g: bits(g), constant: constant.to_bits() })
     }
 
-    /// What variables that are gone have left behind.
+    /// Traces of variables that are gone.
     fn put_priors(&mut self, priors: &[SavedPrior], next: u32) -> Result<(), LoadError> {
         let n = self.model.variables() as u32;
         for SavedPrior { number, variables, h, g, constant } in priors {

@@ -12,9 +12,9 @@ const FINE: f64 = 1e-8;
 pub(super) struct Schedule {
     settings: Settings,
     updates: usize,
-    /// Whether the last update had no changes.
+    /// True if the last update had no changes.
     is_quiet: bool,
-    /// Whether the current update and the one before it have no changes.
+    /// True if the current update and the one before it have no changes.
     is_idle: bool,
     window: SlidingWindow,
 }
@@ -40,12 +40,12 @@ impl Schedule {
         self.updates
     }
 
-    /// Whether the last update had no changes.
+    /// Returns whether the last update had no changes.
     pub(super) fn is_quiet(&self) -> bool {
         self.is_quiet
     }
 
-    /// Whether the current update and the one before it have no changes.
+    /// Returns whether the current update and the one before it have no changes.
     pub(super) fn is_idle(&self) -> bool {
         self.is_idle
     }
@@ -61,7 +61,7 @@ impl Schedule {
         self.is_quiet = is_quiet;
     }
 
-    /// Whether the update that has begun relinearizes by its turn.
+    /// Returns whether the update that has begun relinearizes by its turn.
     pub(super) fn is_turn(&self) -> bool {
         self.is_idle || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.get())
     }

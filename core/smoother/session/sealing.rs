@@ -43,7 +43,7 @@ impl Session {
     /// its key.
     ///
     /// # Errors
-    /// Where a variable is not there, or gone already. None leaves then.
+    /// If a variable is not there, or gone already. None leaves then.
     pub fn marginalize<K: AsRef<str>>(&mut self, keys: &[K]) -> Result<(), ChangeError> {
         for key in keys.iter().map(AsRef::as_ref) {
             if self.find(key).is_none() {

@@ -53,7 +53,7 @@ impl Steps {
         self.delta[model.blocks.range(variable)].fill(0.0);
     }
 
-    /// Whether a variable has a step other than zero.
+    /// Returns whether a variable has a step other than zero.
     pub(super) fn has_step(&self, model: &Model, variable: u32) -> bool {
         model.place(variable).is_there && self.of(model, variable).iter().any(|step| *step != 0.0)
     }
@@ -133,7 +133,7 @@ impl Steps {
         self.damped.iter().copied()
     }
 
-    /// Whether a variable's steps are damped.
+    /// Returns whether a variable's steps are damped.
     pub(super) fn is_damped(&self, variable: u32) -> bool {
         self.damped.contains(&variable)
     }

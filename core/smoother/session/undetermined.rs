@@ -138,7 +138,7 @@ impl Undetermined {
         self.inactive.remove(&factor);
     }
 
-    /// Has parked variables looked at again by the next update, as their factors say something else now.
+    /// Marks parked variables for the next update, because their factors have changed.
     pub(super) fn doubt_parked(&mut self, model: &Model, factors: &[u32]) {
         let factors = factors.iter().filter(|f| !model.is_whole(**f)).filter_map(|f| model.factor(*f));
         let parked = factors.flat_map(|f| f.variables()).filter(|v| model.is_parked(*v));
@@ -183,7 +183,7 @@ impl Undetermined {
     }
 }
 
-/// Whether the factors that could count determine a variable, all others being known.
+/// Returns whether the factors that could count determine a variable, all others being known.
 fn is_determined(model: &Model, variable: u32) -> bool {
     let others_are_in = |f: u32| {
         let mut others = model.factor(f).into_iter().flat_map(|f| f.variables());
@@ -193,7 +193,7 @@ fn is_determined(model: &Model, variable: u32) -> bool {
     has_full_rank(&mut h, model.dim(variable))
 }
 
-/// Whether a symmetric matrix, of which the lower triangle counts, has full rank once it is scaled to a unit diagonal.
+/// Returns whether a symmetric matrix, of which the lower triangle counts, has full rank once it is scaled to a unit diagonal.
 fn has_full_rank(h: &mut [f64], d: usize) -> bool {
     let scale: Vec<f64> = (0..d).map(|c| 1.0 / h[c * d + c].sqrt()).collect();
     if !scale.iter().all(|s| s.is_finite()) {

@@ -11,7 +11,7 @@ use crate::report::Report;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// What takes changes back.
+/// The state that takes changes back.
 #[derive(Default)]
 pub(super) struct Undo {
     pub(super) variables: Vec<NewNumber>,
@@ -31,7 +31,7 @@ impl Session {
     /// [`deviation`](crate::Settings::deviation), so that repeated updates lead to the minimum.
     ///
     /// # Errors
-    /// Where a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last
+    /// If a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last
     /// update are taken back then, and the session is as that left it; ids of the pushed factors are void.
     pub fn update(&mut self) -> Result<Report, UpdateError> {
         let pending = std::mem::take(&mut self.pending);

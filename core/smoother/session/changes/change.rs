@@ -32,7 +32,7 @@ pub(in crate::session) enum Change {
     },
 }
 
-/// What changes have touched.
+/// Variables and factors that changes have touched.
 #[derive(Debug, Default)]
 pub(in crate::session) struct Touched {
     /// Variables whose blocks of H have changed.

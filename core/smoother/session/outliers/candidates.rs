@@ -44,7 +44,7 @@ impl OutlierCandidates {
         self.candidates.iter().map(|(f, candidate)| (*f, *candidate))
     }
 
-    /// Whether a factor is a candidate, and counts.
+    /// Returns whether a factor is a candidate, and counts.
     pub(in crate::session) fn counts(&self, model: &Model, factor: u32) -> bool {
         self.contains(factor) && !model.is_rejected(factor)
     }

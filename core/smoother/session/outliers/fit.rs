@@ -1,4 +1,4 @@
-//! What factors cost on top of what is known.
+//! The cost of factors beside the information that the smoother has.
 use crate::elimination_tree::Couplings;
 use crate::model::Model;
 use crate::session::factorization::Factorization;
@@ -10,7 +10,7 @@ const STEPS: usize = 10;
 /// Halvings of such a step.
 const HALVINGS: usize = 5;
 
-/// What factors say on top of what is known.
+/// Information of factors beside that of the smoother.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Surprise {
     /// min Σ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ.

@@ -1,4 +1,4 @@
-//! Whether rejected factors are right and what counts is wrong: all of them count for a while, by shares that part them.
+//! Trials of rejected factors: all of them count for a while, with weights that separate the consistent ones.
 //!
 //! Shares follow the scale-invariant graduated kernel of riSAM (McGann, Rogers and Kaess, *Robust Incremental Smoothing and
 //! Mapping*, ICRA 2023): ρ = ½c²r² / (c² + r^2μ), with μ from 0, where it is a quadratic, to 1, where it is Geman and

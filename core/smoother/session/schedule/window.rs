@@ -88,7 +88,7 @@ impl Schedule {
         }
     }
 
-    /// Whether a variable is of a type that leaves a window.
+    /// Returns whether a variable is of a type that leaves a window.
     fn leaves(&self, model: &Model, variable: u32) -> bool {
         let Some(window) = &self.settings.window else { return false };
         let name = model.point(variable).map_or("", |point| point.typetag_name());

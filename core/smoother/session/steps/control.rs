@@ -24,7 +24,7 @@ impl Steps {
         self.moved.iter().map(|(v, first)| (*v, &self.before[*first..*first + model.blocks.dim(*v)]))
     }
 
-    /// Whether the factors around some variables cost more than with these steps.
+    /// Returns whether the factors around some variables cost more than with these steps.
     pub(in crate::session) fn has_risen(
         &mut self,
         model: &mut Model,
