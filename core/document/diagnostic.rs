@@ -163,7 +163,7 @@ impl Errors {
         self.0.borrow_mut().extend(diagnostics);
     }
 
-    /// Whether nothing is wrong so far.
+    /// Returns whether nothing is wrong so far.
     pub fn is_empty(&self) -> bool {
         self.0.borrow().is_empty()
     }

@@ -95,7 +95,7 @@ struct Rest {
 }
 
 impl Rest {
-    /// Whether an error only says that something is missing which was taken out, or was called otherwise.
+    /// Returns whether an error only says that something is missing which was taken out, or was called otherwise.
     fn explains(&self, place: &Place, fault: &Fault) -> bool {
         let is_cut =
             |by: &str| self.cut.iter().any(|(at, field)| at == place && (by.is_empty() || by == field));

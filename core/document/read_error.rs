@@ -55,7 +55,7 @@ impl ReadError {
         }
     }
 
-    /// Whether a field is there that nothing reads: without it, reading may go on.
+    /// Returns whether a field is there that nothing reads: without it, reading may go on.
     pub(crate) fn is_unread_field(&self) -> bool {
         matches!(&*self.0, Inner::Placed { unread: true, .. })
     }

@@ -44,7 +44,7 @@ impl<'e> Section<'e> {
         self.node.field(field).unwrap_or(self.node).place.clone()
     }
 
-    /// Whether the field is there and not yet taken.
+    /// Returns whether the field is there and not yet taken.
     pub fn has(&self, field: &str) -> bool {
         self.node.field(field).is_some() && !self.is_asked(field)
     }

@@ -112,7 +112,7 @@ impl Place {
         self
     }
 
-    /// Whether all of another place is within this one, or is this one. What was not read from a text is nowhere.
+    /// Returns whether all of another place is within this one, or is this one. What was not read from a text is nowhere.
     pub fn contains(&self, other: &Place) -> bool {
         self.start <= other.start
             && other.end <= self.end

@@ -110,7 +110,7 @@ pub trait ErasedResidual: Send + Sync {
     fn new_batch(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> Box<dyn Batch>;
     /// The residual; `None` where number or types of variables do not fit.
     fn residual(&self, variables: &[&dyn Variable]) -> Option<Vec<f64>>;
-    /// Whether the residual means anything there; `None` where variables do not fit.
+    /// Returns whether the residual means anything there; `None` where variables do not fit.
     fn is_defined(&self, variables: &[&dyn Variable]) -> Option<bool>;
     /// The residual with its Jacobian, analytic where the author wrote one.
     fn linearize(&self, variables: &[&dyn Variable]) -> Option<Linearization>;

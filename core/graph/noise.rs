@@ -169,28 +169,28 @@ impl Noise {
     /// The same standard deviation in every row.
     ///
     /// # Errors
-    /// Where it is not a positive number.
+    /// If it is not a positive number.
     pub fn sigma(s: f64) -> Result<Self, NoiseError> {
         Ok(Model::Isotropic(sigma(s)?).into())
     }
     /// A standard deviation for each row.
     ///
     /// # Errors
-    /// Where one is not a positive number.
+    /// If one is not a positive number.
     pub fn sigmas(s: &[f64]) -> Result<Self, NoiseError> {
         Ok(Model::Diagonal(s.iter().map(|s| sigma(*s)).collect::<Result<_, _>>()?).into())
     }
     /// A covariance matrix.
     ///
     /// # Errors
-    /// Where it is not symmetric and positive definite.
+    /// If it is not symmetric and positive definite.
     pub fn covariance(m: DMatrix<f64>) -> Result<Self, NoiseError> {
         Ok(Model::Covariance(spd(m)?).into())
     }
     /// An information matrix, the inverse of a covariance.
     ///
     /// # Errors
-    /// Where it is not symmetric and positive definite.
+    /// If it is not symmetric and positive definite.
     pub fn information(m: DMatrix<f64>) -> Result<Self, NoiseError> {
         Ok(Model::Information(spd(m)?).into())
     }
@@ -203,7 +203,7 @@ impl Noise {
     /// The same noise, of a measurement that counts `weight` times: its information, multiplied.
     ///
     /// # Errors
-    /// Where that is not positive and finite.
+    /// If that is not positive and finite.
     pub fn weighted(&self, weight: f64) -> Result<Self, NoiseError> {
         let spread = sigma(weight)?.sqrt().recip();
         let model = match &self.model {
@@ -221,7 +221,7 @@ impl Noise {
     pub fn observed(&self) -> Option<&[bool]> {
         self.observed.as_deref()
     }
-    /// Whether it is the unit noise of all rows.
+    /// Returns whether it is the unit noise of all rows.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
@@ -229,7 +229,7 @@ impl Noise {
     /// W, in its cheapest form, for a residual of `rows` rows.
     ///
     /// # Errors
-    /// Where the noise has another number of rows, or observes none.
+    /// If the noise has another number of rows, or observes none.
     pub fn whitener(&self, rows: usize) -> Result<Whitener, NoiseError> {
         let check = |found: usize| match found == rows {
             true => Ok(()),

@@ -24,7 +24,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Whether it is a vector of numbers.
+    /// Returns whether it is a vector of numbers.
     pub fn is_vector(&self) -> bool {
         VECTORS.contains(&self.name)
     }

@@ -36,7 +36,7 @@ pub trait Residual: Debug + Clone + Send + Sync + 'static {
     /// The residual, not whitened.
     fn residual<T: Scalar>(&self, variables: Lifted<Self::Variables, T>) -> Vector<Self::Dim, T>;
 
-    /// Whether the residual means anything at this point; an object behind a camera has no box.
+    /// Returns whether the residual means anything at this point; an object behind a camera has no box.
     ///
     /// A factor that is not defined where a problem is linearized takes no part in that step; a
     /// step that would make a defined factor undefined is refused by solvers with step control.

@@ -72,7 +72,7 @@ pub trait ErasedManifold {
     fn retract(&self, delta: &[f64]) -> Option<Box<dyn Variable>>;
     /// The tangent vector to `other`; `None` where that has another type.
     fn local(&self, other: &dyn Variable) -> Option<Vec<f64>>;
-    /// Whether every coordinate is finite.
+    /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
     /// The same point again.
     fn clone_box(&self) -> Box<dyn Variable>;

@@ -9,7 +9,7 @@ use std::any::TypeId;
 /// The example in the docs of a registered type.
 ///
 /// # Errors
-/// Where there is none, or it cannot be read.
+/// If there is none, or it cannot be read.
 pub fn example<K: Kind + ?Sized>(entry: &'static Entry) -> Result<Box<K>, LawError> {
     entry.read::<K>(&example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))
 }

@@ -50,7 +50,7 @@ pub struct ManifoldReport {
 }
 
 impl ManifoldReport {
-    /// Whether every law holds.
+    /// Returns whether every law holds.
     pub fn holds(&self) -> bool {
         self.broken.is_none()
     }

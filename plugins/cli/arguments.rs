@@ -112,7 +112,7 @@ impl Cli {
         Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, NonZero::get)))
     }
 
-    /// Whether results are to be JSON.
+    /// Returns whether results are to be JSON.
     pub fn json(&self) -> bool {
         match &self.command {
             Command::Run(command) => command.options.json,

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Whether results were lost on their way out.
 static LOST: AtomicBool = AtomicBool::new(false);
 
-/// Whether standard output could not take all that was printed.
+/// Returns whether standard output could not take all that was printed.
 pub(crate) fn is_lost() -> bool {
     LOST.load(Ordering::Relaxed)
 }

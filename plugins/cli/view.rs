@@ -46,7 +46,7 @@ impl View {
     /// Serves the page on this address from now on; port 0 is one that is free.
     ///
     /// # Errors
-    /// Where the address cannot be listened at.
+    /// If the address cannot be listened at.
     pub(crate) fn open(address: SocketAddr) -> Result<Self, Failure> {
         let failed = |error: std::io::Error| {
             let help = "choose another with --view=ADDRESS; with port 0, or --view alone, the system chooses a free one";

@@ -96,7 +96,7 @@ impl Program {
     pub fn len(&self) -> usize {
         self.code.calls.len()
     }
-    /// Whether it computes nothing.
+    /// Returns whether it computes nothing.
     pub fn is_empty(&self) -> bool {
         self.code.calls.is_empty()
     }

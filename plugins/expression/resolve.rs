@@ -130,7 +130,7 @@ impl Library {
     }
 }
 
-/// Whether it is a function rather than an operator.
+/// Returns whether it is a function rather than an operator.
 pub(crate) fn is_word(name: &str) -> bool {
     name.starts_with(char::is_alphabetic)
 }

@@ -88,7 +88,7 @@ const CAMERA: usize = 9;
 const FOCAL_LENGTH: usize = 6;
 const POINT: usize = 3;
 
-/// Whether a text begins as a BAL file does: with three whole numbers.
+/// Returns whether a text begins as a BAL file does: with three whole numbers.
 pub fn begins(text: &str) -> bool {
     lines(text).next().is_some_and(|(_, line)| header(line).is_ok())
 }

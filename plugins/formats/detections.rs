@@ -55,7 +55,7 @@ impl Detection {
     /// The classes and their scores: those of `scores`, or the best alone; none for a box without a class.
     ///
     /// # Errors
-    /// Where `scores` is not written as it should be.
+    /// If `scores` is not written as it should be.
     pub fn class_scores(&self) -> Result<Vec<(String, f64)>, Mistake> {
         let Some(scores) = self.scores.as_deref().filter(|s| !s.is_empty()) else {
             let named = Some(&self.class_name).filter(|name| !name.is_empty());
@@ -169,7 +169,7 @@ fn reason(e: &csv::Error, header: &StringRecord) -> String {
 /// Writes detections with all columns.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write(path: impl AsRef<Path>, detections: &[Detection]) -> Result<(), FormatError> {
     let path = path.as_ref();
     let other = |e: csv::Error| FormatError::Io { path: path.to_owned(), source: e.into() };

@@ -88,7 +88,7 @@ impl Replay {
         self.steps.len()
     }
 
-    /// Whether no step is left.
+    /// Returns whether no step is left.
     pub fn is_empty(&self) -> bool {
         self.steps.is_empty()
     }
@@ -96,7 +96,7 @@ impl Replay {
     /// The next step, `None` after the last. New variables start from where `estimate` has those that are known.
     ///
     /// # Errors
-    /// Where a factor takes a variable for another type than its estimate has.
+    /// If a factor takes a variable for another type than its estimate has.
     pub fn step(
         &mut self,
         estimate: impl Fn(&str) -> Option<Box<dyn Variable>>,

@@ -47,7 +47,7 @@ impl Column {
         }
     }
 
-    /// Whether there is no cell.
+    /// Returns whether there is no cell.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -65,7 +65,7 @@ impl Table {
     /// How many rows there are.
     ///
     /// # Errors
-    /// Where columns differ in length.
+    /// If columns differ in length.
     pub fn rows(&self) -> Result<usize, TableError> {
         let expected = self.columns.first().map_or(0, |(_, column)| column.len());
         match self.columns.iter().find(|(_, column)| column.len() != expected) {
@@ -80,7 +80,7 @@ impl Table {
     /// apostrophe before it: one that begins with `=`, `+`, `-`, `@`, a tab or a line break, and is no number.
     ///
     /// # Errors
-    /// Where columns differ in length.
+    /// If columns differ in length.
     pub fn to_csv(&self) -> Result<String, TableError> {
         let fail = |error: &dyn std::fmt::Display| TableError::Writer(error.to_string());
         let rows = self.rows()?;

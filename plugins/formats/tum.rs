@@ -116,7 +116,7 @@ pub fn format(trajectory: &[StampedPose]) -> String {
 /// Writes a trajectory.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write(path: impl AsRef<Path>, trajectory: &[StampedPose]) -> Result<(), FormatError> {
     write_text(path.as_ref(), &format(trajectory))
 }

@@ -18,17 +18,17 @@ const SUFFIX: &str = ".unfinished";
 /// then. A file that is replaced keeps its permissions; a link is replaced, and what it points to is left alone.
 ///
 /// # Errors
-/// Where it cannot be written; what was there before is there still, and nothing else.
+/// If it cannot be written; what was there before is there still, and nothing else.
 pub fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
     let written = if is_stream(path) { write_stream(path, content) } else { replace(path, content) };
     tracing::debug!(file = %path.display(), bytes = content.len(), whole = written.is_ok(), "written");
     written
 }
 
-/// Whether a file can be written: asked before hours are spent on what goes there.
+/// Returns whether a file can be written: asked before hours are spent on what goes there.
 ///
 /// # Errors
-/// Where it cannot, with what the system says.
+/// If it cannot, with what the system says.
 pub fn can_write(path: &Path) -> io::Result<()> {
     if path.is_dir() {
         return Err(ErrorKind::IsADirectory.into());
@@ -59,7 +59,7 @@ pub fn remove_unfinished(folder: &Path) {
 /// that what is written stays in its folder.
 ///
 /// # Errors
-/// Where it is a link or no regular file; where it cannot be opened.
+/// If it is a link or no regular file; where it cannot be opened.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     let refused = || io::Error::new(ErrorKind::InvalidInput, "it is a link, or not a regular file");
     let mut options = OpenOptions::new();
@@ -80,7 +80,7 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
 /// The bytes of a regular file. A pipe, which would be waited for without end, is refused.
 ///
 /// # Errors
-/// Where it cannot be read, or is a link or no regular file.
+/// If it cannot be read, or is a link or no regular file.
 pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
     if !path.symlink_metadata()?.is_file() {
         return Err(io::Error::new(ErrorKind::InvalidInput, "it is a link, or not a regular file"));

@@ -107,7 +107,7 @@ pub enum CertificateError {
 /// Certifies the minimum that an estimate of a pose graph is close to.
 ///
 /// # Errors
-/// Where the graph is more than relative poses and priors of one type, in squared costs.
+/// If the graph is more than relative poses and priors of one type, in squared costs.
 pub fn certify(graph: &Graph, values: &Values) -> Result<Certificate, CertificateError> {
     if let Some(factor) = graph.factors().iter().position(|f| f.loss.is_some()) {
         return Err(CertificateError::RobustLoss { factor });

@@ -26,7 +26,7 @@ pub trait Initialiser: Debug + Send + Sync {
     /// An object that all views show, in the frame of their poses.
     ///
     /// # Errors
-    /// Where the views do not say enough, or what they say is no object in front of them.
+    /// If the views do not say enough, or what they say is no object in front of them.
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError>;
 }
 

@@ -141,7 +141,7 @@ pub enum MixtureError {
 
 impl MaxMixture {
     /// # Errors
-    /// Where the components do not fit together.
+    /// If the components do not fit together.
     pub fn new(components: Vec<Component>) -> Result<Self, MixtureError> {
         let mixture = Dynamic::new(Mixture::new(&components)?)?;
         Ok(Self { document: Document { components }, mixture })

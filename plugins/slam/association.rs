@@ -27,7 +27,7 @@ pub trait Association: Debug + Send + Sync {
     /// Begins, with the objects of an earlier map, where there is one, known as well as they are trusted.
     fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator>;
 
-    /// Whether it takes the names that the source gives. Where it does not, they may serve to score it.
+    /// Returns whether it takes the names that the source gives. Where it does not, they may serve to score it.
     fn uses_names(&self) -> bool {
         false
     }
@@ -67,7 +67,7 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// Whether no box has another object for it.
+    /// Returns whether no box has another object for it.
     pub(crate) fn is_nothing(&self) -> bool {
         self.moved.is_empty() && self.merged.is_empty()
     }

@@ -131,7 +131,7 @@ impl Estimate {
     /// [`variance`]. The graph of the estimate has the noise of its last solve.
     ///
     /// # Errors
-    /// Where graph and values do not fit each other, or the noise cannot be estimated.
+    /// If graph and values do not fit each other, or the noise cannot be estimated.
     pub fn new(
         sequence: Arc<Sequence>,
         mapping: Mapping,
@@ -197,7 +197,7 @@ impl Estimate {
     /// Each of these steps lowers the cost or does nothing.
     ///
     /// # Errors
-    /// Where graph and values do not fit each other.
+    /// If graph and values do not fit each other.
     fn solve(
         sequence: Arc<Sequence>,
         mapping: Mapping,

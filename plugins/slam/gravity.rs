@@ -22,7 +22,7 @@ pub trait Gravity: Debug + Send + Sync {
     /// Up, and the frame of the map.
     ///
     /// # Errors
-    /// Where the sequence does not have what this needs.
+    /// If the sequence does not have what this needs.
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError>;
 
     /// In a stream: seconds after the first frame from which on nothing that comes makes a difference.

@@ -105,7 +105,7 @@ impl Mapping {
     /// Makes the graph of a sequence.
     ///
     /// # Errors
-    /// Where there is no frame, or up is not known and a rule needs it.
+    /// If there is no frame, or up is not known and a rule needs it.
     pub fn new(sequence: &Sequence, settings: &Settings) -> Result<Self, MappingError> {
         let first = sequence.frames.first().ok_or(MappingError::NoFrames)?;
         let located = settings.gravity.locate(sequence)?;

@@ -149,7 +149,7 @@ impl Mapper {
     /// `association` says which object a box shows.
     ///
     /// # Errors
-    /// Where the pose cannot be taken. Boxes that cannot be taken are no error: the report tells of them.
+    /// If the pose cannot be taken. Boxes that cannot be taken are no error: the report tells of them.
     pub fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
         let mut report = FrameReport::new(self.live.len(), observation.frame.timestamp);
         let seen = self.take_pose(observation, &mut report)?;
@@ -225,7 +225,7 @@ impl Mapper {
     /// they came have another chance, with all their boxes: what is mapped in the end is what a batch maps.
     ///
     /// # Errors
-    /// Where `sequence`, all frames that were taken, has none, or the graph cannot be solved.
+    /// If `sequence`, all frames that were taken, has none, or the graph cannot be solved.
     pub fn finish(
         self,
         sequence: Arc<Sequence>,

@@ -79,7 +79,7 @@ pub(crate) fn variant_folder(output: &Path, variant: &str) -> PathBuf {
 /// Writes a file whole or not at all, and the folders that it lies in, where they are not there.
 ///
 /// # Errors
-/// Where the folder or the file cannot be written.
+/// If the folder or the file cannot be written.
 pub fn write_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputError> {
     let fail = |source| OutputError::Io { path: path.to_owned(), source };
     if let Some(folder) = path.parent() {
@@ -101,7 +101,7 @@ fn remove(path: &Path) -> Result<(), OutputError> {
 /// Writes the report and the record of a run.
 ///
 /// # Errors
-/// Where one cannot be written.
+/// If one cannot be written.
 pub fn write_report(output: &Path, report: &RunReport, record: &RunRecord) -> Result<(), OutputError> {
     write_document(&output.join(RECORD), compact(record))?;
     write_document(&output.join("report.json"), results(report))
@@ -110,7 +110,7 @@ pub fn write_report(output: &Path, report: &RunReport, record: &RunRecord) -> Re
 /// Writes all files of a variant into its folder, and returns it.
 ///
 /// # Errors
-/// Where one cannot be written; those before it are there.
+/// If one cannot be written; those before it are there.
 pub fn write_variant(
     run: &RunDocument,
     variant: &Variant,

@@ -79,7 +79,7 @@ impl<'a> Mapped<'a> {
     /// Finds where a sequence begins in the settings' prior map, puts its boxes to objects, and makes its graph.
     ///
     /// # Errors
-    /// Where no graph can be made of it.
+    /// If no graph can be made of it.
     pub fn new(
         sequence: Arc<Sequence>,
         settings: &'a Settings,
@@ -105,7 +105,7 @@ impl<'a> Mapped<'a> {
 /// Maps, solves and evaluates a sequence.
 ///
 /// # Errors
-/// Where no graph can be made of it. Numerical trouble is no error: see the report.
+/// If no graph can be made of it. Numerical trouble is no error: see the report.
 pub fn estimate(
     name: &str,
     sequence: Arc<Sequence>,
@@ -151,7 +151,7 @@ impl<'a> Run<'a> {
     /// The sequence of a variant.
     ///
     /// # Errors
-    /// Where its source has none.
+    /// If its source has none.
     pub fn sequence(&mut self, variant: &Variant) -> Result<Arc<Sequence>, SourceError> {
         let source = &variant.settings.source;
         // what is written alike is the same source
@@ -168,7 +168,7 @@ impl<'a> Run<'a> {
     /// Maps, solves and evaluates one variant.
     ///
     /// # Errors
-    /// Where there is no data, or no graph can be made of it. Numerical trouble is no error: see the report.
+    /// If there is no data, or no graph can be made of it. Numerical trouble is no error: see the report.
     pub fn variant(
         &mut self,
         variant: &Variant,
@@ -183,7 +183,7 @@ impl<'a> Run<'a> {
     /// The same, frame by frame; see [`online`].
     ///
     /// # Errors
-    /// Where there is no data, or no graph can be made of it.
+    /// If there is no data, or no graph can be made of it.
     pub fn variant_online(
         &mut self,
         variant: &Variant,

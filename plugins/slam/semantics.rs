@@ -92,13 +92,13 @@ pub struct Rule {
     pub shipped: bool,
 }
 
-/// Whether a list of classes has this one, named as [`Aliases::canonical`] does.
+/// Returns whether a list of classes has this one, named as [`Aliases::canonical`] does.
 fn names(classes: &[String], class: &str, aliases: &Aliases) -> bool {
     classes.iter().any(|name| name == ANY || aliases.canonical(name) == class)
 }
 
 impl Rule {
-    /// Whether objects of a class, named as [`Aliases::canonical`] does, get this factor.
+    /// Returns whether objects of a class, named as [`Aliases::canonical`] does, get this factor.
     pub fn applies(&self, class: &str, aliases: &Aliases) -> bool {
         names(&self.classes, class, aliases)
     }
@@ -158,7 +158,7 @@ pub(crate) const SHIPPED: [&str; 1] = ["table_one"];
 /// The rules of the paper's Table I.
 ///
 /// # Errors
-/// Where the factors that it names are not linked.
+/// If the factors that it names are not linked.
 pub fn table_one() -> Result<Vec<Rule>, manifactor_config::Diagnostics> {
     read::shipped_rules("table_one", TABLE_ONE)
 }

@@ -23,7 +23,7 @@ impl Direction {
     /// The direction of `v`.
     ///
     /// # Errors
-    /// Where `v` is zero or not finite.
+    /// If `v` is zero or not finite.
     pub fn new(v: Vector3<f64>) -> Result<Self, NoDirection> {
         // scale first: the squares of tiny and of huge entries leave the range of f64
         let scale = v.amax();

@@ -95,13 +95,13 @@ pub struct FactorRows<'a> {
 pub trait Batch: Send + Sync {
     /// Number of factors.
     fn len(&self) -> usize;
-    /// Whether there is no factor.
+    /// Returns whether there is no factor.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Whether a factor of the same type belongs here, by its noise and loss.
+    /// Returns whether a factor of the same type belongs here, by its noise and loss.
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool;
-    /// Whether a factor of the same type belongs here, by its parameters. Any does, as a rule; not where a batch is evaluated
+    /// Returns whether a factor of the same type belongs here, by its parameters. Any does, as a rule; not where a batch is evaluated
     /// in one call, of which those have to be the same.
     fn takes(&self, _factor: &dyn Any) -> bool {
         true
@@ -149,7 +149,7 @@ pub trait Batch: Send + Sync {
     /// Sets what is held of a factor's variables, by its place in the batch: see [`Member::starts`] and
     /// [`Member::held`].
     fn hold(&mut self, index: usize, starts: &[u32], held: &[u32]);
-    /// Whether a factor was defined at its last linearization.
+    /// Returns whether a factor was defined at its last linearization.
     fn is_active(&self, index: usize) -> bool;
 }
 

@@ -31,7 +31,7 @@ pub trait DynamicResidual: Debug + Clone + Send + Sync + 'static {
     fn variables(&self) -> &[TypeId];
     /// Dimensions of its variables' tangent spaces, in order.
     fn dimensions(&self) -> &[usize];
-    /// Whether it means anything at this point; see [`Residual::is_defined`](crate::Residual::is_defined).
+    /// Returns whether it means anything at this point; see [`Residual::is_defined`](crate::Residual::is_defined).
     fn is_defined(&self, _variables: &[&dyn Any]) -> bool {
         true
     }
@@ -102,7 +102,7 @@ pub struct WrongRows(pub usize);
 
 impl<F: DynamicResidual> Dynamic<F> {
     /// # Errors
-    /// Where it has no rows, or more than [`MAX_ROWS`].
+    /// If it has no rows, or more than [`MAX_ROWS`].
     pub fn new(residual: F) -> Result<Self, WrongRows> {
         let rows = residual.rows();
         if (1..=MAX_ROWS).contains(&rows) { Ok(Self(residual)) } else { Err(WrongRows(rows)) }

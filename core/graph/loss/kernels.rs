@@ -23,7 +23,7 @@ macro_rules! loss {
             /// A loss of this scale.
             ///
             /// # Errors
-            /// Where `scale` is not positive and finite.
+            /// If `scale` is not positive and finite.
             pub fn new(scale: f64) -> Result<Self, crate::registry::checked::OutOfDomain> {
                 Ok(Self { scale: Positive::new(scale)? })
             }

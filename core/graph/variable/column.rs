@@ -17,7 +17,7 @@ pub trait Column: Send + Sync {
     fn as_any(&self) -> &dyn Any;
     /// Number of variables.
     fn len(&self) -> usize;
-    /// Whether there is no variable.
+    /// Returns whether there is no variable.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -130,7 +130,7 @@ impl Columns {
     pub fn len(&self) -> usize {
         self.0.len()
     }
-    /// Whether there is no column.
+    /// Returns whether there is no column.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -35,7 +35,7 @@ pub trait Manifold: Clone + Debug + Send + Sync + 'static {
     /// The tangent vector that leads to `other`.
     fn local(&self, other: &Self) -> Vector<Self::Dim>;
 
-    /// Whether every coordinate is finite.
+    /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
 }
 

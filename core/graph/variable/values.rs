@@ -63,7 +63,7 @@ impl Values {
     /// The value of a key.
     ///
     /// # Errors
-    /// Where there is none, or one of another type.
+    /// If there is none, or one of another type.
     pub fn get<M: Variable + 'static>(&self, key: impl AsRef<str>) -> Result<&M, ValueError> {
         let key = key.as_ref();
         let value = self.variable(key).ok_or_else(|| ValueError::Missing { key: key.into() })?;
@@ -93,7 +93,7 @@ impl Values {
     pub fn remove(&mut self, key: &str) -> Option<Box<dyn Variable>> {
         self.0.shift_remove(key)
     }
-    /// Whether there is a value of that key.
+    /// Returns whether there is a value of that key.
     pub fn contains(&self, key: &str) -> bool {
         self.0.contains_key(key)
     }
@@ -101,7 +101,7 @@ impl Values {
     pub fn len(&self) -> usize {
         self.0.len()
     }
-    /// Whether there is no value.
+    /// Returns whether there is no value.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

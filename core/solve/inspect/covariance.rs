@@ -58,7 +58,7 @@ impl Solution {
     /// [`Factorized::marginals`](crate::Factorized::marginals).
     ///
     /// # Errors
-    /// Where a key is unknown, something is not constrained, or `graph` is not the one that was solved.
+    /// If a key is unknown, something is not constrained, or `graph` is not the one that was solved.
     pub fn marginals(&self, graph: &Graph, keys: &[&str]) -> Result<Vec<Marginal>, CovarianceError> {
         if let Some(unknown) = keys.iter().find(|key| !self.values.contains(key)) {
             return Err(CovarianceError::Unknown((*unknown).to_owned()));
@@ -93,7 +93,7 @@ impl Problem {
     /// The marginal covariance of each variable at the estimate; see [`Factorized::marginals`](crate::Factorized::marginals).
     ///
     /// # Errors
-    /// Where something is not constrained, or there is no memory.
+    /// If something is not constrained, or there is no memory.
     pub fn marginals(&mut self) -> Result<Vec<(Key, DMatrix<f64>)>, CovarianceError> {
         self.factorized()?.marginals()
     }
@@ -101,7 +101,7 @@ impl Problem {
     /// The joint covariance of a few variables at the estimate; see [`Factorized::joint`](crate::Factorized::joint).
     ///
     /// # Errors
-    /// Where a key is unknown, or something is not constrained.
+    /// If a key is unknown, or something is not constrained.
     pub fn joint_covariance(&mut self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
         self.factorized()?.joint(keys)
     }

@@ -58,7 +58,7 @@ impl Solution {
     /// Looks for what is wrong: the factors that fit worst, and a linear system that is close to open.
     ///
     /// # Errors
-    /// Where `graph` is not the one that was solved.
+    /// If `graph` is not the one that was solved.
     pub fn diagnose(&self, graph: &Graph) -> Result<Diagnosis, CompileError> {
         let look = |problem: &mut Problem| match problem.factorized() {
             Ok(mut system) => (None, system.condition()),

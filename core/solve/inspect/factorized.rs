@@ -30,7 +30,7 @@ impl Problem {
     /// has changed since the last question; else H is factorized anew.
     ///
     /// # Errors
-    /// Where something is not constrained, or there is no memory for a factor.
+    /// If something is not constrained, or there is no memory for a factor.
     pub fn factorized(&mut self) -> Result<Factorized<'_>, CovarianceError> {
         self.linearize_once();
         let revision = Some(self.model.revision());
@@ -69,7 +69,7 @@ impl Factorized<'_> {
     /// one path of the elimination tree.
     ///
     /// # Errors
-    /// Where there is no such variable.
+    /// If there is no such variable.
     pub fn marginal(&mut self, key: &str) -> Result<DMatrix<f64>, CovarianceError> {
         self.joint(&[key])
     }
@@ -77,7 +77,7 @@ impl Factorized<'_> {
     /// The joint covariance of a few variables, in the order of `keys`.
     ///
     /// # Errors
-    /// Where a key is unknown.
+    /// If a key is unknown.
     pub fn joint(&mut self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
         // by row of the result: its unknown, `None` for what is held
         let mut unknowns = vec![];
@@ -118,7 +118,7 @@ impl Factorized<'_> {
     /// factorizations.
     ///
     /// # Errors
-    /// Where there is no memory.
+    /// If there is no memory.
     pub fn marginals(&mut self) -> Result<Vec<(Key, DMatrix<f64>)>, CovarianceError> {
         let out_of_memory = self.problem.out_of_memory();
         let Problem { model, system, .. } = &mut *self.problem;

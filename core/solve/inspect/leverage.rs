@@ -15,7 +15,7 @@ impl Problem {
     /// together are the number of unknowns that anything constrains. Empty for a factor that takes no part.
     ///
     /// # Errors
-    /// Where there is no memory, or something is not finite.
+    /// If there is no memory, or something is not finite.
     pub fn leverages(&mut self) -> Result<Vec<Vec<f64>>, CovarianceError> {
         self.linearize_once();
         let out_of_memory = self.out_of_memory();

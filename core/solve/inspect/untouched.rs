@@ -43,7 +43,7 @@ impl Problem {
         (!keys.is_empty()).then(|| Untouched { keys, active, factors: self.factors() })
     }
 
-    /// Whether there is a free variable on which no residual depends to first order.
+    /// Returns whether there is a free variable on which no residual depends to first order.
     fn has_flat_variable(&self) -> bool {
         let diagonal: Vec<f64> = self.system.diagonal().copied().collect();
         self.model.variables.iter().any(|place| {

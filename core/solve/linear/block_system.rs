@@ -52,7 +52,7 @@ impl BlockSystem {
     /// and however often. Pairs of blocks that are not there are passed over.
     ///
     /// # Errors
-    /// Where its factor does not fit into memory.
+    /// If its factor does not fit into memory.
     pub fn new(dims: &[usize], pairs: &[(u32, u32)]) -> Result<Self, BlockSystemError> {
         let unknowns = dims.iter().sum();
         let known = |(a, b): &&(u32, u32)| (*a as usize) < dims.len() && (*b as usize) < dims.len();
@@ -101,7 +101,7 @@ impl BlockSystem {
     /// Factorizes the matrix as it stands.
     ///
     /// # Errors
-    /// Where it is not positive definite, as far as f64 can tell.
+    /// If it is not positive definite, as far as f64 can tell.
     pub fn factorize(&mut self) -> Result<(), BlockSystemError> {
         let done = self.cholesky.factorize(&self.values, None, &mut self.ordered);
         done.map_err(|_| BlockSystemError::NotPositiveDefinite)

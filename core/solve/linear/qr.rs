@@ -30,7 +30,7 @@ impl Qr {
     /// The solution, for `x.len()` unknowns.
     ///
     /// # Errors
-    /// Where there is none, or it is not finite.
+    /// If there is none, or it is not finite.
     pub(crate) fn solve(&mut self, x: &mut [f64]) -> Result<(), NotPositiveDefinite> {
         let (rows, columns) = (self.right.len(), x.len());
         if rows < columns {

@@ -83,7 +83,7 @@ impl LinearSystem {
         }
     }
 
-    /// Whether g and H are finite. No entry of a sum of JᵀJ is larger than those on its diagonal, so these will do.
+    /// Returns whether g and H are finite. No entry of a sum of JᵀJ is larger than those on its diagonal, so these will do.
     pub(crate) fn is_finite(&self) -> bool {
         self.g.iter().chain(self.diagonal()).all(|x| x.is_finite())
     }
@@ -198,7 +198,7 @@ impl LinearSystem {
         done.map_err(|_| NoFactor::NotPositiveDefinite)
     }
 
-    /// Whether the factor by Cholesky is that of H as it is, without damping.
+    /// Returns whether the factor by Cholesky is that of H as it is, without damping.
     pub(crate) fn is_factorized(&self) -> bool {
         self.is_factorized
     }

@@ -77,7 +77,7 @@ pub struct Undetermined {
 }
 
 impl Termination {
-    /// Whether the values are a solution.
+    /// Returns whether the values are a solution.
     pub fn is_converged(&self) -> bool {
         matches!(self, Self::Converged { .. })
     }

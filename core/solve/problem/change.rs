@@ -52,7 +52,7 @@ impl Problem {
     /// The graph keeps what it has: from now on the problem answers for itself, and not for that graph.
     ///
     /// # Errors
-    /// Where there is no such factor, or it is no `R`.
+    /// If there is no such factor, or it is no `R`.
     pub fn factor_mut<R: Residual>(&mut self, factor: usize) -> Result<&mut R, ChangeError> {
         let factors = self.factors();
         let Some(place) = self.model.factors.get(factor) else {
@@ -72,7 +72,7 @@ impl Problem {
     /// Sets the noise of a factor. Nothing is compiled again; see [`factor_mut`](Self::factor_mut).
     ///
     /// # Errors
-    /// Where there is no such factor, or the noise does not fit it or is of another kind than before.
+    /// If there is no such factor, or the noise does not fit it or is of another kind than before.
     pub fn set_noise(&mut self, factor: usize, noise: &Noise) -> Result<(), ChangeError> {
         let factors = self.factors();
         let Some(place) = self.model.factors.get(factor) else {

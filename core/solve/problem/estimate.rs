@@ -28,7 +28,7 @@ impl Problem {
     /// Sets the estimate of the variables that `values` has; the others keep theirs, and the structure stays.
     ///
     /// # Errors
-    /// Where `values` has a key that the problem does not know, another type, or a value that is not finite. The
+    /// If `values` has a key that the problem does not know, another type, or a value that is not finite. The
     /// estimate is then as it was.
     pub fn set_values(&mut self, values: &Values) -> Result<(), ValueError> {
         let mut known = 0;
@@ -58,7 +58,7 @@ impl Problem {
     /// Makes each factor count as often as its weight says, on top of its loss.
     ///
     /// # Errors
-    /// Where there is not one weight for each factor, or one is negative or not finite.
+    /// If there is not one weight for each factor, or one is negative or not finite.
     pub fn set_weights(&mut self, weights: &[f64]) -> Result<(), WeightError> {
         let factors = self.factors();
         if weights.len() != factors {

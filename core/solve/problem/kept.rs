@@ -21,7 +21,7 @@ impl Solution {
     /// that has no factorization of its own, is busy, or `graph` has been changed since.
     ///
     /// # Errors
-    /// Where `graph` is not the one that was solved.
+    /// If `graph` is not the one that was solved.
     pub(crate) fn ask<R>(
         &self,
         graph: &Graph,
@@ -43,7 +43,7 @@ impl Solution {
     /// The problem at the estimate, compiled anew, with the weights that the solver has left.
     ///
     /// # Errors
-    /// Where `graph` is not the one that was solved.
+    /// If `graph` is not the one that was solved.
     pub fn problem(&self, graph: &Graph) -> Result<Problem, CompileError> {
         let mut problem = Problem::compile(graph, &self.values)?;
         if !self.weights.is_empty() {

@@ -131,7 +131,7 @@ impl Model {
         }
     }
 
-    /// Whether the estimate is these values: then what is known of it still holds.
+    /// Returns whether the estimate is these values: then what is known of it still holds.
     pub(crate) fn is_at(&self, values: &Values) -> bool {
         self.variables.iter().all(|place| {
             let here = self.columns.column(place.column).get(place.index);

@@ -233,7 +233,7 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Whether an observer has asked for an end.
+    /// Returns whether an observer has asked for an end.
     pub fn interrupted(&self) -> bool {
         self.interrupted
     }
@@ -255,7 +255,7 @@ impl<'a> Descent<'a> {
         self.problem.system.g.iter().zip(self.problem.system.diagonal()).map(cosine).fold(0.0, f64::max)
     }
 
-    /// Whether one unknown alone could lower the cost by more than a thousandth: by g²/2H = cos² · cost, by the quadratic model. A
+    /// Returns whether one unknown alone could lower the cost by more than a thousandth: by g²/2H = cos² · cost, by the quadratic model. A
     /// short step and a small fall are then a sign of damping, or of a plateau, as for a landmark that is very far away.
     pub(crate) fn is_steep(&self) -> bool {
         const SHARE: f64 = 1e-3;
@@ -278,12 +278,12 @@ impl<'a> Descent<'a> {
         if trial.cost < self.at.cost && gain > 0.0 { Tried::Lower { gain } } else { Tried::Higher }
     }
 
-    /// Whether the last trial and its model both say that there is nothing left to gain.
+    /// Returns whether the last trial and its model both say that there is nothing left to gain.
     pub(crate) fn settled(&self, step: &Step) -> bool {
         self.is_small(self.at.cost - self.trial.cost) && self.is_small(step.predicted) && !self.is_steep()
     }
 
-    /// Whether a change of the cost is within the tolerance.
+    /// Returns whether a change of the cost is within the tolerance.
     pub(crate) fn is_small(&self, change: f64) -> bool {
         change.abs() <= *self.stop.relative_cost * self.at.cost.abs()
     }
@@ -340,7 +340,7 @@ impl<'a> Descent<'a> {
     }
 }
 
-/// Whether an observer lets a step go on.
+/// Returns whether an observer lets a step go on.
 fn go_on(observer: &mut dyn Observer, interrupted: &mut bool) -> bool {
     *interrupted |= observer.poll().is_break();
     !*interrupted

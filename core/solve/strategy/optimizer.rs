@@ -27,7 +27,7 @@ pub trait Optimizer: Debug + Send + Sync {
     /// `auto` does with the registered starts, overrides this. [`solve`](crate::solve()) calls it.
     ///
     /// # Errors
-    /// Where graph and values do not fit each other.
+    /// If graph and values do not fit each other.
     fn solve(
         &self,
         graph: &Graph,

@@ -13,10 +13,10 @@ pub trait Start: Debug + Send + Sync {
     /// of. Held variables keep their values, and the order of the values stays.
     ///
     /// # Errors
-    /// Where the strategy does not apply to the graph, or the graph does not fit its values.
+    /// If the strategy does not apply to the graph, or the graph does not fit its values.
     fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError>;
 
-    /// Whether `minimum`, which a solve from other values has led to, looks wrong, so that it is worth beginning
+    /// Returns whether `minimum`, which a solve from other values has led to, looks wrong, so that it is worth beginning
     /// here as well. [`Auto`](crate::Auto) asks after each solve: the answer must take almost no time, and may
     /// not depend on the unit of the noise. Default: no.
     fn doubts(&self, _graph: &Graph, _minimum: &Values) -> bool {

@@ -106,7 +106,7 @@ pub struct Broken {
 }
 
 impl FactorReport {
-    /// Whether every law holds, at one point at least.
+    /// Returns whether every law holds, at one point at least.
     pub fn holds(&self) -> bool {
         self.broken.is_none() && self.defined > 0
     }

@@ -151,12 +151,12 @@ fn graph(input: &GraphFile) -> Result<Found, Failure> {
     Ok(found)
 }
 
-/// Whether a document is a literal graph. A run may have variables of its own, and has a source.
+/// Returns whether a document is a literal graph. A run may have variables of its own, and has a source.
 fn is_graph(document: &Document) -> bool {
     has(document, "variables") && !has(document, "source")
 }
 
-/// Whether it is an experiment: a run has no axes.
+/// Returns whether it is an experiment: a run has no axes.
 fn is_experiment(document: &Document) -> bool {
     has(document, "axes") && !has(document, "source")
 }

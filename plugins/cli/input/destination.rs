@@ -20,7 +20,7 @@ pub(crate) struct Destination {
 }
 
 impl Destination {
-    /// Whether the graph of `input` can be written there, and over what is there: asked before it is solved.
+    /// Returns whether the graph of `input` can be written there, and over what is there: asked before it is solved.
     pub(crate) fn check(&self, input: &Path) -> Result<(), Failure> {
         let Some(path) = &self.out else { return Ok(()) };
         if Format::of_path(path).is_none() && writer(path).is_none() {
@@ -32,7 +32,7 @@ impl Destination {
         can_write(path).map_err(Failure::at(path))
     }
 
-    /// Whether a graph is to be written.
+    /// Returns whether a graph is to be written.
     pub(crate) fn is_given(&self) -> bool {
         self.out.is_some()
     }

@@ -20,7 +20,7 @@ pub(crate) struct SolverArguments {
 }
 
 impl SolverArguments {
-    /// Whether `--start` is given.
+    /// Returns whether `--start` is given.
     pub(crate) fn names_a_start(&self) -> bool {
         self.start.is_some()
     }

@@ -68,7 +68,7 @@ fn registered(schema: &Value) -> Option<&'static str> {
     catalogue::all().iter().map(|entry| entry.kind).find(|kind| *kind == name)
 }
 
-/// Whether it is the noise, by itself or as the definition that others refer to.
+/// Returns whether it is the noise, by itself or as the definition that others refer to.
 fn is_noise(root: &Value, schema: &Value) -> bool {
     let defined = || root.pointer("/$defs/Noise").is_some_and(|noise| noise == schema);
     schema.get("title").is_some_and(|title| title == "Noise") || defined()

@@ -22,7 +22,7 @@ impl Access {
     /// That to an address; a new token for one that others reach.
     ///
     /// # Errors
-    /// Where the system has no random numbers.
+    /// If the system has no random numbers.
     pub(super) fn to(address: SocketAddr) -> io::Result<Self> {
         if address.ip().is_loopback() {
             return Ok(Self::Local);
@@ -50,7 +50,7 @@ impl Access {
         }
     }
 
-    /// Whether a request may be answered.
+    /// Returns whether a request may be answered.
     pub(super) fn admits<T>(&self, request: &Request<T>) -> bool {
         match self {
             Self::Local => host(request).is_some_and(is_local),
@@ -73,7 +73,7 @@ fn host<T>(request: &Request<T>) -> Option<&str> {
     hosts.next().filter(|_| hosts.next().is_none())?.to_str().ok()
 }
 
-/// Whether a host, with its port or without, is this machine by its nature: no name server is asked about these.
+/// Returns whether a host, with its port or without, is this machine by its nature: no name server is asked about these.
 fn is_local(host: &str) -> bool {
     let port = |rest: &str| {
         // RFC 3986: a port is digits, and there may be none after the colon

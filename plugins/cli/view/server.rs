@@ -36,7 +36,7 @@ const FAREWELL: Duration = Duration::from_secs(5);
 /// Serves from now on, in a thread that ends when nobody can change the state any more and browsers know.
 ///
 /// # Errors
-/// Where the system has no thread for it.
+/// If the system has no thread for it.
 pub(super) fn begin(
     listener: std::net::TcpListener,
     access: Access,

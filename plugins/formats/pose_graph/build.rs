@@ -322,7 +322,7 @@ fn of_bearing(noise: Noise) -> Result<Noise, NoiseError> {
     Ok(Noise::information(both)?.observing(&[true, false]))
 }
 
-/// Whether these are two poses, one right after the other.
+/// Returns whether these are two poses, one right after the other.
 fn are_consecutive(keys: &[Key]) -> bool {
     let number = |key: &Key| key.as_str().strip_prefix('x').and_then(|number| number.parse::<u64>().ok());
     match keys {

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// A table as the bytes of a Parquet file.
 ///
 /// # Errors
-/// Where columns differ in length or share a name.
+/// If columns differ in length or share a name.
 pub fn to_parquet(table: &Table) -> Result<Vec<u8>, TableError> {
     table.rows()?;
     write(table).map_err(|error| TableError::Writer(error.to_string()))

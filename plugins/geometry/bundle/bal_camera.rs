@@ -66,7 +66,7 @@ impl<T: Scalar> BalCamera<T> {
 }
 
 impl BalCamera {
-    /// Whether a point of the camera's frame is in front of it, by a millionth of its distance.
+    /// Returns whether a point of the camera's frame is in front of it, by a millionth of its distance.
     #[inline(always)]
     pub fn is_in_front(point: &Vector3<f64>) -> bool {
         point.z < 0.0 && point.z * point.z > MARGIN * MARGIN * point.norm_squared()

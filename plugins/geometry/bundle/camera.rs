@@ -77,7 +77,7 @@ impl Camera {
     /// A camera without skew.
     ///
     /// # Errors
-    /// Where a focal length or a size is not positive, or a number not finite.
+    /// If a focal length or a size is not positive, or a number not finite.
     pub fn new([fx, fy, cx, cy]: [f64; 4], width: u32, height: u32) -> Result<Self, NotACamera> {
         Self { fx, fy, cx, cy, skew: 0.0, width, height }.checked()
     }

@@ -22,7 +22,7 @@ pub trait CameraModel:
     /// A direction that is seen at a pixel, of any length; `None` if the model has none there.
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>>;
 
-    /// Whether a point is in the domain of [`project`](Self::project), in the image or beside it.
+    /// Returns whether a point is in the domain of [`project`](Self::project), in the image or beside it.
     fn sees(&self, point: &Vector3<f64>) -> bool;
 
     /// The pinhole camera of the rectified image: same focal lengths, principal point and size.

@@ -84,7 +84,7 @@ impl<const D: usize> Dual<D> {
         Ok(Self { system, blocks, dims, scale, cost, trace })
     }
 
-    /// Whether S + shift·diag(d) is positive definite, d the scale of each pose. Leaves its factor behind.
+    /// Returns whether S + shift·diag(d) is positive definite, d the scale of each pose. Leaves its factor behind.
     fn is_positive(&mut self, shift: f64) -> bool {
         self.system.clear();
         for (a, b, block) in &self.blocks {

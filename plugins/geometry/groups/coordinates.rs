@@ -35,7 +35,7 @@ pub enum NoCoordinates {
 
 impl<const N: usize> Coordinates<N> {
     /// # Errors
-    /// Where an entry is not finite.
+    /// If an entry is not finite.
     pub fn new(vector: SVector<f64, N>) -> Result<Self, NoCoordinates> {
         match vector.iter().position(|x| !x.is_finite()) {
             Some(position) => Err(NoCoordinates::NotFinite { position, value: vector[position] }),

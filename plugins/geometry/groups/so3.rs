@@ -118,7 +118,7 @@ impl So3 {
     /// The rotation of a unit quaternion, given as x, y, z, w.
     ///
     /// # Errors
-    /// Where its length differs from 1 by more than 0.001; a smaller difference is normalised away.
+    /// If its length differs from 1 by more than 0.001; a smaller difference is normalised away.
     pub fn from_quaternion_xyzw(xyzw: [f64; 4]) -> Result<Self, NotARotation> {
         let q = Quaternion::from(Vector4::from(xyzw));
         let length = q.norm();

@@ -11,7 +11,7 @@ use manifactor_graph::{Factor, FactorEntry, Graph, Key, Values};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
-/// Whether the residual rotations of some loop add up to more than half a turn. In space they are added up as vectors in
+/// Returns whether the residual rotations of some loop add up to more than half a turn. In space they are added up as vectors in
 /// the outer frame, which is exact where they turn about one axis.
 pub(crate) fn is_wound(graph: &Graph, values: &Values) -> bool {
     is_wound_in::<Se2, 2>(graph, values)
@@ -61,7 +61,7 @@ where
     has_turn(outer + 1, &edges)
 }
 
-/// Whether a loop adds up to more than half a turn.
+/// Returns whether a loop adds up to more than half a turn.
 fn has_turn(nodes: usize, edges: &[Edge]) -> bool {
     // by node: its edges
     let mut first = vec![0_u32; nodes + 1];

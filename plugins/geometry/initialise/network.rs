@@ -80,7 +80,7 @@ impl<const D: usize> Information<D> {
         above_zero(marginal.try_inverse().map_or(0.0, |m| D as f64 / m.trace()))
     }
 
-    /// Whether rotation and translation are apart and each as uncertain along all axes.
+    /// Returns whether rotation and translation are apart and each as uncertain along all axes.
     pub(crate) fn is_isotropic(&self) -> bool {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
         let turns = if D == 2 { 2..3 } else { 0..3 };

@@ -39,7 +39,7 @@ impl<const D: usize> Relaxation<D> {
         Ok(Self { system, block, anchored })
     }
 
-    /// Whether it has the structure that follows from these anchors.
+    /// Returns whether it has the structure that follows from these anchors.
     pub(crate) fn fits(&self, anchored: &[bool]) -> bool {
         self.anchored == anchored
     }

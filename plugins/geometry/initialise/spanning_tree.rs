@@ -32,7 +32,7 @@ pub enum Tree {
 /// of a pose that has one. Variables that nothing leads to stay without, for [`Graph::check`] to name.
 ///
 /// # Errors
-/// Where a factor takes a variable for another type than its value has.
+/// If a factor takes a variable for another type than its value has.
 pub fn spanning_tree(graph: &Graph, values: &Values, tree: Tree) -> Result<Values, ValueError> {
     let mut values = values.clone();
     grow::<So2>(graph, &mut values, tree)?;

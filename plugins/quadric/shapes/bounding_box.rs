@@ -30,7 +30,7 @@ impl BoundingBox {
     /// The box xmin, ymin, xmax, ymax.
     ///
     /// # Errors
-    /// Where a minimum is above its maximum, or a number not finite.
+    /// If a minimum is above its maximum, or a number not finite.
     pub fn new(bounds: [f64; 4]) -> Result<Self, NotABox> {
         let [xmin, ymin, xmax, ymax] = bounds;
         let ordered = xmin <= xmax && ymin <= ymax && bounds.iter().all(|x| x.is_finite());
@@ -56,7 +56,7 @@ impl BoundingBox {
     pub fn area(&self) -> f64 {
         self.width() * self.height()
     }
-    /// Whether it is as wide and as high as the least that a detector resolves: a hundredth of a pixel. A box without width
+    /// Returns whether it is as wide and as high as the least that a detector resolves: a hundredth of a pixel. A box without width
     /// shows nothing, and a map that took it for a measurement would make its object thin.
     pub fn has_area(&self) -> bool {
         const LEAST: f64 = 0.01;
@@ -75,14 +75,14 @@ impl BoundingBox {
             Vector3::new(0.0, 1.0, -self.ymax),
         ]
     }
-    /// Whether all of `other` is in this box; sides may touch.
+    /// Returns whether all of `other` is in this box; sides may touch.
     pub fn contains(&self, other: &Self) -> bool {
         self.xmin <= other.xmin
             && self.ymin <= other.ymin
             && other.xmax <= self.xmax
             && other.ymax <= self.ymax
     }
-    /// Whether the two have a point in common; one inside of the other counts, and so does a touch.
+    /// Returns whether the two have a point in common; one inside of the other counts, and so does a touch.
     pub fn intersects(&self, other: &Self) -> bool {
         self.intersection(other).is_some()
     }

@@ -39,7 +39,7 @@ impl Box3 {
     /// The box between two corners.
     ///
     /// # Errors
-    /// Where a coordinate of `min` is above that of `max`, or not finite.
+    /// If a coordinate of `min` is above that of `max`, or not finite.
     pub fn new(min: Vector3<f64>, max: Vector3<f64>) -> Result<Self, NotABox3> {
         let finite = Coordinates::new(min).is_ok() && Coordinates::new(max).is_ok();
         if finite && min <= max {

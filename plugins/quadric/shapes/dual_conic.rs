@@ -29,11 +29,11 @@ impl DualConic {
             determinant,
         })
     }
-    /// Whether it is a real ellipse.
+    /// Returns whether it is a real ellipse.
     pub fn is_ellipse(&self) -> bool {
         self.ellipse().is_some()
     }
-    /// Whether it is less than a conic: a point or two, to within rounding.
+    /// Returns whether it is less than a conic: a point or two, to within rounding.
     pub fn is_degenerate(&self) -> bool {
         let scale: f64 = self.0.row_iter().map(|row| row.norm()).product();
         let determinant = self.0.determinant().abs();

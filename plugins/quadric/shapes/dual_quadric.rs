@@ -86,7 +86,7 @@ impl DualQuadric {
         let half = Vector3::from_fn(|i, _| axes.row(i).norm());
         Box3 { min: self.centroid() - half, max: self.centroid() + half }
     }
-    /// Whether all of it is in front of a camera, see [`Ellipsoid::is_in_front`](crate::Ellipsoid::is_in_front).
+    /// Returns whether all of it is in front of a camera, see [`Ellipsoid::is_in_front`](crate::Ellipsoid::is_in_front).
     #[inline]
     pub fn is_in_front_of(&self, world_from_camera: &Se3) -> bool {
         // along the camera's axis alone, which is all that counts and half the work
@@ -95,7 +95,7 @@ impl DualQuadric {
         let b = self.pose.rotation.inverse().act(&forward).component_mul(&self.semi_axes);
         ellipsoid::is_in_front(z, b.norm_squared())
     }
-    /// Whether a point of the outer frame is inside, or on the surface.
+    /// Returns whether a point of the outer frame is inside, or on the surface.
     pub fn contains(&self, point: &Vector3<f64>) -> bool {
         self.pose.inverse_act(point).component_div(&self.semi_axes).norm_squared() <= 1.0
     }

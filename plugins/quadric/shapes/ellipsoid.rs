@@ -28,7 +28,7 @@ impl<T: Scalar> Ellipsoid<T> {
         }
         Self { centroid: world_from_camera.inverse_act(&quadric.centroid()), axes }
     }
-    /// Whether all of it is in front of the camera, which then is outside of it; its outline is an
+    /// Returns whether all of it is in front of the camera, which then is outside of it; its outline is an
     /// ellipse.
     #[inline]
     pub fn is_in_front(&self) -> bool {

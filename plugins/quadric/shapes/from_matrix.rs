@@ -49,7 +49,7 @@ impl DualQuadric {
     /// come longest first.
     ///
     /// # Errors
-    /// Where it is none: a hyperboloid is not turned into an ellipsoid.
+    /// If it is none: a hyperboloid is not turned into an ellipsoid.
     pub fn from_matrix(matrix: &Matrix4<f64>) -> Result<Self, NotAnEllipsoid> {
         Self::from_matrix_or(matrix, OnHyperboloid::Reject)
     }

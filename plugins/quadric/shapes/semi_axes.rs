@@ -26,7 +26,7 @@ pub(crate) fn step(s: f64, delta: f64) -> f64 {
 
 impl SemiAxes {
     /// # Errors
-    /// Where one is not a number from 1e-9 to 1e9.
+    /// If one is not a number from 1e-9 to 1e9.
     pub fn new(s: Vector3<f64>) -> Result<Self, NotSemiAxes> {
         let fits = s.iter().all(|s| (SHORTEST..=LONGEST).contains(s));
         if fits { Ok(Self(s)) } else { Err(NotSemiAxes(s.into())) }

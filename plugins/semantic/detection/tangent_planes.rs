@@ -114,7 +114,7 @@ mod tests {
         (graph, values)
     }
 
-    /// Whether the true object is found.
+    /// Returns whether the true object is found.
     fn finds(start: DualQuadric) -> bool {
         let (graph, values) = views(start);
         let solution = solve(&graph, &values, &LevenbergMarquardt::default(), &mut Silent).unwrap();

@@ -80,7 +80,7 @@ impl TrialLog {
     /// Adds a trial that is done; it is on the disk when this returns.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If it cannot be written.
     pub fn append(&mut self, record: TrialRecord) -> Result<(), JournalError> {
         let done = self.file.append(&record).and_then(|_| self.file.sync());
         done.map_err(|source| JournalError::Io { path: self.file.path().to_owned(), source })?;

@@ -9,7 +9,7 @@ use std::fmt;
 /// Writes all tables, and returns the summary.
 ///
 /// # Errors
-/// Where one cannot be written; those before it are there.
+/// If one cannot be written; those before it are there.
 pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<Summary, OutputError> {
     let file = |name: &str| experiment.output.join(name);
     let write = |name: &str, content: Result<Vec<u8>, TableError>| {

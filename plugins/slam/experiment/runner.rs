@@ -22,7 +22,7 @@ pub struct Progress {
 /// `interrupt` ends it early, and leaves those under way to the next run.
 ///
 /// # Errors
-/// Where the journal cannot be written. What goes wrong in a trial is its outcome.
+/// If the journal cannot be written. What goes wrong in a trial is its outcome.
 pub fn run(
     experiment: &Experiment,
     folders: &Folders,

@@ -132,7 +132,7 @@ impl Quantities {
         self.0.iter().map(|measurement| &**measurement)
     }
 
-    /// Whether there is nothing but the box.
+    /// Returns whether there is nothing but the box.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

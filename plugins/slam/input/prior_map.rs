@@ -87,7 +87,7 @@ impl PriorMap {
     /// Reads `map.json`, as a run leaves it.
     ///
     /// # Errors
-    /// Where there is none, or what it says is not a map: each at its place.
+    /// If there is none, or what it says is not a map: each at its place.
     pub fn read(path: &Path) -> Result<Self, Diagnostics> {
         let document = Document::open(path)?;
         let errors = Errors::new();
@@ -140,7 +140,7 @@ impl PriorObject {
     /// The noise of a factor that holds it.
     ///
     /// # Errors
-    /// Where the covariance is none; that of an object which was read is one.
+    /// If the covariance is none; that of an object which was read is one.
     pub(crate) fn noise(&self) -> Result<Noise, NoiseError> {
         let noise = Noise::covariance(DMatrix::from_fn(9, 9, |r, c| self.covariance[r][c]))?;
         noise.whitener(9)?;

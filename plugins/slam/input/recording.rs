@@ -16,7 +16,7 @@ pub(crate) const OBJECTS: &str = "objects.json";
 /// `objects.json`, into a folder, which is made where it is not there.
 ///
 /// # Errors
-/// Where a file cannot be written.
+/// If a file cannot be written.
 pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
     let io = |path: &Path| {
         let path = path.to_owned();
@@ -39,7 +39,7 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
 /// Writes the boxes alone, with the objects that they show.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write_detections(sequence: &Sequence, file: &Path) -> Result<(), FormatError> {
     let quantities = sequence.detections.iter().flat_map(|detection| detection.quantities.iter());
     if let Some(other) = quantities.map(Measurement::name).find(|name| *name != "depth") {

@@ -66,7 +66,7 @@ pub struct WithoutPose {
 }
 
 impl WithoutPose {
-    /// Whether they are more than was expected.
+    /// Returns whether they are more than was expected.
     pub fn is_too_many(&self) -> bool {
         self.rows as f64 > self.allowed * self.of as f64
     }

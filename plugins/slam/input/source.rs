@@ -59,7 +59,7 @@ impl Folders {
     /// one of the folders there.
     ///
     /// # Errors
-    /// Where there is none, with the places that were tried.
+    /// If there is none, with the places that were tried.
     pub fn data_set(&self, name: &Path) -> Result<PathBuf, SourceError> {
         let mut tried = vec![self.beside_document(name)];
         if let Some(data) = self.data.as_ref().filter(|_| name.is_relative()) {

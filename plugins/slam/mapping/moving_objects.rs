@@ -30,10 +30,10 @@ struct Place {
     sigma: f64,
 }
 
-/// Whether an object stands still within short windows. `at` has the time and pose of a frame.
+/// Returns whether an object stands still within short windows. `at` has the time and pose of a frame.
 ///
 /// # Errors
-/// Where it does not.
+/// If it does not.
 pub(super) fn still(
     views: &[ObjectBox],
     at: impl Fn(usize) -> Option<StampedPose>,

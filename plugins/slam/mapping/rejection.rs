@@ -131,7 +131,7 @@ pub(crate) fn start(
     still(measured, &measured.views, at, &camera, *detections.depth_error).map(|()| start)
 }
 
-/// Whether an object stands still, as far as the depths of these boxes of it tell; what an earlier map has does.
+/// Returns whether an object stands still, as far as the depths of these boxes of it tell; what an earlier map has does.
 pub(crate) fn still(
     measured: &Measured,
     views: &[ObjectBox],
@@ -145,7 +145,7 @@ pub(crate) fn still(
     moving_objects::still(views, at, camera, depth_error)
 }
 
-/// Whether an object has boxes enough, and such as one object has; what an earlier map has needs none.
+/// Returns whether an object has boxes enough, and such as one object has; what an earlier map has needs none.
 pub(crate) fn sound(measured: &Measured, settings: &ObjectSettings) -> Result<(), Rejection> {
     if measured.prior.is_some() {
         return Ok(());

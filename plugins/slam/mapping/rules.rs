@@ -35,7 +35,7 @@ impl Ledger {
     /// Asks the rules about some of all objects, and returns the factors that are new.
     ///
     /// # Errors
-    /// Where a rule cannot be applied.
+    /// If a rule cannot be applied.
     pub(crate) fn ask(
         &mut self,
         about: &[ObjectId],
@@ -115,7 +115,7 @@ impl Ledger {
     /// The decisions for a batch: rules are asked about those objects that were not asked about before.
     ///
     /// # Errors
-    /// Where a rule cannot be applied.
+    /// If a rule cannot be applied.
     pub(crate) fn complete(
         mut self,
         measurements: &Measurements,

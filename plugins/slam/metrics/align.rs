@@ -27,7 +27,7 @@ impl Alignment {
 /// `truth_from_estimate` of the best alignment of that kind, and the pairs with aligned estimates.
 ///
 /// # Errors
-/// Where there is no pair; for the best fit of positions, where they lie on one line.
+/// If there is no pair; for the best fit of positions, where they lie on one line.
 pub fn align(pairs: &[PosePair], kind: Alignment) -> Result<(Similarity, Vec<PosePair>), MetricsError> {
     let too_few = MetricsError::TooFew { what: "alignment", needed: 1, found: 0 };
     let first = pairs.first().ok_or(too_few)?;

@@ -19,7 +19,7 @@ pub struct PosePair {
 /// shorter one is lost: one of the longer may serve twice. Both have to be sorted by time.
 ///
 /// # Errors
-/// Where nothing matches.
+/// If nothing matches.
 pub fn associate(
     truth: &[StampedPose],
     estimate: &[StampedPose],

@@ -20,7 +20,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Whether zero lies outside; not, where there is no interval.
+    /// Returns whether zero lies outside; not, where there is no interval.
     pub fn excludes_zero(&self) -> bool {
         self.low.is_some_and(|low| low > 0.0) || self.high.is_some_and(|high| high < 0.0)
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Absolute trajectory error: distances between positions, in metres. Align the pairs first.
 ///
 /// # Errors
-/// Where there is no pair.
+/// If there is no pair.
 pub fn absolute_error(pairs: &[PosePair]) -> Result<Statistics, MetricsError> {
     let errors: Vec<f64> =
         pairs.iter().map(|p| (p.truth.translation - p.estimate.translation).norm()).collect();
@@ -38,7 +38,7 @@ pub struct RelativeError {
 /// The same in any frame, but not at any scale.
 ///
 /// # Errors
-/// Where there are not more pairs than `delta`, or that is 0.
+/// If there are not more pairs than `delta`, or that is 0.
 pub fn relative_error(
     pairs: &[PosePair],
     delta: usize,

@@ -147,7 +147,7 @@ impl Mapper {
         owners
     }
 
-    /// Whether nothing of an object stays when it is taken out of the map, so that it can come back: no pose that it was seen from has left the window.
+    /// Returns whether nothing of an object stays when it is taken out of the map, so that it can come back: no pose that it was seen from has left the window.
     pub(super) fn leaves_nothing(&self, id: ObjectId) -> bool {
         let Some(Tracked::Mapped(mapped)) = self.objects.get(&id) else { return true };
         mapped.boxes.iter().all(|(_, factor)| self.session.entry(*factor).is_some())

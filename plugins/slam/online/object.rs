@@ -81,7 +81,7 @@ impl Sights {
         self.lines.push(line);
     }
 
-    /// Whether it is worth while to try and place the object: it is seen under this angle, and there is more than at the last
+    /// Returns whether it is worth while to try and place the object: it is seen under this angle, and there is more than at the last
     /// try.
     pub(super) fn are_enough(&self, measured: &Measured, degrees: f64) -> bool {
         let angle = self.cosine.clamp(-1.0, 1.0).acos().to_degrees();

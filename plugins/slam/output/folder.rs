@@ -68,7 +68,7 @@ impl OutputFolder {
     /// runs of the same have left unfinished. With `force` it is taken whatever is in it, unless another process uses it.
     ///
     /// # Errors
-    /// Where it cannot be made or written, is in use, or holds what others have written; it is unchanged then.
+    /// If it cannot be made or written, is in use, or holds what others have written; it is unchanged then.
     pub fn claim(path: &Path, command: &str, document: &Path, force: bool) -> Result<Self, FolderError> {
         let document = document.canonicalize().unwrap_or_else(|_| document.to_owned());
         // quoted, so that it is one line whatever the name
@@ -123,7 +123,7 @@ fn make(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// Whether the folder around it belongs to the command, as that of a run does around that of a variant.
+/// Returns whether the folder around it belongs to the command, as that of a run does around that of a variant.
 fn lies_in_one_of(folder: &Path, command: &str) -> bool {
     let Ok(folder) = folder.canonicalize() else { return false };
     let Some(place) = folder.parent().map(|outer| outer.join(MARKER)) else { return false };

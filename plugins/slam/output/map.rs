@@ -38,7 +38,7 @@ impl PriorMap {
     /// read, so that a map does not fade from run to run.
     ///
     /// # Errors
-    /// Where there are no covariances.
+    /// If there are no covariances.
     pub fn of(estimate: &Estimate, settings: &Settings) -> Result<Self, MapError> {
         let new = looks(estimate, *settings.detections.border_px);
         let mut covariances = covariances(estimate)?;
@@ -83,7 +83,7 @@ pub(super) fn gone(estimate: &Estimate, settings: &Settings) -> Vec<ObjectId> {
     looks.into_iter().filter_map(is_gone).collect()
 }
 
-/// Whether an object is not there any more: it should have been seen since it was seen last, in this run or before, and was not.
+/// Returns whether an object is not there any more: it should have been seen since it was seen last, in this run or before, and was not.
 fn is_gone(measured: &Measured, looked: Looked, settings: &Settings) -> bool {
     let prior = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default();
     let missed = (1.0 - prior.plus(looked.before).rate()).powf(looked.since as f64);

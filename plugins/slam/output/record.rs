@@ -112,7 +112,7 @@ impl RunRecord {
     /// Reads the record of a run's folder.
     ///
     /// # Errors
-    /// Where there is none, it cannot be read, or a variant's folder is not within that of the run.
+    /// If there is none, it cannot be read, or a variant's folder is not within that of the run.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let path = folder.join(RECORD);
         let text = std::fs::read_to_string(&path)

@@ -21,7 +21,7 @@ pub(super) struct Associated {
 /// object.
 ///
 /// # Errors
-/// Where the session cannot begin.
+/// If the session cannot begin.
 pub(super) fn associated(
     sequence: Arc<Sequence>,
     settings: &Settings,

@@ -41,7 +41,7 @@ impl Search {
 /// Where a sequence begins in the settings' prior map, if that is to be found, and is.
 ///
 /// # Errors
-/// Where a session cannot begin.
+/// If a session cannot begin.
 pub(super) fn find(
     sequence: &Sequence,
     settings: &Settings,

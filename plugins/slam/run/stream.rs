@@ -19,7 +19,7 @@ use std::time::Instant;
 /// before its source is, that thread ends with the next frame.
 ///
 /// # Errors
-/// Where the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
+/// If the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
 pub fn online(
     name: &str,
     stream: Stream,

@@ -70,7 +70,7 @@ fn rules(items: &[Node], own: &Values, errors: &Errors) -> Vec<Rule> {
 }
 
 impl Rule {
-    /// Whether it makes sense as a whole; what does not is reported where it is written.
+    /// Returns whether it makes sense as a whole; what does not is reported where it is written.
     fn check(&self, written: &Node, own: &Values, errors: &Errors) -> Option<()> {
         let place = written.field("factor").unwrap_or(written).place.clone();
         self.factor.check(self.with.iter().zip(written.items("with")), &place, own, errors)?;

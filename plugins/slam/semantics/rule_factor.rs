@@ -72,7 +72,7 @@ impl RuleFactor {
         self.factor.typetag_name()
     }
 
-    /// Whether it waits for gravity.
+    /// Returns whether it waits for gravity.
     pub fn wants_up(&self) -> bool {
         self.factor.with_up(Direction::Z).is_some()
     }

@@ -44,7 +44,7 @@ pub enum CutSides {
 }
 
 impl CutSides {
-    /// Whether a box with these of its sides inside of the image is used.
+    /// Returns whether a box with these of its sides inside of the image is used.
     pub fn accepts(self, inside: [bool; 4]) -> bool {
         match self {
             Self::Drop => inside.iter().all(|inside| *inside),

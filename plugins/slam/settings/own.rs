@@ -50,7 +50,7 @@ impl OwnGraph {
     }
 }
 
-/// Whether a key is a prefix and a number.
+/// Returns whether a key is a prefix and a number.
 fn is_numbered(key: &str, prefix: &str) -> bool {
     let number = key.strip_prefix(prefix).unwrap_or_default();
     !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit())

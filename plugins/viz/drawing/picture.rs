@@ -41,7 +41,7 @@ impl Picture {
     /// As PNG, with two pixels for each of the SVG.
     ///
     /// # Errors
-    /// Where the picture is too large for that.
+    /// If the picture is too large for that.
     pub fn png(&self, theme: Theme) -> Result<Vec<u8>, NotDrawn> {
         self.sheet.png(theme).map_err(|problem| NotDrawn { name: self.name.clone(), problem })
     }

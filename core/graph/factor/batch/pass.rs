@@ -197,7 +197,7 @@ impl<F: Kernel> BatchOf<F> {
         });
     }
 
-    /// Whether threads are worth it for this share of a linearization's work.
+    /// Returns whether threads are worth it for this share of a linearization's work.
     pub(super) fn in_parallel(&self, share: f64) -> bool {
         share * self.alone > PARALLEL && rayon::current_num_threads() > 1
     }

@@ -267,7 +267,7 @@ fn groups(blocks: Pattern<'_>, start: &[u32]) -> Vec<Group> {
     groups
 }
 
-/// Whether fewer and larger supernodes are worth zeros: relaxed amalgamation (Ashcraft and Grimes, 1989). The shares
+/// Returns whether fewer and larger supernodes are worth zeros: relaxed amalgamation (Ashcraft and Grimes, 1989). The shares
 /// are those that took the least time on pose graphs in the plane and in space.
 fn worth_merging(width: usize, zeros: usize, entries: usize) -> bool {
     let share = zeros as f64 / entries as f64;

@@ -51,7 +51,7 @@ pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> V
     registered().iter().filter_map(|start| point(&**start)).collect()
 }
 
-/// Whether a start doubts the minimum that the problem is in.
+/// Returns whether a start doubts the minimum that the problem is in.
 pub(super) fn is_doubted(graph: &Graph, problem: &Problem) -> bool {
     if registered().is_empty() {
         return false;
@@ -141,7 +141,7 @@ impl Auto {
     }
 }
 
-/// Whether a solve has ended at a minimum, of all variables or of those that a factor touches.
+/// Returns whether a solve has ended at a minimum, of all variables or of those that a factor touches.
 pub(super) fn is_minimum(termination: &Termination) -> bool {
     matches!(termination, Termination::Converged { .. } | Termination::Indeterminate(_))
 }

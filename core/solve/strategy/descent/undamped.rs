@@ -30,7 +30,7 @@ impl Descent<'_> {
         })
     }
 
-    /// Whether a step without damping promises next to nothing: then it is not the damping that makes steps small.
+    /// Returns whether a step without damping promises next to nothing: then it is not the damping that makes steps small.
     /// Leaves that step in `step`.
     pub(crate) fn is_at_rest(&mut self, step: &mut Step) -> bool {
         self.at.not_finite.is_none()
@@ -39,7 +39,7 @@ impl Descent<'_> {
             && self.is_small(step.predicted)
     }
 
-    /// Whether a step without any damping promises more than this share of the cost. Leaves that step in `step`.
+    /// Returns whether a step without any damping promises more than this share of the cost. Leaves that step in `step`.
     pub(crate) fn promises(&mut self, step: &mut Step, share: f64) -> bool {
         let can_step =
             self.at.not_finite.is_none() && self.factorize(None) && self.newton_step(&mut step.delta);

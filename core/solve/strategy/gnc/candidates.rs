@@ -74,7 +74,7 @@ impl Candidates {
     }
 }
 
-/// Whether variables are of one type and follow one another, as those of odometry do.
+/// Returns whether variables are of one type and follow one another, as those of odometry do.
 ///
 /// A variable is given by its column, one for each type, and its position among the variables of that type.
 pub fn is_sequential(variables: impl IntoIterator<Item = (usize, u64)>) -> bool {

@@ -13,7 +13,7 @@ pub(crate) fn on_one_line(text: &str) -> Cow<'_, str> {
     escaped(text, is_obeyed)
 }
 
-/// Whether a terminal obeys a character: control characters, and those that change the direction of the text around them, so
+/// Returns whether a terminal obeys a character: control characters, and those that change the direction of the text around them, so
 /// that it reads as something else (Boucher and Anderson, *Trojan Source*, 2021).
 fn is_obeyed(c: char) -> bool {
     const DIRECTIONS: [char; 12] = [

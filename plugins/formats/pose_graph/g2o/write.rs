@@ -73,7 +73,7 @@ pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
 /// Writes a graph as g2o file, and returns what could not be written.
 ///
 /// # Errors
-/// Where the file cannot be written.
+/// If the file cannot be written.
 pub fn write(path: impl AsRef<Path>, graph: &Graph, values: &Values) -> Result<Omitted, FormatError> {
     let (text, omitted) = format(graph, values);
     write_text(path.as_ref(), &text).map(|()| omitted)

@@ -129,7 +129,7 @@ impl Fitter<'_> {
         squared_error(&fitted.quadric, seen, self.camera, &self.settings.noise())
     }
 
-    /// Whether an ellipsoid explains boxes as well as merging asks for, or that many times less well.
+    /// Returns whether an ellipsoid explains boxes as well as merging asks for, or that many times less well.
     fn is_good(&self, fitted: &Fitted, sightings: &[Sighting], times: f64) -> bool {
         let rows: usize = sightings.iter().map(Sighting::rows).sum();
         let errors: f64 = sightings.iter().map(|seen| self.error(fitted, seen)).sum();

@@ -59,7 +59,7 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// Whether one of two has its centre in the other.
+    /// Returns whether one of two has its centre in the other.
     pub(super) fn is_where(&self, other: &Self) -> bool {
         let (own, others) = (&self.quadric, &other.quadric);
         own.contains(&others.centroid()) || others.contains(&own.centroid())

@@ -102,12 +102,12 @@ impl Track {
         Self { votes, ..Self::bare(object.id, Belief::known(&fitted), fitted) }
     }
 
-    /// Whether an earlier map has it.
+    /// Returns whether an earlier map has it.
     pub(super) fn is_known(&self) -> bool {
         matches!(self.belief, Belief::Known { .. })
     }
 
-    /// Whether one of two has its centre in the other, and it is known where they are.
+    /// Returns whether one of two has its centre in the other, and it is known where they are.
     pub(super) fn is_where(&self, other: &Self) -> bool {
         self.fitted.is_where(&other.fitted) && self.spread(other) < VAGUE * self.sizes(other)
     }
@@ -194,7 +194,7 @@ impl Track {
         self.fitted = fitted.unwrap_or(self.fitted);
     }
 
-    /// Whether it is time to compare it with others: its name, and the time is put off.
+    /// Returns whether it is time to compare it with others: its name, and the time is put off.
     pub(super) fn is_due(&mut self, frame: usize) -> Option<ObjectId> {
         let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_look;
         is_due.then(|| {
@@ -203,7 +203,7 @@ impl Track {
         })
     }
 
-    /// Whether it is time to ask if it is two, and the time is put off.
+    /// Returns whether it is time to ask if it is two, and the time is put off.
     pub(super) fn is_doubtful(&mut self, frame: usize) -> bool {
         let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_doubt;
         if is_due {

@@ -69,7 +69,7 @@ impl Components {
     /// Out of an estimate: the noise of boxes from their residuals, that of odometry by what objects say of it that take no part.
     ///
     /// # Errors
-    /// Where the estimate has no covariance.
+    /// If the estimate has no covariance.
     pub fn of(
         estimate: &Estimate,
         settings: &VarianceSettings,

@@ -38,7 +38,7 @@ pub struct Score {
 }
 
 impl Score {
-    /// Whether the trajectory is better than the odometry, by more than chance may have it.
+    /// Returns whether the trajectory is better than the odometry, by more than chance may have it.
     pub fn is_better(&self) -> bool {
         self.cost < -CLEAR * self.deviation
     }
@@ -67,7 +67,7 @@ struct LeftOut {
 }
 
 impl<'a> CrossValidation<'a> {
-    /// Whether there are objects enough.
+    /// Returns whether there are objects enough.
     pub(super) fn is_possible(mapping: &Mapping) -> bool {
         mapping.mapped().count() >= LEAST_OBJECTS
     }
@@ -99,7 +99,7 @@ impl<'a> CrossValidation<'a> {
     /// What is said of each of these.
     ///
     /// # Errors
-    /// Where a graph without some objects is none.
+    /// If a graph without some objects is none.
     pub(super) fn scores(&self, tried: &[MotionComponent]) -> Result<Vec<Score>, VarianceError> {
         let tasks: Vec<(&MotionComponent, &Fold)> =
             tried.iter().flat_map(|motion| self.folds.iter().map(move |fold| (motion, fold))).collect();

@@ -68,7 +68,7 @@ impl MotionChoice {
         Self { noise: component(BEGIN, 0.0), score: Score { cost: 0.0, deviation: 0.0 }, place: BEGIN }
     }
 
-    /// Whether the odometry is kept as it came in.
+    /// Returns whether the odometry is kept as it came in.
     pub fn is_kept(&self) -> bool {
         !self.score.is_better()
     }
@@ -151,7 +151,7 @@ pub(super) fn distance(estimate: &Estimate) -> f64 {
 /// noise. `pivot` is how far away what the camera sees is, in metres.
 ///
 /// # Errors
-/// Where a graph without some objects is none.
+/// If a graph without some objects is none.
 pub(super) fn choose(
     validation: &CrossValidation<'_>,
     pivot: f64,

@@ -129,7 +129,7 @@ pub(super) fn project(camera: &Camera, p: &Vector3<f64>) -> Vector2<f64> {
     Vector2::new(camera.fx * x + camera.skew * y + camera.cx, camera.fy * y + camera.cy)
 }
 
-/// Whether a point is in a convex polygon, whichever way around that goes.
+/// Returns whether a point is in a convex polygon, whichever way around that goes.
 pub(super) fn inside_convex(polygon: &[Vector2<f64>], p: &Vector2<f64>) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let sides = polygon.iter().zip(next).map(|(a, b)| (b - a).perp(&(p - a)));

@@ -32,7 +32,7 @@ impl Agreement {
         self.overlap * self.seen
     }
 
-    /// Whether a place is good enough.
+    /// Returns whether a place is good enough.
     pub(super) fn is_believed(self) -> bool {
         self.whole() >= BELIEVED
     }
@@ -93,7 +93,7 @@ impl Mapper {
         f64::min(seen / f64::max(expected, 1.0), 1.0)
     }
 
-    /// Whether an object of the map has a box where it is there to be seen.
+    /// Returns whether an object of the map has a box where it is there to be seen.
     fn is_shown(&self, sight: &Sight, object: &PriorObject, layout: &Layout) -> bool {
         layout.may_be(object.id).any(|local| {
             let view = self.measured(local).and_then(|measured| measured.view(sight.frame));

@@ -241,7 +241,7 @@ impl Layout {
         places
     }
 
-    /// Whether two pairs may both be right: what they join is as far apart in both sets.
+    /// Returns whether two pairs may both be right: what they join is as far apart in both sets.
     fn go_together(&self, a: &Pair, b: &Pair) -> bool {
         if a.local == b.local || a.known == b.known {
             return false;
@@ -313,14 +313,14 @@ impl Layout {
         self.pairs.iter().filter(is_match).copied().collect()
     }
 
-    /// Whether two places put all marks at about the same points.
+    /// Returns whether two places put all marks at about the same points.
     fn is_same(&self, one: &Se3, two: &Se3) -> bool {
         self.local
             .iter()
             .all(|mark| (one.act(&mark.centre) - two.act(&mark.centre)).norm() < SAME * 2.0 * mark.sigma)
     }
 
-    /// Whether a point lies where the known marks lie.
+    /// Returns whether a point lies where the known marks lie.
     fn is_among(&self, point: &Vector3<f64>) -> bool {
         let nearest =
             self.known.iter().map(|mark| (mark.centre - point).norm()).fold(f64::INFINITY, f64::min);
@@ -360,7 +360,7 @@ impl Aligned {
     /// How well a local pose is known in the map: rad, then m, in its own frame.
     ///
     /// # Errors
-    /// Where the place is not finite.
+    /// If the place is not finite.
     pub(crate) fn noise(&self, local: &Se3) -> Result<Noise, NoiseError> {
         let [turn, shift] = self.sigmas;
         let shift = shift.hypot(turn * (local.translation - self.centre).norm());
