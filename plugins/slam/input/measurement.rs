@@ -10,7 +10,7 @@ use manifactor_quadric::DualQuadric;
 use nalgebra::{SMatrix, SVector};
 use serde_json::Value;
 use std::f64::consts::TAU;
-use std::fmt::Debug;
+use std::fmt::{Debug, Display};
 use std::sync::Arc;
 
 mod depth;
@@ -34,6 +34,11 @@ pub trait Measurement: Debug + Send + Sync {
     /// Factor between the pose of the camera, world from camera, and the object; of one to [`ROWS`] rows.
     fn factor(&self) -> Arc<dyn Factor>;
 
+    /// Rows of the factor, one to [`ROWS`].
+    fn rows(&self) -> usize {
+        self.factor().erased().signature().rows.unwrap_or(ROWS).min(ROWS)
+    }
+
     /// Standard deviations of the rows, if their residual is `residual`.
     fn deviations(&self, errors: &Errors, residual: &Rows) -> Rows;
 
@@ -51,12 +56,10 @@ pub trait Measurement: Debug + Send + Sync {
         let variables: [&dyn Variable; 2] = [pose, object];
         let is_defined = factor.erased().is_defined(&variables)?;
         let linear = factor.erased().linearize(&variables).filter(|_| is_defined)?;
-        let rows = linear.residual.len().min(ROWS);
-        let mut innovation = Innovation::none(rows);
-        for i in 0..rows {
+        let [by_pose, by_object] = &linear.jacobians[..] else { return None };
+        let mut innovation = Innovation::none(linear.residual.len().min(ROWS));
+        for i in 0..innovation.rows {
             innovation.residual[i] = linear.residual[i];
-            let [by_pose, by_object] =
-                linear.jacobians.get(..2)?.try_into().ok().map(|[a, b]: &[_; 2]| [a, b])?;
             innovation.by_pose.row_mut(i).copy_from(&by_pose.row(i));
             innovation.by_object.row_mut(i).copy_from(&by_object.row(i));
         }
@@ -109,11 +112,6 @@ impl UsualDepth {
     }
 }
 
-/// Rows of a measurement's factor.
-fn rows(measurement: &dyn Measurement) -> usize {
-    measurement.factor().erased().signature().rows.unwrap_or(ROWS).min(ROWS)
-}
-
 /// The measurements of one detection besides its box.
 #[derive(Debug, Clone, Default)]
 pub struct Quantities(Vec<Arc<dyn Measurement>>);
@@ -139,7 +137,7 @@ impl Quantities {
 
     /// Rows of all factors together.
     pub fn rows(&self) -> usize {
-        self.iter().map(rows).sum()
+        self.iter().map(Measurement::rows).sum()
     }
 
     /// Distance of the object's centre along the optical axis, in metres, if that is measured.
@@ -147,7 +145,7 @@ impl Quantities {
         self.iter().find_map(Measurement::depth)
     }
 
-    /// Factors of a frame and an object; none for a measurement without a usable noise.
+    /// Factors of a frame and an object. A measurement whose deviations are no noise has none, which is logged.
     pub(crate) fn entries<'a>(
         &'a self,
         frame: usize,
@@ -156,15 +154,18 @@ impl Quantities {
         loss: Option<&'a Arc<dyn Loss>>,
     ) -> impl Iterator<Item = FactorEntry> + 'a {
         self.iter().filter_map(move |measurement| {
-            let factor = measurement.factor();
-            let rows = rows(measurement);
             let deviations = measurement.deviations(&errors, &Rows::zeros());
-            let noise = match &deviations.as_slice()[..rows] {
+            let noise = match &deviations.as_slice()[..measurement.rows().min(ROWS)] {
                 [sigma] => Noise::sigma(*sigma),
                 sigmas => Noise::sigmas(sigmas),
             };
-            let keys = vec![pose_key(frame), object.clone()];
-            Some(FactorEntry { keys, name: None, factor, noise: noise.ok()?, loss: loss.cloned() })
+            let log = |why: &dyn Display| {
+                let name = measurement.name();
+                tracing::warn!("`{name}` of {object} in frame {frame} is left out: {why}");
+            };
+            let noise = noise.inspect_err(|why| log(why)).ok()?;
+            let (keys, factor) = (vec![pose_key(frame), object.clone()], measurement.factor());
+            Some(FactorEntry { keys, name: None, factor, noise, loss: loss.cloned() })
         })
     }
 

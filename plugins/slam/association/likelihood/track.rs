@@ -4,7 +4,7 @@ use super::Likelihood;
 use super::fit::{Belief, BoxNoise, Fitted, Predicted, SIDES, fit, predict};
 use super::sightings::{Sighting, Sightings};
 use crate::input::class::Aliases;
-use crate::input::measurement::Quantities;
+use crate::input::measurement::{Quantities, ROWS};
 use crate::input::prior_map::PriorObject;
 use crate::input::sequence::{ClassScores, Detection, ObjectId};
 use indexmap::IndexMap;
@@ -246,7 +246,14 @@ impl Expected<'_> {
             return cost(&error, self.covariance);
         }
         // all together: the sides depend on the object's place as the others do
-        let n = SIDES + quantities.rows();
+        let mut innovations = vec![];
+        for measurement in quantities.iter() {
+            let Some(innovation) = measurement.innovation(self.pose, &self.fitted.quadric) else {
+                return f64::INFINITY;
+            };
+            innovations.push((measurement, innovation));
+        }
+        let n = SIDES + innovations.iter().map(|(_, innovation)| innovation.rows.min(ROWS)).sum::<usize>();
         let (mut all, mut by_detector) = (DVector::zeros(n), DMatrix::zeros(n, n));
         let (mut by_pose, mut by_object) = (DMatrix::zeros(n, 6), DMatrix::zeros(n, 9));
         all.rows_mut(0, SIDES).copy_from(&error);
@@ -256,12 +263,9 @@ impl Expected<'_> {
         let sides = noise.deviations(&self.predicted.bounding_box) * *self.settings.lasting;
         (0..SIDES).for_each(|i| by_detector[(i, i)] = sides[i] * sides[i]);
         let mut first = SIDES;
-        for measurement in quantities.iter() {
-            let Some(innovation) = measurement.innovation(self.pose, &self.fitted.quadric) else {
-                return f64::INFINITY;
-            };
+        for (measurement, innovation) in innovations {
             let sigma = measurement.deviations(&noise.others, &innovation.residual) * *self.settings.lasting;
-            for i in 0..innovation.rows {
+            for i in 0..innovation.rows.min(ROWS) {
                 all[first] = innovation.residual[i];
                 by_pose.row_mut(first).copy_from(&innovation.by_pose.row(i));
                 by_object.row_mut(first).copy_from(&innovation.by_object.row(i));

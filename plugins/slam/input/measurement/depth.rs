@@ -28,6 +28,10 @@ impl Measurement for Depth {
         Arc::new(CentroidDepth { depth: self.0 })
     }
 
+    fn rows(&self) -> usize {
+        1
+    }
+
     fn deviations(&self, errors: &Errors, residual: &Rows) -> Rows {
         Rows::repeat(errors.depth * (self.0.get() + residual[0]))
     }
