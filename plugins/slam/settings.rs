@@ -35,8 +35,8 @@ pub use prior_map::PriorMapSettings;
 pub use report::ReportSettings;
 pub use variance::{BoxGroups, VarianceSettings};
 
-/// Everything that is to be known to make an estimate. What a document may say of it, its defaults and its schema are those of
-/// this type; [`Settings::read`] adds what needs the rest of the document: the rules, and variables and factors of its own.
+/// Settings of one estimate. Parser, defaults and schema of a document derive from this type; [`Settings::read`] adds the parts that need
+/// the rest of the document: rules, and variables and factors of its own.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {

@@ -110,9 +110,8 @@ impl Mapper {
         }
     }
 
-    /// Brings the factors of objects whose boxes have moved into line with what is measured. Those that have so many other boxes
-    /// now that they are better begun again, as where they are is where other things are, are taken out of the map until they are seen the next time.
-    /// Returns objects that rules had connected with them.
+    /// Updates the factors of objects whose boxes have moved. An object begins again if a large share of its boxes changed at once, because its
+    /// place is then that of another: it leaves the map until its next detection. Returns objects that rules had connected with those.
     fn put_right(&mut self, all: &[Move], report: &mut FrameReport) -> Vec<ObjectId> {
         let mut changed: BTreeMap<ObjectId, BTreeSet<usize>> = BTreeMap::new();
         for (id, frame) in all.iter().flat_map(|moved| [(moved.from, moved.frame), (moved.into, moved.frame)])

@@ -23,8 +23,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Frames as lines of JSON, one by one as they come: from standard input, or from a file.
 ///
 /// A line has the time, the pose by odometry (from the camera's frame, z forward, to a world of its own choice), and the boxes,
-/// each with a class and its score, or with the scores of several. What else it may have: `object`, where somebody knows which
-/// one it is, `depth`, where somebody has measured how far away its centre is, in metres along the optical axis, and readings of an accelerometer since the line before.
+/// each with a class and its score, or with the scores of several. Optional: the `object` that a box shows; its `depth`, the distance of
+/// the centre along the optical axis in metres, or another registered measurement; accelerometer readings since the line before.
 ///
 /// ```json
 /// {"timestamp": 0.1, "pose": {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}, "boxes": [{"box": [10.0, 20.0, 90.0, 80.0], "class": "cup", "score": 0.8}]}

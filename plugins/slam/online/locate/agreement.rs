@@ -1,7 +1,7 @@
-//! How well what a stream has seen agrees with a place in a map.
+//! Agreement of the boxes of a stream with a place in a map.
 //!
-//! A place predicts boxes. Those of objects that it matches should lie where the map's ellipsoids are seen, and what the map has besides should be
-//! seen as well where it is in view: in another room, a few objects may stand as in the map, but the others are missing.
+//! A place predicts boxes. Boxes of matched objects should lie on the outlines of the map's ellipsoids. Other objects of the map should be
+//! detected too if they are in view: in another room, a few objects may stand as in the map, but the others are missing.
 use super::layout::{Aligned, Layout};
 use crate::estimate::looks::{Expected, Sight, sights};
 use crate::input::prior_map::{PriorMap, PriorObject};
