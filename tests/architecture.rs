@@ -4,7 +4,23 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// From the bottom up: a plugin may build on those before it.
-const PLUGINS: [&str; 7] = ["geometry", "quadric", "semantic", "formats", "slam", "viz", "expression"];
+const PLUGINS: [&str; 15] = [
+    "geometry",
+    "quadric",
+    "semantic",
+    "formats",
+    "metrics",
+    "recording",
+    "simulator",
+    "association",
+    "mapping",
+    "online",
+    "run",
+    "experiment",
+    "slam",
+    "viz",
+    "expression",
+];
 /// What a plugin may take from the core.
 const FOR_PLUGINS: [&str; 6] = ["document", "graph", "solve", "smoother", "config", "testing"];
 

@@ -11,20 +11,29 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+fn is_crate(folder: &Path) -> bool {
+    folder.join("Cargo.toml").is_file() && folder.join("lib.rs").is_file()
+}
+
+/// The folders of crates below `core` and `plugins`; a crate's folder may hold others.
 fn crates() -> Vec<PathBuf> {
-    let folders = ["core", "plugins"].into_iter().flat_map(|f| std::fs::read_dir(root().join(f)).unwrap());
-    let mut crates: Vec<_> =
-        folders.map(|entry| entry.unwrap().path()).filter(|path| path.join("lib.rs").is_file()).collect();
+    let mut folders = vec![root().join("core"), root().join("plugins")];
+    let mut crates = vec![];
+    while let Some(folder) = folders.pop() {
+        let inner = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+        folders.extend(inner.filter(|path| is_crate(path)));
+        crates.extend(is_crate(&folder).then_some(folder));
+    }
     crates.sort();
     crates
 }
 
-/// The files of source below a folder, but for tests and examples.
+/// The source files of a crate below a folder, without tests, examples and other crates.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut files = vec![];
     for path in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
         let name = path.file_name().unwrap().to_str().unwrap();
-        if path.is_dir() && !["tests", "examples", "plugin_template"].contains(&name) {
+        if path.is_dir() && !is_crate(&path) && !["tests", "examples", "plugin_template"].contains(&name) {
             files.extend(sources(&path));
         } else if name.ends_with(".rs") && !name.ends_with("tests.rs") {
             files.push(path);
@@ -98,6 +107,9 @@ fn needs(of_crate: &Path) -> BTreeMap<String, BTreeSet<String>> {
             continue;
         }
         let text = std::fs::read_to_string(file).unwrap();
+        // at the root of a crate, `super` is the crate
+        let is_at_root = file.parent() == Some(of_crate);
+        let text = if is_at_root { text.replace("super::", "crate::") } else { text };
         let others = named(&text).into_iter().map(|name| shown.get(&name).cloned().unwrap_or(name));
         let others: Vec<_> = others.filter(|other| rooms.contains(other) && *other != room).collect();
         needs.entry(room).or_default().extend(others);

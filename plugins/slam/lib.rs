@@ -1,32 +1,18 @@
 //! Object SLAM: from a camera's odometry and a detector's boxes to a map of objects.
 //!
-//! A [`RunDocument`](run_document::RunDocument) says what to do. A [`Source`](source::Source) gives a
+//! Each module is a crate of its own; this crate gathers them under one name. A
+//! [`RunDocument`](run_document::RunDocument) describes a run. A [`Source`](source::Source) gives a
 //! [`Sequence`](sequence::Sequence); a [`Mapping`](mapping::Mapping) makes a graph of it; a solver an
-//! [`Estimate`](estimate::Estimate), which is compared with the truth in a [`report`].
-#[doc(hidden)]
-pub mod __private {
-    pub use {inventory, serde_json};
-}
-
-pub mod association;
-pub mod estimate;
-pub mod experiment;
-pub mod gravity;
-mod input;
-pub mod mapping;
-pub mod metrics;
-pub mod motion;
-pub mod online;
-pub mod output;
-pub mod run;
-pub mod semantics;
-pub mod settings;
-
-pub use estimate::{refine, variance};
-pub use experiment::schema;
-pub use input::{
-    class, fusion, journal, measurement, prior_map, recording, sequence, simulator, source, stream,
+//! [`Estimate`](estimate::Estimate), which is compared with the ground truth in a [`report`].
+pub use manifactor_association as association;
+pub use manifactor_experiment::{self as experiment, schema};
+pub use manifactor_mapping::{
+    estimate, gravity, mapping, measurements, motion, refine, run_document, semantics, settings, variance,
 };
-pub use mapping::measurements;
-pub use output::{record, report};
-pub use settings::run_document;
+pub use manifactor_metrics as metrics;
+pub use manifactor_online as online;
+pub use manifactor_recording::{
+    class, fusion, journal, measurement, prior_map, recording, register_measurement, sequence, source, stream,
+};
+pub use manifactor_run::{output, record, report, run};
+pub use manifactor_simulator as simulator;

@@ -1,9 +1,9 @@
 use super::{Association, Associator, Image, Learned, Map};
-use crate::input::class::Aliases;
-use crate::input::prior_map::PriorObject;
-use crate::input::sequence::ObjectId;
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
+use manifactor_recording::class::Aliases;
+use manifactor_recording::prior_map::PriorObject;
+use manifactor_recording::sequence::ObjectId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -10,13 +10,13 @@ mod tracker;
 mod union;
 
 use super::{Association, Associator};
-use crate::input::class::Aliases;
-use crate::input::measurement::{Errors, Quantities, UsualDepth};
-use crate::input::prior_map::PriorObject;
 use fit::BoxNoise;
 use manifactor_graph::checked::{Positive, Share};
 use manifactor_graph::register;
 use manifactor_quadric::Camera;
+use manifactor_recording::class::Aliases;
+use manifactor_recording::measurement::{Errors, Quantities, UsualDepth};
+use manifactor_recording::prior_map::PriorObject;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

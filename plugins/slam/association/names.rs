@@ -1,4 +1,4 @@
-use crate::input::sequence::{Detection, ObjectId};
+use manifactor_recording::sequence::{Detection, ObjectId};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -78,8 +78,8 @@ impl Names {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::sequence::ClassScores;
     use manifactor_quadric::BoundingBox;
+    use manifactor_recording::sequence::ClassScores;
 
     fn merge(from: u32, into: u32) -> Merge {
         Merge { from: ObjectId(from), into: ObjectId(into) }
@@ -104,7 +104,7 @@ mod tests {
             object: None,
             scores,
             bounding_box,
-            quantities: crate::input::measurement::Quantities::NONE,
+            quantities: manifactor_recording::measurement::Quantities::NONE,
         };
         let put = |from, into| {
             let (from, into) = (ObjectId(from), ObjectId(into));

@@ -1,14 +1,24 @@
 //! The document that describes an experiment.
-use super::axis::{Axis, AxisDocument, Choice, Column};
-use super::names::Names;
-use super::{SummarySettings, Trial, check};
-use crate::settings::Settings;
-use crate::settings::run_document::{absolute, split, stem};
+mod axis;
+mod check;
+mod names;
+mod shard;
+mod summary_settings;
+
+use crate::trial::Trial;
+use axis::{Axis, AxisDocument, Choice, Column};
 use manifactor_config::{Diagnostics, Document, Errors, Fault, Node, merge};
+use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::run_document::{absolute, split, stem};
+use names::Names;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::Map;
 use std::path::{Path, PathBuf};
+
+pub(crate) use shard::folders;
+pub use shard::{NoShard, Shard};
+pub use summary_settings::SummarySettings;
 
 /// An experiment: all its trials, in the order of the table.
 #[derive(Debug, Clone)]

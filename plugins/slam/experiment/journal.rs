@@ -3,10 +3,10 @@
 //! A trial whose line is torn is run again. Of several lines for one trial the last counts, as a trial that
 //! failed may be run again, and lines of trials that the experiment does not have any more are passed over, so that a
 //! changed experiment runs what is new and keeps what is not.
-use super::shard::folders;
-use super::{Trial, TrialRecord};
-use crate::output::OutputFolder;
+use crate::document::folders;
+use crate::trial::{Trial, TrialRecord};
 use manifactor_formats::journal::{Journal, JournalError, Record, read};
+use manifactor_run::output::OutputFolder;
 use std::collections::HashMap;
 use std::io;
 use std::path::Path;
@@ -95,8 +95,8 @@ fn keyed(record: TrialRecord) -> ((Vec<String>, String), TrialRecord) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::TrialOutcome;
     use super::*;
+    use crate::trial::TrialOutcome;
     use manifactor_formats::whole::checked_line;
 
     fn record(label: &str, reason: &str) -> TrialRecord {

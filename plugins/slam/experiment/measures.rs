@@ -1,12 +1,12 @@
 //! What a trial is measured by.
-use crate::estimate::Estimate;
-use crate::input::class::Aliases;
-use crate::metrics::Alignment;
-use crate::output::report::{TrajectoryReport, VariantReport, alignment_name};
-use crate::semantics::{Rule, table_one};
 use indexmap::IndexMap;
 use manifactor_config::quoted_list;
+use manifactor_mapping::estimate::Estimate;
+use manifactor_mapping::semantics::{Rule, table_one};
+use manifactor_metrics::Alignment;
 use manifactor_quadric::DualQuadric;
+use manifactor_recording::class::Aliases;
+use manifactor_run::output::report::{TrajectoryReport, VariantReport, alignment_name};
 
 /// A name, and what it measures of a trajectory.
 type OfTrajectory = (&'static str, fn(&TrajectoryReport) -> Option<f64>);
@@ -116,8 +116,9 @@ fn mean_alignment(estimate: &Estimate, factor: &str) -> Option<f64> {
         rules.iter().any(applies)
     };
     let landmarks = estimate.landmarks();
-    let of_class =
-        |l: &&crate::estimate::Landmark<'_>| l.object.class.as_ref().is_some_and(|c| applies(&c.name));
+    let of_class = |l: &&manifactor_mapping::estimate::Landmark<'_>| {
+        l.object.class.as_ref().is_some_and(|c| applies(&c.name))
+    };
     let cosines: Vec<f64> =
         landmarks.iter().filter(of_class).map(|l| l.quadric.major_axis().dot(&up).abs()).collect();
     (!cosines.is_empty()).then(|| cosines.iter().sum::<f64>() / cosines.len() as f64)

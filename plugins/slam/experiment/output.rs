@@ -1,9 +1,11 @@
 //! The files that an experiment leaves.
-use super::document::Documents;
-use super::{Comparison, Experiment, Interval, Summary, TrialLog, times_table, trials_table};
-use crate::output::{OutputError, results, write_document, write_whole};
+use crate::document::{Documents, Experiment};
+use crate::journal::TrialLog;
+use crate::summary::{Comparison, Summary, times_table, trials_table};
 use manifactor_config::to_toml;
 use manifactor_formats::table::{Column, Table, TableError, to_parquet};
+use manifactor_metrics::Interval;
+use manifactor_run::output::{OutputError, results, write_document, write_whole};
 use std::fmt;
 
 /// Writes all tables, and returns the summary.

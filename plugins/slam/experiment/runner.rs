@@ -1,7 +1,9 @@
 //! Trials on all cores, each on one thread.
-use super::{Experiment, Trial, TrialLog, TrialOutcome, TrialRecord};
-use crate::input::source::Folders;
+use crate::document::Experiment;
+use crate::journal::TrialLog;
+use crate::trial::{Trial, TrialOutcome, TrialRecord};
 use manifactor_formats::journal::JournalError;
+use manifactor_recording::source::Folders;
 use manifactor_solve::{Interrupt, Observer};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,12 +1,12 @@
 //! JSON Schema of a run, for editors to complete and check by: that of the types that read it.
-use crate::experiment::ExperimentDocument;
-use crate::semantics::{RulesDocument, SemanticsDocument};
-use crate::settings::Settings;
-use crate::settings::run_document::Header;
+use crate::document::ExperimentDocument;
 use manifactor_config::{Definitions, graph_root};
+use manifactor_mapping::semantics::{RulesDocument, SemanticsDocument};
+use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::run_document::Header;
 use serde_json::{Value, json};
 
-/// The schema of a [`RunDocument`](crate::settings::run_document::RunDocument), with everything registered that it can name; its
+/// The schema of a [`RunDocument`](manifactor_mapping::settings::run_document::RunDocument), with everything registered that it can name; its
 /// definitions are put among the others.
 pub fn run_root(definitions: &mut Definitions) -> Value {
     let mut root = definitions.of::<Settings>();
@@ -32,7 +32,7 @@ pub fn rules_root(definitions: &mut Definitions) -> Value {
     titled(definitions.of::<RulesDocument>(), "Semantic rules", description)
 }
 
-/// The schema of an [`Experiment`](crate::experiment::Experiment); its definitions are put among the others.
+/// The schema of an [`Experiment`](crate::Experiment); its definitions are put among the others.
 pub fn experiment_root(definitions: &mut Definitions) -> Value {
     let root = definitions.of::<ExperimentDocument>();
     titled(root, "An experiment", "A run over a grid of settings and seeds.")

@@ -1,12 +1,17 @@
 //! Means over trials, and how far variants are apart.
-mod settings;
+mod markdown;
+mod table;
 
-use super::table::records;
-use super::{Experiment, Interval, TrialLog, TrialRecord, bootstrap};
+use crate::document::{Experiment, SummarySettings};
+use crate::journal::TrialLog;
+use crate::trial::TrialRecord;
 use indexmap::{IndexMap, IndexSet};
+use manifactor_metrics::{Interval, bootstrap};
 use serde::Serialize;
+use table::records;
 
-pub use settings::SummarySettings;
+pub(crate) use table::times_table;
+pub use table::trials_table;
 
 /// Means and comparisons, group by group.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -97,7 +102,7 @@ struct Over<'a> {
     /// The column that is compared, and the value of the baseline.
     compared: Option<(usize, &'a str)>,
     clusters: &'a [usize],
-    settings: &'a super::SummarySettings,
+    settings: &'a SummarySettings,
 }
 
 impl<'a> Over<'a> {

@@ -1,9 +1,9 @@
 //! One trial, and what it came to.
-use super::measures::measures;
-use crate::input::source::Folders;
-use crate::run::{RunError, estimate};
-use crate::settings::Settings;
+use crate::measures::measures;
 use indexmap::IndexMap;
+use manifactor_mapping::settings::Settings;
+use manifactor_recording::source::Folders;
+use manifactor_run::run::{RunError, estimate};
 use manifactor_solve::{Observer, Termination};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

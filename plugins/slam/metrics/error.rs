@@ -56,7 +56,7 @@ pub fn relative_error(
 }
 
 /// The relative pose errors of which [`relative_error`] is the summary, in order: metres, radians.
-pub(crate) fn relative_errors(pairs: &[PosePair], delta: usize, pairing: Pairing) -> Vec<(f64, f64)> {
+pub fn relative_errors(pairs: &[PosePair], delta: usize, pairing: Pairing) -> Vec<(f64, f64)> {
     if delta == 0 {
         return vec![];
     }

@@ -1,8 +1,8 @@
 //! Objects that are put elsewhere, between two runs or within one.
 use crate::prior_map::{Found, begun, in_map, sequence, settings, told};
 use manifactor_slam::estimate::Estimate;
+use manifactor_slam::output::map_of;
 use manifactor_slam::output::write_whole;
-use manifactor_slam::prior_map::PriorMap;
 use manifactor_slam::report::VariantReport;
 use manifactor_slam::run::{estimate, online};
 use manifactor_slam::sequence::{ObjectId, Sequence, TrueObject};
@@ -35,7 +35,7 @@ fn what_is_moved_between_two_runs_is_gone_and_added() {
     let first = settings(&[given]);
     let before = sequence(&first);
     let (made, _) = estimate("first", before.clone(), &first, &mut Silent).unwrap();
-    let map = serde_json::to_string(&PriorMap::of(&made, &first).unwrap()).unwrap();
+    let map = serde_json::to_string(&map_of(&made, &first).unwrap()).unwrap();
     write_whole(&folder.path().join("map.json"), map).unwrap();
     let start = sequence(&in_map(folder.path(), &[])).frames[0].world_from_camera;
     for association in [given, "association.type=likelihood"] {
@@ -83,7 +83,7 @@ fn what_is_moved_within_a_stream_is_told_and_not_in_its_map() {
         let is_right = |(estimate, report): (Estimate, VariantReport)| {
             let gone = report.gone.iter().filter_map(|id| place(&estimate, *id));
             assert_eq!(at(gone, &truth), old, "{association} {:?}", report.gone);
-            let map = PriorMap::of(&estimate, &settings).unwrap();
+            let map = map_of(&estimate, &settings).unwrap();
             let left = at(map.objects.iter().map(|object| object.quadric.centroid()), &truth);
             assert!(left.is_disjoint(&old) && left.len() >= 11, "{association} {left:?}");
         };

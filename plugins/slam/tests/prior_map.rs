@@ -4,6 +4,7 @@ use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_quadric::{BoundingBox, QuadricPrior};
 use manifactor_slam::online::{FrameError, FrameReport, Mapper};
+use manifactor_slam::output::map_of;
 use manifactor_slam::output::{write_variant, write_whole};
 use manifactor_slam::prior_map::{PriorMap, PriorObject};
 use manifactor_slam::record::VariantRecord;
@@ -64,7 +65,7 @@ fn mapped(folder: &Path, change: impl FnOnce(&mut Sequence)) -> PriorMap {
     let mut sequence = Sequence::clone(&sequence(&settings));
     change(&mut sequence);
     let (estimate, _) = estimate("first", Arc::new(sequence), &settings, &mut Silent).unwrap();
-    let map = PriorMap::of(&estimate, &settings).unwrap();
+    let map = map_of(&estimate, &settings).unwrap();
     write_whole(&folder.join("map.json"), serde_json::to_string(&map).unwrap()).unwrap();
     map
 }
@@ -237,7 +238,7 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
     };
     assert_eq!(prior.gone.len(), 1, "{prior:?}");
     assert!(near(&prior.gone[0], &map, place(gone)));
-    let after = PriorMap::of(&estimate, &settings).unwrap();
+    let after = map_of(&estimate, &settings).unwrap();
     assert!(after.object(prior.gone[0]).is_none());
     assert!(prior.added.iter().any(|id| near(id, &after, place(2))), "{prior:?}");
     // a map that is extended knows its objects better, and what they were in both walks
@@ -269,7 +270,7 @@ fn what_is_not_seen_again_does_not_fade() {
         let settings = begun(folder.path(), &all.frames[0].world_from_camera, &[]);
         let (estimate, report) = estimate("again", Arc::new(few), &settings, &mut Silent).unwrap();
         assert!(told(&report).seen.is_empty() && told(&report).gone.is_empty(), "{:?}", told(&report));
-        let after = PriorMap::of(&estimate, &settings).unwrap();
+        let after = map_of(&estimate, &settings).unwrap();
         let known = |map: &PriorMap| -> Vec<_> {
             map.objects.iter().map(|o| (o.id, o.classes.clone(), o.quadric, o.covariance)).collect()
         };
@@ -377,7 +378,7 @@ fn what_the_solver_has_rejected_says_nothing_in_the_map() {
         !rejected.contains(&(place - 1))
     });
     without.solution.weights.retain(|weight| *weight != 0.0);
-    let [map, without] = [&estimate, &without].map(|of| PriorMap::of(of, &settings).unwrap());
+    let [map, without] = [&estimate, &without].map(|of| map_of(of, &settings).unwrap());
     for (a, b) in map.objects.iter().zip(&without.objects) {
         let (a, b) = (a.covariance(), b.covariance());
         assert!((a - b).norm() < 1e-6 * b.norm(), "{}", (a - b).norm() / b.norm());

@@ -10,8 +10,8 @@ use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
 use manifactor_slam::metrics::{Alignment, align, associate};
 use manifactor_slam::online::{FrameError, FrameReport, Located, Mapper};
+use manifactor_slam::output::map_of;
 use manifactor_slam::output::write_whole;
-use manifactor_slam::prior_map::PriorMap;
 use manifactor_slam::run::{Watch, online};
 use manifactor_slam::run_document::RunDocument;
 use manifactor_slam::sequence::{Observation, Sequence};
@@ -106,7 +106,7 @@ fn main() {
     let (estimate, _) = manifactor_slam::run::estimate("map", mapped, settings, &mut Silent).unwrap();
     let frame = truth_from_map(&sequence, &estimate.trajectory());
     let clock = std::time::Instant::now();
-    let map = PriorMap::of(&estimate, settings).unwrap();
+    let map = map_of(&estimate, settings).unwrap();
     println!("{} objects, in {:.2} s", map.objects.len(), clock.elapsed().as_secs_f64());
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("map.json");

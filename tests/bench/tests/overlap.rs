@@ -3,8 +3,8 @@
 use manifactor::config::{Document, Format};
 use manifactor::prelude::*;
 use manifactor::slam::metrics::IdentityScores;
+use manifactor::slam::output::map_of;
 use manifactor::slam::output::write_whole;
-use manifactor::slam::prior_map::PriorMap;
 use manifactor::slam::report::VariantReport;
 use manifactor::slam::run::{Run, estimate};
 use manifactor::slam::run_document::RunDocument;
@@ -73,7 +73,7 @@ fn objects_of_a_prior_map_are_found_again_by_their_outlines() {
     let sequence = Arc::new(first.source.load(&Folders::default()).unwrap());
     let (mapped, _) = estimate("first", sequence, &first, &mut Silent).unwrap();
     let file = folder.path().join("map.json");
-    let map = PriorMap::of(&mapped, &first).unwrap();
+    let map = map_of(&mapped, &first).unwrap();
     write_whole(&file, serde_json::to_string(&map).unwrap()).unwrap();
     let again = ["source.seed=2", "source.trajectory.seed=2"];
     let start = settings(TABLE, &again).source.load(&Folders::default()).unwrap().frames[0].world_from_camera;

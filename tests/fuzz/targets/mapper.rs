@@ -7,6 +7,7 @@ use manifactor::nalgebra::Vector3;
 use manifactor::quadric::BoundingBox;
 use manifactor::slam::measurement::{Depth, Quantities};
 use manifactor::slam::online::Mapper;
+use manifactor::slam::output::map_of;
 use manifactor::slam::prior_map::PriorMap;
 use manifactor::slam::run_document::RunDocument;
 use manifactor::slam::sequence::{
@@ -64,7 +65,7 @@ pub fn mapper(data: &[u8]) {
     assert_eq!(estimates(&loaded), estimates(mapper.session()));
     let Ok(estimate) = mapper.finish(Arc::new(sequence), &mut third()) else { return };
     is_finite(&estimate.solution.values);
-    let Ok(map) = PriorMap::of(&estimate, settings) else { return };
+    let Ok(map) = map_of(&estimate, settings) else { return };
     let (folder, text) = (temporary(), serde_json::to_string(&map).unwrap_or_else(|e| panic!("{e}")));
     let path = folder.path().join("map.json");
     std::fs::write(&path, &text).unwrap_or_else(|e| panic!("{e}"));

@@ -6,9 +6,9 @@ use super::sightings::{Sighting, Sightings};
 use super::track::{Seen, Track};
 use super::tracker::{FIRM, Tracker};
 use super::union::{LOOSER, SAME, alike};
-use crate::input::class::Aliases;
-use crate::input::sequence::ObjectId;
 use manifactor_quadric::Camera;
+use manifactor_recording::class::Aliases;
+use manifactor_recording::sequence::ObjectId;
 
 /// Of so many objects it is asked in a frame, at most.
 const LOOKS: usize = 4;

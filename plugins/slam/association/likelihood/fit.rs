@@ -3,10 +3,10 @@
 //! One box says where an object is but for its depth. What is not known yet is held by a weak prior: a depth that is usual here,
 //! axes of about the same length, a rotation not far from that of the first camera.
 use super::sightings::Sighting;
-use crate::input::measurement::{Errors, Rows};
 use manifactor_geometry::Se3;
 use manifactor_graph::{Manifold, Residual};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric, QuadricPrior};
+use manifactor_recording::measurement::{Errors, Rows};
 use nalgebra::{Cholesky, SMatrix, SVector, Vector3, Vector4};
 
 type Matrix9 = SMatrix<f64, 9, 9>;
@@ -295,7 +295,7 @@ pub(super) fn squared_error(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::input::measurement::Quantities;
+    use manifactor_recording::measurement::Quantities;
     use nalgebra::Vector2;
 
     const CAMERA: Camera =

@@ -1,9 +1,9 @@
 //! What tests look at: things in a row, from a rail.
 use super::fit::predict;
-use crate::association::Map;
-use crate::input::sequence::{ClassScores, Detection, ObjectId};
+use crate::Map;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{Camera, DualQuadric};
+use manifactor_recording::sequence::{ClassScores, Detection, ObjectId};
 use nalgebra::Vector3;
 
 pub(super) const CAMERA: Camera =
@@ -31,6 +31,6 @@ pub(super) fn seen(frame: usize, x: f64, class: &str) -> Detection {
         object: None,
         scores: ClassScores::single(class, 0.8),
         bounding_box,
-        quantities: crate::input::measurement::Quantities::NONE,
+        quantities: manifactor_recording::measurement::Quantities::NONE,
     }
 }

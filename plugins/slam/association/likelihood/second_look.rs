@@ -2,7 +2,7 @@
 use super::super::{Associator, Image, Map, Merge, Move};
 use super::track::Seen;
 use super::tracker::Tracker;
-use crate::input::sequence::{Detection, ObjectId};
+use manifactor_recording::sequence::{Detection, ObjectId};
 
 /// A frame that is to be looked at once more, and what its boxes are called.
 #[derive(Debug)]

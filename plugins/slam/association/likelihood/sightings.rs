@@ -1,9 +1,9 @@
 //! Boxes of an object that say the most about its ellipsoid.
 use super::super::Map;
 use super::fit::SIDES;
-use crate::input::measurement::Quantities;
 use manifactor_geometry::Se3;
 use manifactor_quadric::BoundingBox;
+use manifactor_recording::measurement::Quantities;
 use nalgebra::Vector3;
 
 /// A box, and from where it was seen.

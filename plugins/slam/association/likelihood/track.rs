@@ -3,13 +3,13 @@ use super::super::Map;
 use super::Likelihood;
 use super::fit::{Belief, BoxNoise, Fitted, Predicted, SIDES, fit, predict};
 use super::sightings::{Sighting, Sightings};
-use crate::input::class::Aliases;
-use crate::input::measurement::{Quantities, ROWS};
-use crate::input::prior_map::PriorObject;
-use crate::input::sequence::{ClassScores, Detection, ObjectId};
 use indexmap::IndexMap;
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
+use manifactor_recording::class::Aliases;
+use manifactor_recording::measurement::{Quantities, ROWS};
+use manifactor_recording::prior_map::PriorObject;
+use manifactor_recording::sequence::{ClassScores, Detection, ObjectId};
 use nalgebra::allocator::Allocator;
 use nalgebra::{
     Cholesky, DMatrix, DVector, DefaultAllocator, Dim, Matrix3, Matrix6, OMatrix, OVector, SMatrix, Vector6,

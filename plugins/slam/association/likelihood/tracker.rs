@@ -5,11 +5,11 @@ use super::fit::Belief;
 use super::second_look::Past;
 use super::sightings::Sighting;
 use super::track::{Seen, Track};
-use crate::input::class::Aliases;
-use crate::input::prior_map::PriorObject;
-use crate::input::sequence::{Detection, ObjectId};
 use manifactor_geometry::Se3;
 use manifactor_quadric::Camera;
+use manifactor_recording::class::Aliases;
+use manifactor_recording::prior_map::PriorObject;
+use manifactor_recording::sequence::{Detection, ObjectId};
 use std::collections::VecDeque;
 use std::sync::Arc;
 

@@ -5,8 +5,8 @@ use super::fit::{Fitted, fit, squared_error};
 use super::sightings::{Sighting, Sightings};
 use super::track::{Seen, Track};
 use super::tracker::Tracker;
-use crate::input::sequence::ObjectId;
 use manifactor_quadric::Camera;
+use manifactor_recording::sequence::ObjectId;
 
 /// Two objects that are one.
 struct Union {

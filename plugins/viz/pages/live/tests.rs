@@ -1,6 +1,6 @@
 use super::*;
 use manifactor_geometry::Se3;
-use manifactor_slam::prior_map::PriorMap;
+use manifactor_slam::output::map_of;
 use manifactor_slam::run::{Watch, estimate, online};
 use manifactor_slam::settings::Settings;
 use manifactor_slam::source::Folders;
@@ -96,7 +96,7 @@ fn what_was_shown_moves_into_the_map_that_is_found() {
     let sequence = |settings: &Settings| Arc::new(settings.source.load(&Folders::default()).unwrap());
     let (made, _) = estimate("first", sequence(&first), &first, &mut Silent).unwrap();
     let mut second = settings(2);
-    second.prior_map.as_mut().unwrap().map = Arc::new(PriorMap::of(&made, &first).unwrap());
+    second.prior_map.as_mut().unwrap().map = Arc::new(map_of(&made, &first).unwrap());
     // its odometry begins elsewhere
     let (mut stream, all) = (sequence(&second).opening().into_sequence(), sequence(&second));
     let begin = all.frames[0].world_from_camera;

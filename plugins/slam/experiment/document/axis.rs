@@ -1,0 +1,152 @@
+//! What an experiment varies.
+use manifactor_config::{Errors, Fault, Field, Node, Place, Placed, Table, Value, deserialize_with};
+use manifactor_mapping::settings::run_document::Declared;
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer};
+use std::collections::BTreeMap;
+
+/// Columns of the table that change together, and the ways they do.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    pub(super) columns: Vec<Column>,
+    pub(super) options: Vec<Choice>,
+}
+
+/// A column of the table, and where it is named.
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    pub(super) name: String,
+    pub(super) place: Place,
+}
+
+/// One way to set the columns of an axis.
+#[derive(Debug, Clone)]
+pub(super) struct Choice {
+    /// As tables show it, by column.
+    pub(super) labels: Vec<String>,
+    pub(super) place: Place,
+    /// What is put over the base, by column.
+    pub(super) sets: Vec<Node>,
+}
+
+/// What is varied: columns with rows of values, or a name with options.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+pub(super) enum AxisDocument {
+    Rows(Rows),
+    Options(Options),
+}
+
+/// Columns that change together.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Rows {
+    /// Columns, and the setting that each changes: { seed = "source.seed" }.
+    #[schemars(with = "BTreeMap<String, String>")]
+    columns: Node,
+    /// Their values: a list for each row, or the value itself where there is one column.
+    #[schemars(with = "Vec<serde_json::Value>")]
+    rows: Placed<Vec<Node>>,
+}
+
+/// One column of options.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Options {
+    /// The column.
+    #[schemars(with = "String")]
+    name: Placed<String>,
+    /// Ways to set it.
+    #[schemars(with = "Vec<Declared>")]
+    options: Placed<Vec<Declared>>,
+}
+
+impl<'de> Deserialize<'de> for AxisDocument {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserialize_with(deserializer, |node| {
+            Ok(Box::new(match node.field("columns") {
+                Some(_) => Self::Rows(node.try_read()?),
+                None => Self::Options(node.try_read()?),
+            }))
+        })
+    }
+}
+
+impl Axis {
+    /// What one of `[[axes]]` says; `None` where that makes no sense, which is reported.
+    pub(super) fn read(document: AxisDocument, errors: &Errors) -> Option<Self> {
+        let (place, axis) = match document {
+            AxisDocument::Rows(rows) => (rows.rows.place.clone(), Self::of_rows(rows, errors)?),
+            AxisDocument::Options(Options { name: Placed { place, value: name }, options }) => {
+                (options.place, Self::of_options(Column { name, place }, options.value))
+            }
+        };
+        if axis.options.is_empty() {
+            errors.report(place, Fault::invalid("an axis without options leaves nothing to run"));
+        }
+        Some(axis)
+    }
+
+    /// One column, each option with a name.
+    pub(super) fn of_options(column: Column, options: Vec<Declared>) -> Self {
+        let choice = |Declared { name: Placed { place, value: name }, set, .. }| Choice {
+            labels: vec![name],
+            sets: vec![set.unwrap_or_else(|| Node::new(place.clone(), Value::Table(Table::default())))],
+            place,
+        };
+        Self { columns: vec![column], options: options.into_iter().map(choice).collect() }
+    }
+
+    fn of_rows(Rows { columns, rows }: Rows, errors: &Errors) -> Option<Self> {
+        let Value::Table(columns) = columns.value else {
+            let problem = Fault::wrong_type("a table of columns and what they set", columns.in_words());
+            errors.report(columns.place, problem);
+            return None;
+        };
+        let (columns, keys): (Vec<Column>, Vec<Node>) = columns
+            .into_iter()
+            .map(|(name, Field { key, node })| (Column { name, place: key }, node))
+            .unzip();
+        let paths: Vec<Option<String>> = keys.into_iter().map(|key| key.read(errors)).collect();
+        let paths: Vec<String> = paths.into_iter().collect::<Option<_>>()?;
+        let options: Vec<Option<Choice>> =
+            rows.value.into_iter().map(|row| choice(row, &paths, errors)).collect();
+        Some(Self { columns, options: options.into_iter().collect::<Option<_>>()? })
+    }
+}
+
+/// A row: a value for each column, or the value itself where there is one column.
+fn choice(row: Node, paths: &[String], errors: &Errors) -> Option<Choice> {
+    let place = row.place.clone();
+    let values = match row.value {
+        Value::Array(items) if paths.len() > 1 => items,
+        value => vec![Node::new(place.clone(), value)],
+    };
+    if values.len() != paths.len() {
+        let (expected, found) = (paths.len(), values.len());
+        let problem = Fault::wrong_type(format!("{expected} values, one a column"), format!("{found}"));
+        errors.report(place, problem);
+        return None;
+    }
+    let labels = values.iter().map(label).collect();
+    let sets = paths.iter().zip(values).map(|(path, value)| nested(path, value)).collect();
+    Some(Choice { labels, place, sets })
+}
+
+/// `a.b.c` and a value as tables within tables.
+fn nested(path: &str, value: Node) -> Node {
+    path.rsplit('.').fold(value, |node, key| {
+        let place = node.place.clone();
+        let field = Field { key: place.clone(), node };
+        Node::new(place, Value::Table(Box::new([(key.trim().to_owned(), field)].into_iter().collect())))
+    })
+}
+
+/// A value as a table shows it.
+fn label(value: &Node) -> String {
+    match &value.value {
+        Value::String(text) => text.clone(),
+        // as it is written: 0.1 and 1e-1 are two labels
+        _ => value.place.text().split_whitespace().collect::<Vec<_>>().join(" "),
+    }
+}

@@ -1,0 +1,70 @@
+//! One of several parts of an experiment, for a process of its own, on any machine.
+//!
+//! A shard has every N-th trial, a folder of its own beside that of the experiment, and a journal there. The experiment
+//! itself begins with what its shards have done; its tables are those of a single run.
+use super::Experiment;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// The folder of all shards, by that of their experiment: `out/sweep.shards`.
+fn beside(output: &Path) -> PathBuf {
+    let name = output.file_name().unwrap_or(OsStr::new("experiment"));
+    output.with_file_name([name, OsStr::new(".shards")].join(OsStr::new("")))
+}
+
+/// The K-th of N parts, written `K/N`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1.
+    number: usize,
+    /// How many there are.
+    of: usize,
+}
+
+/// A text that is no shard.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("expected K/N, the K-th of N parts, such as 2/8; got `{0}`")]
+pub struct NoShard(String);
+
+impl FromStr for Shard {
+    type Err = NoShard;
+    fn from_str(text: &str) -> Result<Self, NoShard> {
+        let parts = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((number, of)) if 1 <= number && number <= of => Ok(Self { number, of }),
+            _ => Err(NoShard(text.to_owned())),
+        }
+    }
+}
+
+impl Experiment {
+    /// Keeps one part of the trials, whose results go to a folder of its own.
+    pub fn keep(&mut self, Shard { number, of }: Shard) {
+        let mut place = 0..;
+        self.trials.retain(|_| place.next().is_some_and(|i| i % of == number - 1));
+        self.output = beside(&self.output).join(format!("{number}-of-{of}"));
+    }
+}
+
+/// The folders of an experiment's shards, by name.
+pub(crate) fn folders(output: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(beside(output)).into_iter().flatten();
+    let mut folders: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    folders.sort();
+    folders
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_shard_is_refused() {
+        for text in ["", "1", "0/3", "4/3", "1/0", "-1/3", "1/3/5", "a/b", "1/ 3"] {
+            let error = text.parse::<Shard>().unwrap_err().to_string();
+            assert!(error.ends_with(&format!("got `{text}`")), "{error}");
+        }
+        assert_eq!("2/8".parse(), Ok(Shard { number: 2, of: 8 }));
+    }
+}

@@ -1,0 +1,43 @@
+//! Experiments: the settings of one run, swept over axes; a row for each trial.
+//!
+//! ```toml
+//! title = "how much the noise of boxes matters"
+//! base = "base.toml"                                  # a run; its variants are an axis of their own
+//!
+//! [[axes]]                                            # a column, and what it sets
+//! columns = { sigma_px = "source.detector.sigma_px" }
+//! rows = [1.0, 2.0, 4.0]
+//!
+//! [[axes]]                                            # several columns that change together
+//! columns = { scene = "source.scene.seed", path = "source.trajectory.seed" }
+//! rows = [[1, 11], [1, 12], [2, 21]]
+//!
+//! [[axes]]                                            # whole tables, by name
+//! name = "model"
+//! options = [{ name = "standard" }, { name = "truncated", set = { detections = { model = "truncated" } } }]
+//!
+//! [summary]                                           # means over all columns that are not named here
+//! by = ["sigma_px", "model"]
+//! baseline = { variant = "QuadricSLAM" }              # what each other variant is compared with, in pairs
+//! clusters = ["scene"]                                # trials of one scene are not independent
+//! metrics = ["position", "shape", "quality"]
+//! ```
+//! All combinations of all axes are run. Each [`Trial`] is solved on one thread, so that it is the same whatever else
+//! runs; it is written to a [`TrialLog`] once it is done, and not run again. The tables are made of the journal.
+mod document;
+mod journal;
+mod measures;
+mod output;
+mod runner;
+pub mod schema;
+mod summary;
+mod trial;
+
+pub use document::{Documents, Experiment, NoShard, Shard, SummarySettings};
+pub use journal::TrialLog;
+pub use manifactor_metrics::{Interval, bootstrap};
+pub use measures::measures;
+pub use output::write;
+pub use runner::{Progress, alone, run};
+pub use summary::{Comparison, Group, Summary, trials_table};
+pub use trial::{Trial, TrialOutcome, TrialRecord};

@@ -1,0 +1,87 @@
+//! All trials that are done, in the order of the experiment.
+use crate::document::Experiment;
+use crate::journal::TrialLog;
+use crate::trial::{TrialOutcome, TrialRecord};
+use indexmap::IndexSet;
+use manifactor_formats::table::{Column, Table};
+
+/// A row for each trial that is done: its columns, `status` (`failed`, or how the solve ended), the `reason` of a
+/// failure, and every measure that any trial has.
+///
+/// The order is that of the experiment, and no time is in it: it is the same however often the experiment was
+/// interrupted, and whatever number of threads it ran on.
+pub fn trials_table(experiment: &Experiment, journal: &TrialLog) -> Table {
+    let records: Vec<&TrialRecord> = records(experiment, journal).collect();
+    let measures: IndexSet<&str> =
+        records.iter().flat_map(|r| r.outcome.measures()).map(|(name, _)| name).collect();
+    let mut columns = labels(experiment, &records);
+    let text = |of: fn(&TrialOutcome) -> &str| {
+        Column::Text(records.iter().map(|record| of(&record.outcome).to_owned()).collect())
+    };
+    columns.push(("status".to_owned(), text(TrialOutcome::status)));
+    columns.push(("reason".to_owned(), text(TrialOutcome::reason)));
+    for measure in measures {
+        let cells = records.iter().map(|record| record.outcome.measure(measure)).collect();
+        columns.push((measure.to_owned(), Column::Number(cells)));
+    }
+    Table { columns }
+}
+
+/// How long each trial took, in seconds.
+pub(crate) fn times_table(experiment: &Experiment, journal: &TrialLog) -> Table {
+    let records: Vec<&TrialRecord> = records(experiment, journal).collect();
+    let mut columns = labels(experiment, &records);
+    let seconds = records.iter().map(|record| Some(record.seconds)).collect();
+    columns.push(("seconds".to_owned(), Column::Number(seconds)));
+    Table { columns }
+}
+
+/// The trials that are done, in the order of the experiment.
+pub(super) fn records<'a>(
+    experiment: &'a Experiment,
+    journal: &'a TrialLog,
+) -> impl Iterator<Item = &'a TrialRecord> {
+    experiment.trials.iter().filter_map(|trial| journal.find(trial))
+}
+
+fn labels(experiment: &Experiment, records: &[&TrialRecord]) -> Vec<(String, Column)> {
+    let label =
+        |i: usize| records.iter().map(|record| record.labels.get(i).cloned().unwrap_or_default()).collect();
+    let columns = experiment.columns.iter().enumerate();
+    columns.map(|(i, name)| (name.clone(), Column::Text(label(i)))).collect()
+}
+
+impl TrialOutcome {
+    /// `failed`, or how the solve ended.
+    pub fn status(&self) -> &str {
+        match self {
+            Self::Solved { termination, .. } => termination,
+            Self::Failed { .. } => "failed",
+        }
+    }
+
+    /// Why it failed; nothing, where it did not.
+    pub fn reason(&self) -> &str {
+        match self {
+            Self::Solved { .. } => "",
+            Self::Failed { reason } => reason,
+        }
+    }
+
+    /// What is measured, in order.
+    pub fn measures(&self) -> impl Iterator<Item = (&str, f64)> {
+        let measures = match self {
+            Self::Solved { measures, .. } => Some(measures),
+            Self::Failed { .. } => None,
+        };
+        measures.into_iter().flatten().map(|(name, value)| (name.as_str(), *value))
+    }
+
+    /// One measure; `None` where it is not known.
+    pub fn measure(&self, name: &str) -> Option<f64> {
+        match self {
+            Self::Solved { measures, .. } => measures.get(name).copied(),
+            Self::Failed { .. } => None,
+        }
+    }
+}

@@ -1,0 +1,135 @@
+use super::{Gravity, GravityError, MapFrame, first_frame};
+use manifactor_geometry::{NotARotation, So3};
+use manifactor_graph::checked::NotNegative;
+use manifactor_graph::{Direction, register};
+use manifactor_recording::sequence::{Frame, Sequence};
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Up is what an accelerometer feels.
+///
+/// Held still, an accelerometer reads 9.8 m/s² upwards. A hand that holds a camera is never still: readings are turned
+/// into the frame of the odometry by the frame nearest in time, and averaged there, where pushes to and fro cancel
+/// out. The map stays in that frame.
+///
+/// ```toml
+/// gravity = { type = "accelerometer", window = 10.0, camera_from_sensor = [0.0, 0.0, 1.0, 0.0] }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Accelerometer {
+    /// Readings this near in time to the first frame are averaged, in seconds: the longer, the less the pushes count, and
+    /// the more the drift of the odometry.
+    pub window: NotNegative,
+    /// Rotation from the sensor's frame to the camera's, a unit quaternion (x, y, z, w). The Kinect's of TUM RGB-D
+    /// is half a turn about z, [0, 0, 1, 0].
+    pub camera_from_sensor: Quaternion,
+}
+
+/// A unit quaternion (x, y, z, w).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(try_from = "[f64; 4]", into = "[f64; 4]")]
+#[schemars(with = "[f64; 4]")]
+pub struct Quaternion(pub So3);
+
+impl TryFrom<[f64; 4]> for Quaternion {
+    type Error = NotARotation;
+    fn try_from(xyzw: [f64; 4]) -> Result<Self, NotARotation> {
+        So3::from_quaternion_xyzw(xyzw).map(Self)
+    }
+}
+impl From<Quaternion> for [f64; 4] {
+    fn from(q: Quaternion) -> [f64; 4] {
+        q.0.quaternion_xyzw()
+    }
+}
+
+impl Default for Accelerometer {
+    fn default() -> Self {
+        Self { window: NotNegative::literal(10.0), camera_from_sensor: Quaternion(So3::identity()) }
+    }
+}
+
+#[typetag::serialize(name = "accelerometer")]
+impl Gravity for Accelerometer {
+    fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
+        let first = first_frame(sequence)?;
+        let near = |timestamp: f64| (timestamp - first.timestamp).abs() <= *self.window;
+        let mut near = sequence.accelerometer.iter().filter(|r| near(r.timestamp)).peekable();
+        if near.peek().is_none() {
+            return Err(GravityError::NoReadings { timestamp: first.timestamp, within: *self.window });
+        }
+        let up: Vector3<f64> = near
+            .map(|reading| {
+                let felt = self.camera_from_sensor.0.act(&reading.acceleration);
+                frame_at(&sequence.frames, reading.timestamp)
+                    .unwrap_or(first)
+                    .world_from_camera
+                    .rotation
+                    .act(&felt)
+            })
+            .sum();
+        Ok(MapFrame::of_odometry(Some(Direction::new(up)?)))
+    }
+
+    fn settled_after(&self) -> f64 {
+        *self.window
+    }
+}
+register!(dyn Gravity, "accelerometer", Accelerometer);
+
+/// The frame nearest in time.
+fn frame_at(frames: &[Frame], timestamp: f64) -> Option<&Frame> {
+    let after = frames.partition_point(|frame| frame.timestamp < timestamp);
+    let around = frames.get(after.saturating_sub(1)..frames.len().min(after + 1)).unwrap_or_default();
+    let away = |frame: &Frame| (frame.timestamp - timestamp).abs();
+    around.iter().min_by(|a, b| away(a).total_cmp(&away(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::sequence;
+    use super::*;
+    use manifactor_recording::sequence::Acceleration;
+
+    fn reading(timestamp: f64, acceleration: [f64; 3]) -> Acceleration {
+        Acceleration { timestamp, acceleration: acceleration.into() }
+    }
+
+    fn half_turn() -> Accelerometer {
+        let camera_from_sensor = Quaternion(So3::from_quaternion_xyzw([0.0, 0.0, 1.0, 0.0]).unwrap());
+        Accelerometer { window: NotNegative::literal(1.0), camera_from_sensor }
+    }
+
+    #[test]
+    fn up_is_the_average_of_what_is_felt_at_first() {
+        let accelerometer = vec![
+            reading(9.5, [1.0, 9.0, 0.0]),
+            reading(10.5, [-1.0, 9.0, 0.0]),
+            reading(13.0, [9.0, 0.0, 0.0]),
+        ];
+        let map = half_turn().locate(&Sequence { accelerometer, ..sequence() }).unwrap();
+        assert!((*map.up.unwrap() - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn a_camera_that_turns_feels_the_same_up() {
+        let quarter = So3::exp(&Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
+        let mut sequence = sequence();
+        sequence.frames[1].world_from_camera.rotation = quarter;
+        // up is -y in the world, and -x in the second camera
+        sequence.accelerometer = vec![reading(10.1, [0.0, 9.0, 0.0]), reading(10.9, [9.0, 0.0, 0.0])];
+        let map = half_turn().locate(&sequence).unwrap();
+        assert!((*map.up.unwrap() - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn free_fall_and_silence_are_errors() {
+        let fall = vec![reading(10.0, [0.0; 3])];
+        let fall = Accelerometer::default().locate(&Sequence { accelerometer: fall, ..sequence() });
+        assert!(matches!(fall, Err(GravityError::NoDirection(_))));
+        let silence = Accelerometer::default().locate(&sequence());
+        assert!(matches!(silence, Err(GravityError::NoReadings { .. })));
+    }
+}

@@ -1,0 +1,69 @@
+use super::{Gravity, GravityError, MapFrame, first_frame};
+use manifactor_graph::checked::NotNegative;
+use manifactor_graph::{Direction, register};
+use manifactor_recording::sequence::Sequence;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Up is the z axis of the ground truth.
+///
+/// The ground-truth pose nearest in time to the first frame puts the map into the frame of the ground truth, as
+/// the paper did. An experimenter's choice: a robot has no ground truth.
+///
+/// ```toml
+/// gravity = { type = "ground_truth" }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct GroundTruthPose {
+    /// How near that pose has to be, in seconds.
+    pub max_time_difference: NotNegative,
+}
+
+impl Default for GroundTruthPose {
+    fn default() -> Self {
+        Self { max_time_difference: NotNegative::literal(0.1) }
+    }
+}
+
+#[typetag::serialize(name = "ground_truth")]
+impl Gravity for GroundTruthPose {
+    fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
+        let first = first_frame(sequence)?;
+        let away = |timestamp: f64| (timestamp - first.timestamp).abs();
+        let truth = sequence.ground_truth.iter().flat_map(|truth| &truth.trajectory);
+        let nearest = truth.min_by(|a, b| away(a.timestamp).total_cmp(&away(b.timestamp)));
+        match nearest {
+            Some(pose) if away(pose.timestamp) <= *self.max_time_difference => Ok(MapFrame {
+                map_from_odometry: pose.pose.compose(&first.world_from_camera.inverse()),
+                up: Some(Direction::Z),
+            }),
+            _ => Err(GravityError::NoGroundTruth {
+                timestamp: first.timestamp,
+                within: *self.max_time_difference,
+                nearest: nearest.map(|pose| pose.timestamp),
+            }),
+        }
+    }
+}
+register!(dyn Gravity, "ground_truth", GroundTruthPose);
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{sequence, upright_camera, with_truth};
+    use super::*;
+
+    #[test]
+    fn the_first_frame_comes_to_lie_on_its_true_pose() {
+        let map = GroundTruthPose::default().locate(&with_truth(10.05)).unwrap();
+        assert_eq!(map.map_from_odometry, upright_camera());
+        assert_eq!(map.up, Some(Direction::Z));
+    }
+
+    #[test]
+    fn a_truth_of_another_time_is_refused() {
+        let locate = |sequence| GroundTruthPose::default().locate(&sequence).unwrap_err().to_string();
+        assert!(locate(with_truth(12.0)).contains("the nearest is at 12 s"));
+        assert!(locate(sequence()).contains("give the source a ground truth"));
+    }
+}

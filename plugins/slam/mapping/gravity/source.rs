@@ -1,0 +1,24 @@
+use super::{Gravity, GravityError, MapFrame};
+use manifactor_graph::register;
+use manifactor_recording::sequence::Sequence;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Up as the data source knows it; a simulator does, real data seldom do.
+///
+/// The map stays in the frame of the odometry.
+///
+/// ```toml
+/// gravity = { type = "source" }
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FromSource {}
+
+#[typetag::serialize(name = "source")]
+impl Gravity for FromSource {
+    fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError> {
+        Ok(MapFrame::of_odometry(sequence.up))
+    }
+}
+register!(dyn Gravity, "source", FromSource);

@@ -1,0 +1,364 @@
+//! From a sequence to a graph.
+//!
+//! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
+//! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
+//! semantic rules say of it; last, variables and factors of the document's own. Offsets of boxes, where they are asked for, come with their noise.
+use crate::gravity::{GravityError, MapFrame};
+use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
+use crate::motion::{MotionError, RelativePose, Step};
+use crate::semantics::{Applied, Candidate, LeftOut, RuleError, Verdict, unmatched};
+use crate::settings::{DetectionSettings, OdometrySettings, Settings};
+use manifactor_formats::plausible;
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::{Prior, Se3};
+use manifactor_graph::{FactorEntry, Graph, Key, Values, Variable};
+use manifactor_quadric::{BoundingBoxFactor, Camera, DualQuadric, QuadricPrior};
+use manifactor_recording::fusion::FusedClass;
+use manifactor_recording::measurement::Errors;
+use manifactor_recording::prior_map::PriorObject;
+use manifactor_recording::sequence::{Frame, ObjectId, Sequence, UnusedDetection};
+use serde::Serialize;
+use std::sync::Arc;
+
+pub mod measurements;
+mod moving_objects;
+pub mod rejection;
+pub mod rules;
+mod warning;
+
+pub use manifactor_recording::keys::{object_key, pose_key};
+pub use rejection::Rejection;
+use rules::Ledger;
+pub use warning::Warning;
+
+/// A graph made of a sequence, and how it was made.
+#[derive(Debug, Clone)]
+pub struct Mapping {
+    /// Priors, odometry, boxes and semantics.
+    pub graph: Graph,
+    /// Where a solve begins.
+    pub values: Values,
+    /// The frame of the values, and up in it.
+    pub frame: MapFrame,
+    /// Each object that was detected, mapped or not, by number.
+    pub objects: Vec<MappedObject>,
+    /// What was done with the detections.
+    pub measurements: Measurements,
+    /// What the user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// An object that was detected.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MappedObject {
+    /// Its number.
+    pub id: ObjectId,
+    /// Its key in the graph, if it is mapped.
+    pub key: Key,
+    /// Its class; `None` where no detection named one.
+    pub class: Option<FusedClass>,
+    /// Detections that are associated with it.
+    pub detections: usize,
+    /// Boxes that passed the filters.
+    pub boxes: usize,
+    /// Why it is not mapped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rejected: Option<Rejection>,
+    /// Factors that semantic rules brought it, and why.
+    pub semantic_factors: Vec<Applied>,
+    /// Rules that are for its class and were not applied, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
+}
+
+/// Why a sequence could not be mapped.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MappingError {
+    /// A sequence of nothing.
+    #[error("the sequence has no frames")]
+    NoFrames,
+    /// Up is unknown.
+    #[error(transparent)]
+    Gravity(#[from] GravityError),
+    /// A semantic rule that cannot be applied.
+    #[error(transparent)]
+    Rule(#[from] RuleError),
+    /// A step that the motion model has no factor for.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+}
+
+/// The frame that a pose's key names; `None` for any other key.
+pub(crate) fn frame_of(key: &Key) -> Option<usize> {
+    let number = key.as_str().strip_prefix('x')?;
+    let is_number = number.bytes().all(|b| b.is_ascii_digit());
+    is_number.then(|| number.parse().ok()).flatten()
+}
+
+impl Mapping {
+    /// Makes the graph of a sequence.
+    ///
+    /// # Errors
+    /// If there is no frame, or up is not known and a rule needs it.
+    pub fn new(sequence: &Sequence, settings: &Settings) -> Result<Self, MappingError> {
+        let first = sequence.frames.first().ok_or(MappingError::NoFrames)?;
+        let located = settings.gravity.locate(sequence)?;
+        let frame = settings.anchor().map_or(located, |anchor| anchor.frame(first, located));
+        let measurements = Measurements::gather(sequence, settings);
+        let at = |i: usize| {
+            let seen = sequence.frames.get(i)?;
+            let pose = frame.map_from_odometry.compose(&seen.world_from_camera);
+            Some(StampedPose { timestamp: seen.timestamp, pose })
+        };
+        let start = |measured| rejection::start(measured, at, sequence.camera, settings);
+        let starts = measurements.objects.iter().map(start).collect();
+        let decisions = Ledger::default().complete(&measurements, starts, settings, frame.up)?;
+        Self::assemble(sequence, settings, frame, measurements, decisions)
+    }
+
+    /// Puts together what was measured and what was decided of it: a decision for each object, in their order.
+    pub fn assemble(
+        sequence: &Sequence,
+        settings: &Settings,
+        frame: MapFrame,
+        measurements: Measurements,
+        decisions: Vec<Decision>,
+    ) -> Result<Self, MappingError> {
+        let (graph, values) = (Graph::new(), Values::new());
+        let (objects, warnings) = (vec![], vec![]);
+        let mut mapping = Self { graph, values, frame, objects, measurements, warnings };
+        mapping.add_poses(sequence, settings)?;
+        let all = mapping.measurements.objects.clone();
+        for (measured, decision) in all.iter().zip(decisions) {
+            let object = mapping.add_object(measured, decision, sequence.camera, settings);
+            mapping.objects.push(object);
+        }
+        settings.own.add_to(&mut mapping.graph, &mut mapping.values);
+        mapping.warn(sequence, settings);
+        let (poses, objects, factors) =
+            (sequence.frames.len(), mapping.mapped().count(), mapping.graph.factors().len());
+        tracing::info!(poses, objects, factors, "mapped");
+        Ok(mapping)
+    }
+
+    /// Objects that are in the graph.
+    pub fn mapped(&self) -> impl Iterator<Item = &MappedObject> {
+        self.objects.iter().filter(|object| object.rejected.is_none())
+    }
+
+    fn add_poses(&mut self, sequence: &Sequence, settings: &Settings) -> Result<(), MappingError> {
+        for (i, frame) in sequence.frames.iter().enumerate() {
+            let pose = self.frame.map_from_odometry.compose(&frame.world_from_camera);
+            self.values.insert(pose_key(i), pose);
+        }
+        let first = *self.values.get(pose_key(0)).map_err(|_| MappingError::NoFrames)?;
+        self.graph.push(prior_entry(first, settings));
+        for (i, pair) in sequence.frames.windows(2).enumerate() {
+            let [from, to] = pair else { continue };
+            let estimates = |key: &str| self.values.variable(key).map(|value| value.erased().clone_box());
+            let step = step([i, i + 1], [from, to], &settings.odometry, &estimates);
+            let factors = settings.motion.factors(&step)?;
+            if let (Ok(a), Ok(b)) = (self.values.get(pose_key(i)), self.values.get(pose_key(i + 1))) {
+                let variables = settings.motion.variables(&step, [a, b]);
+                for (key, value) in variables.iter() {
+                    self.values.insert_boxed(key.clone(), value.erased().clone_box());
+                }
+            }
+            self.graph.factors_mut().extend(factors);
+        }
+        Ok(())
+    }
+
+    fn add_object(
+        &mut self,
+        measured: &Measured,
+        decision: Decision,
+        camera: Camera,
+        settings: &Settings,
+    ) -> MappedObject {
+        let key = object_key(measured.id);
+        let Decision { start, verdict } = decision;
+        match &start {
+            Err(rejection) => tracing::info!(object = %measured.id, "not mapped: {rejection}"),
+            Ok(start) => {
+                let known = measured.prior.as_ref().map(|known| known_entry(known, settings));
+                self.graph.factors_mut().extend(known);
+                let boxes = measured.views.iter();
+                let boxes = boxes.flat_map(|view| view_entries(view, &key, camera, &settings.detections));
+                self.graph.factors_mut().extend(boxes);
+                self.graph.factors_mut().extend(verdict.entries);
+                self.values.insert(key.clone(), *start);
+            }
+        }
+        MappedObject {
+            id: measured.id,
+            key,
+            class: measured.class(),
+            detections: measured.detections,
+            boxes: measured.views.len(),
+            rejected: start.err(),
+            semantic_factors: verdict.applied,
+            left_out: verdict.left_out,
+        }
+    }
+
+    fn warn(&mut self, sequence: &Sequence, settings: &Settings) {
+        let odometry = sequence.frames.iter().map(|frame| (frame.timestamp, frame.world_from_camera));
+        let doubts = plausible::trajectory(odometry).into_iter().map(|what| Warning::Implausible { what });
+        self.warnings.extend(doubts);
+        self.warnings.extend(unused(sequence, self.measurements.without_area));
+        let detected = self.objects.iter().filter(|object| object.detections > 0);
+        self.warnings
+            .extend(not_mapped(detected.filter_map(|object| Some((object, object.rejected.as_ref()?)))));
+        let classes = self.objects.iter().filter_map(|object| Some(object.class.as_ref()?.name.clone()));
+        let mut seen: Vec<String> = classes.collect();
+        seen.sort();
+        seen.dedup();
+        for rule in settings.semantics.iter().filter(|rule| !rule.shipped) {
+            for class in unmatched(rule, &seen, &settings.aliases) {
+                let (class, factor) = (class.to_owned(), rule.factor.name().to_owned());
+                self.warnings.push(Warning::ClassWithoutObjects { class, factor, seen: seen.clone() });
+            }
+        }
+        if self.mapped().next().is_none() {
+            self.warnings.push(Warning::NoObjects { detected: self.objects.len() });
+        } else if !settings.association.uses_names() && settings.detections.loss.is_none() {
+            self.warnings.push(Warning::NotRobust);
+        }
+    }
+}
+
+/// Detections that are not used, a warning for each reason.
+fn unused(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
+    let mut warnings = vec![];
+    let (mut boxes, mut first) = (0, None);
+    for unused in &sequence.unused {
+        match unused {
+            UnusedDetection::WithoutPose(without) if without.is_too_many() => {
+                warnings.push(Warning::TooManyUnused { what: without.to_string(), allowed: without.allowed });
+            }
+            UnusedDetection::WithoutPose(without) => {
+                warnings.push(Warning::Unused { what: without.to_string() });
+            }
+            UnusedDetection::Box { timestamp, place, fault } => {
+                boxes += 1;
+                first.get_or_insert_with(|| format!("box {place} at {timestamp} s: {fault}"));
+            }
+        }
+    }
+    if let Some(first) = first {
+        let what = format!("boxes that cannot be read are left out: {boxes}, the first {first}");
+        warnings.push(Warning::Unused { what });
+    }
+    if without_area > 0 {
+        let what = format!(
+            "boxes without width or height are left out: {without_area}; check the detector's output"
+        );
+        warnings.push(Warning::Unused { what });
+    }
+    warnings
+}
+
+/// Objects that are not mapped, a warning for each kind of reason.
+fn not_mapped<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a Rejection)>) -> Vec<Warning> {
+    const NAMED: usize = 5;
+    let mut kinds: Vec<(&Rejection, Vec<String>)> = vec![];
+    for (object, rejection) in objects {
+        let class = object.class.as_ref().map(|class| format!(" ({})", class.name)).unwrap_or_default();
+        let named = format!("{}{class}", object.key);
+        match kinds
+            .iter_mut()
+            .find(|(kind, _)| std::mem::discriminant(*kind) == std::mem::discriminant(rejection))
+        {
+            Some((_, keys)) => keys.push(named),
+            None => kinds.push((rejection, vec![named])),
+        }
+    }
+    let warning = |(rejection, keys): (&Rejection, Vec<String>)| {
+        let more = match keys.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let named = keys.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let what = format!("{named}{more}: {rejection}");
+        Warning::NotMapped { what, remedy: rejection.remedy() }
+    };
+    kinds.into_iter().map(warning).collect()
+}
+
+/// What was decided of an object.
+#[derive(Debug, Clone)]
+pub struct Decision {
+    /// Where it begins, or why it is not mapped.
+    pub start: Result<DualQuadric, Rejection>,
+    /// What the rules have for it; nothing, where it is not mapped.
+    pub verdict: Verdict,
+}
+
+/// An object that is mapped, as rules look at it.
+pub fn as_candidate(measured: &Measured, start: DualQuadric) -> Candidate {
+    let (key, class, known) = (object_key(measured.id), measured.class(), measured.prior.is_some());
+    Candidate { key, class, start, known }
+}
+
+/// The factor that holds the first pose.
+pub fn prior_entry(value: Se3, settings: &Settings) -> FactorEntry {
+    FactorEntry {
+        keys: vec![pose_key(0)],
+        name: None,
+        factor: Arc::new(Prior { value }),
+        noise: settings.prior.noise.clone(),
+        loss: None,
+    }
+}
+
+/// The factor that holds an object of an earlier map, as far as that is trusted.
+pub fn known_entry(object: &PriorObject, settings: &Settings) -> FactorEntry {
+    let prior_map = settings.prior_map.as_ref();
+    let noise = prior_map.and_then(|prior| prior.trusted(object).noise().ok());
+    FactorEntry {
+        keys: vec![object_key(object.id)],
+        name: None,
+        factor: Arc::new(QuadricPrior { value: object.quadric }),
+        // what was read has one
+        noise: noise.unwrap_or_default(),
+        loss: prior_map.map(|prior| prior.loss.clone()),
+    }
+}
+
+/// The step between two frames, as a motion model sees it.
+pub fn step<'a>(
+    frames: [usize; 2],
+    [from, to]: [&Frame; 2],
+    settings: &'a OdometrySettings,
+    estimates: &'a dyn Fn(&str) -> Option<Box<dyn Variable>>,
+) -> Step<'a> {
+    let pose = from.world_from_camera.between(&to.world_from_camera);
+    let odometry = RelativePose { pose, noise: &settings.noise, loss: settings.loss.as_ref() };
+    Step { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
+}
+
+/// The factors of a detection: that of its box, then those of what it measures besides.
+pub fn view_entries<'a>(
+    view: &'a ObjectBox,
+    object: &'a Key,
+    camera: Camera,
+    settings: &'a DetectionSettings,
+) -> impl Iterator<Item = FactorEntry> + 'a {
+    let errors = Errors { depth: *settings.depth_error };
+    let others = view.quantities.entries(view.frame, object, errors, settings.loss.as_ref());
+    std::iter::once(box_entry(view, object.clone(), camera, settings)).chain(others)
+}
+
+/// The factor of a box.
+fn box_entry(view: &ObjectBox, object: Key, camera: Camera, settings: &DetectionSettings) -> FactorEntry {
+    let (bounding_box, model) = (view.bounding_box, settings.model);
+    FactorEntry {
+        keys: vec![pose_key(view.frame), object],
+        name: None,
+        factor: Arc::new(BoundingBoxFactor { bounding_box, camera, model }),
+        noise: settings.noise_of(view.inside),
+        loss: settings.loss.clone(),
+    }
+}

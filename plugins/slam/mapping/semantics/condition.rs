@@ -1,0 +1,124 @@
+//! Which objects a rule is for, besides their class: by score, by size, by what is near.
+use super::{ANY, Candidate, Rule};
+use manifactor_graph::Direction;
+use manifactor_graph::checked::{Positive, Share};
+use manifactor_quadric::DualQuadric;
+use manifactor_recording::class::Aliases;
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Another object, near the one that a rule is for; where the rule's factor connects two objects, the other of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Near {
+    /// Its class. Default: any.
+    #[serde(default = "any")]
+    pub classes: Vec<String>,
+    /// How wide the gap between the two is at most, along the line through their centres, where the solve begins.
+    pub within_m: Positive,
+    /// Whether its centre has to be the lower one.
+    #[serde(default)]
+    pub below: bool,
+}
+
+fn any() -> Vec<String> {
+    vec![ANY.to_owned()]
+}
+
+/// Why a rule applies to an object, and which others are near.
+pub(super) struct Met<'a> {
+    pub because: Vec<String>,
+    pub others: Vec<&'a Candidate>,
+}
+
+impl Rule {
+    /// Looks at an object among all; `Err` has the condition that does not hold, in words.
+    pub(super) fn met<'a>(
+        &self,
+        object: &Candidate,
+        all: &'a [Candidate],
+        wanted: usize,
+        up: Option<Direction>,
+        aliases: &Aliases,
+    ) -> Result<Met<'a>, String> {
+        let (mut because, score) = (vec![], object.class.as_ref().map_or(0.0, |class| class.score));
+        let mut require = |holds: bool, what: String, bound: String| {
+            if holds {
+                because.push(format!("{what} ({bound})"));
+                return Ok(());
+            }
+            Err(format!("{what}, not {bound}"))
+        };
+        if let Some(least) = self.min_score.map(Share::get) {
+            require(score >= least, format!("score {score:.2}"), format!("at least {least}"))?;
+        }
+        let size = 2.0 * object.start.semi_axes.max();
+        if let Some(least) = self.min_size_m.map(Positive::get) {
+            require(size >= least, format!("{size:.2} m long"), format!("at least {least} m"))?;
+        }
+        if let Some(most) = self.max_size_m.map(Positive::get) {
+            require(size <= most, format!("{size:.2} m long"), format!("at most {most} m"))?;
+        }
+        let Some(near) = &self.near else { return Ok(Met { because, others: vec![] }) };
+        let found = near.of(object, all, up, aliases);
+        let within = found.iter().filter(|(gap, _)| *gap <= near.within_m.get()).count();
+        if within < wanted.max(1) {
+            return Err(near.in_vain(&found, wanted.max(1)));
+        }
+        let chosen = found.into_iter().take(wanted.max(1));
+        let others = chosen.map(|(gap, other)| {
+            because.push(format!("{gap:.2} m from {} ({})", other.key, other.class_name()));
+            other
+        });
+        let others = others.collect();
+        Ok(Met { because, others })
+    }
+}
+
+impl Near {
+    /// Those of its classes, and lower if they have to be, with the gaps to them, the nearest first.
+    fn of<'a>(
+        &self,
+        object: &Candidate,
+        all: &'a [Candidate],
+        up: Option<Direction>,
+        aliases: &Aliases,
+    ) -> Vec<(f64, &'a Candidate)> {
+        let fits = |other: &&Candidate| {
+            let lower =
+                up.is_some_and(|up| (other.start.centroid() - object.start.centroid()).dot(&up) < 0.0);
+            other.key != object.key
+                && super::names(&self.classes, other.class_name(), aliases)
+                && (lower || !self.below)
+        };
+        let others = all.iter().filter(fits);
+        let mut found: Vec<_> = others.map(|other| (gap(&object.start, &other.start), other)).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found
+    }
+
+    fn in_vain(&self, found: &[(f64, &Candidate)], wanted: usize) -> String {
+        let what =
+            if self.classes.iter().any(|c| c == ANY) { "object".into() } else { self.classes.join(" or ") };
+        let lower = if self.below { " below" } else { "" };
+        let nearest = match found.first() {
+            Some((gap, other)) => format!("the nearest is {}, {gap:.2} m away", other.key),
+            None => "none is mapped".into(),
+        };
+        let many = if wanted > 1 { format!("fewer than {wanted} of") } else { "no".into() };
+        format!("{many} {what}{lower} within {} m: {nearest}", self.within_m.get())
+    }
+}
+
+/// The gap between two ellipsoids along the line through their centres; negative, where they overlap.
+fn gap(a: &DualQuadric, b: &DualQuadric) -> f64 {
+    let way = b.centroid() - a.centroid();
+    let Some(u) = way.try_normalize(1e-12) else { return -a.semi_axes.min() - b.semi_axes.min() };
+    way.norm() - radius(a, &u) - radius(b, &u)
+}
+
+/// How far the surface is from the centre in a direction.
+fn radius(quadric: &DualQuadric, u: &Vector3<f64>) -> f64 {
+    quadric.pose.rotation.inverse().act(u).component_div(&quadric.semi_axes).norm().recip()
+}

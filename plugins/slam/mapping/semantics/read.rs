@@ -1,0 +1,119 @@
+//! `semantics = "table_one"`, `semantics = "my_rules.toml"`, or `[[semantics]]` rule by rule.
+use super::{Rule, SHIPPED, shipped};
+use manifactor_config::{Diagnostics, Document, Errors, Fault, Format, Node, Value, nearest, quoted_list};
+use manifactor_graph::Values;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::path::Path;
+
+/// `semantics` of a run: which objects get which factors.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+pub enum SemanticsDocument {
+    /// The name of a shipped table, or a file.
+    Named(String),
+    /// Rules.
+    Rules(Vec<Rule>),
+}
+
+/// A file of semantic rules, which runs name: `semantics = "this_file.toml"`.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RulesDocument {
+    /// Which objects get which factors.
+    #[schemars(with = "Vec<Rule>")]
+    semantics: Vec<Node>,
+}
+
+/// The rules of a run's document. Files are found from `folder`, the document's own; `own` are the variables that it declares.
+pub(crate) fn read_semantics(
+    semantics: Option<&Node>,
+    folder: &Path,
+    own: &Values,
+    errors: &Errors,
+) -> Vec<Rule> {
+    match semantics {
+        None => Vec::new(),
+        Some(Node { place, value: Value::String(name) }) => match rules_named(name, folder, own) {
+            Ok(rules) => rules,
+            Err(Unread::Unknown) => {
+                let known: Vec<String> = SHIPPED.iter().map(|s| (*s).to_owned()).collect();
+                let meant = nearest(name, SHIPPED).map_or(String::new(), |n| format!("did you mean `{n}`? "));
+                let help =
+                    format!("{meant}there is {}, or give the path of a .toml file", quoted_list(&known));
+                errors.report(place.clone(), Fault::with_help(format!("unknown semantics `{name}`"), help));
+                Vec::new()
+            }
+            Err(Unread::Wrong(diagnostics)) => {
+                errors.extend(diagnostics);
+                Vec::new()
+            }
+        },
+        Some(Node { value: Value::Array(items), .. }) => rules(items, own, errors),
+        Some(other) => {
+            let expected = "an array of rules, or the name of a file with rules";
+            errors.report(other.place.clone(), Fault::wrong_type(expected, other.in_words()));
+            Vec::new()
+        }
+    }
+}
+
+/// Each rule, over the document's own variables; what is wrong is reported and left out.
+fn rules(items: &[Node], own: &Values, errors: &Errors) -> Vec<Rule> {
+    let read = |item: &Node| {
+        let rule = item.read::<Rule>(errors)?;
+        rule.check(item, own, errors)?;
+        Some(rule)
+    };
+    items.iter().filter_map(read).collect()
+}
+
+impl Rule {
+    /// Returns whether it makes sense as a whole; what does not is reported where it is written.
+    fn check(&self, written: &Node, own: &Values, errors: &Errors) -> Option<()> {
+        let place = written.field("factor").unwrap_or(written).place.clone();
+        self.factor.check(self.with.iter().zip(written.items("with")), &place, own, errors)?;
+        if let Some(Err(error)) = self.factor.rows.map(|rows| self.noise.whitener(rows)) {
+            let place = written.field("noise").unwrap_or(written).place.clone();
+            errors.report(place, Fault::invalid(error.to_string()));
+        }
+        if self.factor.partners() > 0 && self.near.is_none() {
+            let message =
+                format!("`{}` connects objects, and the rule does not say which", self.factor.name());
+            let help = "say where the other one is: near = { classes = [\"tv monitor\"], within_m = 0.5 }";
+            errors.report(place, Fault::with_help(message, help));
+            return None;
+        }
+        Some(())
+    }
+}
+
+enum Unread {
+    Unknown,
+    Wrong(Diagnostics),
+}
+
+fn rules_named(name: &str, folder: &Path, own: &Values) -> Result<Vec<Rule>, Unread> {
+    match shipped(name) {
+        Some(text) => shipped_rules(name, text).map_err(Unread::Wrong),
+        None if Format::of_path(name).is_some() => Document::open(folder.join(name))
+            .and_then(|document| rules_of(&document, own))
+            .map_err(Unread::Wrong),
+        None => Err(Unread::Unknown),
+    }
+}
+
+/// The rules of a file that is shipped.
+pub(super) fn shipped_rules(name: &str, text: &str) -> Result<Vec<Rule>, Diagnostics> {
+    let document = Document::parse(format!("{name}.toml"), text, Format::Toml)?;
+    let rules = rules_of(&document, &Values::new())?;
+    Ok(rules.into_iter().map(|rule| Rule { shipped: true, ..rule }).collect())
+}
+
+/// The rules of a document with nothing else in it.
+fn rules_of(document: &Document, own: &Values) -> Result<Vec<Rule>, Diagnostics> {
+    let errors = Errors::new();
+    let read = document.root().read::<RulesDocument>(&errors);
+    let rules = read.map(|document| rules(&document.semantics, own, &errors));
+    errors.finish(rules)
+}

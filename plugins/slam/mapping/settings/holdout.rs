@@ -1,0 +1,75 @@
+use manifactor_graph::checked::Share;
+use manifactor_recording::sequence::{Detection, Sequence};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::num::NonZeroUsize;
+
+/// Boxes that the estimate does without, and which are then predicted by it: how good a map is, where no truth is known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Holdout {
+    /// This share of all boxes, drawn at random; others of the same frames take part.
+    Share(Share),
+    /// Those of the last frames, this share of all.
+    Last(Share),
+    /// Those of so many frames in a row, of each five times as many: longer than a detector's errors last.
+    Block(NonZeroUsize),
+}
+
+/// Of so many blocks the last is held out.
+const BLOCKS: usize = 5;
+/// Of the draw.
+const SEED: u64 = 1;
+
+impl Holdout {
+    /// Takes the boxes out of a sequence.
+    pub fn take_from(self, sequence: &mut Sequence) -> Vec<Detection> {
+        let mut rng = Pcg64::seed_from_u64(SEED);
+        let frames = sequence.frames.len();
+        let mut is_held_out = |detection: &Detection| match self {
+            Self::Share(share) => rng.random_bool(*share),
+            Self::Last(share) => detection.frame as f64 >= (1.0 - *share) * frames as f64,
+            Self::Block(length) => detection.frame / length.get() % BLOCKS == BLOCKS - 1,
+        };
+        let all = std::mem::take(&mut sequence.detections);
+        let (held_out, used) = all.into_iter().partition(|detection| is_held_out(detection));
+        sequence.detections = used;
+        held_out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_simulator::Simulated;
+
+    #[test]
+    fn boxes_are_held_out_as_it_says_and_none_is_lost() {
+        let whole = Simulated::default().simulate().unwrap();
+        let (boxes, frames) = (whole.detections.len(), whole.frames.len());
+        let split = |holdout: Holdout| {
+            let mut rest = whole.clone();
+            let held_out = holdout.take_from(&mut rest);
+            assert_eq!(held_out.len() + rest.detections.len(), boxes);
+            (held_out, rest.detections)
+        };
+        let (held_out, _) = split(Holdout::Share(Share::literal(0.25)));
+        assert!((held_out.len() as f64 / boxes as f64 - 0.25).abs() < 0.05);
+        assert_eq!(
+            split(Holdout::Share(Share::literal(0.0))).0.len()
+                + split(Holdout::Share(Share::literal(1.0))).1.len(),
+            0
+        );
+        let (held_out, rest) = split(Holdout::Last(Share::literal(0.2)));
+        assert!(
+            held_out.iter().all(|d| 5 * d.frame >= 4 * frames)
+                && rest.iter().all(|d| 5 * d.frame < 4 * frames)
+        );
+        let length = NonZeroUsize::new(3).unwrap();
+        let (held_out, rest) = split(Holdout::Block(length));
+        assert!(!held_out.is_empty() && held_out.iter().all(|d| d.frame % 15 >= 12));
+        assert!(rest.iter().all(|d| d.frame % 15 < 12));
+    }
+}

@@ -1,0 +1,378 @@
+//! Where a map lies in another, by the classes and the layout of its objects.
+//!
+//! Two pairs of objects of like classes, as far apart in the one map as in the other, make a hypothesis where up is known; three, where it
+//! is not. What else fits under it, and what should and does not, is its score; it is believed where no other one comes near.
+use super::agreement::Agreement;
+use manifactor_association::best_assignment;
+use manifactor_geometry::{PointPairs, Se3};
+use manifactor_graph::noise::NoiseError;
+use manifactor_graph::{Direction, Noise};
+use manifactor_quadric::DualQuadric;
+use manifactor_recording::fusion::Fusion;
+use manifactor_recording::prior_map::{PriorMap, PriorObject};
+use manifactor_recording::sequence::ObjectId;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+mod hypotheses;
+
+/// An object by which a place is known again.
+#[derive(Debug, Clone)]
+pub(crate) struct Mark {
+    pub id: ObjectId,
+    centre: Vector3<f64>,
+    /// How far off that may be, in metres.
+    sigma: f64,
+    classes: HashMap<String, f64>,
+}
+
+/// Two sets of marks.
+#[derive(Debug)]
+pub(crate) struct Layout {
+    local: Vec<Mark>,
+    known: Vec<Mark>,
+    /// Up in both.
+    up: Option<[Direction; 2]>,
+    /// Pairs that may show one object.
+    pairs: Vec<Pair>,
+    /// Logarithm of the volume that the known marks lie in, m³.
+    log_volume: f64,
+    /// How far known marks usually are from the next.
+    gap: f64,
+}
+
+/// A mark in both sets.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    local: usize,
+    known: usize,
+    /// What speaks for it before places are looked at, in nats: their classes, and that it is one of all known marks that the local one may
+    /// be, where its name does not say which.
+    evidence: f64,
+    /// How far apart the two may be, in metres.
+    sigma: f64,
+}
+
+/// Where the local marks lie among the known ones.
+#[derive(Debug, Clone)]
+pub(crate) struct Aligned {
+    pub known_from_local: Se3,
+    /// Marks that are the same: of the local ones, of the known ones.
+    pub matches: Vec<(ObjectId, ObjectId)>,
+    /// What speaks for it and not for the next best place, in nats.
+    pub lead: f64,
+    centre: Vector3<f64>,
+    /// Standard deviations, rad and m, at the centre of the local marks that have matches.
+    sigmas: [f64; 2],
+    /// Up in the map, where it is known in both.
+    up: Option<Direction>,
+}
+
+/// An object's place is known to this part of its size at best.
+const OF_SIZE: f64 = 0.5;
+/// Classes that two objects of one class have in common, as a share, at least.
+const ALIKE: f64 = 0.3;
+/// The share of boxes with a class that says nothing, among so many classes.
+const CLASS_ERROR: f64 = 0.1;
+const CLASSES: f64 = 20.0;
+/// Marks that are further apart than so many standard deviations are no match.
+const GATE: f64 = 3.0;
+/// What it costs, in nats, that a local mark among the known ones has no match.
+const NEW: f64 = 1.6;
+/// Hypotheses that are looked at closely, no two of the same place.
+const LOOKED_AT: usize = 40;
+/// Rounds in which matches are found and the place by them.
+const ROUNDS: usize = 5;
+/// Two places are one where all marks move by less than so many standard deviations.
+const SAME: f64 = 3.0;
+/// A place is believed where so many marks match,
+const MATCHES: usize = 4;
+/// this share of the local ones among the known ones,
+const MOST: f64 = 0.6;
+/// and it is so far ahead, in nats.
+const LEAD: f64 = 12.0;
+
+/// How much better than by all marks together up is known.
+const UP: f64 = 10.0;
+/// How well up is known: standard deviation in radians.
+const TILT: f64 = 0.01;
+/// Directions whose spread is a smaller part of the largest are not determined.
+const FLAT: f64 = 1e-3;
+
+impl Mark {
+    /// An object whose centre has this variance, the mean over three directions, in m².
+    pub(crate) fn new(id: ObjectId, quadric: &DualQuadric, variance: f64, classes: &Fusion) -> Self {
+        let size = quadric.semi_axes.mean();
+        let sigma = (variance + (OF_SIZE * size).powi(2)).sqrt();
+        let classes = classes.shares().map(|(class, share)| (class.to_owned(), share)).collect();
+        Self { id, centre: quadric.centroid(), sigma, classes }
+    }
+
+    fn share(&self, class: &str) -> f64 {
+        self.classes.get(class).copied().unwrap_or_default()
+    }
+}
+
+impl Layout {
+    /// Of local marks, and up among them, in a map. With `by_name`, one number is one object in both.
+    pub(crate) fn new(local: Vec<Mark>, up: Option<Direction>, map: &PriorMap, by_name: bool) -> Self {
+        let mark = |object: &Arc<PriorObject>| {
+            let variance = object.covariance().fixed_view::<3, 3>(3, 3).trace() / 3.0;
+            Mark::new(object.id, &object.quadric, variance, &object.classes)
+        };
+        let known: Vec<Mark> = map.objects.iter().map(mark).collect();
+        let sides = |axis: usize| {
+            let along = known
+                .iter()
+                .map(|mark| (mark.centre[axis] - GATE * mark.sigma, mark.centre[axis] + GATE * mark.sigma));
+            along.reduce(|(a, b), (c, d)| (a.min(c), b.max(d))).map_or(1.0, |(from, to)| to - from)
+        };
+        let log_volume = (0..3).map(|axis| sides(axis).ln()).sum();
+        let up = up.zip(map.up).map(|(local, known)| [local, known]);
+        let gap = gap(&known);
+        let mut layout = Self { local, known, up, pairs: vec![], log_volume, gap };
+        layout.pairs = layout.pairs(by_name);
+        layout
+    }
+
+    fn pairs(&self, by_name: bool) -> Vec<Pair> {
+        let mut usual: HashMap<&str, f64> = HashMap::new();
+        for mark in &self.known {
+            for (class, share) in &mark.classes {
+                *usual.entry(class).or_default() += share / self.known.len() as f64;
+            }
+        }
+        let (doubt, one_of_all) = (CLASS_ERROR / CLASSES, (self.known.len() as f64).ln());
+        let mut pairs = vec![];
+        for (l, local) in self.local.iter().enumerate() {
+            let mut classes: Vec<_> = local.classes.iter().collect();
+            classes.sort_by(|a, b| a.0.cmp(b.0));
+            let over = |of: &dyn Fn(&str) -> f64| -> f64 {
+                classes.iter().map(|(class, share)| *share * of(class)).sum()
+            };
+            let by_chance =
+                (1.0 - CLASS_ERROR) * over(&|class| usual.get(class).copied().unwrap_or_default()) + doubt;
+            for (k, known) in self.known.iter().enumerate() {
+                let alike: f64 =
+                    classes.iter().map(|(class, share)| (*share * known.share(class)).sqrt()).sum();
+                // what was never given a class may be anything
+                let is_nameless = local.classes.is_empty() || known.classes.is_empty();
+                let evidence = match by_name {
+                    true if local.id == known.id => 0.0,
+                    false if is_nameless => -one_of_all,
+                    false if alike >= ALIKE => {
+                        let by_class = (1.0 - CLASS_ERROR) * over(&|class| known.share(class)) + doubt;
+                        (by_class / by_chance).ln() - one_of_all
+                    }
+                    _ => continue,
+                };
+                pairs.push(Pair { local: l, known: k, evidence, sigma: local.sigma.hypot(known.sigma) });
+            }
+        }
+        pairs.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+        pairs
+    }
+
+    /// The local marks that may be this known one.
+    pub(super) fn may_be(&self, known: ObjectId) -> impl Iterator<Item = ObjectId> {
+        let pairs = self.pairs.iter().filter(move |pair| self.known[pair.known].id == known);
+        pairs.map(|pair| self.local[pair.local].id)
+    }
+
+    /// Where the local marks lie, if there is one place for them. `agreement` says how well boxes agree with a place; one with which they do not
+    /// is none, whatever its score.
+    pub(super) fn align(
+        &self,
+        agreement: impl Fn(&Aligned) -> Option<Agreement>,
+    ) -> Option<(Aligned, Agreement)> {
+        let mut ranked = self.ranked();
+        // what boxes say of a place is costly, and no lead is more than a score
+        if ranked.first().is_none_or(|(score, ..)| *score < LEAD) {
+            return None;
+        }
+        ranked.retain(|(score, ..)| *score > 0.0);
+        let mut possible = ranked.into_iter().filter_map(|(score, place, matches)| {
+            let aligned = self.aligned(place, &matches, score);
+            let agreement = agreement(&aligned)?;
+            Some((aligned, agreement))
+        });
+        let (mut best, agreement) = possible.next()?;
+        best.lead -= possible.next().map_or(0.0, |(next, _)| next.lead);
+        let place = &best.known_from_local;
+        let among = self.local.iter().filter(|mark| self.is_among(&place.act(&mark.centre))).count();
+        let Aligned { lead, matches, .. } = &best;
+        tracing::debug!(lead, matches = matches.len(), among, ?agreement, "a place in the prior map");
+        let is_clear =
+            matches.len() >= MATCHES && matches.len() as f64 >= MOST * among as f64 && *lead >= LEAD;
+        (is_clear && agreement.is_believed()).then_some((best, agreement))
+    }
+
+    /// Places where the local marks may lie, each with its score and its matches, the best first.
+    fn ranked(&self) -> Vec<(f64, Se3, Vec<Pair>)> {
+        let mut places: Vec<(f64, Se3, Vec<Pair>)> = vec![];
+        for place in self.promising() {
+            let Some((score, place, matches)) = self.refined(place) else { continue };
+            match places.iter_mut().find(|(_, other, _)| self.is_same(other, &place)) {
+                Some(other) if score > other.0 => *other = (score, place, matches),
+                Some(_) => {}
+                None => places.push((score, place, matches)),
+            }
+        }
+        places.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
+        places
+    }
+
+    /// The places that may score most. Many hypotheses are of one place; each counts once, so that the next best place is among them.
+    fn promising(&self) -> Vec<Se3> {
+        let hypotheses = self.hypotheses().into_iter();
+        let mut rough: Vec<(f64, Se3)> = hypotheses.map(|place| (self.at_most(&place), place)).collect();
+        rough.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let mut places: Vec<Se3> = vec![];
+        for (_, place) in rough {
+            if places.len() == LOOKED_AT {
+                break;
+            }
+            if !places.iter().any(|other| self.is_same(other, &place)) {
+                places.push(place);
+            }
+        }
+        places
+    }
+
+    /// Returns whether two pairs may both be right: what they join is as far apart in both sets.
+    fn go_together(&self, a: &Pair, b: &Pair) -> bool {
+        if a.local == b.local || a.known == b.known {
+            return false;
+        }
+        let local = self.local[b.local].centre - self.local[a.local].centre;
+        let known = self.known[b.known].centre - self.known[a.known].centre;
+        let (sigma, apart) = (a.sigma.hypot(b.sigma), local.norm());
+        let is_as_high = self.up.is_none_or(|[u, v]| (local.dot(&u) - known.dot(&v)).abs() < GATE * sigma);
+        // what is too close says nothing of the direction
+        apart > sigma && (apart - known.norm()).abs() < GATE * sigma && is_as_high
+    }
+
+    /// The place that brings pairs closest, in the mean square (Umeyama); `None` where it is not determined.
+    fn place(&self, pairs: &[Pair]) -> Option<Se3> {
+        if pairs.len() < 2 {
+            return None;
+        }
+        let centres = |pair: &Pair| (self.local[pair.local].centre, self.known[pair.known].centre);
+        let weighted = |pair: &Pair| (centres(pair).0, centres(pair).1, pair.sigma.powi(-2));
+        let mut points = PointPairs::new(pairs.iter().map(weighted));
+        if let Some([u, v]) = self.up {
+            // up is known better than any mark
+            points.add_direction(&u, &v, UP);
+        }
+        points.rigid(FLAT).map(|found| Se3::new(found.rotation, found.translation))
+    }
+
+    /// What speaks for a pair at a place, in nats; `None` where the two are too far apart.
+    fn gain(&self, place: &Se3, pair: &Pair) -> Option<f64> {
+        let apart = place.act(&self.local[pair.local].centre) - self.known[pair.known].centre;
+        let square = apart.norm_squared() / (pair.sigma * pair.sigma);
+        let density = -0.5 * square - 1.5 * (TAU * pair.sigma * pair.sigma).ln();
+        Some(pair.evidence + density + self.log_volume).filter(|_| square < GATE * GATE)
+    }
+
+    /// The score of a place at most: as if a known mark could match several local ones.
+    fn at_most(&self, place: &Se3) -> f64 {
+        let mut best = vec![0.0_f64; self.local.len()];
+        for pair in &self.pairs {
+            if let Some(gain) = self.gain(place, pair) {
+                best[pair.local] = best[pair.local].max(gain);
+            }
+        }
+        best.iter().sum()
+    }
+
+    /// The place near this one that fits its matches best, with its score and its matches.
+    fn refined(&self, mut place: Se3) -> Option<(f64, Se3, Vec<Pair>)> {
+        for _ in 0..ROUNDS {
+            place = self.place(&self.matches(&place))?;
+        }
+        // what the last move has taken out of reach is no match
+        let matches = self.matches(&place);
+        let gained: f64 = matches.iter().filter_map(|pair| self.gain(&place, pair)).sum();
+        let is_matched = |l: usize| matches.iter().any(|pair: &Pair| pair.local == l);
+        let alone = (0..self.local.len())
+            .filter(|l| !is_matched(*l) && self.is_among(&place.act(&self.local[*l].centre)));
+        Some((gained - NEW * alone.count() as f64, place, matches))
+    }
+
+    fn matches(&self, place: &Se3) -> Vec<Pair> {
+        let gains: Vec<(usize, usize, f64)> = self
+            .pairs
+            .iter()
+            .filter_map(|pair| Some((pair.local, pair.known, self.gain(place, pair)?)))
+            .collect();
+        let matched = best_assignment(self.local.len(), self.known.len(), &gains);
+        let is_match = |pair: &&Pair| matched[pair.local] == Some(pair.known);
+        self.pairs.iter().filter(is_match).copied().collect()
+    }
+
+    /// Returns whether two places put all marks at about the same points.
+    fn is_same(&self, one: &Se3, two: &Se3) -> bool {
+        self.local
+            .iter()
+            .all(|mark| (one.act(&mark.centre) - two.act(&mark.centre)).norm() < SAME * 2.0 * mark.sigma)
+    }
+
+    /// Returns whether a point lies where the known marks lie.
+    fn is_among(&self, point: &Vector3<f64>) -> bool {
+        let nearest =
+            self.known.iter().map(|mark| (mark.centre - point).norm()).fold(f64::INFINITY, f64::min);
+        nearest < self.gap
+    }
+
+    fn aligned(&self, place: Se3, matches: &[Pair], lead: f64) -> Aligned {
+        let n = matches.len() as f64;
+        let centre = matches.iter().map(|pair| self.local[pair.local].centre).sum::<Vector3<f64>>() / n;
+        let mean = |of: &dyn Fn(&Pair) -> f64| (matches.iter().map(of).sum::<f64>() / n).sqrt();
+        let sigma = mean(&|pair| pair.sigma * pair.sigma) / n.sqrt();
+        let spread = mean(&|pair| (self.local[pair.local].centre - centre).norm_squared());
+        let name = |pair: &Pair| (self.local[pair.local].id, self.known[pair.known].id);
+        Aligned {
+            known_from_local: place,
+            matches: matches.iter().map(name).collect(),
+            lead,
+            centre,
+            sigmas: [sigma / spread, sigma],
+            up: self.up.map(|[_, up]| up),
+        }
+    }
+}
+
+/// How far marks usually are from the next: the median.
+fn gap(marks: &[Mark]) -> f64 {
+    let to_next = |mark: &Mark| {
+        let others = marks.iter().filter(|other| other.id != mark.id);
+        others.map(|other| (other.centre - mark.centre).norm()).fold(f64::INFINITY, f64::min)
+    };
+    let mut gaps: Vec<f64> = marks.iter().map(to_next).collect();
+    gaps.sort_by(f64::total_cmp);
+    gaps.get(gaps.len() / 2).copied().unwrap_or_default()
+}
+
+impl Aligned {
+    /// How well a local pose is known in the map: rad, then m, in its own frame.
+    ///
+    /// # Errors
+    /// If the place is not finite.
+    pub(crate) fn noise(&self, local: &Se3) -> Result<Noise, NoiseError> {
+        let [turn, shift] = self.sigmas;
+        let shift = shift.hypot(turn * (local.translation - self.centre).norm());
+        let mut covariance = DMatrix::from_diagonal_element(6, 6, shift * shift);
+        let known_from_camera = self.known_from_local.rotation.compose(&local.rotation);
+        let tilt = self.up.map_or(turn, |_| TILT);
+        let up = self.up.map_or(Vector3::z(), |up| known_from_camera.inverse().act(&up));
+        let turns = Matrix3::identity() * (tilt * tilt) + up * up.transpose() * (turn * turn - tilt * tilt);
+        covariance.view_mut((0, 0), (3, 3)).copy_from(&turns);
+        Noise::covariance(covariance)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,201 @@
+use super::*;
+use manifactor_geometry::So3;
+use manifactor_recording::class::Aliases;
+use manifactor_recording::prior_map::Looks;
+use manifactor_recording::sequence::ClassScores;
+
+/// Boxes that agree with every place.
+const AGREES: Agreement = Agreement { overlap: 1.0, seen: 1.0 };
+const CLASSES: [&str; 3] = ["cup", "book", "bottle"];
+
+fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
+    let mut classes = Fusion::default();
+    classes.add(&ClassScores::single(class, 0.8), &Aliases::default());
+    let quadric = DualQuadric { pose: Se3::new(So3::identity(), centre), semi_axes: Vector3::repeat(0.08) };
+    let covariance = std::array::from_fn(|r| std::array::from_fn(|c| if r == c { 1e-4 } else { 0.0 }));
+    Arc::new(PriorObject {
+        id: ObjectId(id),
+        classes,
+        quadric,
+        covariance,
+        looks: Looks::default(),
+        least_px: None,
+    })
+}
+
+/// Objects on a table, each of one of the classes.
+fn table(classes: &[&str], up: Option<Direction>) -> PriorMap {
+    let places =
+        [[0.0, 0.0], [0.7, 0.1], [1.5, -0.2], [0.3, 0.9], [1.1, 1.0], [-0.4, 0.6], [1.9, 0.8], [0.8, 1.7]];
+    let all = places.iter().enumerate().map(|(i, [x, y])| {
+        let height = 0.1 * (i % 3) as f64;
+        object(10 + i as u32, classes[i % classes.len()], Vector3::new(*x, *y, height))
+    });
+    PriorMap::new(up, all.collect())
+}
+
+/// The same objects, seen from elsewhere; the first ones are not.
+fn seen(map: &PriorMap, known_from_local: &Se3, without: usize) -> (Vec<Mark>, Option<Direction>) {
+    let local = known_from_local.inverse();
+    let mark = |object: &Arc<PriorObject>| {
+        let quadric = DualQuadric { pose: local.compose(&object.quadric.pose), ..object.quadric };
+        Mark::new(ObjectId(object.id.0 - 10), &quadric, 1e-4, &object.classes)
+    };
+    let up = map.up.map(|up| Direction::new(local.rotation.act(&up)).unwrap());
+    (map.objects.iter().skip(without).map(mark).collect(), up)
+}
+
+/// A map of objects of these classes, at these places on a floor.
+fn floor(objects: impl IntoIterator<Item = ([f64; 2], &'static str)>) -> PriorMap {
+    let all = objects.into_iter().zip(10..);
+    let all = all.map(|(([x, y], class), id)| object(id, class, Vector3::new(x, y, 0.0)));
+    PriorMap::new(Some(Direction::Z), all.collect())
+}
+
+/// Places on a floor without any order.
+fn scattered(n: u32) -> impl Iterator<Item = [f64; 2]> {
+    let part = |i: u32, step: f64| (f64::from(i + 1) * step).fract();
+    (0..n).map(move |i| [8.0 * part(i * i, 0.618_033_988_7), 8.0 * part(i * i, 0.414_213_562_4)])
+}
+
+fn elsewhere() -> Se3 {
+    Se3::new(So3::exp(&Vector3::new(0.4, -0.7, 1.9)), Vector3::new(2.0, -1.0, 0.5))
+}
+
+#[test]
+fn a_layout_is_found_again_with_and_without_up() {
+    for up in [Some(Direction::Z), None] {
+        let map = table(&CLASSES, up);
+        let (marks, local_up) = seen(&map, &elsewhere(), 2);
+        let found = Layout::new(marks, local_up, &map, false).align(|_| Some(AGREES)).unwrap().0;
+        let error = found.known_from_local.between(&elsewhere());
+        assert!(error.log().norm() < 1e-6, "{up:?} {error:?}");
+        assert_eq!(found.matches.len(), 6);
+        assert!(found.matches.iter().all(|(local, known)| local.0 + 10 == known.0), "{:?}", found.matches);
+    }
+}
+
+#[test]
+fn what_looks_the_same_from_two_sides_is_nowhere() {
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let bottles = square.iter().zip(10..).map(|([x, y], id)| object(id, "bottle", Vector3::new(*x, *y, 0.0)));
+    let map = PriorMap::new(Some(Direction::Z), bottles.collect());
+    let (marks, up) = seen(&map, &elsewhere(), 0);
+    assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
+    // names tell them apart
+    let (mut marks, up) = seen(&map, &elsewhere(), 0);
+    marks.iter_mut().for_each(|mark| mark.id.0 += 10);
+    let found = Layout::new(marks, up, &map, true).align(|_| Some(AGREES)).unwrap().0;
+    assert!(found.known_from_local.between(&elsewhere()).log().norm() < 1e-6);
+}
+
+#[test]
+fn a_place_is_one_where_boxes_agree_with_it() {
+    let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    let map = floor(square.map(|place| (place, "bottle")));
+    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let layout = Layout::new(marks, up, &map, false);
+    let is_right = |aligned: &Aligned| aligned.known_from_local.between(&elsewhere()).log().norm() < 0.1;
+    let found = layout.align(|aligned| is_right(aligned).then_some(AGREES)).unwrap().0;
+    assert!(is_right(&found), "{found:?}");
+    // others are possible as well
+    let less = Agreement { seen: 0.5, ..AGREES };
+    assert!(layout.align(|aligned| Some(if is_right(aligned) { AGREES } else { less })).is_none());
+    // most of what should be seen is missing
+    let missing = Agreement { seen: 0.4, ..AGREES };
+    assert!(layout.align(|aligned| is_right(aligned).then_some(missing)).is_none());
+    assert!(layout.align(|_| None).is_none());
+}
+
+#[test]
+fn too_few_objects_or_others_are_nowhere() {
+    let map = table(&CLASSES, Some(Direction::Z));
+    let (marks, up) = seen(&map, &elsewhere(), 5);
+    assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
+    let (marks, up) = seen(&table(&["laptop"], map.up), &elsewhere(), 0);
+    assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
+    assert!(Layout::new(vec![], up, &map, false).align(|_| Some(AGREES)).is_none());
+    let (marks, up) = seen(&map, &elsewhere(), 0);
+    assert!(Layout::new(marks, up, &PriorMap::default(), false).align(|_| Some(AGREES)).is_none());
+}
+
+#[test]
+fn tilt_is_known_better_than_heading() {
+    let map = table(&CLASSES, Some(Direction::Z));
+    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let found = Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).unwrap().0;
+    let level = Se3::new(elsewhere().rotation.inverse(), Vector3::zeros());
+    let information = found.noise(&level).unwrap().information_matrix(6).unwrap();
+    assert!(information[(0, 0)] > 2.0 * information[(2, 2)], "{information}");
+}
+
+#[test]
+fn the_next_best_place_is_that_of_a_room_that_is_nearly_the_same_from_two_sides() {
+    // five pairs under a half turn, and two objects whose partners are of another class
+    let half = [[1.9, 0.2], [1.2, 1.1], [0.4, 1.7], [1.7, -0.8], [0.8, 0.5]];
+    let classes = ["cup", "book", "bottle", "laptop", "cup"];
+    let both = half.iter().zip(classes).flat_map(|([x, y], class)| [([*x, *y], class), ([-x, -y], class)]);
+    let map = floor(both.chain([([0.9, -1.5], "laptop"), ([-0.9, 1.5], "book")]));
+    let (marks, up) = seen(&map, &elsewhere(), 0);
+    let layout = Layout::new(marks, up, &map, false);
+    let ranked = layout.ranked();
+    let half_turn = Se3::new(So3::exp(&Vector3::new(0.0, 0.0, std::f64::consts::PI)), Vector3::zeros());
+    let [first, second] = [&ranked[0], &ranked[1]];
+    assert!(first.1.between(&elsewhere()).log().norm() < 1e-6, "{first:?}");
+    assert!(second.1.between(&half_turn.compose(&elsewhere())).log().norm() < 1e-6, "{second:?}");
+    assert_eq!((first.2.len(), second.2.len()), (12, 10));
+    // two matches, and two that are alone
+    let gain = layout.gain(&first.1, &first.2[0]).unwrap();
+    assert!((first.0 - second.0 - 2.0 * (gain + NEW)).abs() < 2.0, "{} {gain}", first.0 - second.0);
+}
+
+#[test]
+fn many_objects_of_one_class_are_found_again() {
+    let map = floor(scattered(70).map(|place| (place, "bottle")));
+    for without in [0, 50] {
+        let (marks, up) = seen(&map, &elsewhere(), without);
+        let found = Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).unwrap().0;
+        assert!(found.known_from_local.between(&elsewhere()).log().norm() < 1e-6, "{found:?}");
+        assert_eq!(found.matches.len(), 70 - without);
+    }
+}
+
+#[test]
+fn what_has_no_class_may_be_anything() {
+    let map = table(&CLASSES, Some(Direction::Z));
+    let (mut marks, up) = seen(&map, &elsewhere(), 0);
+    marks.iter_mut().for_each(|mark| mark.classes.clear());
+    let found = Layout::new(marks, up, &map, false).ranked().remove(0);
+    assert!(found.1.between(&elsewhere()).log().norm() < 1e-6, "{found:?}");
+    assert_eq!(found.2.len(), 8);
+}
+
+#[test]
+fn one_pair_or_none_is_no_place() {
+    let map = table(&CLASSES, Some(Direction::Z));
+    for up in [map.up, None] {
+        let map = PriorMap::new(up, map.objects.clone());
+        let (marks, up) = seen(&map, &elsewhere(), 0);
+        let layout = Layout::new(marks, up, &map, false);
+        assert!(layout.place(&[]).is_none() && layout.place(&layout.pairs[..1]).is_none());
+    }
+}
+
+#[test]
+fn matches_are_within_reach_of_the_place_that_they_are_told_with() {
+    // walks that disagree by more than is believed, so that matches come and go
+    let map = table(&["cup"], Some(Direction::Z));
+    let mut looked_at = 0;
+    for draw in 0..40 {
+        let (mut marks, up) = seen(&map, &elsewhere(), 0);
+        for (mark, [x, y]) in marks.iter_mut().zip(scattered(8 * (draw + 1)).skip(8 * draw as usize)) {
+            mark.centre += 9.0 * mark.sigma * Vector3::new(x / 8.0 - 0.5, y / 8.0 - 0.5, 0.0);
+        }
+        let layout = Layout::new(marks, up, &map, false);
+        for (_, place, matches) in layout.ranked() {
+            looked_at += 1;
+            assert!(matches.iter().all(|pair| layout.gain(&place, pair).is_some()));
+        }
+    }
+    assert!(looked_at > 100, "{looked_at}");
+}

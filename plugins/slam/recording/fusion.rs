@@ -1,0 +1,165 @@
+//! One class for an object, out of all of its detections.
+use crate::class::Aliases;
+use crate::sequence::ClassScores;
+use indexmap::IndexMap;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// Scores of an object's detections, averaged.
+///
+/// The class is the arg max of the average of the score vectors (Jablonsky et al., section V). Where a detector
+/// reports its best class only, the average is a vote in which each detection counts with its score.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fusion {
+    /// Scores, summed over the detections.
+    #[serde(rename = "scores", deserialize_with = "sums")]
+    sums: IndexMap<String, f64>,
+    /// How many there were.
+    detections: usize,
+}
+
+/// The class of an object, and how sure it is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FusedClass {
+    /// Its name, after aliases.
+    pub name: String,
+    /// Its score, averaged over the detections.
+    pub score: f64,
+    /// Its part of all scores, from 0 to 1.
+    pub share: f64,
+    /// What else it may be: the other classes by their part of all scores, the largest first.
+    #[serde(skip_serializing_if = "IndexMap::is_empty")]
+    pub others: IndexMap<String, f64>,
+}
+
+fn sums<'de, D: Deserializer<'de>>(from: D) -> Result<IndexMap<String, f64>, D::Error> {
+    let sums = IndexMap::<String, f64>::deserialize(from)?;
+    match sums.iter().find(|(_, sum)| !(sum.is_finite() && **sum >= 0.0)) {
+        None => Ok(sums),
+        Some((class, sum)) => {
+            Err(D::Error::custom(format!("a score of 0 or more is expected for `{class}`, got {sum}")))
+        }
+    }
+}
+
+/// Classes with a smaller part of all scores are not worth a word.
+const LEAST_SHARE: f64 = 0.01;
+
+impl FusedClass {
+    /// All classes that it may be, with their parts of all scores.
+    pub fn shares(&self) -> impl Iterator<Item = (&str, f64)> {
+        let others = self.others.iter().map(|(name, share)| (name.as_str(), *share));
+        std::iter::once((self.name.as_str(), self.share)).chain(others)
+    }
+}
+
+impl Fusion {
+    /// Counts a detection in.
+    pub fn add(&mut self, scores: &ClassScores, aliases: &Aliases) {
+        self.detections += 1;
+        for (class, score) in scores.iter() {
+            *self.sums.entry(aliases.canonical(class)).or_default() += score;
+        }
+    }
+
+    /// Takes back a detection that was counted in.
+    pub fn take_back(&mut self, scores: &ClassScores, aliases: &Aliases) {
+        self.detections = self.detections.saturating_sub(1);
+        for (class, score) in scores.iter() {
+            if let Some(sum) = self.sums.get_mut(&*aliases.canonical(class)) {
+                *sum = (*sum - score).max(0.0);
+            }
+        }
+    }
+
+    /// Counts another's detections in.
+    pub fn add_all(&mut self, other: Self) {
+        self.detections += other.detections;
+        for (class, sum) in other.sums {
+            *self.sums.entry(class).or_default() += sum;
+        }
+    }
+
+    /// The same by the names of `aliases`: what was written under others is counted together.
+    pub fn canonical(&self, aliases: &Aliases) -> Self {
+        let mut sums = IndexMap::new();
+        for (class, sum) in &self.sums {
+            *sums.entry(aliases.canonical(class)).or_default() += sum;
+        }
+        Self { sums, detections: self.detections }
+    }
+
+    /// The classes that were named, each with its part of all scores; for none, nothing.
+    pub fn shares(&self) -> impl Iterator<Item = (&str, f64)> {
+        let all: f64 = self.sums.values().sum();
+        let share = move |sum: f64| if all > 0.0 { sum / all } else { 0.0 };
+        self.sums.iter().map(move |(class, sum)| (class.as_str(), share(*sum)))
+    }
+
+    /// The classes that were named, each with the sum of its scores.
+    pub fn sums(&self) -> &IndexMap<String, f64> {
+        &self.sums
+    }
+
+    /// The class with the largest sum of scores, the first seen of equals, and that sum.
+    pub fn leading(&self) -> Option<(&str, f64)> {
+        let best = self.sums.iter().reduce(|best, next| if next.1 > best.1 { next } else { best });
+        best.map(|(name, sum)| (name.as_str(), *sum))
+    }
+
+    /// The best class, the first seen of equals; `None` where no detection named any.
+    pub fn best(&self) -> Option<FusedClass> {
+        let total: f64 = self.sums.values().sum();
+        let share = |sum: f64| if total > 0.0 { sum / total } else { 0.0 };
+        self.leading().map(|(name, sum)| {
+            let others =
+                self.sums.iter().filter(|(other, sum)| *other != name && share(**sum) >= LEAST_SHARE);
+            let mut others: IndexMap<_, _> =
+                others.map(|(other, sum)| (other.clone(), share(*sum))).collect();
+            others.sort_by(|_, a, _, b| b.total_cmp(a));
+            let score = sum / self.detections.max(1) as f64;
+            FusedClass { name: name.to_owned(), score, share: share(sum), others }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fuse(detections: &[&[(&str, f64)]]) -> FusedClass {
+        let mut fusion = Fusion::default();
+        for scores in detections {
+            let scores = scores.iter().map(|(class, score)| ((*class).to_owned(), *score)).collect();
+            fusion.add(&scores, &Aliases::default());
+        }
+        fusion.best().unwrap()
+    }
+
+    #[test]
+    fn the_average_decides_and_not_the_majority() {
+        let class = fuse(&[&[("cup", 0.4)], &[("cup", 0.3)], &[("bottle", 0.9)]]);
+        assert_eq!(class.name, "bottle");
+        assert!((class.score - 0.3).abs() < 1e-15);
+        assert!((class.share - 0.9 / 1.6).abs() < 1e-15);
+        assert!((class.others["cup"] - 0.7 / 1.6).abs() < 1e-15 && class.others.len() == 1);
+    }
+
+    #[test]
+    fn second_best_classes_count() {
+        let class = fuse(&[&[("cup", 0.5), ("vase", 0.45)], &[("bowl", 0.5), ("vase", 0.45)]]);
+        assert_eq!(class.name, "vase");
+    }
+
+    #[test]
+    fn spellings_are_counted_together() {
+        let class = fuse(&[&[("tvmonitor", 0.4)], &[("laptop", 0.7)], &[("tv", 0.5)]]);
+        assert_eq!(class.name, "tv monitor");
+    }
+
+    #[test]
+    fn no_detection_has_no_class() {
+        assert_eq!(Fusion::default().best(), None);
+    }
+}

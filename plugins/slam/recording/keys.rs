@@ -1,0 +1,26 @@
+//! Numbers of objects, and the keys of the variables that every run has.
+use manifactor_graph::Key;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Returns the key of a frame's pose: `x0`, `x1`, …
+pub fn pose_key(frame: usize) -> Key {
+    Key::indexed("x", frame)
+}
+
+/// Returns the key of an object's ellipsoid: `q1`, `q2`, …
+pub fn object_key(id: ObjectId) -> Key {
+    Key::indexed("q", id)
+}
+
+/// A number for an object, the same in detections and in the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct ObjectId(pub u32);
+
+impl fmt::Display for ObjectId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}

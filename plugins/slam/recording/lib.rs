@@ -1,0 +1,20 @@
+//! The input of a run: frames with odometry, detections and ground truth, and the sources that read them.
+//!
+//! A [`Source`](source::Source) gives a [`Sequence`](sequence::Sequence), or its frames one by one as a
+//! [`Stream`](source::stream::Stream). A detection has a box, scores of classes, and further quantities, each a
+//! [`Measurement`](measurement::Measurement).
+#[doc(hidden)]
+pub mod __private {
+    pub use {inventory, serde_json};
+}
+
+pub mod class;
+pub mod fusion;
+pub mod keys;
+pub mod measurement;
+pub mod prior_map;
+pub mod recording;
+pub mod sequence;
+pub mod source;
+
+pub use source::{journal, stream};

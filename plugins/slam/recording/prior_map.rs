@@ -1,0 +1,227 @@
+//! A map that was made before: what is in it is known when a run begins.
+//!
+//! Each object of it is a variable from the first frame on, with a factor that holds it where the map has it, as well as the map
+//! knows it. Boxes that show it are its own, and rules are not asked about it again.
+use crate::class::Aliases;
+use crate::fusion::Fusion;
+use crate::keys::ObjectId;
+use manifactor_config::{Diagnostics, Document, Errors, Fault};
+use manifactor_graph::noise::NoiseError;
+use manifactor_graph::{Direction, Noise};
+use manifactor_quadric::DualQuadric;
+use nalgebra::{DMatrix, SMatrix};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::collections::HashSet;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Objects, and up, in a frame of the map's own.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorMap {
+    /// Of the form of the file.
+    #[serde(deserialize_with = "version")]
+    version: u32,
+    /// Up, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+    /// By number.
+    pub objects: Vec<Arc<PriorObject>>,
+}
+
+/// An object of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorObject {
+    /// Its number.
+    pub id: ObjectId,
+    /// What detectors took it for.
+    pub classes: Fusion,
+    /// What it is estimated to be, in the map's frame.
+    pub quadric: DualQuadric,
+    /// Covariance of that, in the order of its tangent: rad, then m, both in its own frame, then the logarithms of its axes.
+    pub covariance: [[f64; 9]; 9],
+    /// How often it was there to be seen.
+    pub looks: Looks,
+    /// The smallest size at which it was seen, in pixels: the root of a box's area. Default: not known, as in maps of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "least_px")]
+    pub least_px: Option<f64>,
+}
+
+/// How often an object was looked at from nearby times and places, and how often it was seen then. A detector that misses an object in one frame misses
+/// it in the next as well, so that frames alone say little.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Looks {
+    /// All of them.
+    pub expected: usize,
+    /// Those with a box at least.
+    pub seen: usize,
+}
+
+/// The only one that there is yet.
+const VERSION: u32 = 1;
+
+fn version<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
+    let found = u32::deserialize(from)?;
+    let told = || format!("a map of version {found}, and this program reads version {VERSION}");
+    if found == VERSION { Ok(found) } else { Err(serde::de::Error::custom(told())) }
+}
+
+fn least_px<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    let told =
+        |size: f64| serde::de::Error::custom(format!("a size of more than 0 pixels is expected, got {size}"));
+    match Option::<f64>::deserialize(from)? {
+        Some(size) if !(size.is_finite() && size > 0.0) => Err(told(size)),
+        size => Ok(size),
+    }
+}
+
+impl PriorMap {
+    /// A map of these objects.
+    pub fn new(up: Option<Direction>, mut objects: Vec<Arc<PriorObject>>) -> Self {
+        objects.sort_by_key(|object| object.id);
+        Self { version: VERSION, up, objects }
+    }
+
+    /// Reads `map.json`, as a run leaves it.
+    ///
+    /// # Errors
+    /// If there is none, or what it says is not a map: each at its place.
+    pub fn read(path: &Path) -> Result<Self, Diagnostics> {
+        let document = Document::open(path)?;
+        let errors = Errors::new();
+        let map = document.root().read::<Self>(&errors).map(|map| {
+            let places = document.root().items("objects");
+            let mut ids = HashSet::new();
+            for (object, node) in map.objects.iter().zip(places) {
+                if let Err(error) = object.noise() {
+                    let place = node.field("covariance").unwrap_or(node).place.clone();
+                    errors.report(place, Fault::invalid(error.to_string()));
+                }
+                if object.id.0 == u32::MAX {
+                    let place = node.field("id").unwrap_or(node).place.clone();
+                    let told =
+                        format!("an object's number is below {}, so that new ones have room", u32::MAX);
+                    errors.report(place, Fault::invalid(told));
+                }
+                if !ids.insert(object.id) {
+                    let place = node.field("id").unwrap_or(node).place.clone();
+                    errors.report(place, Fault::invalid(format!("object {} is there twice", object.id)));
+                }
+            }
+            Self::new(map.up, map.objects)
+        });
+        errors.finish(map)
+    }
+
+    /// The same with classes by the names of `aliases`.
+    pub fn with_classes(mut self, aliases: &Aliases) -> Self {
+        for object in &mut self.objects {
+            let object = Arc::make_mut(object);
+            object.classes = object.classes.canonical(aliases);
+        }
+        self
+    }
+
+    /// The object of this number.
+    pub fn object(&self, id: ObjectId) -> Option<&Arc<PriorObject>> {
+        let place = self.objects.binary_search_by_key(&id, |object| object.id).ok()?;
+        self.objects.get(place)
+    }
+}
+
+impl PriorObject {
+    /// Its covariance.
+    pub fn covariance(&self) -> SMatrix<f64, 9, 9> {
+        SMatrix::from_fn(|r, c| self.covariance[r][c])
+    }
+
+    /// The noise of a factor that holds it.
+    ///
+    /// # Errors
+    /// If the covariance is none; that of an object which was read is one.
+    pub fn noise(&self) -> Result<Noise, NoiseError> {
+        let noise = Noise::covariance(DMatrix::from_fn(9, 9, |r, c| self.covariance[r][c]))?;
+        noise.whitener(9)?;
+        Ok(noise)
+    }
+
+    /// The same, if it may be `sigma_scale` times as far off as it says, and `shape_error` besides: rad, and as a part of its size.
+    pub fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
+        let mut covariance = self.covariance.map(|row| row.map(|entry| entry * sigma_scale * sigma_scale));
+        let size = self.quadric.semi_axes.mean();
+        let errors = [1.0, size, 1.0].map(|of| shape_error * of);
+        for i in 0..9 {
+            covariance[i][i] += errors[i / 3] * errors[i / 3];
+        }
+        Self { covariance, ..self.clone() }
+    }
+}
+
+impl Looks {
+    /// How likely it is to be seen in a look.
+    pub fn rate(&self) -> f64 {
+        (self.seen + 1) as f64 / (self.expected + 2) as f64
+    }
+
+    /// Those of both.
+    pub fn plus(self, other: Self) -> Self {
+        Self { expected: self.expected + other.expected, seen: self.seen + other.seen }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(change: impl FnOnce(&mut serde_json::Value)) -> String {
+        let row = |r: usize| (0..9).map(|c| if r == c { 0.01 } else { 0.0 }).collect::<Vec<f64>>();
+        let object = serde_json::json!({
+            "id": 3,
+            "classes": { "scores": { "cup": 2.5 }, "detections": 4 },
+            "quadric": { "translation": [0.0, 1.0, 2.0], "rotation": [0.0, 0.0, 0.0, 1.0], "semi_axes": [0.1, 0.1, 0.1] },
+            "covariance": (0..9).map(row).collect::<Vec<_>>(),
+            "looks": { "expected": 5, "seen": 4 },
+        });
+        let mut map = serde_json::json!({ "version": 1, "up": [0.0, 0.0, 1.0], "objects": [object] });
+        change(&mut map);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("map.json");
+        std::fs::write(&file, map.to_string()).unwrap();
+        PriorMap::read(&file)
+            .map_or_else(|error| error.to_string(), |map| format!("{} objects", map.objects.len()))
+    }
+
+    type Change = fn(&mut serde_json::Value);
+
+    #[test]
+    fn a_file_that_is_no_map_is_told_at_its_place() {
+        assert_eq!(told(|_| {}), "1 objects");
+        let cases: [(&str, Change); 8] = [
+            ("a map of version 2, and this program reads version 1", |map| map["version"] = 2.into()),
+            ("object 3 is there twice", |map| {
+                let again = map["objects"][0].clone();
+                map["objects"].as_array_mut().unwrap().push(again);
+            }),
+            ("positive definite", |map| map["objects"][0]["covariance"][4][4] = (-1.0).into()),
+            ("a score of 0 or more", |map| map["objects"][0]["classes"]["scores"]["cup"] = (-2.0).into()),
+            ("three semi-axes", |map| map["objects"][0]["quadric"]["semi_axes"][1] = 0.0.into()),
+            ("below 4294967295", |map| map["objects"][0]["id"] = u32::MAX.into()),
+            ("of more than 0 pixels", |map| map["objects"][0]["least_px"] = 0.0.into()),
+            ("expected an array", |map| map["objects"] = "none".into()),
+        ];
+        for (expected, change) in cases {
+            let told = told(change);
+            assert!(told.contains(expected), "{expected}: {told}");
+        }
+    }
+
+    #[test]
+    fn looks_say_how_likely_an_object_is_seen() {
+        let looks = Looks { expected: 8, seen: 8 }.plus(Looks { expected: 10, seen: 0 });
+        assert_eq!(looks, Looks { expected: 18, seen: 8 });
+        assert!((looks.rate() - 0.45).abs() < 1e-12);
+        assert!((Looks::default().rate() - 0.5).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,75 @@
+//! A sequence as files: what [`Recorded`](crate::source::Recorded) reads.
+use crate::measurement::Measurement;
+use crate::sequence::Sequence;
+use manifactor_formats::FormatError;
+use manifactor_formats::detections::{self, Detection};
+use manifactor_formats::tum::{self, StampedPose};
+use manifactor_formats::whole::write_whole;
+use serde_json::json;
+use std::io;
+use std::path::Path;
+
+/// The file of the true objects.
+pub(crate) const OBJECTS: &str = "objects.json";
+
+/// Writes `odometry.txt` and `detections.csv`, and where the truth is known `groundtruth.txt` and
+/// `objects.json`, into a folder, which is made where it is not there.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
+    let io = |path: &Path| {
+        let path = path.to_owned();
+        move |source| FormatError::Io { path, source }
+    };
+    std::fs::create_dir_all(folder).map_err(io(folder))?;
+    let odometry = sequence.frames.iter();
+    let odometry: Vec<_> =
+        odometry.map(|f| StampedPose { timestamp: f.timestamp, pose: f.world_from_camera }).collect();
+    tum::write(folder.join("odometry.txt"), &odometry)?;
+    write_detections(sequence, &folder.join("detections.csv"))?;
+    if let Some(truth) = &sequence.ground_truth {
+        tum::write(folder.join("groundtruth.txt"), &truth.trajectory)?;
+        let path = folder.join(OBJECTS);
+        write_whole(&path, format!("{:#}\n", json!(truth.objects)).as_bytes()).map_err(io(&path))?;
+    }
+    Ok(())
+}
+
+/// Writes the boxes alone, with the objects that they show.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_detections(sequence: &Sequence, file: &Path) -> Result<(), FormatError> {
+    let quantities = sequence.detections.iter().flat_map(|detection| detection.quantities.iter());
+    if let Some(other) = quantities.map(Measurement::name).find(|name| *name != "depth") {
+        let message = format!("detections with `{other}` have no column here: use JSON lines");
+        let source = io::Error::new(io::ErrorKind::Unsupported, message);
+        return Err(FormatError::Io { path: file.to_owned(), source });
+    }
+    detections::write(file, &rows(sequence))
+}
+
+fn rows(sequence: &Sequence) -> Vec<Detection> {
+    let row = |d: &crate::sequence::Detection| {
+        let (class, score) = d.scores.best().unwrap_or_default();
+        let all: Vec<_> = d.scores.iter().map(|(class, score)| format!("{class}:{score}")).collect();
+        let [xmin, ymin, xmax, ymax] = d.bounding_box.bounds();
+        Some(Detection {
+            frame_idx: Some(d.frame as u64),
+            timestamp: sequence.frames.get(d.frame)?.timestamp,
+            frame_idx_as_published: None,
+            object_key: d.object.map(|id| id.0),
+            class_id: None,
+            class_name: class.to_owned(),
+            score,
+            xmin,
+            ymin,
+            xmax,
+            ymax,
+            scores: (all.len() > 1).then(|| all.join(";")),
+            depth: d.quantities.depth(),
+        })
+    };
+    sequence.detections.iter().filter_map(row).collect()
+}

@@ -1,0 +1,160 @@
+//! Frames and detections put together by time.
+use super::SourceError;
+use crate::measurement::{Depth, Quantities};
+use crate::recording::OBJECTS;
+use crate::sequence::{
+    ClassScores, Detection, Frame, GroundTruth, ObjectId, TrueObject, UnusedDetection, WithoutPose,
+};
+use manifactor_config::{Document, Errors};
+use manifactor_formats::tum::{StampedPose, Trajectory};
+use manifactor_formats::{detections, tum};
+use manifactor_graph::checked::{NotNegative, Positive, Share};
+use manifactor_quadric::BoundingBox;
+use std::path::Path;
+
+/// Frames, the detections in them, and those that belong to none.
+pub(super) type Matched = (Vec<Frame>, Vec<Detection>, Vec<UnusedDetection>);
+
+/// Detections for which a frame is looked for by time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Matching {
+    /// Largest difference in time, in seconds.
+    pub within: NotNegative,
+    /// Largest share of the detections that may be without a frame.
+    pub without_pose: Share,
+}
+
+/// A tenth of the detections may be made where the odometry has no pose, as at the beginning of a recording.
+pub(super) fn a_tenth() -> Share {
+    Share::literal(0.1)
+}
+
+/// The default is not written: fingerprints of settings stay.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+pub(super) fn is_a_tenth(share: &Share) -> bool {
+    *share == a_tenth()
+}
+
+/// Reads odometry and detections; each detection goes to the frame nearest in time, if it is near enough. Others are
+/// left out.
+///
+/// # Errors
+/// Files that cannot be read; detections of which none has a frame.
+pub(super) fn read_matched(odometry: &Path, file: &Path, by: Matching) -> Result<Matched, SourceError> {
+    let within = *by.within;
+    let frames = read_poses(odometry)?.into_iter();
+    let frames = frames.map(|StampedPose { timestamp, pose }| Frame { timestamp, world_from_camera: pose });
+    let frames: Vec<Frame> = frames.collect();
+    let rows = detections::read(file)?;
+    let mut matched = vec![];
+    for row in &rows {
+        if let Some((frame, _)) = nearest(&frames, row.timestamp).filter(|(_, away)| *away <= within) {
+            matched.push(detection(frame, row)?);
+        }
+    }
+    if matched.is_empty() && !rows.is_empty() {
+        let (file, odometry) = (file.to_owned(), odometry.to_owned());
+        let away = |at: f64| nearest(&frames, at).map(|(_, away)| (at, away));
+        let nearest = rows.iter().filter_map(|row| away(row.timestamp)).min_by(|a, b| a.1.total_cmp(&b.1));
+        return Err(SourceError::NothingMatches { file, odometry, detections: rows.len(), within, nearest });
+    }
+    let without = without_frame(&frames, &rows, by);
+    // stable: the order of a file decides between duplicates
+    matched.sort_by_key(|detection| detection.frame);
+    Ok((frames, matched, without.map(UnusedDetection::WithoutPose).into_iter().collect()))
+}
+
+/// The rows without a frame; `None` if there are none.
+fn without_frame(frames: &[Frame], rows: &[detections::Detection], by: Matching) -> Option<WithoutPose> {
+    let Matching { within, without_pose: allowed } = by;
+    let away = |row: &detections::Detection| Some((row.timestamp, nearest(frames, row.timestamp)?.1));
+    let far: Vec<(f64, f64)> = rows.iter().filter_map(away).filter(|(_, away)| *away > *within).collect();
+    let nearest = far.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(WithoutPose { rows: far.len(), of: rows.len(), allowed: *allowed, within: *within, nearest })
+}
+
+/// The poses of a file; what had to be repaired is logged.
+fn read_poses(file: &Path) -> Result<Vec<StampedPose>, SourceError> {
+    let Trajectory { poses, moved, dropped } = tum::read(file)?;
+    let (moved, dropped) = (moved.len(), dropped.len());
+    if moved + dropped > 0 {
+        tracing::warn!("{}: {moved} lines out of order, {dropped} time stamps twice", file.display());
+    }
+    Ok(poses)
+}
+
+/// The frame nearest in time, and how far it is away, in seconds.
+fn nearest(frames: &[Frame], timestamp: f64) -> Option<(usize, f64)> {
+    let after = frames.partition_point(|frame| frame.timestamp < timestamp);
+    let candidates = [after.checked_sub(1), Some(after)].into_iter().flatten();
+    let away = candidates.filter_map(|i| Some((i, (frames.get(i)?.timestamp - timestamp).abs())));
+    away.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, SourceError> {
+    let scores: ClassScores = match row.class_scores() {
+        Ok(scores) => scores.into_iter().collect(),
+        // the reader has checked them
+        Err(_) => ClassScores::single(row.class_name.clone(), row.score),
+    };
+    Ok(Detection {
+        frame,
+        object: row.object_key.filter(|key| *key != 0).map(ObjectId),
+        scores,
+        bounding_box: BoundingBox { xmin: row.xmin, ymin: row.ymin, xmax: row.xmax, ymax: row.ymax },
+        quantities: row
+            .depth
+            .and_then(|depth| Positive::new(depth).ok())
+            .map_or(Quantities::NONE, |depth| Quantities::one(Depth(depth))),
+    })
+}
+
+/// The true objects that are named, or those that lie there, as `simulate` writes them.
+pub(super) fn read_objects(folder: &Path, named: Option<&Path>) -> Result<Vec<TrueObject>, SourceError> {
+    let file = folder.join(named.unwrap_or(Path::new(OBJECTS)));
+    if named.is_none() && !file.is_file() {
+        return Ok(vec![]);
+    }
+    let document = Document::open(&file)?;
+    let errors = Errors::new();
+    let objects = document.root().read::<Vec<TrueObject>>(&errors);
+    let objects = errors.finish(objects)?;
+    let is_sound = |object: &&TrueObject| object.half_extents.iter().all(|x| *x > 0.0 && x.is_finite());
+    match objects.iter().find(|object| !is_sound(object)) {
+        Some(object) => Err(SourceError::NoObject { file, object: object.id }),
+        None => Ok(objects),
+    }
+}
+
+/// The ground truth that is named, or the one that lies there.
+pub(super) fn read_ground_truth(
+    folder: &Path,
+    named: Option<&Path>,
+) -> Result<Option<GroundTruth>, SourceError> {
+    let usual = folder.join("groundtruth.txt");
+    let file = match named {
+        Some(name) => Some(folder.join(name)),
+        None => usual.is_file().then_some(usual),
+    };
+    let trajectory = file.map(|file| read_poses(&file)).transpose()?;
+    Ok(trajectory.map(|trajectory| GroundTruth { trajectory, objects: vec![] }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use manifactor_geometry::Se3;
+
+    fn frames() -> Vec<Frame> {
+        [1.0, 2.0, 3.0].map(|timestamp| Frame { timestamp, world_from_camera: Se3::identity() }).into()
+    }
+
+    #[test]
+    fn the_nearest_frame_is_taken_if_it_is_near() {
+        let found =
+            |timestamp| nearest(&frames(), timestamp).map(|(frame, away)| (frame, (10.0 * away).round()));
+        assert_eq!([found(2.4), found(2.6), found(0.9)], [Some((1, 4.0)), Some((2, 4.0)), Some((0, 1.0))]);
+        assert_eq!(found(9.0), Some((2, 60.0)));
+        assert_eq!(nearest(&[], 1.0), None);
+    }
+}

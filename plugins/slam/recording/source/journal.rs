@@ -1,0 +1,196 @@
+//! Frames on disk as they come, so that a stream that was cut off goes on.
+//!
+//! The journal's key is the fingerprint of the settings; each record is a frame, as the source `json_lines` has it. The same
+//! frames give the same bits: a program that was killed reads them again, and has the map that it had.
+//!
+//! A frame that cannot be written, on a full disk, is mapped all the same. The journal ends there, and the run reports it.
+use super::stream::Stream;
+use crate::sequence::Observation;
+use crate::source::{line, parse};
+use manifactor_formats::journal::{Journal, JournalError, Record};
+use manifactor_graph::Manifold;
+use std::collections::HashSet;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+impl Record for Observation {
+    const NAME: &'static str = "frame";
+    const BEGINNINGS: &'static [&'static str] = &[r#"{"checked_frames_for":""#, r#"{"frames_for":""#];
+
+    fn write(&self) -> io::Result<String> {
+        Ok(line(self))
+    }
+
+    fn read(line: &[u8]) -> Result<Self, String> {
+        parse(line)
+    }
+}
+
+/// The frames of a journal, then those of the stream that come after them, which are added to it. A journal that is not there is begun.
+///
+/// # Errors
+/// A file that cannot be read or written, is a link, or is not the journal of these settings; it is unchanged then.
+pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Stream, JournalError> {
+    let (mut journal, before) = Journal::<Observation>::open(path, fingerprint)?;
+    let past = before.iter().map(|frame| frame.frame.timestamp).fold(f64::NEG_INFINITY, f64::max);
+    let had: HashSet<u64> = before.iter().map(|frame| frame.frame.timestamp.to_bits()).collect();
+    let is_new = move |frame: &Result<Observation, _>| {
+        frame.as_ref().map_or(true, |frame| !had.contains(&frame.frame.timestamp.to_bits()))
+    };
+    let new = stream.observations.filter(is_new);
+    let lost = Lost::default();
+    let (path, counted) = (path.to_owned(), lost.clone());
+    let kept = new.map(move |frame| {
+        let frame = frame?;
+        // a journal with a gap would give another map
+        if counted.get().is_some() {
+            counted.add(&path, None);
+            return Ok(frame);
+        }
+        Ok(keep(&mut journal, &frame).unwrap_or_else(|source| {
+            counted.add(&path, Some(source));
+            frame
+        }))
+    });
+    let observations = Box::new(before.into_iter().map(Ok).chain(kept));
+    Ok(Stream { opening: stream.opening, observations, past, lost })
+}
+
+/// The frames that a journal could not keep, counted while they come.
+#[derive(Debug, Clone, Default)]
+pub struct Lost(Arc<Mutex<Option<LostFrames>>>);
+
+/// Frames that a journal could not keep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LostFrames {
+    /// The journal.
+    pub path: PathBuf,
+    /// How many frames, from the first that could not be written to the end.
+    pub frames: usize,
+    /// The system's reason.
+    pub reason: String,
+}
+
+impl Lost {
+    /// Those so far; `None` if all are kept.
+    pub fn get(&self) -> Option<LostFrames> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn add(&self, path: &Path, error: Option<io::Error>) {
+        let mut lost = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let reason = || error.map_or_else(String::new, |error| error.to_string());
+        lost.get_or_insert_with(|| LostFrames { path: path.to_owned(), frames: 0, reason: reason() })
+            .frames += 1;
+    }
+}
+
+/// Adds a frame, and returns it as it will be read: a rotation that is written and read may differ in its last digit. One that is not finite, which
+/// no map takes, cannot be written either.
+fn keep(journal: &mut Journal<Observation>, frame: &Observation) -> io::Result<Observation> {
+    if !(frame.frame.timestamp.is_finite() && frame.frame.world_from_camera.is_finite()) {
+        return Ok(frame.clone());
+    }
+    Ok(Observation { unused: frame.unused.clone(), ..journal.append(frame)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::Quantities;
+    use crate::sequence::{ClassScores, Detection, Frame, ObjectId, Opening};
+    use manifactor_geometry::Se3;
+    use manifactor_quadric::{BoundingBox, Camera};
+    use nalgebra::Vector6;
+
+    /// Twelve frames of a camera that moves ahead, each with two boxes.
+    fn stream() -> Stream {
+        let camera = Camera::new([500.0, 500.0, 320.0, 240.0], 640, 480).unwrap();
+        let mut sequence = Opening::new(camera).into_sequence();
+        for i in 0..12 {
+            let t = f64::from(i) / 7.0;
+            let world_from_camera = Se3::exp(&Vector6::new(0.1 * t, 0.2, 0.3, t, 0.5, 0.6 * t));
+            sequence.frames.push(Frame { timestamp: 10.0 + t, world_from_camera });
+            for (object, left) in [(1, 100.0), (2, 300.0)] {
+                let bounding_box = BoundingBox::new([left + 3.0 * t, 120.0, left + 80.5, 200.0 + t]).unwrap();
+                sequence.detections.push(Detection {
+                    frame: sequence.frames.len() - 1,
+                    bounding_box,
+                    scores: ClassScores::single("cup", 0.7),
+                    object: Some(ObjectId(object)),
+                    quantities: Quantities::default(),
+                });
+            }
+        }
+        Arc::new(sequence).into()
+    }
+
+    fn frames(stream: Stream, count: usize) -> Vec<Observation> {
+        stream.observations.take(count).map(Result::unwrap).collect()
+    }
+
+    #[test]
+    fn a_journal_that_was_cut_off_anywhere_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.jsonl");
+        let whole = folder.path().join("whole.jsonl");
+        let expected = frames(journaled(stream(), &whole, "7").unwrap(), 99);
+        assert_eq!(expected.len(), 12);
+        assert_eq!(frames(journaled(stream(), &path, "7").unwrap(), 5), expected[..5]);
+        let whole = std::fs::read(&path).unwrap();
+        for end in (0..whole.len()).step_by(97).chain([whole.len() - 1]) {
+            std::fs::write(&path, &whole[..end]).unwrap();
+            assert_eq!(frames(journaled(stream(), &path, "7").unwrap(), 99), expected, "cut off at {end}");
+            assert_eq!(std::fs::read(&path).unwrap()[..whole.len()], whole);
+        }
+    }
+
+    #[test]
+    fn a_file_of_something_else_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.jsonl");
+        let others = [
+            ("notes", "no journal"),
+            ("{\"frames\": 1}\n", "no journal"),
+            ("{\"frames_for\":\"7\"}\n", "other settings"),
+            ("{\"checked_frames_for\":\"8\"}\n", "other settings"),
+            ("{\"checked_frames_for\":\"7\"}\nnotes\n", ":2 is no frame"),
+        ];
+        for (text, words) in others {
+            std::fs::write(&path, text).unwrap();
+            let error = journaled(stream(), &path, "7").unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        }
+    }
+
+    #[test]
+    fn a_journal_belongs_to_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.jsonl");
+        let held = journaled(stream(), &path, "7").unwrap();
+        let error = journaled(stream(), &path, "7").unwrap_err();
+        assert!(matches!(error, JournalError::InUse { .. }), "{error}");
+        drop(held);
+        journaled(stream(), &path, "7").unwrap();
+    }
+
+    #[test]
+    fn a_damaged_line_is_refused_with_its_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.jsonl");
+        frames(journaled(stream(), &path, "7").unwrap(), 4);
+        let whole = std::fs::read(&path).unwrap();
+        let line = |place: usize| whole[..place].iter().filter(|byte| **byte == b'\n').count() + 1;
+        let second = whole.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+        for place in (second..whole.len()).step_by(53).filter(|place| whole[*place] != b'\n') {
+            let mut damaged = whole.clone();
+            damaged[place] = if damaged[place] == b'7' { b'8' } else { b'7' };
+            std::fs::write(&path, &damaged).unwrap();
+            let error = journaled(stream(), &path, "7").unwrap_err().to_string();
+            assert!(error.contains(&format!(":{} is no frame", line(place))), "{error}");
+            assert_eq!(std::fs::read(&path).unwrap(), damaged);
+        }
+    }
+}

@@ -1,0 +1,415 @@
+use super::assemble::read_ground_truth;
+use super::rectification::Rectification;
+use super::stream::Stream;
+use super::{CameraChoice, Folders, Source, SourceError};
+use crate::measurement::Quantities;
+use crate::sequence::{
+    Acceleration, ClassScores, Detection, Frame, ObjectId, Observation, Opening, Sequence, UnusedDetection,
+};
+use indexmap::IndexMap;
+use manifactor_formats::FormatError;
+use manifactor_geometry::Se3;
+use manifactor_graph::checked::Share;
+use manifactor_graph::{Direction, register};
+use manifactor_quadric::BoundingBox;
+use nalgebra::Vector3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, stdin};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Frames as lines of JSON, one by one as they come: from standard input, or from a file.
+///
+/// A line has the time, the pose by odometry (from the camera's frame, z forward, to a world of its own choice), and the boxes,
+/// each with a class and its score, or with the scores of several. Optional: the `object` that a box shows; its `depth`, the distance of
+/// the centre along the optical axis in metres, or another registered measurement; accelerometer readings since the line before.
+///
+/// ```json
+/// {"timestamp": 0.1, "pose": {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}, "boxes": [{"box": [10.0, 20.0, 90.0, 80.0], "class": "cup", "score": 0.8}]}
+/// ```
+///
+/// A box that cannot be read is left out and reported; the frame stays. A line that is no frame is left out and reported by
+/// `manifactor online`, and an error in `manifactor run`, which reads all lines first.
+///
+/// ```toml
+/// source = { type = "json_lines", camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
+/// ```
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JsonLines {
+    /// The camera.
+    pub camera: CameraChoice,
+    /// The file, beside the document. Default: standard input.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// The true trajectory, a file in TUM's format beside the document, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+    /// Up in the odometry's frame, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+}
+
+/// A frame, as a line has it.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Line {
+    /// Seconds.
+    timestamp: f64,
+    pose: Se3,
+    #[serde(default)]
+    boxes: Vec<serde_json::Value>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    accelerometer: Vec<Reading>,
+}
+
+/// A box; `quantities` has all fields that are none of its own.
+#[derive(Debug, Serialize, Deserialize)]
+struct LineBox {
+    #[serde(rename = "box")]
+    bounding_box: BoundingBox,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    class: Option<String>,
+    #[serde(default = "sure", skip_serializing_if = "is_sure")]
+    score: Share,
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    scores: IndexMap<String, f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    object: Option<ObjectId>,
+    #[serde(flatten)]
+    quantities: IndexMap<String, serde_json::Value>,
+}
+
+/// Fields of a box besides its measurements.
+const FIELDS: [&str; 5] = ["box", "class", "score", "scores", "object"];
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Reading {
+    timestamp: f64,
+    acceleration: Vector3<f64>,
+}
+
+fn sure() -> Share {
+    Share::literal(1.0)
+}
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_sure(score: &Share) -> bool {
+    **score >= 1.0
+}
+
+/// A frame as a line that this source reads, without its end.
+pub fn line(observation: &Observation) -> String {
+    let of_box = |detection: &Detection| {
+        let scores: IndexMap<String, f64> = detection.scores.iter().map(|(c, s)| (c.to_owned(), s)).collect();
+        let first = scores.first().filter(|_| scores.len() == 1);
+        let single = first.and_then(|(class, score)| Some((class.clone(), Share::new(*score).ok()?)));
+        LineBox {
+            bounding_box: detection.bounding_box,
+            scores: if single.is_some() { IndexMap::new() } else { scores },
+            score: single.as_ref().map_or_else(sure, |(_, score)| *score),
+            class: single.map(|(class, _)| class),
+            object: detection.object,
+            quantities: detection.quantities.to_fields().collect(),
+        }
+    };
+    let of_reading = |r: &Acceleration| Reading { timestamp: r.timestamp, acceleration: r.acceleration };
+    let line = Line {
+        timestamp: observation.frame.timestamp,
+        pose: observation.frame.world_from_camera,
+        boxes: observation
+            .detections
+            .iter()
+            .map(of_box)
+            .filter_map(|b| serde_json::to_value(b).ok())
+            .collect(),
+        accelerometer: observation.accelerometer.iter().map(of_reading).collect(),
+    };
+    serde_json::to_string(&line).unwrap_or_default()
+}
+
+/// A frame of such a line.
+pub fn parse(line: &[u8]) -> Result<Observation, String> {
+    let read = serde_json::from_slice(line).or_else(|error| match without_infinities(line) {
+        Some(text) => serde_json::from_str(&text),
+        None => Err(error),
+    });
+    let Line { timestamp, pose, boxes, accelerometer } =
+        read.map_err(|error: serde_json::Error| error.to_string())?;
+    let (mut detections, mut unused) = (vec![], vec![]);
+    for (place, value) in boxes.into_iter().enumerate() {
+        match LineBox::read(value) {
+            Ok(seen) => detections.push(seen),
+            Err(fault) => unused.push(UnusedDetection::Box { timestamp, place: place + 1, fault }),
+        }
+    }
+    let of_reading = |r: Reading| Acceleration { timestamp: r.timestamp, acceleration: r.acceleration };
+    Ok(Observation {
+        frame: Frame { timestamp, world_from_camera: pose },
+        detections,
+        accelerometer: accelerometer.into_iter().map(of_reading).collect(),
+        unused,
+    })
+}
+
+/// A line with `null` for each number that is not finite: JSON has none, and other languages write them all the same. `None` if
+/// there is no such number. What needs the number refuses `null`, a box for itself.
+fn without_infinities(line: &[u8]) -> Option<String> {
+    let text = std::str::from_utf8(line).ok()?;
+    let (mut out, mut word, mut found) = (String::with_capacity(text.len()), String::new(), false);
+    let (mut is_text, mut is_escaped) = (false, false);
+    for c in text.chars().chain(['\n']) {
+        if !is_text && (c.is_ascii_alphanumeric() || ['+', '-', '.'].contains(&c)) {
+            word.push(c);
+            continue;
+        }
+        if !word.is_empty() {
+            let is_infinite = word.parse::<f64>().is_ok_and(|number| !number.is_finite());
+            found |= is_infinite;
+            out += if is_infinite { "null" } else { &word };
+            word.clear();
+        }
+        match c {
+            '"' if !is_escaped => is_text = !is_text,
+            _ => {}
+        }
+        is_escaped = is_text && c == '\\' && !is_escaped;
+        out.push(c);
+    }
+    found.then_some(out)
+}
+
+impl LineBox {
+    fn read(value: serde_json::Value) -> Result<Detection, String> {
+        let seen: Self = serde_json::from_value(value).map_err(|error| error.to_string())?;
+        if let Some((class, score)) = seen.scores.iter().find(|(_, score)| !(0.0..=1.0).contains(*score)) {
+            return Err(format!("the score of `{class}` must be a number from 0 to 1, got {score}"));
+        }
+        match &seen.class {
+            Some(class) if !seen.scores.is_empty() => {
+                Err(format!("a box has `class` and `score`, or `scores`, and not both: `{class}`"))
+            }
+            _ => seen.into_detection(),
+        }
+    }
+
+    fn into_detection(self) -> Result<Detection, String> {
+        let single = self.class.map(|class| (class, self.score.get()));
+        let scores: ClassScores = self.scores.into_iter().chain(single).collect();
+        let quantities = Quantities::read(self.quantities, &FIELDS)?;
+        Ok(Detection { frame: 0, object: self.object, scores, bounding_box: self.bounding_box, quantities })
+    }
+}
+
+/// Standard input is read once.
+static READ: AtomicBool = AtomicBool::new(false);
+/// What standard input is called.
+const STDIN: &str = "standard input";
+/// Some editors begin a file with it.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+/// A longer line is no frame, in bytes.
+const LONGEST: u64 = 1 << 26;
+/// After so many bytes more without an end of the line, the file is given up.
+const ENDLESS: u64 = 1 << 30;
+/// After so many lines in a row that are no frames, the file is given up: half a minute of a camera at 30 Hz. A device such
+/// as `/dev/urandom`, or a recording of something else, has no frame at all and perhaps no end.
+const UNREADABLE: usize = 1000;
+
+#[typetag::serialize(name = "json_lines")]
+impl Source for JsonLines {
+    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
+        self.lines(folders)?.collect()
+    }
+
+    fn open(&self, folders: &Folders) -> Result<Option<Stream>, SourceError> {
+        Ok(Some(self.lines(folders)?))
+    }
+}
+register!(dyn Source, "json_lines", JsonLines);
+
+impl JsonLines {
+    fn lines(&self, folders: &Folders) -> Result<Stream, SourceError> {
+        let truth = self.ground_truth.as_deref().map(|file| read_ground_truth(&folders.document, Some(file)));
+        let ground_truth = truth.transpose()?.flatten();
+        let lens = Rectification::new(&self.camera, None)?;
+        let opening = Opening { camera: lens.camera, up: self.up, ground_truth };
+        let (file, reader): (_, Box<dyn BufRead + Send>) = match &self.file {
+            Some(file) => {
+                let file = folders.beside_document(file);
+                let opened =
+                    File::open(&file).map_err(|source| FormatError::Io { path: file.clone(), source })?;
+                (file, Box::new(BufReader::new(opened)))
+            }
+            None if READ.swap(true, Ordering::Relaxed) => {
+                return Err(SourceError::ReadBefore { file: STDIN.into() });
+            }
+            None => (STDIN.into(), Box::new(BufReader::new(stdin()))),
+        };
+        let lines = Lines { file, reader, line: 0, text: vec![], unreadable: 0 };
+        let rectified = lines.fuse().map(move |read| {
+            read.map(|mut observation| {
+                lens.apply_to_frame(&mut observation);
+                observation
+            })
+        });
+        Ok(Stream::new(opening, rectified))
+    }
+}
+
+/// The lines of a file, to its end or to where it cannot be read.
+struct Lines {
+    file: PathBuf,
+    reader: Box<dyn BufRead + Send>,
+    line: usize,
+    text: Vec<u8>,
+    /// Lines before the next that are no frames, in a row.
+    unreadable: usize,
+}
+
+impl Lines {
+    /// Reads the next line; its length, 0 at the end.
+    fn read(&mut self) -> std::io::Result<usize> {
+        self.line += 1;
+        self.text.clear();
+        let read = self.reader.by_ref().take(LONGEST).read_until(b'\n', &mut self.text)?;
+        if read as u64 == LONGEST && !self.text.ends_with(b"\n") {
+            // the rest of it is not kept; what has no end is no file of lines
+            let skipped = self.reader.by_ref().take(ENDLESS).skip_until(b'\n')?;
+            if skipped as u64 == ENDLESS {
+                return Err(std::io::Error::other("there is no end of a line within a gigabyte"));
+            }
+        }
+        if self.line == 1 && self.text.starts_with(BYTE_ORDER_MARK) {
+            self.text.drain(..BYTE_ORDER_MARK.len());
+        }
+        Ok(read)
+    }
+
+    /// No more is read.
+    fn give_up(&mut self) {
+        self.reader = Box::new(std::io::empty());
+    }
+
+    /// The frame of the line that was read last.
+    fn frame(&mut self) -> Result<Observation, SourceError> {
+        let read = self.parse();
+        self.unreadable = if read.is_ok() { 0 } else { self.unreadable + 1 };
+        let (file, line) = (self.file.clone(), self.line);
+        read.map_err(|message| match self.unreadable {
+            UNREADABLE => {
+                self.give_up();
+                SourceError::NoFrames { file, line, count: UNREADABLE, message }
+            }
+            _ => SourceError::Line { file, line, message },
+        })
+    }
+
+    fn parse(&self) -> Result<Observation, String> {
+        if self.text.len() as u64 == LONGEST {
+            return Err(format!("the line is longer than {LONGEST} bytes"));
+        }
+        parse(&self.text)
+    }
+}
+
+impl Iterator for Lines {
+    type Item = Result<Observation, SourceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            match self.read() {
+                Ok(0) => return None,
+                Ok(_) if self.text.trim_ascii().is_empty() => {}
+                Ok(_) => return Some(self.frame()),
+                Err(source) => {
+                    self.give_up();
+                    return Some(Err(FormatError::Io { path: self.file.clone(), source }.into()));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+    use std::path::Path;
+
+    fn source(folder: &Path, file: &str) -> JsonLines {
+        let camera =
+            json!({ "fx": 320.0, "fy": 320.0, "cx": 320.0, "cy": 240.0, "width": 640, "height": 480 });
+        std::fs::write(folder.join("frames.jsonl"), file).unwrap();
+        serde_json::from_value(json!({ "camera": camera, "file": "frames.jsonl" })).unwrap()
+    }
+
+    #[test]
+    fn a_line_that_is_no_frame_is_reported_and_a_bad_box_leaves_its_frame() {
+        let good = r#"{"timestamp": 1.0, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}"#;
+        let bad_box = good.replace("}}", r#"}, "boxes": [{"box": [9, 0, 1, 1]}]}"#);
+        let text = format!("\u{feff}{good}\n{{\n{bad_box}\n{good}");
+        let folder = tempfile::tempdir().unwrap();
+        let folders = Folders { data: None, document: folder.path().into() };
+        let source = source(folder.path(), &text);
+        let stream = source.open(&folders).unwrap().unwrap();
+        let read: Vec<_> = stream.observations.collect();
+        assert_eq!(read.iter().map(Result::is_ok).collect::<Vec<_>>(), [true, false, true, true]);
+        let UnusedDetection::Box { place, fault, .. } = &read[2].as_ref().unwrap().unused[0] else {
+            panic!()
+        };
+        assert!(*place == 1 && fault.contains("expected [xmin, ymin, xmax, ymax]"), "{fault}");
+        let error = source.load(&folders).unwrap_err().to_string();
+        assert!(error.contains("line 2"), "{error}");
+    }
+
+    #[test]
+    fn a_file_without_frames_is_given_up() {
+        let good = r#"{"timestamp": 1.0, "pose": {"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}"#;
+        let bad = "\u{1}{?\n".repeat(UNREADABLE - 1);
+        let folder = tempfile::tempdir().unwrap();
+        let folders = Folders { data: None, document: folder.path().into() };
+        let read = |text: &str| -> Vec<_> {
+            let stream = source(folder.path(), text).open(&folders).unwrap().unwrap();
+            stream.observations.collect()
+        };
+        // a frame in between begins the count again
+        let sound = read(&format!("{bad}{good}\n{bad}{good}\n"));
+        assert_eq!((sound.len(), sound.iter().filter(|read| read.is_ok()).count()), (2 * UNREADABLE, 2));
+        let given_up = read(&format!("{good}\n{bad}{bad}{good}\n"));
+        assert_eq!(given_up.len(), 1 + UNREADABLE);
+        let error = given_up.last().unwrap().as_ref().unwrap_err().to_string();
+        let place = format!("line {}: {UNREADABLE} lines in a row are no frames", UNREADABLE + 1);
+        assert!(error.contains(&place) && error.contains("check `source.file`"), "{error}");
+    }
+
+    #[test]
+    fn scores_are_from_0_to_1_and_given_once() {
+        let line = |seen: &str| {
+            format!(
+                r#"{{"timestamp": 1.0, "pose": {{"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}}, "boxes": [{seen}]}}"#
+            )
+        };
+        let wrong = [
+            (r#"{"box": [1, 1, 5, 5], "class": "cup", "score": 1.7}"#, "0"),
+            (
+                r#"{"box": [1, 1, 5, 5], "scores": {"cup": 1.7}}"#,
+                "the score of `cup` must be a number from 0 to 1",
+            ),
+            (r#"{"box": [1, 1, 5, 5], "class": "cup", "scores": {"cup": 0.7}}"#, "and not both: `cup`"),
+            (r#"{"box": [1, 1, 5, NaN], "class": "Infinity \" NaN"}"#, "null"),
+            (r#"{"box": [1, -Infinity, 5, 5], "class": "cup"}"#, "null"),
+            (r#"{"box": [1, 1, 1e999, 5], "class": "cup"}"#, "null"),
+        ];
+        for (seen, words) in wrong {
+            let good = r#"{"box": [1, 1, 5, 5], "class": "cup"}"#;
+            let read = parse(line(&format!("{seen}, {good}")).as_bytes()).unwrap();
+            let UnusedDetection::Box { place, fault, .. } = &read.unused[0] else { panic!() };
+            assert!(*place == 1 && fault.contains(words) && read.detections.len() == 1, "{fault}");
+        }
+        let two =
+            parse(line(r#"{"box": [1, 1, 5, 5], "scores": {"cup": 0.7, "bowl": 0.2}}"#).as_bytes()).unwrap();
+        assert_eq!(two.detections[0].scores.iter().count(), 2);
+    }
+}

@@ -1,0 +1,90 @@
+use super::assemble::{Matching, a_tenth, is_a_tenth, read_ground_truth, read_matched, read_objects};
+use super::camera::CameraChoice;
+use super::rectification::{Distortion, Rectification};
+use super::{Folders, Source, SourceError};
+use crate::sequence::Sequence;
+use manifactor_graph::checked::{NotNegative, Share};
+use manifactor_graph::{Direction, register};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Odometry and detections from files of one's own.
+///
+/// `folder` is found as that of `tum` is. In it lie `odometry.txt` and `detections.csv`, and where there is one, a
+/// `groundtruth.txt` and `objects.json`: poses `timestamp tx ty tz qx qy qz qw`, boxes by column names, and true objects
+/// as `manifactor simulate` writes them.
+///
+/// ```toml
+/// source = { type = "recorded", folder = "my_recording", camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
+/// ```
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Recorded {
+    /// Where the files are.
+    pub folder: PathBuf,
+    /// The camera.
+    pub camera: CameraChoice,
+    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV: boxes are rectified. Default: none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<Distortion>,
+    /// The odometry in the folder.
+    #[serde(default = "odometry")]
+    pub odometry: PathBuf,
+    /// The detections in the folder.
+    #[serde(default = "detections")]
+    pub detections: PathBuf,
+    /// The ground truth in the folder. Default: `groundtruth.txt`, if there is such a file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+    /// The true objects in the folder, in the ground truth's frame. Default: `objects.json`, if there is such a file and a
+    /// ground truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objects: Option<PathBuf>,
+    /// Up in the odometry's frame, where it is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Direction>,
+    /// How far apart in time a detection and its pose may be, in seconds.
+    #[serde(default = "exact")]
+    pub max_time_difference: NotNegative,
+    /// Largest expected share of detections without a pose at their time, from 0 to 1. With more, the run ends with exit code 1.
+    #[serde(default = "a_tenth", skip_serializing_if = "is_a_tenth")]
+    pub max_without_pose: Share,
+}
+
+fn odometry() -> PathBuf {
+    "odometry.txt".into()
+}
+fn detections() -> PathBuf {
+    "detections.csv".into()
+}
+fn exact() -> NotNegative {
+    NotNegative::literal(1e-6)
+}
+
+#[typetag::serialize(name = "recorded")]
+impl Source for Recorded {
+    fn load(&self, folders: &Folders) -> Result<Sequence, SourceError> {
+        let folder = folders.data_set(&self.folder)?;
+        let lens = Rectification::new(&self.camera, self.distortion)?;
+        let (odometry, detections) = (folder.join(&self.odometry), folder.join(&self.detections));
+        let by = Matching { within: self.max_time_difference, without_pose: self.max_without_pose };
+        let (frames, mut detections, unused) = read_matched(&odometry, &detections, by)?;
+        lens.apply(&mut detections)?;
+        let mut truth = read_ground_truth(&folder, self.ground_truth.as_deref())?;
+        if self.objects.is_some() || truth.is_some() {
+            let objects = read_objects(&folder, self.objects.as_deref())?;
+            truth.get_or_insert_default().objects = objects;
+        }
+        Ok(Sequence {
+            camera: lens.camera,
+            frames,
+            detections,
+            up: self.up,
+            accelerometer: vec![],
+            ground_truth: truth,
+            unused,
+        })
+    }
+}
+register!(dyn Source, "recorded", Recorded);

@@ -1,0 +1,146 @@
+//! Boxes in the rectified image: as a pinhole camera of the same focal lengths would have them.
+//!
+//! The outline of an ellipsoid is a conic for a pinhole alone, so everything after a source speaks of the rectified image. A camera
+//! model is known here and nowhere else.
+use super::{CameraChoice, SourceError};
+use crate::sequence::{Detection, Observation, UnusedDetection};
+use manifactor_geometry::{AnyCamera, RadialTangential};
+use manifactor_quadric::{BoundingBox, Camera};
+use nalgebra::Vector2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Distortion([f64; 5]);
+
+/// The way from the images of a camera to those of its pinhole.
+#[derive(Debug)]
+pub(super) struct Rectification {
+    /// The pinhole camera.
+    pub(super) camera: Camera,
+    /// The model of the images; `None` if they are the pinhole's.
+    model: Option<Arc<dyn AnyCamera>>,
+}
+
+impl Rectification {
+    /// Of a source's camera, whose lens may have a distortion besides.
+    ///
+    /// # Errors
+    /// If a model that has its own distortion is given another.
+    pub(super) fn new(choice: &CameraChoice, distortion: Option<Distortion>) -> Result<Self, SourceError> {
+        match (choice, distortion) {
+            (CameraChoice::Model(_), Some(_)) => Err(SourceError::DistortedTwice),
+            (CameraChoice::Model(model), None) => {
+                Ok(Self { camera: model.pinhole(), model: Some(Arc::clone(model)) })
+            }
+            (choice, distortion) => Ok(Self::of_pinhole(choice.pinhole(), distortion)),
+        }
+    }
+
+    /// Of a pinhole camera, whose lens may have a distortion.
+    pub(super) fn of_pinhole(camera: Camera, distortion: Option<Distortion>) -> Self {
+        let model = distortion.map(|Distortion(coefficients)| {
+            let model: Arc<dyn AnyCamera> = Arc::new(RadialTangential::new(camera, coefficients));
+            model
+        });
+        Self { camera, model }
+    }
+
+    /// Rectifies the boxes of a recording.
+    ///
+    /// # Errors
+    /// If a box has no place in the rectified image.
+    pub(super) fn apply(&self, detections: &mut [Detection]) -> Result<(), SourceError> {
+        let Some(model) = &self.model else { return Ok(()) };
+        for detection in detections {
+            let seen = detection.bounding_box;
+            detection.bounding_box = rectified(&**model, &seen)
+                .ok_or(SourceError::Distorted { frame: detection.frame, bounds: seen.bounds() })?;
+        }
+        Ok(())
+    }
+
+    /// Rectifies the boxes of one frame; those without a place in the rectified image are left out and counted.
+    pub(super) fn apply_to_frame(&self, observation: &mut Observation) {
+        let Some(model) = &self.model else { return };
+        let timestamp = observation.frame.timestamp;
+        let mut place = 0;
+        let unused = &mut observation.unused;
+        observation.detections.retain_mut(|detection| {
+            place += 1;
+            let seen = detection.bounding_box;
+            match rectified(&**model, &seen) {
+                Some(bounding_box) => detection.bounding_box = bounding_box,
+                None => {
+                    let fault =
+                        format!("{:?} has no place in the rectified image of the camera", seen.bounds());
+                    unused.push(UnusedDetection::Box { timestamp, place, fault });
+                    return false;
+                }
+            }
+            true
+        });
+    }
+}
+
+/// A box whose sides touch its object in their middles, as those of an ellipse do that stands or lies.
+fn rectified(model: &dyn AnyCamera, seen: &BoundingBox) -> Option<BoundingBox> {
+    let [x, y] = [0.5 * (seen.xmin + seen.xmax), 0.5 * (seen.ymin + seen.ymax)];
+    let side = |u, v, axis: usize| Some(model.rectify(&Vector2::new(u, v))?[axis]);
+    let bounds =
+        [side(seen.xmin, y, 0)?, side(x, seen.ymin, 1)?, side(seen.xmax, y, 0)?, side(x, seen.ymax, 1)?];
+    BoundingBox::new(bounds).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The calibration of freiburg1, as the benchmark publishes it.
+    fn freiburg1(distortion: [f64; 5]) -> Rectification {
+        let named = serde_json::from_value::<CameraChoice>("freiburg1".into()).unwrap();
+        Rectification::new(&named, Some(Distortion(distortion))).unwrap()
+    }
+
+    const LENS: [f64; 5] = [0.2624, -0.9531, -0.0054, 0.0026, 1.1633];
+
+    #[test]
+    fn a_box_in_the_middle_stays_and_one_at_the_side_moves_by_pixels() {
+        let moved = |bounds: [f64; 4]| {
+            let lens = freiburg1(LENS);
+            let model = lens.model.unwrap();
+            let free = rectified(&*model, &BoundingBox::new(bounds).unwrap()).unwrap().bounds();
+            free.iter().zip(bounds).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        assert!(moved([310.0, 245.0, 330.0, 265.0]) < 0.1);
+        let at_the_side = moved([20.0, 30.0, 120.0, 200.0]);
+        assert!((2.0..12.0).contains(&at_the_side), "{at_the_side}");
+    }
+
+    #[test]
+    fn a_model_is_named_in_a_document_and_is_not_distorted_twice() {
+        let lens = freiburg1(LENS);
+        let mut numbers = serde_json::to_value(lens.camera).unwrap();
+        numbers["type"] = "radial_tangential".into();
+        numbers["distortion"] = LENS.to_vec().into();
+        let named: CameraChoice = serde_json::from_value(numbers).unwrap();
+        let seen = BoundingBox::new([20.0, 30.0, 120.0, 200.0]).unwrap();
+        let model = Rectification::new(&named, None).unwrap();
+        let of = |lens: &Rectification| rectified(&**lens.model.as_ref().unwrap(), &seen);
+        assert_eq!(of(&model), of(&lens));
+        assert_eq!(model.camera, lens.camera);
+        assert!(matches!(
+            Rectification::new(&named, Some(Distortion(LENS))),
+            Err(SourceError::DistortedTwice)
+        ));
+    }
+
+    #[test]
+    fn a_lens_that_folds_the_image_leaves_no_box() {
+        let folds = freiburg1([-9.0, 0.0, 0.0, 0.0, 0.0]);
+        let seen = BoundingBox::new([20.0, 30.0, 120.0, 200.0]).unwrap();
+        assert_eq!(rectified(&*folds.model.unwrap(), &seen), None);
+    }
+}

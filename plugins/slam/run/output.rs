@@ -1,0 +1,215 @@
+//! The files that a run leaves.
+//!
+//! `report.json` and `record.json` (all that there is to draw) for the run as a whole, and a folder for each variant with
+//! `config.toml` (all settings, ready to be run again), `trajectory.txt` (TUM's format; `live.txt` as it was when each frame came, where they came one by one), `detections.csv` (the boxes with the objects that they were put to, where the source does not say), `objects.json`, `frames.jsonl` (poses
+//! and boxes, a frame a line), `graph.json` (the literal graph at the estimate), `map.json` (the objects with their covariances, for another run to begin with), `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
+//! into an [`OutputFolder`].
+use crate::output::record::{FrameRecord, RECORD, RunRecord, VariantRecord};
+use crate::output::report::{RunReport, VariantReport};
+use manifactor_config::{Format, WriteError, to_toml, write_graph};
+use manifactor_formats::FormatError;
+use manifactor_formats::table::TableError;
+use manifactor_formats::tum;
+use manifactor_formats::whole;
+use manifactor_mapping::estimate::Estimate;
+use manifactor_mapping::settings::run_document::{RunDocument, Variant, absolute, slug};
+use manifactor_recording::recording;
+use manifactor_solve::{CovarianceError, IterationRecord};
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::io;
+use std::path::{Path, PathBuf};
+
+mod folder;
+mod map;
+mod own_map;
+pub mod record;
+pub mod report;
+mod shapes;
+
+pub use folder::{FolderError, OutputFolder};
+pub use map::{MapError, map_of};
+pub use own_map::refuse_own_maps;
+
+/// The name of the file with a variant's map.
+const MAP: &str = "map.json";
+
+/// Why results could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// A file or folder that cannot be written.
+    #[error("{} cannot be written: {source}", path.display())]
+    Io {
+        /// Which.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Covariances that are asked for, and infinite or out of reach.
+    #[error("covariances.json: {0}")]
+    Covariance(#[from] CovarianceError),
+    /// Boxes that cannot be written.
+    #[error(transparent)]
+    Boxes(#[from] FormatError),
+    /// A table that no format can hold.
+    #[error("{}: {source}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: TableError,
+    },
+    /// A result that no document can hold.
+    #[error("{}: {source}", path.display())]
+    Document {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: WriteError,
+    },
+}
+
+/// The folder of a variant.
+pub(crate) fn variant_folder(output: &Path, variant: &str) -> PathBuf {
+    output.join(slug(variant))
+}
+
+/// Writes a file whole or not at all, and the folders that it lies in, where they are not there.
+///
+/// # Errors
+/// If the folder or the file cannot be written.
+pub fn write_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputError> {
+    let fail = |source| OutputError::Io { path: path.to_owned(), source };
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(fail)?;
+    }
+    whole::write_whole(path, content.as_ref()).map_err(fail)
+}
+
+/// Removes a file, if it is there.
+fn remove(path: &Path) -> Result<(), OutputError> {
+    match std::fs::remove_file(path) {
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
+            Err(OutputError::Io { path: path.to_owned(), source })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes the report and the record of a run.
+///
+/// # Errors
+/// If one cannot be written.
+pub fn write_report(output: &Path, report: &RunReport, record: &RunRecord) -> Result<(), OutputError> {
+    write_document(&output.join(RECORD), compact(record))?;
+    write_document(&output.join("report.json"), results(report))
+}
+
+/// Writes all files of a variant into its folder, and returns it.
+///
+/// # Errors
+/// If one cannot be written; those before it are there.
+pub fn write_variant(
+    run: &RunDocument,
+    variant: &Variant,
+    estimate: &Estimate,
+    report: &VariantReport,
+    record: &VariantRecord,
+) -> Result<PathBuf, OutputError> {
+    let folder = variant_folder(&run.output, &variant.name);
+    let file = |name: &str| folder.join(name);
+    write_document(&file("config.toml"), resolved(run, variant))?;
+    write_whole(&file("trajectory.txt"), tum::format(&estimate.trajectory()))?;
+    if let Some(online) = &report.online {
+        write_whole(&file("live.txt"), tum::format(&online.live))?;
+    }
+    if report.association.is_some() {
+        recording::write_detections(&estimate.sequence, &file("detections.csv"))?;
+    }
+    write_document(&file("objects.json"), results(&report.objects))?;
+    write_document(&file("frames.jsonl"), lines(&record.frames))?;
+    let graph = write_graph(&estimate.mapping.graph, &estimate.solution.values, Format::Json);
+    write_document(&file("graph.json"), graph)?;
+    match map_of(estimate, &variant.settings) {
+        Ok(map) => write_document(&file(MAP), results(&map))?,
+        Err(error) => {
+            tracing::warn!("there is no {MAP}: {error}");
+            // that of an earlier run would be taken for the map of these results
+            remove(&file(MAP))?;
+        }
+    }
+    write_whole(&file("iterations.csv"), iterations(&estimate.solution.outcome.history))?;
+    write_document(&file("metrics.json"), results(report))?;
+    if variant.settings.report.covariances {
+        let marginals = estimate.solution.marginals(&estimate.mapping.graph, &[])?;
+        write_document(&file("covariances.json"), results(&marginals))?;
+    }
+    Ok(folder)
+}
+
+/// Writes a document, if there is one.
+pub fn write_document(path: &Path, text: Result<String, WriteError>) -> Result<(), OutputError> {
+    let text = text.map_err(|source| OutputError::Document { path: path.to_owned(), source })?;
+    write_whole(path, &text)
+}
+
+/// Each on a line.
+fn lines(frames: &[FrameRecord]) -> Result<String, WriteError> {
+    frames.iter().map(|frame| Ok(compact(frame)? + "\n")).collect()
+}
+
+/// Results as JSON, to be read by people as well. Unlike in a document, a number may be infinite or none, as a cost that
+/// overflows is: it is null.
+pub fn results(value: &impl Serialize) -> Result<String, WriteError> {
+    serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(|error| inexpressible(&error))
+}
+
+/// The same on one line.
+fn compact(value: &impl Serialize) -> Result<String, WriteError> {
+    serde_json::to_string(value).map_err(|error| inexpressible(&error))
+}
+
+fn inexpressible(error: &serde_json::Error) -> WriteError {
+    WriteError::Inexpressible { format: Format::Json, message: error.to_string() }
+}
+
+/// The settings of one variant as a document of its own.
+fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> {
+    #[derive(Serialize)]
+    struct Resolved<'a> {
+        title: &'a str,
+        output: String,
+        folder: String,
+        #[serde(flatten)]
+        settings: &'a manifactor_mapping::settings::Settings,
+        variants: [Named<'a>; 1],
+    }
+    #[derive(Serialize)]
+    struct Named<'a> {
+        name: &'a str,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        about: Option<&'a str>,
+    }
+    // names that are not UTF-8 have no other form in a document
+    let output = variant_folder(&run.output, &variant.name).display().to_string();
+    let folder = absolute(&run.folder).display().to_string();
+    let variants = [Named { name: &variant.name, about: variant.about.as_deref() }];
+    let title = &run.title;
+    to_toml(&Resolved { title, output, folder, settings: &variant.settings, variants })
+}
+
+fn iterations(history: &[IterationRecord]) -> String {
+    let mut text =
+        String::from("iteration,cost,trial_cost,gradient,step,control,accepted,inactive,seconds\n");
+    for r in history {
+        let trial = r.trial_cost.map_or(String::new(), |cost| cost.to_string());
+        // writing to a String does not fail
+        let _ = writeln!(
+            text,
+            "{},{},{trial},{},{},{},{},{},{}",
+            r.iteration, r.cost, r.gradient, r.step, r.control, r.accepted, r.inactive, r.seconds
+        );
+    }
+    text
+}

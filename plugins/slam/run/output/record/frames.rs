@@ -1,0 +1,160 @@
+//! Each frame: where the camera was, and what it saw.
+use super::drawn::Frames;
+use manifactor_formats::tum::StampedPose;
+use manifactor_geometry::Se3;
+use manifactor_mapping::estimate::Estimate;
+use manifactor_mapping::mapping::pose_key;
+use manifactor_mapping::settings::EvaluationSettings;
+use manifactor_metrics::{Alignment, Pairing, PosePair, Similarity, align, associate, relative_errors};
+use manifactor_quadric::{BoundingBox, Camera, DualQuadric, Ellipsoid};
+use manifactor_recording::sequence::ObjectId;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One frame. Poses are `world_from_camera`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameRecord {
+    /// Seconds.
+    pub timestamp: f64,
+    /// Where the camera was, if that is known for this time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<Se3>,
+    /// Where odometry alone puts it.
+    pub odometry: TrackedPose,
+    /// Where the solver puts it.
+    pub estimate: TrackedPose,
+    /// Boxes in it, by object.
+    pub boxes: Vec<SeenBox>,
+}
+
+/// A pose, and how far it is from the truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrackedPose {
+    /// The pose.
+    pub pose: Se3,
+    /// The absolute error of its position, metres, under the run's alignment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<f64>,
+    /// The error of the motion that ends here: metres, radians.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub relative: Option<[f64; 2]>,
+}
+
+/// An object in one frame. Boxes are xmin, ymin, xmax, ymax in pixels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SeenBox {
+    /// Its number.
+    pub object: ObjectId,
+    /// The detector's box.
+    pub measured: BoundingBox,
+    /// The box around the estimated ellipsoid's outline, where it is in front of the camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub projected: Option<[f64; 4]>,
+    /// That outline, the points centre + x with xᵀΣ⁻¹x ≤ 1: u, v, Σ's uu, uv, vv.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ellipse: Option<[f64; 5]>,
+}
+
+impl SeenBox {
+    /// A box of an object, beside what `estimate` puts there: the pose of the camera, and the object.
+    pub fn new(
+        object: ObjectId,
+        measured: BoundingBox,
+        estimate: Option<(&Se3, &DualQuadric)>,
+        camera: &Camera,
+    ) -> Self {
+        let ellipsoid = estimate.map(|(pose, quadric)| Ellipsoid::seen(pose, quadric));
+        let ellipse = ellipsoid.filter(Ellipsoid::is_in_front).map(|e| e.outline(camera));
+        Self {
+            object,
+            measured,
+            projected: ellipse.map(|e| e.bounds()),
+            ellipse: ellipse.map(|e| [e.centre.x, e.centre.y, e.xx, e.xy, e.yy]),
+        }
+    }
+}
+
+/// Errors of one trajectory by time stamp.
+#[derive(Default)]
+struct Errors {
+    absolute: Vec<(f64, f64)>,
+    relative: Vec<(f64, [f64; 2])>,
+    truth: Vec<(f64, Se3)>,
+}
+
+/// All frames, and how their errors are aligned.
+pub(super) fn frames(
+    estimate: &Estimate,
+    settings: &EvaluationSettings,
+    drawn: &Frames,
+) -> (Vec<FrameRecord>, Option<Alignment>) {
+    let alignment = settings.alignments.first().copied().unwrap_or_default();
+    let (before, after) = (estimate.odometry(), estimate.trajectory());
+    let [odometry, estimated] =
+        [&before, &after].map(|poses| Errors::of(estimate, poses, alignment, settings));
+    let any = odometry.is_some();
+    let (odometry, estimated) = (odometry.unwrap_or_default(), estimated.unwrap_or_default());
+    let mut boxes = boxes(estimate);
+    let frames = before.iter().zip(&after).enumerate().map(|(i, (before, after))| FrameRecord {
+        timestamp: after.timestamp,
+        truth: at(&odometry.truth, after.timestamp),
+        odometry: odometry.tracked(before, &drawn.odometry),
+        estimate: estimated.tracked(after, &drawn.estimate),
+        boxes: boxes.remove(&i).unwrap_or_default(),
+    });
+    (frames.collect(), any.then_some(alignment))
+}
+
+impl Errors {
+    /// `None` where there is no truth that it can be compared with.
+    fn of(
+        estimate: &Estimate,
+        poses: &[StampedPose],
+        alignment: Alignment,
+        settings: &EvaluationSettings,
+    ) -> Option<Self> {
+        let truth = estimate.sequence.ground_truth.as_ref()?;
+        let pairs = associate(&truth.trajectory, poses, *settings.max_time_difference).ok()?;
+        let (_, aligned) = align(&pairs, alignment).ok()?;
+        let distance = |p: &PosePair| (p.timestamp, (p.truth.translation - p.estimate.translation).norm());
+        let over = settings.relative_over.get();
+        let relative = relative_errors(&aligned, over, Pairing::All).into_iter();
+        let ends = aligned.iter().skip(over).map(|p| p.timestamp);
+        Some(Self {
+            absolute: aligned.iter().map(distance).collect(),
+            relative: ends.zip(relative.map(|(metres, radians)| [metres, radians])).collect(),
+            truth: pairs.iter().map(|p| (p.timestamp, p.truth)).collect(),
+        })
+    }
+
+    fn tracked(&self, stamped: &StampedPose, drawn: &Similarity) -> TrackedPose {
+        TrackedPose {
+            pose: drawn.act_on_pose(&stamped.pose),
+            error: at(&self.absolute, stamped.timestamp),
+            relative: at(&self.relative, stamped.timestamp),
+        }
+    }
+}
+
+/// What a list by time has for a time.
+fn at<T: Copy>(list: &[(f64, T)], timestamp: f64) -> Option<T> {
+    let place = list.binary_search_by(|(own, _)| own.total_cmp(&timestamp)).ok()?;
+    list.get(place).map(|(_, value)| *value)
+}
+
+/// What is seen, by frame.
+fn boxes(estimate: &Estimate) -> BTreeMap<usize, Vec<SeenBox>> {
+    let landmarks = estimate.landmarks();
+    let quadrics: BTreeMap<ObjectId, &DualQuadric> =
+        landmarks.iter().map(|landmark| (landmark.object.id, landmark.quadric)).collect();
+    let mut boxes: BTreeMap<usize, Vec<SeenBox>> = BTreeMap::new();
+    for object in &estimate.mapping.measurements.objects {
+        for view in &object.views {
+            let camera: Option<&Se3> = estimate.solution.values.get(pose_key(view.frame)).ok();
+            let seen = camera.zip(quadrics.get(&object.id).copied());
+            let seen = SeenBox::new(object.id, view.bounding_box, seen, &estimate.sequence.camera);
+            boxes.entry(view.frame).or_default().push(seen);
+        }
+    }
+    boxes
+}

@@ -1,0 +1,148 @@
+//! Boxes that the estimate did without, against those that it predicts.
+use manifactor_geometry::Se3;
+use manifactor_mapping::estimate::Estimate;
+use manifactor_mapping::mapping::measurements::{ObjectBox, Sifted, sift};
+use manifactor_mapping::mapping::{object_key, pose_key};
+use manifactor_mapping::settings::{Holdout, Settings};
+use manifactor_quadric::{BoundingBoxFactor, DualQuadric};
+use manifactor_recording::sequence::{Detection, ObjectId};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// How well boxes are predicted that had no part in the estimate: once they pass the filters, and show an object of the map.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HeldOutReport {
+    /// Which they are.
+    pub holdout: Holdout,
+    /// Boxes of objects that are not in the map.
+    pub unmapped: usize,
+    /// All boxes that are predicted.
+    pub all: Prediction,
+    /// By class.
+    pub classes: BTreeMap<String, Prediction>,
+}
+
+/// Boxes as they are predicted, against those that were detected.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Prediction {
+    /// How many.
+    pub boxes: usize,
+    /// Objects that they show.
+    pub objects: usize,
+    /// Those of which no outline is in view: their intersection over union is 0, and they have no error in pixels.
+    pub out_of_view: usize,
+    /// Mean intersection over union, 0 to 1.
+    pub iou: Mean,
+    /// Mean over boxes of the root mean square over their sides, in pixels.
+    pub pixels: Mean,
+}
+
+/// A mean with its standard error: boxes of one object err alike, so that objects are what is counted. `None` for a single object.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mean {
+    /// The mean.
+    pub mean: f64,
+    /// Its standard error.
+    pub error: Option<f64>,
+}
+
+/// One box.
+struct Predicted {
+    object: ObjectId,
+    iou: f64,
+    pixels: Option<f64>,
+}
+
+impl HeldOutReport {
+    pub(crate) fn new(estimate: &Estimate, held_out: &[Detection], settings: &Settings) -> Option<Self> {
+        let holdout = settings.evaluation.holdout?;
+        let (mut unmapped, mut all) = (0, vec![]);
+        let mut classes: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+        for detection in held_out {
+            let Sifted::View(view) = sift(detection, &estimate.sequence.camera, &settings.detections) else {
+                continue;
+            };
+            let Some(object) = detection.object else { continue };
+            match predicted(estimate, object, &view, settings) {
+                Some(predicted) => {
+                    let class = estimate.mapping.measurements.object(object).and_then(|own| own.class_name());
+                    classes.entry(class.unwrap_or("unknown").to_owned()).or_default().push(all.len());
+                    all.push(predicted);
+                }
+                None => unmapped += 1,
+            }
+        }
+        let of_class = |places: Vec<usize>| Prediction::of(places.iter().filter_map(|i| all.get(*i)));
+        let classes = classes.into_iter().map(|(class, places)| (class, of_class(places))).collect();
+        Some(Self { holdout, unmapped, all: Prediction::of(all.iter()), classes })
+    }
+}
+
+/// `None` for an object that is not in the map.
+fn predicted(
+    estimate: &Estimate,
+    object: ObjectId,
+    view: &ObjectBox,
+    settings: &Settings,
+) -> Option<Predicted> {
+    let values = &estimate.solution.values;
+    let quadric = values.get::<DualQuadric>(object_key(object).as_str()).ok()?;
+    let pose = values.get::<Se3>(pose_key(view.frame).as_str()).ok()?;
+    let (bounding_box, model, camera) =
+        (view.bounding_box, settings.detections.model, estimate.sequence.camera);
+    let outline = BoundingBoxFactor { bounding_box, camera, model }.predict(pose, quadric);
+    let outline = outline.filter(|_| quadric.is_in_front_of(pose));
+    let pixels = outline.map(|outline| {
+        let off = outline.bounds().into_iter().zip(bounding_box.bounds()).map(|(a, b)| (a - b).powi(2));
+        (off.sum::<f64>() / 4.0).sqrt()
+    });
+    Some(Predicted { object, iou: outline.map_or(0.0, |outline| outline.iou(&bounding_box)), pixels })
+}
+
+impl Prediction {
+    fn of<'a>(boxes: impl Iterator<Item = &'a Predicted>) -> Self {
+        let boxes: Vec<&Predicted> = boxes.collect();
+        let by_object = |of: &dyn Fn(&Predicted) -> Option<f64>| {
+            let mut objects: BTreeMap<ObjectId, Vec<f64>> = BTreeMap::new();
+            for predicted in &boxes {
+                objects.entry(predicted.object).or_default().extend(of(predicted));
+            }
+            objects.into_values().collect::<Vec<_>>()
+        };
+        let ious = by_object(&|predicted| Some(predicted.iou));
+        Self {
+            boxes: boxes.len(),
+            objects: ious.len(),
+            out_of_view: boxes.iter().filter(|predicted| predicted.pixels.is_none()).count(),
+            iou: Mean::of(&ious),
+            pixels: Mean::of(&by_object(&|predicted| predicted.pixels)),
+        }
+    }
+}
+
+impl Mean {
+    /// Over values by object.
+    fn of(objects: &[Vec<f64>]) -> Self {
+        let n = objects.iter().map(Vec::len).sum::<usize>() as f64;
+        let mean = objects.iter().flatten().sum::<f64>() / n;
+        let squares: f64 = objects.iter().map(|own| own.iter().map(|x| x - mean).sum::<f64>().powi(2)).sum();
+        let m = objects.len() as f64;
+        Self { mean, error: (m > 1.0).then(|| (squares * m / (m - 1.0)).sqrt() / n) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_a_mean_counts_objects_and_not_boxes() {
+        let alone = Mean::of(&[vec![0.5, 0.7]]);
+        assert!((alone.mean - 0.6).abs() < 1e-12 && alone.error.is_none());
+        let (few, many) = (Mean::of(&[vec![0.4], vec![0.8]]), Mean::of(&[vec![0.4; 50], vec![0.8; 50]]));
+        assert!((few.mean - many.mean).abs() < 1e-12);
+        assert!((few.error.unwrap() - many.error.unwrap()).abs() < 1e-12);
+        // the standard error of a mean of two
+        assert!((few.error.unwrap() - 0.2).abs() < 1e-12);
+    }
+}

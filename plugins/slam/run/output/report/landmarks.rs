@@ -1,0 +1,85 @@
+use manifactor_mapping::estimate::{Estimate, Landmark};
+use manifactor_quadric::LandmarkError;
+use serde::Serialize;
+
+/// Landmarks against the truth, over all objects of which it is known.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LandmarkReport {
+    /// How many objects are compared.
+    pub objects: usize,
+    /// Where the solve began.
+    pub initial: LandmarkSummary,
+    /// Where it ended.
+    pub estimate: LandmarkSummary,
+}
+
+/// Errors of several landmarks in one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LandmarkSummary {
+    /// The averages, as the paper's authors take them in later code.
+    pub mean: LandmarkError,
+    /// The roots of the averages of the squares, as the paper has it for positions.
+    pub rmse: LandmarkError,
+}
+
+/// The error of each landmark whose truth is known. Simulated truth lies in the frame of the odometry, which may be
+/// another than the map's.
+pub(super) fn in_truth_frame<'a>(
+    estimate: &Estimate,
+    landmarks: Vec<Landmark<'a>>,
+) -> Vec<(Landmark<'a>, LandmarkError)> {
+    let truth_from_map = estimate.mapping.frame.map_from_odometry.inverse();
+    let compare = |landmark: Landmark<'a>| {
+        let mut quadric = *landmark.quadric;
+        quadric.pose = truth_from_map.compose(&quadric.pose);
+        let error = LandmarkError::of(&quadric, &landmark.truth?.bounding_box);
+        Some((landmark, error))
+    };
+    landmarks.into_iter().filter_map(compare).collect()
+}
+
+impl LandmarkReport {
+    /// Summaries before and after; `None` where no truth is known.
+    pub(super) fn new(
+        before: &[(Landmark<'_>, LandmarkError)],
+        after: &[(Landmark<'_>, LandmarkError)],
+    ) -> Option<Self> {
+        let (initial, estimate) = (LandmarkSummary::of(before)?, LandmarkSummary::of(after)?);
+        Some(Self { objects: after.len(), initial, estimate })
+    }
+}
+
+impl LandmarkSummary {
+    fn of(errors: &[(Landmark<'_>, LandmarkError)]) -> Option<Self> {
+        let errors: Vec<LandmarkError> = errors.iter().map(|(_, error)| *error).collect();
+        Self::over(&errors)
+    }
+
+    /// `None` for no landmarks.
+    pub fn over(errors: &[LandmarkError]) -> Option<Self> {
+        let average = |of: fn(&LandmarkError) -> f64, power: i32| {
+            let sum: f64 = errors.iter().map(|error| of(error).powi(power)).sum();
+            (sum / errors.len() as f64).powf(1.0 / f64::from(power))
+        };
+        let summary = |power| LandmarkError {
+            position: average(|error| error.position, power),
+            shape: average(|error| error.shape, power),
+            quality: average(|error| error.quality, power),
+        };
+        (!errors.is_empty()).then(|| Self { mean: summary(1), rmse: summary(2) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_and_rmse_are_apart() {
+        let error = |position| LandmarkError { position, shape: 0.5, quality: 1.0 };
+        let summary = LandmarkSummary::over(&[error(0.0), error(2.0)]).unwrap();
+        assert_eq!(summary.mean, LandmarkError { position: 1.0, shape: 0.5, quality: 1.0 });
+        assert_eq!(summary.rmse.position, 2f64.sqrt());
+        assert_eq!(LandmarkSummary::over(&[]), None);
+    }
+}

@@ -1,0 +1,115 @@
+use manifactor_formats::tum::StampedPose;
+use manifactor_mapping::mapping::Warning;
+use manifactor_mapping::settings::EvaluationSettings;
+use manifactor_metrics::{
+    Alignment, Interval, MetricsError, Pairing, PosePair, RelativeError, Statistics, absolute_error, align,
+    associate, change_of_error, relative_error,
+};
+use manifactor_recording::sequence::GroundTruth;
+use serde::Serialize;
+
+/// The trajectory against the truth, before and after.
+#[derive(Debug, Clone, Serialize)]
+pub struct TrajectoryReport {
+    /// How it was brought into the frame of the truth.
+    pub alignment: Alignment,
+    /// Poses of the estimate for which there is a true one, and all of its poses.
+    pub covered: [usize; 2],
+    /// Number of true poses.
+    pub truth_poses: usize,
+    /// By odometry alone.
+    pub odometry: TrajectoryError,
+    /// As it is estimated.
+    pub estimate: TrajectoryError,
+    /// By how much its ATE is larger than that of odometry, as a share of it; with its interval.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub change: Option<Interval>,
+}
+
+/// How far a trajectory is from the truth.
+#[derive(Debug, Clone, Serialize)]
+pub struct TrajectoryError {
+    /// Absolute error of positions, in metres.
+    pub ate: Statistics,
+    /// Relative pose error over [`EvaluationSettings::relative_over`] frames; `None` for trajectories shorter than that.
+    pub rpe: Option<RelativeError>,
+}
+
+/// One report for each alignment, of the trajectory by odometry and the one that is estimated. An error that grew is a warning, and so is a truth that cannot be used.
+pub(super) fn compare(
+    truth: Option<&GroundTruth>,
+    [before, after]: &[Vec<StampedPose>; 2],
+    settings: &EvaluationSettings,
+    warnings: &mut Vec<Warning>,
+) -> Vec<TrajectoryReport> {
+    let Some(truth) = truth else { return vec![] };
+    let aligned = |trajectory: &[StampedPose], alignment| aligned(truth, trajectory, alignment, settings);
+    let error = |aligned: &[PosePair]| -> Result<TrajectoryError, MetricsError> {
+        let rpe = relative_error(aligned, settings.relative_over.get(), Pairing::All).ok();
+        Ok(TrajectoryError { ate: absolute_error(aligned)?, rpe })
+    };
+    let poses = after.len();
+    let report = |alignment: Alignment| -> Result<TrajectoryReport, MetricsError> {
+        let (before, after) = (aligned(before, alignment)?, aligned(after, alignment)?);
+        let change = change_of_error(&before, &after);
+        let covered = [after.len(), poses];
+        Ok(TrajectoryReport {
+            alignment,
+            covered,
+            truth_poses: truth.trajectory.len(),
+            odometry: error(&before)?,
+            estimate: error(&after)?,
+            change,
+        })
+    };
+    let mut reports = vec![];
+    for alignment in &settings.alignments {
+        match report(*alignment) {
+            Ok(report) => reports.push(report),
+            Err(error) => warnings.push(Warning::NotEvaluated { reason: error.to_string() }),
+        }
+    }
+    warnings.extend(reports.first().and_then(|report| few(report, settings)));
+    warnings.extend(reports.first().and_then(worse));
+    reports
+}
+
+/// Poses of an estimate beside the true ones, in the frame of the truth by the first of them.
+pub(super) fn by_first_pose(
+    truth: &GroundTruth,
+    estimate: &[StampedPose],
+    settings: &EvaluationSettings,
+) -> Result<Vec<PosePair>, MetricsError> {
+    aligned(truth, estimate, Alignment::FirstPose, settings)
+}
+
+fn aligned(
+    truth: &GroundTruth,
+    estimate: &[StampedPose],
+    alignment: Alignment,
+    settings: &EvaluationSettings,
+) -> Result<Vec<PosePair>, MetricsError> {
+    let pairs = associate(&truth.trajectory, estimate, *settings.max_time_difference)?;
+    Ok(align(&pairs, alignment)?.1)
+}
+
+/// A figure over less than half of the poses says little of the rest.
+fn few(report: &TrajectoryReport, settings: &EvaluationSettings) -> Option<Warning> {
+    let [covered, poses] = report.covered;
+    let truth = report.truth_poses;
+    let within = *settings.max_time_difference;
+    (2 * covered < poses.min(truth)).then_some(Warning::FewPoses { covered, poses, truth, within })
+}
+
+fn worse(report: &TrajectoryReport) -> Option<Warning> {
+    let (odometry, estimate) = (report.odometry.ate.rmse, report.estimate.ate.rmse);
+    // to rounding: a graph without objects leaves the odometry as it is
+    let grew = estimate > odometry * (1.0 + 1e-6);
+    grew.then(|| Warning::WorseThanOdometry { alignment: name(report.alignment), odometry, estimate })
+}
+
+/// As documents write it.
+pub fn name(alignment: Alignment) -> String {
+    let json = serde_json::to_value(alignment).unwrap_or_default();
+    json.as_str().unwrap_or_default().to_owned()
+}

@@ -1,0 +1,22 @@
+//! Ellipsoids with a shape that boxes do not limit: plates, and those that reach beyond the farthest camera.
+use manifactor_mapping::estimate::Estimate;
+use manifactor_mapping::mapping::Warning;
+
+/// How many times longer the longest semi-axis may be than the shortest. A sheet of paper on a desk has about 100.
+const PLATE: f64 = 200.0;
+
+/// The objects with such shapes, if there are any.
+pub(super) fn run_away(estimate: &Estimate) -> Option<Warning> {
+    let poses = estimate.trajectory();
+    let mut objects = vec![];
+    for landmark in estimate.landmarks() {
+        let (axes, centre) = (landmark.quadric.semi_axes, landmark.quadric.pose.translation);
+        let distances = poses.iter().map(|stamped| (stamped.pose.translation - centre).norm());
+        let farthest = distances.fold(0.0, f64::max);
+        if axes.max() > PLATE * axes.min() || axes.max() > farthest {
+            objects
+                .push(format!("{} ({:.3} × {:.3} × {:.3} m)", landmark.object.key, axes.x, axes.y, axes.z));
+        }
+    }
+    (!objects.is_empty()).then_some(Warning::RunAway { objects })
+}

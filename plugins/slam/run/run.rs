@@ -1,0 +1,234 @@
+//! A run from its document to its report.
+use crate::output::report::{AssociationReport, Found, HeldOutReport, RunReport, VariantReport};
+use association::{Associated, associated};
+use location::find;
+use manifactor_formats::journal::JournalError;
+use manifactor_mapping::estimate::{Estimate, EstimateError};
+use manifactor_mapping::mapping::{Mapping, MappingError};
+use manifactor_mapping::settings::Settings;
+use manifactor_mapping::settings::run_document::{RunDocument, Variant};
+use manifactor_online::FinishError;
+use manifactor_recording::journal::journaled;
+use manifactor_recording::sequence::{Detection, Sequence};
+use manifactor_recording::source::{Folders, SourceError};
+use manifactor_solve::{Observer, Termination};
+use std::borrow::Cow;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+mod association;
+mod location;
+mod stream;
+
+pub use stream::{Watch, online};
+
+/// Why a variant could not be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// There is no sequence.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// There is no graph.
+    #[error(transparent)]
+    Mapping(#[from] MappingError),
+    /// The graph cannot be solved.
+    #[error(transparent)]
+    Estimate(#[from] EstimateError),
+    /// Frames that cannot be kept.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A journal among files that the run writes.
+    #[error(
+        "the journal {} lies in {}, where the run writes its results: name a file outside of that folder",
+        path.display(), output.display()
+    )]
+    JournalAmongResults {
+        /// The journal.
+        path: PathBuf,
+        /// The folder of the results.
+        output: PathBuf,
+    },
+    /// A journal of a run with several variants.
+    #[error("a journal is that of one variant: name another document, or leave all others out")]
+    JournalOfVariants,
+    /// A map that came frame by frame has no end.
+    #[error(transparent)]
+    Finish(#[from] FinishError),
+}
+
+/// A sequence that is mapped and not solved.
+#[derive(Debug)]
+pub struct Mapped<'a> {
+    /// With the objects that its boxes were put to.
+    pub sequence: Arc<Sequence>,
+    /// The graph.
+    pub mapping: Mapping,
+    /// What it was made with: where the run begins in a map that was made before is known now, if it was found.
+    pub settings: Cow<'a, Settings>,
+    /// How boxes were put to objects.
+    pub association: Option<AssociationReport>,
+    /// Where the run begins in a map that was made before, if that was to be found, and was.
+    pub found: Option<Found>,
+    /// Boxes that are not in the graph, and are to be predicted.
+    pub held_out: Vec<Detection>,
+}
+
+impl<'a> Mapped<'a> {
+    /// Finds where a sequence begins in the settings' prior map, puts its boxes to objects, and makes its graph.
+    ///
+    /// # Errors
+    /// If no graph can be made of it.
+    pub fn new(
+        sequence: Arc<Sequence>,
+        settings: &'a Settings,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, RunError> {
+        let found = find(&sequence, settings, observer)?;
+        let settings = match &found {
+            Some(Found { located, .. }) => {
+                Cow::Owned(settings.beginning_at(located.start, located.noise.clone()))
+            }
+            None => Cow::Borrowed(settings),
+        };
+        let Associated { mut sequence, report: association } = associated(sequence, &settings, observer)?;
+        let held_out = match settings.evaluation.holdout {
+            Some(holdout) => holdout.take_from(Arc::make_mut(&mut sequence)),
+            None => vec![],
+        };
+        let mapping = Mapping::new(&sequence, &settings)?;
+        Ok(Self { sequence, mapping, settings, association, found, held_out })
+    }
+}
+
+/// Maps, solves and evaluates a sequence.
+///
+/// # Errors
+/// If no graph can be made of it. Numerical trouble is no error: see the report.
+pub fn estimate(
+    name: &str,
+    sequence: Arc<Sequence>,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> Result<(Estimate, VariantReport), RunError> {
+    let clock = Instant::now();
+    let Mapped { sequence, mapping, settings: begun, association, found, held_out } =
+        Mapped::new(sequence, settings, observer)?;
+    let estimate = Estimate::new(sequence, mapping, &begun, observer)?;
+    let mut report = VariantReport::new(name, &estimate, settings, 0.0);
+    report.association = association;
+    report.held_out = HeldOutReport::new(&estimate, &held_out, settings);
+    report.tell_prior_map(&estimate, settings, found);
+    report.seconds = clock.elapsed().as_secs_f64();
+    Ok((estimate, report))
+}
+
+/// A run under way: sequences are loaded once for all variants that share them.
+#[derive(Debug)]
+pub struct Run<'a> {
+    /// What to do.
+    pub document: &'a RunDocument,
+    folders: Folders,
+    loaded: Vec<(String, Arc<Sequence>)>,
+    journal: Option<PathBuf>,
+    began: Instant,
+    reports: Vec<VariantReport>,
+}
+
+impl<'a> Run<'a> {
+    /// Nothing done yet; `data` is the folder of public data sets.
+    pub fn new(document: &'a RunDocument, data: Option<PathBuf>) -> Self {
+        let folders = Folders { data, document: document.folder.clone() };
+        Self { document, folders, loaded: vec![], journal: None, began: Instant::now(), reports: vec![] }
+    }
+
+    /// Keeps the frames of a stream in a file, and begins with those that it has; see [`journal`](manifactor_recording::journal).
+    pub fn keep_frames(&mut self, journal: PathBuf) {
+        self.journal = Some(journal);
+    }
+
+    /// The sequence of a variant.
+    ///
+    /// # Errors
+    /// If its source has none.
+    pub fn sequence(&mut self, variant: &Variant) -> Result<Arc<Sequence>, SourceError> {
+        let source = &variant.settings.source;
+        // what is written alike is the same source
+        let name = serde_json::to_string(source).unwrap_or_default();
+        if let Some((_, sequence)) = self.loaded.iter().find(|(known, _)| *known == name && !name.is_empty())
+        {
+            return Ok(sequence.clone());
+        }
+        let sequence = Arc::new(source.load(&self.folders)?);
+        self.loaded.push((name, sequence.clone()));
+        Ok(sequence)
+    }
+
+    /// Maps, solves and evaluates one variant.
+    ///
+    /// # Errors
+    /// If there is no data, or no graph can be made of it. Numerical trouble is no error: see the report.
+    pub fn variant(
+        &mut self,
+        variant: &Variant,
+        observer: &mut dyn Observer,
+    ) -> Result<(Estimate, VariantReport), RunError> {
+        let clock = Instant::now();
+        let sequence = self.sequence(variant)?;
+        let done = estimate(&variant.name, sequence, &variant.settings, observer)?;
+        Ok(self.keep(variant, done, clock))
+    }
+
+    /// The same, frame by frame; see [`online`].
+    ///
+    /// # Errors
+    /// If there is no data, or no graph can be made of it.
+    pub fn variant_online(
+        &mut self,
+        variant: &Variant,
+        watch: &mut dyn Watch,
+        observer: &mut dyn Observer,
+    ) -> Result<(Estimate, VariantReport), RunError> {
+        let clock = Instant::now();
+        let stream = match variant.settings.source.open(&self.folders)? {
+            Some(stream) => stream,
+            None => self.sequence(variant)?.into(),
+        };
+        let stream = match &self.journal {
+            Some(_) if self.document.variants.len() > 1 => return Err(RunError::JournalOfVariants),
+            Some(path) => journaled(stream, path, &variant.settings.fingerprint())?,
+            None => stream,
+        };
+        let done = online(&variant.name, stream, &variant.settings, watch, observer)?;
+        Ok(self.keep(variant, done, clock))
+    }
+
+    fn keep(
+        &mut self,
+        variant: &Variant,
+        (estimate, mut report): (Estimate, VariantReport),
+        clock: Instant,
+    ) -> (Estimate, VariantReport) {
+        report.about.clone_from(&variant.about);
+        report.seconds = clock.elapsed().as_secs_f64();
+        self.reports.push(report.clone());
+        (estimate, report)
+    }
+
+    /// The report over all variants that were run.
+    pub fn finish(self) -> RunReport {
+        let ended = |report: &VariantReport| {
+            let interrupted = report.online.as_ref().is_some_and(|online| online.interrupted);
+            !interrupted && report.solve.termination != Termination::Interrupted
+        };
+        let complete = self.reports.len() == self.document.variants.len() && self.reports.iter().all(ended);
+        RunReport {
+            version: env!("CARGO_PKG_VERSION"),
+            title: self.document.title.clone(),
+            complete,
+            variants: self.reports,
+            seconds: self.began.elapsed().as_secs_f64(),
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! A stream, mapped while it comes.
+use super::RunError;
+use super::location::Search;
+use crate::output::report::{Found, Naming, OnlineReport, VariantReport};
+use manifactor_mapping::estimate::Estimate;
+use manifactor_mapping::mapping::Warning;
+use manifactor_mapping::settings::Settings;
+use manifactor_online::{FrameError, FrameReport, Mapper};
+use manifactor_recording::sequence::{Observation, Opening, Sequence};
+use manifactor_recording::stream::confirmed::Confirmed;
+use manifactor_recording::stream::{Awaited, Stream};
+use manifactor_solve::Observer;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Maps a stream frame by frame, solves all of it at the end, and evaluates. `watch` is told of each frame, with the map and
+/// the seconds that it took; it can end the stream there. Frames are waited for in a thread of their own, one ahead; where the stream is ended
+/// before its source is, that thread ends with the next frame.
+///
+/// # Errors
+/// If the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
+pub fn online(
+    name: &str,
+    stream: Stream,
+    settings: &Settings,
+    watch: &mut dyn Watch,
+    observer: &mut dyn Observer,
+) -> Result<(Estimate, VariantReport), RunError> {
+    let clock = Instant::now();
+    let lost = stream.lost.clone();
+    let mut taken = Taken::new(stream.opening, settings);
+    let (mut progress, mut search, mut found) = (OnlineReport::default(), Search::new(settings), None);
+    let mut awaited = Awaited::new(Box::new(Confirmed::new(stream.observations)));
+    loop {
+        let observation = match awaited.next(|| watch.quiet()) {
+            ControlFlow::Continue(Some(observation)) => observation,
+            ControlFlow::Continue(None) => break,
+            ControlFlow::Break(()) => {
+                progress.interrupted = true;
+                break;
+            }
+        };
+        if let Ok(observation) = &observation
+            && observation.frame.timestamp > stream.past
+            && watch.wait(observation.frame.timestamp).is_break()
+        {
+            progress.interrupted = true;
+            break;
+        }
+        let began = Instant::now();
+        let report = observation.as_ref().map_err(|error| FrameError::Source(error.to_string()));
+        let mut report = report.and_then(|observation| taken.take(observation));
+        if let Ok(report) = &mut report
+            && let Some(located) = search.look(report, &taken.mapper)
+        {
+            let known = settings.beginning_at(located.start, located.noise.clone());
+            taken = taken.again(&known, report);
+            progress.begin_again();
+            report.located = Some(located.clone());
+            found = Some(Found { frame: report.frame, located });
+        }
+        let seconds = began.elapsed().as_secs_f64();
+        progress.count(report.as_ref(), seconds);
+        let goes_on = watch.frame(report.as_ref(), observation.as_ref().ok(), &mut taken.mapper, seconds);
+        if goes_on.is_break() {
+            progress.interrupted = true;
+            break;
+        }
+    }
+    // what waits for a frame may wait for good, but holds what it reads no longer than it has to
+    drop(awaited);
+    progress.tell(&taken.mapper.settle());
+    progress.end(&mut taken.mapper);
+    watch.end(&mut taken.mapper);
+    let Taken { mapper, mut sequence, naming } = taken;
+    for (detection, name) in sequence.detections.iter_mut().zip(naming.now(mapper.names())) {
+        detection.object = name;
+    }
+    let association = naming.report(&*settings.association, mapper.names());
+    let estimate = mapper.finish(Arc::new(sequence), observer)?;
+    progress.compare(&estimate, &settings.evaluation);
+    let mut report = VariantReport::new(name, &estimate, settings, 0.0);
+    report.association = association;
+    if settings.evaluation.holdout.is_some() {
+        report.warnings.push(Warning::NotHeldOut);
+    }
+    report.warnings.extend(lost.get().map(Warning::JournalIncomplete));
+    report.tell_prior_map(&estimate, settings, found);
+    report.online = Some(progress);
+    report.seconds = clock.elapsed().as_secs_f64();
+    Ok((estimate, report))
+}
+
+/// Frames that were taken, and what was made of them.
+struct Taken {
+    mapper: Mapper,
+    sequence: Sequence,
+    naming: Naming,
+}
+
+impl Taken {
+    fn new(opening: Opening, settings: &Settings) -> Self {
+        let mapper = Mapper::new(opening.clone(), settings);
+        Self { mapper, sequence: opening.into_sequence(), naming: Naming::default() }
+    }
+
+    fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
+        let report = self.mapper.take(observation)?;
+        self.naming.note(&observation.detections, Some(&report));
+        self.sequence.push(observation.clone());
+        Ok(report)
+    }
+
+    /// The same frames with other settings; `report` becomes that of the last, and tells of all that has happened to the new map.
+    fn again(self, settings: &Settings, report: &mut FrameReport) -> Self {
+        let (mut again, mut before) = (Self::new(self.sequence.opening(), settings), None);
+        let mut refused = vec![];
+        for observation in self.sequence.observations() {
+            match again.take(&observation) {
+                Ok(mut taken) => {
+                    if let Some(before) = before {
+                        taken.tell_after(before);
+                    }
+                    before = Some(taken);
+                }
+                Err(error) => refused.push(error.to_string()),
+            }
+        }
+        if let Some(last) = before {
+            *report = last;
+        }
+        report.refused.extend(refused);
+        again
+    }
+}
+
+/// Watches frames as they come in.
+pub trait Watch {
+    /// Now and then while no frame comes: to end the stream there.
+    fn quiet(&mut self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    /// Before each frame, with its time stamp in seconds: returns when it is there, or to end the stream before it.
+    fn wait(&mut self, _timestamp: f64) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    /// After each frame: what came of it, the frame if it could be read, the map, and the seconds that it took.
+    fn frame(
+        &mut self,
+        report: Result<&FrameReport, &FrameError>,
+        observation: Option<&Observation>,
+        mapper: &mut Mapper,
+        seconds: f64,
+    ) -> ControlFlow<()>;
+
+    /// After the last frame, before all of it is solved as one batch.
+    fn end(&mut self, _mapper: &mut Mapper) {}
+}

@@ -1,0 +1,256 @@
+//! What is wrong with measurements.
+use manifactor_geometry::Se3;
+use manifactor_graph::Manifold;
+use manifactor_graph::checked::{NotNegative, Positive, Share};
+use manifactor_quadric::{BoundingBox, Camera};
+use manifactor_recording::measurement::{Depth, Quantities};
+use manifactor_recording::sequence::ClassScores;
+use nalgebra::{Vector3, Vector6};
+use rand::RngExt;
+use rand_distr::{Distribution, Poisson, StandardNormal};
+use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Noise of odometry: zero-mean and Gaussian, a share of each motion, applied through retract.
+///
+/// The paper says 5 % of translation and 15 % of rotation, and not of what: see `spread`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionNoise {
+    /// Standard deviation as a share of the translation.
+    pub translation: NotNegative,
+    /// Standard deviation as a share of the rotation.
+    pub rotation: NotNegative,
+    /// What the share is of.
+    pub spread: Spread,
+}
+
+impl Default for MotionNoise {
+    fn default() -> Self {
+        Self {
+            translation: NotNegative::literal(0.05),
+            rotation: NotNegative::literal(0.15),
+            spread: Spread::default(),
+        }
+    }
+}
+
+/// Of what a motion's noise is a share.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Spread {
+    /// The length of the motion, for the whole error: each axis has the share / √3.
+    #[default]
+    Total,
+    /// The length of the motion, for the error along each axis.
+    PerAxis,
+    /// The motion along each axis, for the error along it.
+    Component,
+}
+
+fn normal(rng: &mut Pcg64) -> f64 {
+    StandardNormal.sample(rng)
+}
+
+impl MotionNoise {
+    /// A relative pose as it is measured.
+    pub(super) fn corrupt(&self, motion: &Se3, rng: &mut Pcg64) -> Se3 {
+        let turn = self.sigmas(&motion.rotation.log(), *self.rotation);
+        let shift = self.sigmas(&motion.translation, *self.translation);
+        let sigmas = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+        motion.retract(&Vector6::from_iterator(sigmas.into_iter().map(|s| s * normal(rng))))
+    }
+    fn sigmas(&self, motion: &Vector3<f64>, share: f64) -> Vector3<f64> {
+        match self.spread {
+            Spread::Total => Vector3::repeat(share * motion.norm() / 3.0_f64.sqrt()),
+            Spread::PerAxis => Vector3::repeat(share * motion.norm()),
+            Spread::Component => motion.abs() * share,
+        }
+    }
+}
+
+/// An accelerometer, and what it does wrong: white noise, and an offset that stays.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct AccelerometerNoise {
+    /// Standard deviation of each axis, in m/s².
+    pub sigma: NotNegative,
+    /// Standard deviation of the offset of each axis, in m/s².
+    pub bias: NotNegative,
+}
+
+impl Default for AccelerometerNoise {
+    fn default() -> Self {
+        Self { sigma: NotNegative::literal(0.1), bias: NotNegative::literal(0.05) }
+    }
+}
+
+/// What an accelerometer at rest reads, in m/s².
+const GRAVITY: f64 = 9.81;
+
+impl AccelerometerNoise {
+    /// What it reads at each pose, in the camera's frame: up, and its own acceleration, by differences over `interval` seconds.
+    pub(super) fn read(&self, poses: &[Se3], interval: f64, rng: &mut Pcg64) -> Vec<Vector3<f64>> {
+        let bias = Vector3::from_fn(|_, _| *self.bias * normal(rng));
+        let at = |i: usize| poses[i.min(poses.len() - 1)].translation;
+        let reading = |i: usize| {
+            // at both ends, that of the pose beside; of two poses nobody can tell
+            let middle = i.clamp(1, poses.len().saturating_sub(2).max(1));
+            let moved = at(middle + 1) - at(middle) * 2.0 + at(middle - 1);
+            let moved = if poses.len() < 3 { Vector3::zeros() } else { moved };
+            let felt = Vector3::z() * GRAVITY + moved / interval.powi(2);
+            let noise = Vector3::from_fn(|_, _| *self.sigma * normal(rng));
+            poses[i].rotation.inverse().act(&felt) + bias + noise
+        };
+        (0..poses.len()).map(reading).collect()
+    }
+}
+
+/// A detector and what it does wrong. Shares and rates are from 0 to 1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Detector {
+    /// Standard deviation of each side of a box, in pixels. The paper says a variance of 4 px², its
+    /// authors' code draws with 2 px: the same.
+    pub sigma_px: NotNegative,
+    /// What the noise has besides, as a part of width and height; the two add up as squares.
+    pub sigma_of_size: NotNegative,
+    /// For how long the noise of an object's boxes lasts, in seconds: after that time 1/e of it is left. 0 for new noise in each frame.
+    pub noise_lasts_s: NotNegative,
+    /// Boxes of nothing in an image, on average.
+    pub false_boxes: NotNegative,
+    /// Boxes with a side shorter than this are not seen, in pixels.
+    pub min_size_px: NotNegative,
+    /// Objects of which less than this share is in the image are not seen.
+    pub min_visible: Share,
+    /// Rate at which a box is not there.
+    pub missed: Share,
+    /// Rate at which something hides a part of an object: its box loses part of one side.
+    pub occluded: Share,
+    /// By how much of its width or height such a box shrinks, at most.
+    pub occlusion: Share,
+    /// Whether nearer objects hide what is behind them: a box is around what is left to see, to four pixels or a thousandth of the image, and `min_visible` is about it.
+    pub occluded_by_objects: bool,
+    /// Rate at which a box is put to another object of the scene: a tracker's mistake.
+    pub wrong_object: Share,
+    /// Share of the objects that are taken for another class in most of their images.
+    pub misclassified: Share,
+    /// Rate at which a box has another class than the object's usual.
+    pub confused: Share,
+    /// Standard deviation of the depths of objects' centres that come with their boxes, as a part of the depth. Default: none come.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth_error: Option<Positive>,
+}
+
+impl Default for Detector {
+    fn default() -> Self {
+        Self {
+            sigma_px: NotNegative::literal(2.0),
+            sigma_of_size: NotNegative::literal(0.0),
+            noise_lasts_s: NotNegative::literal(0.0),
+            false_boxes: NotNegative::literal(0.0),
+            min_size_px: NotNegative::literal(8.0),
+            min_visible: Share::literal(0.3),
+            missed: Share::literal(0.0),
+            occluded: Share::literal(0.0),
+            occlusion: Share::literal(0.4),
+            occluded_by_objects: false,
+            wrong_object: Share::literal(0.0),
+            misclassified: Share::literal(0.0),
+            confused: Share::literal(0.0),
+            depth_error: None,
+        }
+    }
+}
+
+impl Detector {
+    /// The box that it draws; `None` where it draws none.
+    /// `visible` is the share of the object that is to be seen; `noise` is that of its box before, in standard deviations, and of this
+    /// one after; `seconds` have passed.
+    pub(super) fn draw(
+        &self,
+        bounding_box: &BoundingBox,
+        visible: f64,
+        camera: &Camera,
+        (noise, seconds): (&mut [f64; 4], f64),
+        rng: &mut Pcg64,
+    ) -> Option<BoundingBox> {
+        // the same draws for each box, seen or not: one setting changes nothing but its own effect
+        let (missed, hidden) = (rng.random_bool(*self.missed), rng.random_bool(*self.occluded));
+        let (side, share) = (rng.random_range(0..4), rng.random::<f64>() * *self.occlusion);
+        let left = if self.noise_lasts_s > NotNegative::literal(0.0) {
+            (-seconds / *self.noise_lasts_s).exp()
+        } else {
+            0.0
+        };
+        noise.iter_mut().for_each(|n| *n = left * *n + (1.0 - left * left).sqrt() * normal(rng));
+        let (width, height) = (bounding_box.width(), bounding_box.height());
+        let sigma = [width, height].map(|size| self.sigma_px.hypot(*self.sigma_of_size * size));
+        let mut b = bounding_box.bounds();
+        if hidden {
+            let extent = b[side % 2 + 2] - b[side % 2];
+            b[side] += if side < 2 { share * extent } else { -share * extent };
+        }
+        (0..4).for_each(|i| b[i] += sigma[i % 2] * noise[i]);
+        let size = camera.size();
+        for axis in 0..2 {
+            let (low, high) = (b[axis].min(b[axis + 2]), b[axis].max(b[axis + 2]));
+            (b[axis], b[axis + 2]) = (low.clamp(0.0, size[axis]), high.clamp(0.0, size[axis]));
+        }
+        let large = b[2] - b[0] >= *self.min_size_px && b[3] - b[1] >= *self.min_size_px;
+        (!missed && large && visible >= *self.min_visible).then(|| BoundingBox::new(b).ok()).flatten()
+    }
+
+    /// What it takes an object for whose usual class is this.
+    pub(super) fn classify(&self, usual: &str, classes: &[&str], rng: &mut Pcg64) -> ClassScores {
+        let (confused, score) = (rng.random_bool(*self.confused), rng.random_range(0.5..1.0));
+        let other = another(usual, classes, rng);
+        ClassScores::single(if confused { other } else { usual }, score)
+    }
+}
+
+impl Detector {
+    /// Measurements besides the box, of an object at this depth in metres: its depth, if it is in front of the camera.
+    pub(super) fn measure(&self, depth: f64, rng: &mut Pcg64) -> Quantities {
+        let Some(relative) = self.depth_error else { return Quantities::NONE };
+        let error = relative.get() * normal(rng);
+        let measured = Positive::new(depth * (1.0 + error));
+        measured.map_or(Quantities::NONE, |measured| Quantities::one(Depth(measured)))
+    }
+
+    /// Boxes of nothing in an image.
+    pub(super) fn imagine(
+        &self,
+        camera: &Camera,
+        classes: &[&str],
+        rng: &mut Pcg64,
+    ) -> Vec<(BoundingBox, ClassScores)> {
+        let count = Poisson::new(*self.false_boxes).map_or(0, |poisson| poisson.sample(rng) as usize);
+        let size = camera.size();
+        let mut one = || {
+            let mut ends = |length: f64| {
+                let (a, b) = (rng.random::<f64>() * length, rng.random::<f64>() * length);
+                (a.min(b), a.max(b))
+            };
+            let ((xmin, xmax), (ymin, ymax)) = (ends(size.x), ends(size.y));
+            let class = classes.get(rng.random_range(0..classes.len().max(1)))?;
+            let scores = ClassScores::single(*class, rng.random_range(0.3..0.6));
+            Some((BoundingBox::new([xmin, ymin, xmax, ymax]).ok()?, scores))
+        };
+        (0..count).filter_map(|_| one()).collect()
+    }
+}
+
+/// The object that a box is put to, of so many: with this rate another one.
+pub(super) fn mistaken(rate: f64, own: usize, objects: usize, rng: &mut Pcg64) -> usize {
+    let (wrong, step) = (rng.random_bool(rate), rng.random_range(1..objects.max(2)));
+    if wrong { (own + step) % objects.max(1) } else { own }
+}
+
+/// A class that is not this one, if there is any.
+pub(super) fn another<'a>(class: &'a str, classes: &[&'a str], rng: &mut Pcg64) -> &'a str {
+    let others: Vec<&str> = classes.iter().copied().filter(|c| *c != class).collect();
+    let i = rng.random_range(0..others.len().max(1));
+    others.get(i).copied().unwrap_or(class)
+}
