@@ -35,23 +35,26 @@ pub enum WriteError {
 
 /// Writes a value as TOML.
 ///
-/// # Errors If a number is not finite, or TOML cannot represent the value.
+/// # Errors
+/// If a number is not finite, or TOML cannot represent the value.
 pub fn to_toml(value: &impl Serialize) -> Result<String, WriteError> {
     Format::Toml.write(value)
 }
 
 /// Writes a value as indented JSON.
 ///
-/// # Errors If a number is not finite, or TOML cannot represent the value. All formats can therefore hold
-/// equal documents.
+/// # Errors
+/// If a number is not finite, or TOML cannot represent the value. All formats can therefore hold equal
+/// documents.
 pub fn to_json(value: &impl Serialize) -> Result<String, WriteError> {
     Format::Json.write(value)
 }
 
 /// Writes a value as YAML.
 ///
-/// # Errors If a number is not finite, or TOML cannot represent the value. All formats can therefore hold
-/// equal documents.
+/// # Errors
+/// If a number is not finite, or TOML cannot represent the value. All formats can therefore hold equal
+/// documents.
 pub fn to_yaml(value: &impl Serialize) -> Result<String, WriteError> {
     Format::Yaml.write(value)
 }
@@ -59,8 +62,9 @@ pub fn to_yaml(value: &impl Serialize) -> Result<String, WriteError> {
 impl Format {
     /// Writes a value in this format.
     ///
-    /// # Errors If a number is not finite, or TOML cannot represent the value. All formats can therefore hold
-    /// equal documents.
+    /// # Errors
+    /// If a number is not finite, or TOML cannot represent the value. All formats can therefore hold equal
+    /// documents.
     pub fn write(self, value: &impl Serialize) -> Result<String, WriteError> {
         let value = tree(self, value)?;
         let text = match self {

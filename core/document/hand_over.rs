@@ -41,7 +41,8 @@ pub(crate) fn run(node: &Node) -> Result<(), ReadError> {
 /// Implements `Deserialize` for a type that is read from a node. `read` returns a boxed `T`. Any deserializer
 /// except [`Reader`](crate::Reader) is first converted to a node without positions.
 ///
-/// # Errors The errors of `read`. With a [`Reader`](crate::Reader) they have positions.
+/// # Errors
+/// The errors of `read`. With a [`Reader`](crate::Reader) they have positions.
 pub fn deserialize_with<'de, T: 'static, D: Deserializer<'de>>(
     deserializer: D,
     read: Run,

@@ -51,7 +51,7 @@ impl Front {
     }
 }
 
-/// All fronts, and for each variable the front that eliminates it.
+/// A slab of fronts, and for each variable the front that eliminates it.
 #[derive(Debug, Default)]
 pub(crate) struct Tree {
     pub fronts: Vec<Front>,
@@ -76,7 +76,7 @@ pub(crate) struct Redone {
     pub kept: Vec<(u32, u32)>,
 }
 
-/// Queries of the tree to the factor graph.
+/// The structure of the factor graph, as the tree needs it.
 pub(crate) trait Couplings {
     /// Returns the number of variables, including variables outside of the tree.
     fn variables(&self) -> usize;

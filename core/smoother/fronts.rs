@@ -1,7 +1,7 @@
 //! Numerical values of the fronts: panels of the Cholesky factor, and the stored updates to their parents.
 //!
-//! The right-hand side −g is the last row of each front. Elimination therefore solves for it at once, and a
-//! kept front already has its part of the solution.
+//! The right-hand side −g is the last row of each front. Elimination therefore includes the forward
+//! substitution, and a kept front already has its part of the result.
 mod assembly;
 mod elimination;
 mod pool;

@@ -54,11 +54,11 @@ pub struct Report {
 /// A factor that is rejected as an outlier.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rejection {
-    /// The update that rejected it. The first update is 1.
+    /// The factor.
     pub factor: FactorId,
-    /// ½ρ(‖r‖²) at the estimate; `None` if the factor is not defined there.
+    /// The update that rejected it. The first update is 1.
     pub since: usize,
-    /// ½ρ(‖r‖²) at the estimate; `None` where it is not defined there.
+    /// ½ρ(‖r‖²) at the estimate; `None` if the factor is not defined there.
     pub cost: Option<f64>,
 }
 

@@ -17,7 +17,8 @@ pub use crate::example::example;
 /// Checks that an entry has a name in snake case, a summary, a schema that is an object, and a readable TOML
 /// example of the type.
 ///
-/// # Errors The first missing part.
+/// # Errors
+/// The first missing part.
 pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
     let require = |holds: bool, text: &str| if holds { Ok(()) } else { Err(problem(entry, text.into())) };
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '-';
@@ -31,7 +32,8 @@ pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
 
 /// Checks the example of a factor at `points` points, see [`FactorCheck`]. Returns the report.
 ///
-/// # Errors If a law does not hold, or the catalogue entry is incomplete.
+/// # Errors
+/// If a law does not hold, or the catalogue entry is incomplete.
 pub fn factor_law(entry: &'static Entry, points: usize) -> Result<FactorReport, LawError> {
     let report = FactorCheck { points, ..FactorCheck::default() }.run(&Subject::example(entry)?);
     if report.holds() { Ok(report) } else { Err(problem(entry, report.to_string())) }
@@ -40,7 +42,8 @@ pub fn factor_law(entry: &'static Entry, points: usize) -> Result<FactorReport, 
 /// Asserts [`documentation_law`] and [`factor_law`] of a registered factor, at 256 points. The tests of
 /// [`factor_laws!`](crate::factor_laws) call it.
 ///
-/// # Panics If a law does not hold, with its error. It is an assertion for tests.
+/// # Panics
+/// If a law does not hold, with its error. It is an assertion for tests.
 #[track_caller]
 pub fn assert_factor_laws(name: &str) {
     let entry = catalogue::find(<dyn Factor as Kind>::NAME, name);
@@ -68,7 +71,8 @@ macro_rules! factor_laws {
 
 /// Checks a manifold at `points` pairs of points, see [`ManifoldCheck`]. Returns the report.
 ///
-/// # Errors If a law does not hold, or the catalogue entry is incomplete.
+/// # Errors
+/// If a law does not hold, or the catalogue entry is incomplete.
 pub fn manifold_law(entry: &'static Entry, points: usize) -> Result<ManifoldReport, LawError> {
     let report = ManifoldCheck { points, ..ManifoldCheck::default() }.run(entry)?;
     if report.holds() { Ok(report) } else { Err(problem(entry, report.to_string())) }
@@ -77,7 +81,8 @@ pub fn manifold_law(entry: &'static Entry, points: usize) -> Result<ManifoldRepo
 /// Asserts [`documentation_law`] and [`manifold_law`] of a registered manifold, at 256 pairs of points,
 /// including its `seed`. The tests of [`manifold_laws!`](crate::manifold_laws!) call it.
 ///
-/// # Panics If a law does not hold, with its error. It is an assertion for tests.
+/// # Panics
+/// If a law does not hold, with its error. It is an assertion for tests.
 #[track_caller]
 pub fn assert_manifold_laws(name: &str) {
     let entry = catalogue::find(<dyn Variable as Kind>::NAME, name);
@@ -96,7 +101,8 @@ pub fn assert_manifold_laws(name: &str) {
 /// Checks the example of a loss at many s. Its weight has to be the derivative of ρ. [Tempered] once and
 /// twice, it has to be ρ(τs)/τ for many τ.
 ///
-/// # Errors If a law does not hold, or the catalogue entry is incomplete.
+/// # Errors
+/// If a law does not hold, or the catalogue entry is incomplete.
 ///
 /// [Tempered]: manifactor_graph::loss::RobustLoss::tempered
 pub fn loss_law(entry: &'static Entry) -> Result<(), LawError> {

@@ -13,7 +13,8 @@ const CASES: u32 = 256;
 /// Checks a law for at least 256 cases of a strategy. Cases with an undefined factor are drawn again, up to a
 /// limit.
 ///
-/// # Panics If the law does not hold, with the simplest case that was found. It is an assertion for tests.
+/// # Panics
+/// If the law does not hold, with the simplest case that was found. It is an assertion for tests.
 #[track_caller]
 pub fn check<S: Strategy>(cases: S, law: impl Fn(S::Value) -> Result<(), LawError>)
 where
@@ -69,7 +70,8 @@ case!(V1 1, V2 2, V3 3, V4 4, V5 5, V6 6);
 
 /// Checks [`jacobian_law`] for the cases of a strategy.
 ///
-/// # Panics See [`check`].
+/// # Panics
+/// See [`check`].
 #[track_caller]
 pub fn check_jacobians<S: Strategy<Value: Case + Debug>>(cases: S) {
     check(cases, |case| case.with(jacobian_law));
@@ -77,7 +79,8 @@ pub fn check_jacobians<S: Strategy<Value: Case + Debug>>(cases: S) {
 
 /// Checks [`manifold_laws`] for the cases of a strategy: two points, and a tangent vector at the first.
 ///
-/// # Panics See [`check`].
+/// # Panics
+/// See [`check`].
 #[track_caller]
 pub fn check_manifolds<S, M, D>(cases: S)
 where

@@ -5,8 +5,9 @@ use manifactor_graph::{Factor, Variable};
 
 /// Checks that the residuals at `moved` and at `variables` are equal, to 1e-9 of their size or of 1.
 ///
-/// # Errors The row with the largest difference; [`LawError::NotDefined`] if the factor is not defined at one
-/// of the points.
+/// # Errors
+/// The row with the largest difference; [`LawError::NotDefined`] if the factor is not defined at one of the
+/// points.
 pub fn invariance_law(
     factor: &dyn Factor,
     variables: &[&dyn Variable],

@@ -33,7 +33,8 @@ impl Default for JacobianLaw {
 
 /// Checks [`JacobianLaw::check`] with the default tolerances.
 ///
-/// # Errors See [`JacobianLaw::check`].
+/// # Errors
+/// See [`JacobianLaw::check`].
 pub fn jacobian_law(factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<(), LawError> {
     JacobianLaw::default().check(factor, variables)
 }
@@ -80,16 +81,17 @@ impl JacobianLaw {
     ///
     /// The differences through `retract` also test the seeds of the manifolds.
     ///
-    /// # Errors The entry with the largest difference. [`LawError::NotDefined`] if the factor is not defined,
-    /// so that nothing was checked.
-    /// there was nothing to check.
+    /// # Errors
+    /// The entry with the largest difference. [`LawError::NotDefined`] if the factor is not defined, so that
+    /// nothing was checked. there was nothing to check.
     pub fn check(&self, factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<(), LawError> {
         self.examine(factor, variables).map(|_| ())
     }
 
     /// Checks the law like [`JacobianLaw::check`] and returns the details of a point at which it holds.
     ///
-    /// # Errors See [`JacobianLaw::check`].
+    /// # Errors
+    /// See [`JacobianLaw::check`].
     pub fn examine(&self, factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<Examined, LawError> {
         let (residual, point, at) = (factor.erased(), || json_of_all(variables), At { factor, variables });
         let wrong = || LawError::WrongVariables { factor: json_of_factor(factor), point: point() };

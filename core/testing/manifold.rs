@@ -19,7 +19,8 @@ const SEED: f64 = 1e-6;
 /// The laws are `x ⊞ 0 = x`; `x ⊞ (y ⊟ x) = y`; `(x ⊞ δ) ⊟ x = δ`; all results are finite; each direction has
 /// a name; a document of x reads back as an equal document; [`seed_law`].
 ///
-/// # Errors The first law that does not hold.
+/// # Errors
+/// The first law that does not hold.
 pub fn manifold_laws(x: &dyn Variable, y: &dyn Variable, delta: &[f64]) -> Result<(), LawError> {
     let broken =
         |law, error| LawError::Manifold { law, error, x: json_of(x), y: json_of(y), delta: delta.to_vec() };
@@ -71,7 +72,8 @@ pub fn manifold_laws(x: &dyn Variable, y: &dyn Variable, delta: &[f64]) -> Resul
 /// relative to the largest derivative or to 1. Returns `None` if the manifold is not registered by
 /// [`register_quantity!`](manifactor_graph::register_quantity), because its values are unknown then.
 ///
-/// # Errors The direction with the largest difference, as `delta`.
+/// # Errors
+/// The direction with the largest difference, as `delta`.
 pub fn seed_law(x: &dyn Variable) -> Result<Option<f64>, LawError> {
     let (from, law) = (x.erased(), "the derivative of x.seed() is that of x.retract(delta)");
     let Some(quantity) = variable_quantity(from.type_id()) else { return Ok(None) };

@@ -60,7 +60,8 @@ impl ManifoldCheck {
     /// Checks [`manifold_laws`] of a registered manifold at random points: near and far from the example in
     /// its docs, at points of its registered strategy, and at its singular points.
     ///
-    /// # Errors If the catalogue entry is incomplete.
+    /// # Errors
+    /// If the catalogue entry is incomplete.
     pub fn run(&self, entry: &'static Entry) -> Result<ManifoldReport, LawError> {
         let origin = example::<dyn Variable>(entry)?;
         let (tangent, dim) = (origin.erased().tangent(), origin.erased().dim());

@@ -30,8 +30,9 @@ use std::sync::Arc;
 ///
 /// Reading the text of [`write_graph`](crate::write_graph) restores all values bit for bit.
 ///
-/// # Errors All errors at once: unknown types and fields, wrong types of fields, variables that are given
-/// twice, and factors that do not fit their variables or their noise.
+/// # Errors
+/// All errors at once: unknown types and fields, wrong types of fields, variables that are given twice, and
+/// factors that do not fit their variables or their noise.
 pub fn read_graph(document: &Document) -> Result<(Graph, Values), Diagnostics> {
     let errors = Errors::new();
     let graph = document.section(&errors).map(|mut section| {

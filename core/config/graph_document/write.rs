@@ -21,7 +21,8 @@ struct LiteralVariable<'a> {
 
 /// Writes a graph and its values as a document. [`read_graph`](crate::read_graph) restores it bit for bit.
 ///
-/// # Errors If a held variable has no value, or a value is not finite.
+/// # Errors
+/// If a held variable has no value, or a value is not finite.
 pub fn write_graph(graph: &Graph, values: &Values, format: Format) -> Result<String, WriteError> {
     if let Some(key) = graph.fixed().keys().find(|key| !values.contains(key.as_str())) {
         return Err(WriteError::FixedWithoutValue { key: key.clone() });

@@ -5,7 +5,7 @@ use super::regions::Regions;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
-/// A neighbour that shares a factor, and the pair with their block.
+/// A neighbour that shares a factor, and the index of the pair with their block.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Coupling {
     pub other: u32,

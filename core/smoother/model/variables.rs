@@ -12,7 +12,7 @@ pub(crate) struct NewNumber {
     pub is_reused: bool,
 }
 
-/// Numbers that are reserved for variables outside of the model.
+/// Numbers that are reserved for variables that are not in the model yet.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Reserved {
     new: u32,

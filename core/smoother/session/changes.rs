@@ -50,9 +50,9 @@ impl Session {
     /// A variable that its factors do not determine yet is *parked*, for example a point that was observed
     /// once. It waits with its factors, and the report names it.
     ///
-    /// # Errors If a variable exists already, if the factors do not fit (all errors are listed), or if the
-    /// window is in seconds and no time is set. Nothing is added then.
-    /// and no time is set. Nothing is added then.
+    /// # Errors
+    /// If a variable exists already, if the factors do not fit (all errors are listed), or if the window is
+    /// in seconds and no time is set. Nothing is added then.
     pub fn push(&mut self, factors: &Graph, values: &Values) -> Result<Vec<FactorId>, ChangeError> {
         let time = self.schedule.time_of_new(self.pending.time)?;
         let is_known = |key: &Key| {

@@ -116,8 +116,9 @@ impl Session {
         variables.iter().zip(changes).map(share).collect()
     }
 
-    /// Returns the variables that the budget allows, the largest excess first. The cost of a relinearization
-    /// is the cost of the current fronts above the variable, without fronts that are already `affected`.
+    /// Returns the variables that the budget allows, the largest excess first. The budget pays for the fronts
+    /// that are already `affected` first. A relinearization costs as much as the current fronts above its
+    /// variable.
     fn afford(
         &mut self,
         mut by_excess: Vec<(f64, u32)>,

@@ -44,7 +44,8 @@ impl Session {
     /// parked variable, are dropped, and the report names them. If a prior overflows, all of these variables
     /// stay, and the report names them. The key of a variable without factors can be used again.
     ///
-    /// # Errors If a variable does not exist, or is marginalized already. None is marginalized then.
+    /// # Errors
+    /// If a variable does not exist, or is marginalized already. None is marginalized then.
     pub fn marginalize<K: AsRef<str>>(&mut self, keys: &[K]) -> Result<(), ChangeError> {
         for key in keys.iter().map(AsRef::as_ref) {
             if self.find(key).is_none() {

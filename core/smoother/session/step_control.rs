@@ -1,4 +1,4 @@
-//! Control of steps that are too long, so that the true cost rises.
+//! Control of steps that are so long that they raise the true cost.
 //!
 //! If a few variables step far, they are poorly determined. They are damped one by one, as Levenberg and
 //! Marquardt damp all variables. If many step far, a loop moves as a whole: the step is halved, repeatedly.
@@ -25,9 +25,9 @@ const ROUNDING: f64 = 1e-12;
 impl Session {
     /// Shortens steps that have raised the cost of the surrounding factors.
     ///
-    /// It examines only steps far outside of the region of their linearization, because a single shorter step
-    /// does little harm. Many of them can: Gauss-Newton may circle around a minimum forever. An idle update
-    /// therefore examines all steps, and solves a batch if the cost has risen.
+    /// It examines only steps far outside of the region of their linearization, because a single short step
+    /// does little harm. Many short steps can: Gauss-Newton may circle around a minimum forever. An idle
+    /// update therefore examines all steps, and solves a batch if the cost has risen.
     pub(super) fn control_step(&mut self, report: &mut Report) {
         if self.schedule.is_idle() {
             let (_, before, after) = self.steps.last_step(&mut self.model);

@@ -11,7 +11,7 @@ use crate::report::Report;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// The state before an update, to undo it.
+/// The inverse changes of an update, to undo it.
 #[derive(Default)]
 pub(super) struct Undo {
     pub(super) variables: Vec<NewNumber>,
@@ -19,8 +19,8 @@ pub(super) struct Undo {
     pub(super) moves: Moves,
 }
 
-/// Largest number of touched variables that are eliminated last. Of more variables, only the newest ones are:
-/// a new object with all its poses would fill the root. Measured on fr2/desk, see `docs/decisions/online.md`.
+/// Largest number of touched variables that are eliminated last. If there are more, only the `NEWEST` are: a
+/// new object with all its poses would fill the root (measured on fr2/desk, see `docs/decisions/online.md`).
 const MANY: usize = 32;
 const NEWEST: usize = 8;
 

@@ -22,14 +22,16 @@ impl Subject {
     /// Creates a subject from the example in the docs of a registered factor, at the examples of its
     /// manifolds.
     ///
-    /// # Errors If the catalogue entry is incomplete.
+    /// # Errors
+    /// If the catalogue entry is incomplete.
     pub fn example(entry: &'static Entry) -> Result<Self, LawError> {
         Self::around_examples(entry, example::<dyn Factor>(entry)?.into())
     }
 
     /// Creates a subject from a factor of this entry, at the examples of its manifolds.
     ///
-    /// # Errors If the catalogue entry is incomplete.
+    /// # Errors
+    /// If the catalogue entry is incomplete.
     pub fn around_examples(entry: &'static Entry, factor: Arc<dyn Factor>) -> Result<Self, LawError> {
         let signature = factor.erased().signature();
         let named = example_keys(entry);

@@ -102,7 +102,7 @@ impl Fit<'_> {
     }
 
     /// Returns the variables of some rejected factors, ascending. Passes the held directions to the factors
-    /// first, because rejected factors are not kept up to date.
+    /// first, because rejected factors are not connected to their variables.
     fn look_at(&mut self, factors: &[u32]) -> Vec<u32> {
         factors.iter().for_each(|f| self.model.hold_in(*f));
         let all = factors.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables());

@@ -11,7 +11,7 @@ const HALVINGS: usize = 6;
 /// which it grows.
 const LEAST_DAMPING: f64 = 1e-3;
 const STRONGER: f64 = 10.0;
-/// Factor of the damping each time that the variable is relinearized.
+/// Factor by which each relinearization of the variable reduces the damping.
 const WEAKER: f64 = 0.1;
 /// Damping that has almost no effect, as a share of that entry. It stays if a direction has less of H than
 /// this. An axis that has almost vanished has nearly no derivative, and its steps would be long again without
