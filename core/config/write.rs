@@ -44,8 +44,8 @@ pub fn to_toml(value: &impl Serialize) -> Result<String, WriteError> {
 /// Writes a value as indented JSON.
 ///
 /// # Errors
-/// If a number is not finite, or TOML cannot represent the value. All formats can therefore hold equal
-/// documents.
+/// If a number is not finite, or TOML cannot represent the value. The limits of TOML apply to all formats, so
+/// that every format holds the same documents.
 pub fn to_json(value: &impl Serialize) -> Result<String, WriteError> {
     Format::Json.write(value)
 }
@@ -53,8 +53,8 @@ pub fn to_json(value: &impl Serialize) -> Result<String, WriteError> {
 /// Writes a value as YAML.
 ///
 /// # Errors
-/// If a number is not finite, or TOML cannot represent the value. All formats can therefore hold equal
-/// documents.
+/// If a number is not finite, or TOML cannot represent the value. The limits of TOML apply to all formats, so
+/// that every format holds the same documents.
 pub fn to_yaml(value: &impl Serialize) -> Result<String, WriteError> {
     Format::Yaml.write(value)
 }
@@ -63,8 +63,8 @@ impl Format {
     /// Writes a value in this format.
     ///
     /// # Errors
-    /// If a number is not finite, or TOML cannot represent the value. All formats can therefore hold equal
-    /// documents.
+    /// If a number is not finite, or TOML cannot represent the value. The limits of TOML apply to all formats,
+    /// so that every format holds the same documents.
     pub fn write(self, value: &impl Serialize) -> Result<String, WriteError> {
         let value = tree(self, value)?;
         let text = match self {

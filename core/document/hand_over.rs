@@ -38,8 +38,8 @@ pub(crate) fn run(node: &Node) -> Result<(), ReadError> {
     Ok(())
 }
 
-/// Implements `Deserialize` for a type that is read from a node. `read` returns a boxed `T`. Any deserializer
-/// except [`Reader`](crate::Reader) is first converted to a node without positions.
+/// Implements `Deserialize` for a type that is read from a node. `read` returns a boxed `T`. With any
+/// deserializer except [`Reader`](crate::Reader), the value is first converted to a node without positions.
 ///
 /// # Errors
 /// The errors of `read`. With a [`Reader`](crate::Reader) they have positions.
@@ -74,7 +74,7 @@ impl<'de, T: 'static> Visitor<'de> for Handed<T> {
         }
     }
 
-    /// Runs the function for any different deserializer.
+    /// Runs the function on a node without positions, for all remaining deserializers.
     fn visit_newtype_struct<D: Deserializer<'de>>(self, deserializer: D) -> Result<T, D::Error> {
         SLOT.set(Slot::Empty);
         let node = Node::without_places(deserializer)?;
@@ -82,7 +82,7 @@ impl<'de, T: 'static> Visitor<'de> for Handed<T> {
     }
 }
 
-/// A value with its position, for errors that need other values to be found.
+/// A value with its position, for errors that only show together with other values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placed<T> {
     /// Position of the value.
@@ -107,7 +107,7 @@ impl<'de, T: DeserializeOwned + 'static> Deserialize<'de> for Placed<T> {
     }
 }
 
-/// Reads a node with its positions from a document, or without positions from any different format.
+/// Reads a node from a document with its positions, or from a different format without positions.
 impl<'de> Deserialize<'de> for Node {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserialize_with(deserializer, |node| Ok(Box::new(node.clone())))

@@ -186,7 +186,7 @@ impl<'de> Deserialize<'de> for Part {
 }
 
 impl Node {
-    /// Converts a value of any different format to a node without positions.
+    /// Converts a value of a different format to a node without positions.
     pub(crate) fn without_places<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Anything;
         impl<'de> Visitor<'de> for Anything {

@@ -95,7 +95,7 @@ struct Rest {
 }
 
 impl Rest {
-    /// Returns whether an error only reports a field that was removed or has a misspelled name.
+    /// Returns whether an error is only a consequence of a removed field or a misspelled name.
     fn explains(&self, place: &Place, fault: &Fault) -> bool {
         let is_cut =
             |by: &str| self.cut.iter().any(|(at, field)| at == place && (by.is_empty() || by == field));
@@ -215,7 +215,8 @@ mod tests {
     #[test]
     fn all_errors_are_told_up_to_a_bound() {
         assert_eq!(errors_of(MOST - 1), MOST - 1);
-        // each error costs a reading of everything; without a limit, a large file of errors would take hours
+        // each error costs a reading of everything; without a limit, a large file of errors would take hours.
+        // The last error reports that there are more
         assert_eq!(errors_of(3 * MOST), MOST + 1);
     }
 }

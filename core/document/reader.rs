@@ -23,7 +23,7 @@ impl<'a> Reader<'a> {
         Self { node, tag: None }
     }
 
-    /// Creates a reader that skips a field, because that has already selected the type.
+    /// Creates a reader that skips the field `tag`, which has already selected the type.
     pub fn without(node: &'a Node, tag: &'static str) -> Self {
         Self { node, tag: Some(tag) }
     }

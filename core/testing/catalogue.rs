@@ -40,7 +40,7 @@ pub fn factor_law(entry: &'static Entry, points: usize) -> Result<FactorReport, 
 }
 
 /// Asserts [`documentation_law`] and [`factor_law`] of a registered factor, at 256 points. The tests of
-/// [`factor_laws!`](crate::factor_laws) call it.
+/// [`factor_laws!`](crate::factor_laws) call this function.
 ///
 /// # Panics
 /// If a law does not hold, with its error. It is an assertion for tests.
@@ -79,7 +79,7 @@ pub fn manifold_law(entry: &'static Entry, points: usize) -> Result<ManifoldRepo
 }
 
 /// Asserts [`documentation_law`] and [`manifold_law`] of a registered manifold, at 256 pairs of points,
-/// including its `seed`. The tests of [`manifold_laws!`](crate::manifold_laws!) call it.
+/// including its `seed`. The tests of [`manifold_laws!`](crate::manifold_laws!) call this function.
 ///
 /// # Panics
 /// If a law does not hold, with its error. It is an assertion for tests.
@@ -98,13 +98,13 @@ pub fn assert_manifold_laws(name: &str) {
     );
 }
 
-/// Checks the example of a loss at many s. Its weight has to be the derivative of ρ. [Tempered] once and
-/// twice, it has to be ρ(τs)/τ for many τ.
+/// Checks the example of a loss at many s. Its weight has to be the derivative of ρ. The loss, [tempered]
+/// once and twice, has to be ρ(τs)/τ for many τ.
 ///
 /// # Errors
 /// If a law does not hold, or the catalogue entry is incomplete.
 ///
-/// [Tempered]: manifactor_graph::loss::RobustLoss::tempered
+/// [tempered]: manifactor_graph::loss::RobustLoss::tempered
 pub fn loss_law(entry: &'static Entry) -> Result<(), LawError> {
     let loss = example::<dyn Loss>(entry)?;
     let rho = |s: f64| loss.erased().rho(s);

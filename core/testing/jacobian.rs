@@ -83,7 +83,7 @@ impl JacobianLaw {
     ///
     /// # Errors
     /// The entry with the largest difference. [`LawError::NotDefined`] if the factor is not defined, so that
-    /// nothing was checked. there was nothing to check.
+    /// nothing was checked.
     pub fn check(&self, factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<(), LawError> {
         self.examine(factor, variables).map(|_| ())
     }

@@ -4,9 +4,9 @@
 //! [`jacobian_laws!`] and [`manifold_laws!`]; the command line applies them to all linked types (see
 //! [`catalogue`]).
 //!
-//! A test of a plugin is one line. It has the name of a factor or a manifold, and uses the example of the
-//! catalogue and the registered points. Or it has a custom strategy that yields a factor and its variables,
-//! or two points and a tangent vector:
+//! A test of a plugin is one line. It names a factor or a manifold, and uses the example of the catalogue and
+//! the registered points. Alternatively, it has a custom strategy that yields a factor and its variables, or
+//! two points and a tangent vector:
 //! ```text
 //! factor_laws! { rests_on }
 //! manifold_laws! { heading }

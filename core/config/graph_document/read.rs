@@ -65,7 +65,7 @@ pub(crate) struct VariableDocument {
     key: Key,
     /// Initial value.
     value: Box<dyn Variable>,
-    /// Directions that are held at the initial value.
+    /// Directions that are held at the initial value, or `true` for all of them.
     #[serde(default)]
     fixed: Fixed,
 }
@@ -80,7 +80,7 @@ pub(crate) struct FactorDocument {
     /// Name in reports. Default: the name of its type.
     #[serde(default)]
     name: Option<Arc<str>>,
-    /// The factor itself.
+    /// Type and parameters of the factor.
     factor: Box<dyn Factor>,
     /// Noise model of its residual.
     #[serde(default)]

@@ -100,8 +100,8 @@ fn settings_outside_their_domain_are_refused() {
     }
 }
 
-/// Creates two variables whose values are close to the largest f64, and are only finite as long as both are
-/// present.
+/// Creates two variables whose entries of H and g are close to the largest f64. Their sums are only finite as
+/// long as both are present.
 fn close_to_overflow() -> (Session, Vec<FactorId>) {
     let (mut session, ids) = pushed_close_to_overflow(never_linearized_anew());
     session.update().unwrap();

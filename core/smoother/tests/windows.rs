@@ -173,7 +173,7 @@ fn a_factor_that_takes_no_part_is_dropped_and_named() {
         values.insert(key, Plane { x, y: 0.0 });
         graph.add([key], At { at: [x, 0.0] });
     }
-    // `b` is not ahead of `a`, and `c` would need the logarithm of a negative number
+    // `b` is not ahead of `a`, and `d` would need the logarithm of a negative number
     graph.add(["a", "b"], Ahead { by: [1.0, 0.0] });
     graph.add(["a", "c"], Distance { by: 2.0 });
     values.insert("d", Plane { x: -1.0, y: 0.0 });
