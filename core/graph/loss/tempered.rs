@@ -8,9 +8,9 @@ use std::sync::Arc;
 /// A loss at a different temperature: ρ(τs)/τ.
 ///
 /// If τ residuals of a kind carry the information of one, their σ is multiplied by √τ. This loss still
-/// counts in the σ of a single residual, because an outlier stands out among single residuals, not among
-/// means of τ of them. Small residuals cost as much as without the loss. The built-in losses need no
-/// wrapper, which is cheaper: use `scale` / √τ, or `scale` / τ for `dcs`.
+/// counts in the σ of a single residual: an outlier is one among single residuals, not among means of τ of
+/// them. Small residuals cost as much as without the loss. The built-in losses need no wrapper, which is
+/// cheaper: use `scale` / √τ, or `scale` / τ for `dcs`.
 ///
 /// ```toml
 /// loss = { type = "tempered", tau = 4.0, loss = { type = "huber", scale = 1.345 } }

@@ -1,4 +1,4 @@
-//! Storage of the normal equations H = JᵀJ and g = Jᵀr, to which factors add.
+//! Storage of the normal equations H = JᵀJ and g = Jᵀr.
 use crate::algebra::{Block, Dimension, Matrix};
 use crate::variable::column::FIXED;
 use nalgebra::U1;

@@ -4,7 +4,7 @@ use crate::outcome::{InactiveFactor, Undetermined, Untouched};
 use crate::problem::Problem;
 use serde::Serialize;
 
-/// Largest number of variables for which the linear system is analysed, since that takes several
+/// Above this number of variables, the linear system is not analysed, since that takes several
 /// factorizations.
 const LARGE: usize = 50_000;
 /// Condition number above which a solution keeps few of its sixteen digits.

@@ -11,7 +11,7 @@ use std::borrow::Cow;
 
 /// Number of factors in the table of the worst.
 const WORST: usize = 10;
-/// Largest number of variables for which the linear system is analysed, since that takes several
+/// Above this number of variables, the linear system is not analysed, since that takes several
 /// factorizations.
 const LARGE: usize = 50_000;
 

@@ -1,4 +1,4 @@
-//! Search for undetermined variables, and the directions in which they are undetermined.
+//! Search for undetermined variables and directions.
 use crate::linear::Method;
 use crate::linear::system::NoFactor;
 use crate::outcome::Undetermined;

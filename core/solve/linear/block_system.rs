@@ -108,8 +108,8 @@ impl BlockSystem {
         done.map_err(|_| BlockSystemError::NotPositiveDefinite)
     }
 
-    /// Returns the smallest pivot of the last factorization, as a share of its diagonal entry in A: about
-    /// 1e-16 if a singular matrix is positive definite only because of rounding.
+    /// Returns the smallest pivot of the last factorization, as a share of its diagonal entry in A. It is
+    /// about 1e-16 if a singular matrix is positive definite only because of rounding.
     pub fn smallest_pivot(&self) -> f64 {
         let mut smallest = f64::INFINITY;
         self.cholesky.pivots(&mut |i, pivot| {

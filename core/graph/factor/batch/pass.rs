@@ -12,8 +12,8 @@ use pulp::{Simd, WithSimd};
 pub(super) const CHUNK: usize = 16;
 /// Factors that threads evaluate in parallel, while one thread adds those of the previous window.
 const WINDOW: usize = 64 * CHUNK;
-/// Duration in seconds from which on a pass runs on several threads, as waking them has a cost. Zero in
-/// debug builds, so that tests cover the threads.
+/// Duration in seconds above which a pass runs on several threads. Waking them has a cost. Zero in debug
+/// builds, so that tests cover the threads.
 const PARALLEL: f64 = if cfg!(debug_assertions) { 0.0 } else { 2e-3 };
 /// Duration of a cost evaluation, as an approximate share of a linearization.
 pub(super) const COST: f64 = 0.2;

@@ -1,6 +1,6 @@
 //! Selected inversion: the entries of the inverse in the pattern of the factor.
 //!
-//! The method of Takahashi, Fagan and Chin (1973), by supernodes: from the root down, each front reads the
+//! The method of Takahashi, Fagan and Chin (1973), by supernodes. From the root down, each front reads the
 //! entries of the inverse that it needs from its parent.
 use crate::linear::cholesky::Cholesky;
 use crate::linear::cholesky::structure::Structure;

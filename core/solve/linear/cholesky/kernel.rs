@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// Number of columns that are eliminated together, and columns of a product that are accumulated in
 /// registers.
 const COLUMNS: usize = 4;
-/// Multiplications from which on a front counts as large.
+/// Multiplications above which a front counts as large.
 const LARGE: usize = 1 << 24;
 /// Threads share an update from this number of multiplications on, and from this number per entry of the
 /// update. Below these, collecting the entries takes longer than the threads save. Debug builds use small
@@ -16,8 +16,8 @@ const SHARED: (usize, usize) = if cfg!(debug_assertions) { (1 << 14, 4) } else {
 /// Columns of an update per thread task.
 const SHARE: usize = 8 * COLUMNS;
 
-/// Factorizes the first `width` columns of a front. Writes L to `panel`, and −L₂₁L₂₁ᵀ to the lower triangle
-/// of `update`, to which it adds unless `REPLACE` is set. Both are column-major. Entries above their
+/// Factorizes the first `width` columns of a front. Writes L to `panel`. Writes −L₂₁L₂₁ᵀ to the lower
+/// triangle of `update`, or adds it if `REPLACE` is not set. Both are column-major. Entries above their
 /// diagonals are garbage afterwards.
 ///
 /// # Errors
@@ -78,7 +78,7 @@ impl<const REPLACE: bool> WithSimd for Update<'_, REPLACE> {
     }
 }
 
-/// Adds the columns of a child's update that belong to the panel of its parent: row i of the update is row
+/// Adds the columns of a child's update that belong to the panel of its parent. Row i of the update is row
 /// `places[i]` of the parent's front.
 #[inline(always)]
 pub(crate) fn assemble_panel(from: &[f64], places: &[u32], panel: &mut [f64], width: usize) {

@@ -11,8 +11,8 @@
 //! ```
 //!
 //! Adjacent columns of the factor with equal rows below them form a supernode. Its dense panel of columns,
-//! together with the dense update for its parent, is a front (multifrontal method: Duff and Reid, 1983;
-//! Liu, 1992).
+//! together with the dense update for its parent, is a front. The method is multifrontal (Duff and Reid,
+//! 1983; Liu, 1992).
 use crate::linear::elimination::{Pattern, ROOT, Tree};
 use std::ops::Range;
 
@@ -58,8 +58,8 @@ pub(crate) struct Node {
     pub parent: u32,
     /// Whether it receives the updates of its children one by one instead of all at its own elimination.
     pub early: bool,
-    /// Distance from its root. Updates of even and of odd levels are on two stacks, so that the update of a
-    /// parent can be written while the updates of its children still exist.
+    /// Distance from its root. Updates of even and of odd levels are on two stacks, so that a parent's
+    /// update can be written while its children's updates still exist.
     pub level: u32,
     /// Position of its update on its stack.
     pub update: usize,

@@ -2,8 +2,8 @@
 //!
 //! The method is multilevel (Karypis and Kumar, *A fast and high quality multilevel scheme for partitioning
 //! irregular graphs*, 1998). It coarsens the graph, splits the coarse graph by growing one part, and
-//! refines the separator on the way back (Fiduccia and Mattheyses, 1982; for vertices: Ashcraft and Liu,
-//! 1997).
+//! refines the separator on the way back. Refinement follows Fiduccia and Mattheyses, 1982, and for
+//! vertices Ashcraft and Liu, 1997.
 use super::adjacency::Adjacency;
 use std::collections::BinaryHeap;
 
@@ -227,8 +227,8 @@ impl<'a> State<'a> {
         best < before
     }
 
-    /// Returns the best move that leaves no side too heavy. Gains in the heaps may be outdated: a gain that
-    /// is too large is pushed back corrected; a gain that is too small has a newer entry already.
+    /// Returns the best move that leaves no side too heavy. Gains in the heaps may be outdated. If a gain
+    /// is too large, the corrected one is pushed. If it is too small, a newer entry exists already.
     fn next(&self, heaps: &mut [BinaryHeap<Move>; 2], locked: &[bool]) -> Option<Move> {
         let mut top: [Option<Move>; 2] = [None; 2];
         for side in [0, 1] {
