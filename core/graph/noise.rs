@@ -12,9 +12,9 @@ pub(crate) use whiteners::Whiteners;
 
 /// Noise of a measurement. Default: unit.
 ///
-/// In documents one of `{ sigma = 0.1 }`, `{ sigmas = [0.1, 0.2] }`, `{ covariance = [[…], […]] }`, `{
-/// information = [[…], […]] }` or `{}`. Add `observed = [true, false, …]` if some rows of the residual were
-/// not measured.
+/// In documents one of `{ sigma = 0.1 }`, `{ sigmas = [0.1, 0.2] }`, `{ covariance = [[…], […]] }`,
+/// `{ information = [[…], […]] }` or `{}`. Add `observed = [true, false, …]` if some rows of the residual
+/// were not measured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Spec", into = "Spec")]
 #[schemars(with = "Spec")]

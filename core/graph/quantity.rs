@@ -154,8 +154,8 @@ pub fn functions() -> Vec<&'static Function> {
 }
 
 /// Lets formulas use variables of a type, as quantities of this type or of a given one with equal points:
-/// `register_quantity!(Se3);`, `register_quantity!(Point3 as Vector3<f64>);`, `register_quantity!(Point1 as
-/// f64, |p| p.x);`
+/// `register_quantity!(Se3);`, `register_quantity!(Point3 as Vector3<f64>);`,
+/// `register_quantity!(Point1 as f64, |p| p.x);`
 #[macro_export]
 macro_rules! register_quantity {
     ($type:ty) => {

@@ -172,7 +172,7 @@ pub(crate) struct BatchOf<F: Kernel> {
     slots: Vec<Slot>,
     whiteners: Whiteners<F::Dim>,
     losses: Option<Box<dyn LossColumn>>,
-    /// Weight of each factor, a multiple of its cost; empty if no weights were set.
+    /// Weight of each factor, which multiplies its cost; empty if no weights were set.
     weights: Vec<f64>,
     active: Vec<bool>,
     /// One entry per chunk of the current window and of the next one, for threads. Empty until first used.

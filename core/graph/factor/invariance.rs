@@ -81,8 +81,7 @@ pub fn apply<R: Residual, P: Moved>(
 /// Registers a motion that does not change a factor's residual. The closure gets the factor, references to
 /// its variables and a source of random numbers, and returns the moved variables as a tuple:
 ///
-/// `register_invariance!(Upright, "turning about up", |factor, (quadric,), random| (turned(quadric,
-/// random(PI)),));`
+/// `register_invariance!(Upright, "turning about up", |factor, (quadric,), random| (turned(quadric, random(PI)),));`
 #[macro_export]
 macro_rules! register_invariance {
     ($factor:ty, $motion:literal, $by:expr) => {

@@ -96,8 +96,7 @@ impl<D: Dimension> Whiteners<D> {
             Self::Full(w) => {
                 let w = w[i].as_slice();
                 for column in x.chunks_exact_mut(D::N) {
-                    // whole columns of W although half of W is zero, so that adjacent entries share a
-                    // register
+                    // whole columns of W, though half of W is zero: adjacent entries share a register
                     let mut sum = <Matrix<D, U1> as Block>::zeros();
                     let sum = sum.as_mut_slice();
                     for (k, x) in column.iter().enumerate() {

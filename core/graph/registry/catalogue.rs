@@ -149,9 +149,9 @@ pub fn find(kind: &str, name: &str) -> Option<&'static Entry> {
     index.get(&(kind, name)).copied()
 }
 
-/// Makes a trait a [`Kind`](crate::registry::catalogue::Kind) with this name: `kind!(dyn Optimizer,
-/// "solver");`. Documents select the type of a box by `type`; `#[typetag::serialize(tag = "type")]` on the
-/// trait writes it.
+/// Makes a trait a [`Kind`](crate::registry::catalogue::Kind) with this name:
+/// `kind!(dyn Optimizer, "solver");`. Documents select the type of a box by `type`;
+/// `#[typetag::serialize(tag = "type")]` on the trait writes it.
 #[macro_export]
 macro_rules! kind {
     ($kind:ty, $name:literal) => {

@@ -1,4 +1,4 @@
-//! Leverage of measurements: the share of a residual that the estimate absorbs.
+//! Leverage of measurements: the share of a measurement that the estimate absorbs.
 use crate::inspect::CovarianceError;
 use crate::linear::system::NoFactor;
 use crate::problem::Problem;

@@ -57,8 +57,7 @@ impl Tree {
         let mut ancestor = vec![ROOT; n];
         for i in 0..n {
             for &j in &columns[ptr[i]..ptr[i + 1]] {
-                // up to the current root, whose parent becomes i; the path is compressed, so the next
-                // search jumps to i
+                // up to the current root, whose parent becomes i; path compression lets the next search jump to i
                 let mut j = j as usize;
                 loop {
                     let next = std::mem::replace(&mut ancestor[j], i as u32);

@@ -89,8 +89,7 @@ impl Optimizer for Auto {
             Termination::Converged { .. } | Termination::Indeterminate(_) => {
                 !search::is_doubted(graph, &problem)
             }
-            // over if the initial values are not finite; if only a step led to non-finite values, the
-            // search goes on
+            // over if the initial values are not finite; after a non-finite step the search goes on
             Termination::NonFinite { .. } => !outcome.final_cost.is_finite(),
             Termination::Interrupted | Termination::MaxIterations | Termination::Stalled { .. } => false,
         };

@@ -304,8 +304,7 @@ fn the_diagnosis_names_the_worst_factors_and_the_condition() {
     let first = &diagnosis.worst[0];
     assert_eq!((&*first.name, first.keys[0].as_str(), first.weight), ("toy_at", "p", 1.0));
     assert!((first.cost - 0.5 * 6.5 * 6.5).abs() < 1e-6 && (first.residual[0].abs() - 6.5).abs() < 1e-6);
-    // two blocks that are almost uncoupled: [1, c; c, 1] with c = 0.01/√(14.01·1.01) has the eigenvalues 1
-    // ± c
+    // two blocks that are almost uncoupled: [1, c; c, 1] with c = 0.01/√(14.01·1.01) has eigenvalues 1 ± c
     let c = 0.01 / (14.01_f64 * 1.01).sqrt();
     let condition = diagnosis.condition.unwrap();
     assert!(condition >= 1.0 - 1e-9 && condition <= (1.0 + c) / (1.0 - c) + 1e-9, "{condition}");

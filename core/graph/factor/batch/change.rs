@@ -28,8 +28,8 @@ fn swap<T: Copy>(list: &mut Vec<T>, gone: Range<usize>, moved: Range<usize>) {
 }
 
 impl<F: Kernel> BatchOf<F> {
-    /// Moves the last factor to position `index`. Returns its index in the graph, or `None` if factor
-    /// `index` was the last.
+    /// Removes factor `index` and moves the last factor to its position. Returns the graph index of the
+    /// moved factor, or `None` if the removed factor was the last.
     pub(super) fn swap_remove(&mut self, index: usize) -> Option<usize> {
         if index >= self.factors.len() {
             return None;
