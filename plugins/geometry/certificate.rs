@@ -8,7 +8,8 @@
 //! translation coordinates. The chordal cost is first minimized from the estimate, and the certificate is
 //! evaluated at that local minimum. If all noise is isotropic, the graph's cost is never below the chordal
 //! cost: θ² is not below 4 sin²(θ/2), and the translation of the logarithm is not shorter than the
-//! translation. The lower bound then holds for the graph's cost too. With any other noise it does not.
+//! translation. The lower bound then holds for the graph's cost too. With any other noise, the graph's cost
+//! has no bound.
 use crate::initialise::network::{Edge, Network};
 use crate::initialise::parts::Parts;
 use crate::initialise::pose::Pose;
@@ -26,14 +27,15 @@ use std::fmt;
 mod dual;
 mod lanczos;
 
-/// Result of [`certify`]: a lower bound on a pose graph's chordal cost, and whether the estimate attains it.
+/// Result of [`certify`]: a lower bound on a pose graph's chordal cost, and whether the minimum close to the
+/// estimate attains it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Certificate {
-    /// Whether the minimum next to the estimate is global: S is positive semidefinite, to within 1e-9 of its
+    /// Whether the minimum close to the estimate is global: S is positive semidefinite, to within 1e-9 of its
     /// diagonal.
     pub certified: bool,
-    /// The chordal cost at its local minimum next to the estimate.
+    /// The chordal cost at its local minimum close to the estimate.
     pub chordal_cost: f64,
     /// Lower bound on the chordal cost over all values, up to rounding.
     pub lower_bound: f64,
@@ -105,7 +107,7 @@ pub enum CertificateError {
     System(#[from] BlockSystemError),
 }
 
-/// Certifies the minimum of a pose graph that is next to an estimate.
+/// Certifies the minimum of a pose graph close to an estimate.
 ///
 /// # Errors
 /// If the graph has factors other than between factors and priors of one pose type, or a robust loss.

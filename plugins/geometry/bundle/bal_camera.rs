@@ -9,8 +9,8 @@ use nalgebra::SVector;
 /// A camera of unknown pose, focal length and radial distortion, as in bundle adjustment in the large (BAL).
 ///
 /// The camera looks along the negative z axis of its frame; x is right and y up in the image, with the origin
-/// at the image centre. A point P in the camera's frame projects to f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p with p =
-/// -(Px, Py) / Pz, in pixels (Agarwal et al., Bundle Adjustment in the Large, ECCV 2010). The pose maps
+/// at the image centre. A point P in the camera's frame projects to f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p with
+/// p = -(Px, Py) / Pz, in pixels (Agarwal et al., Bundle Adjustment in the Large, ECCV 2010). The pose maps
 /// points from the camera's frame to the world frame, as all poses in this library do; BAL files store its
 /// inverse.
 ///

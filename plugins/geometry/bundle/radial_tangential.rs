@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// A point at (x/z, y/z), with radius r, projects through the pinhole at (x/z, y/z) · (1 + k₁ r² + k₂ r⁴ + k₃
 /// r⁶) plus the tangential part (2 p₁ xy/z² + p₂ (r² + 2 x²/z²), p₁ (r² + 2 y²/z²) + 2 p₂ xy/z²); Brown,
-/// *Close-range camera calibration*,
-/// 1971. The model folds back beyond some radius; points beyond that radius are not seen.
+/// *Close-range camera calibration*, 1971. The model folds back beyond some radius; points beyond that radius
+/// are not seen.
 ///
 /// ```toml
 /// [source]

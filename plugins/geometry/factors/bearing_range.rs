@@ -2,7 +2,6 @@
 //!
 //! The bearing residual jumps if the point is opposite to the measured direction. A point within a nanometre
 //! of the pose has no bearing, so the factor is not defined there.
-//! distance zero: within a nanometre the factor is not defined.
 use crate::factors::range::NEAREST;
 use crate::groups::{Angle, atan2};
 use crate::{Point2, Se2, So2, wrap};

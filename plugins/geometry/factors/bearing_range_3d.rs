@@ -11,8 +11,8 @@ use manifactor_graph::prelude::*;
 ///
 /// Three rows: the arc from the measured direction to the direction of the point, in radians along two axes
 /// perpendicular to the measured direction, and the range residual in metres. If both rows of the arc have an
-/// equal σ, the choice of the axes does not matter. The first axis is the closest to the coordinate axis of
-/// the pose that is farthest from the measured direction. Not defined within a nanometre of the pose, and
+/// equal σ, the choice of the axes does not matter. The first axis is as close as possible to the
+/// coordinate axis of the pose that is farthest from the measured direction. Not defined within a nanometre of the pose, and
 /// within 1e-6 radians of the opposite direction, as the arc has no direction there.
 ///
 /// ```toml

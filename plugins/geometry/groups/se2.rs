@@ -66,7 +66,7 @@ impl<T: Scalar> Se2<T> {
         let theta = self.rotation.angle();
         let (half, theta2) = (theta * 0.5, theta * theta);
         let (c, s) = self.rotation.cos_sin();
-        // Numerically safe: sin θ is zero at half a turn, 1 - cos θ at zero.
+        // Avoids a zero denominator: sin θ is zero at half a turn, 1 - cos θ at θ = 0.
         let cot = || if c > T::zero() { (c + 1.0) / s } else { s / (T::one() - c) };
         let half_cot = T::one() - theta2 * small_angle::k(theta2, || half * cot());
         let v = self.translation * half_cot - quarter(&self.translation) * half;

@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 /// their first measurement; other variables keep their values.
 ///
 /// The result is close to the optimum if rotations are measured well, independent of the given values. This
-/// start also doubts a minimum in which the rotations along some loop add up to extra turns.
+/// start also marks a minimum as doubtful if the rotations along some loop add up to extra turns.
 ///
 /// ```toml
 /// start = { type = "chordal" }

@@ -28,8 +28,8 @@ pub enum Tree {
 
 /// Returns the given values plus one for every variable that has a prior or is connected by between factors.
 ///
-/// Points still without a value are placed from the first landmark or bearing-range factor whose pose has
-/// one. Unreachable variables stay without a value, and [`Graph::check`] reports them.
+/// Points still without a value are placed from the first landmark or bearing-range factor whose pose has a
+/// value. Unreachable variables stay without a value, and [`Graph::check`] reports them.
 ///
 /// # Errors
 /// If a factor expects a variable of another type than its value has.
