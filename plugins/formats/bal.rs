@@ -11,7 +11,7 @@
 //! [`BalCamera`] stores the inverse. Cameras get the keys `c<number>`, points `p<number>`. Observations
 //! become `projection_bal` factors with a standard deviation of one pixel.
 //!
-//! Such a file determines neither the position, orientation nor scale of the whole: seven directions are
+//! Such a file does not determine the position, orientation and scale of the whole: seven directions are
 //! free. By default, the reader [holds](read) the pose of one camera and, for the scale, one direction of the
 //! camera that is farthest from it. This does not change the cost. Gauss-Newton requires it. Damped solvers
 //! do not, but report an undetermined direction at the end.

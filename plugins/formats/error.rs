@@ -155,7 +155,7 @@ pub enum Mistake {
         /// Line of the definition or of the first use.
         first: usize,
     },
-    /// A timestamp does not increase, or decreases.
+    /// A timestamp is equal to the previous one, or before it.
     #[error("time stamps have to increase: {found} follows {previous}")]
     NotIncreasing {
         /// Previous timestamp.

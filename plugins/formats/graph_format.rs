@@ -44,7 +44,8 @@ pub struct GraphFormat {
 }
 inventory::collect!(GraphFormat);
 
-/// Returns the text of a graph with its values, and notes about the parts that the format cannot express.
+/// Writer of a format: returns the text of a graph with its values, and notes about the parts that the format
+/// cannot express.
 pub type GraphWriter = fn(&Graph, &Values) -> (String, Vec<String>);
 
 /// Options for cases that a file leaves open.

@@ -25,7 +25,7 @@ pub struct Replay {
 /// The content of one step: factors, and the initial values of their new variables.
 #[derive(Debug, Clone, Default)]
 pub struct Step {
-    /// New factors, and new variables that the whole graph holds.
+    /// New factors. New variables that the whole graph holds are held here too.
     pub factors: Graph,
     /// Initial values of the new variables. A held variable has its value in the file. Any other variable is
     /// placed by odometry from the estimate of known variables, or has its value in the file if that is not

@@ -25,7 +25,7 @@ use std::sync::Arc;
 ///
 /// The cost is continuous; the rows jump when a different component becomes the best. A component that is not
 /// defined is skipped; if none is defined, the mixture is not defined. Each component has a noise model, so
-/// omit `noise` of the factor itself. Each evaluation allocates some memory per component. Use mixtures for
+/// omit `noise` next to the mixture. Each evaluation allocates some memory per component. Use mixtures for
 /// priors on objects and for ambiguous boxes, not for every measurement.
 ///
 /// ```toml
@@ -41,7 +41,7 @@ use std::sync::Arc;
 /// ]
 /// ```
 ///
-/// A box from x0 that shows q0, or half as likely q1:
+/// A box from x0 that shows either q0 or, half as likely, q1:
 ///
 /// ```toml
 /// [[factors]]
@@ -201,7 +201,7 @@ struct Mixture {
 
 #[derive(Debug)]
 struct Part {
-    /// Cost of selecting this component: √(2 ln(w_max / w)).
+    /// First row of the residual if this component is selected: √(2 ln(w_max / w)).
     price: f64,
     factor: Option<Weighted>,
 }

@@ -20,7 +20,7 @@ fn data(path: &str) -> Option<PathBuf> {
     file
 }
 
-/// Runs the given number of steps, and returns the smoother and its last report.
+/// Runs at most this number of steps, and returns the smoother and its last report.
 fn replay(graph: &Graph, most: usize) -> (Session, Report) {
     let mut session = Session::new(Settings::default());
     let (mut steps, mut report) = (Replay::of(graph, &Values::new()), Report::default());

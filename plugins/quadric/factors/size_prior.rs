@@ -15,7 +15,7 @@ use manifactor_graph::prelude::*;
 /// axis. The rotation about that axis is then undetermined or poorly determined: close to the round shape it
 /// behaves like the angle of polar coordinates close to the origin. If only boxes from two places determine
 /// the rotation, solvers may take hundreds of steps during which the cost hardly falls. `prior_quadric`, or
-/// boxes from more sides, determine it.
+/// boxes from more sides, determine this rotation.
 /// ```toml
 /// [[factors]]
 /// keys   = ["q0"]

@@ -119,7 +119,7 @@ mod tests {
             PlanePrior { value }.residual::<f64>((plane.lift(),)).norm()
         };
         assert_eq!(prior(Vector3::z(), 0.7), 0.0);
-        // A plane with equal points, but the opposite side.
+        // The plane through the same points, seen from below.
         assert!((prior(-Vector3::z(), -0.7) - 2.0_f64.hypot(1.4)).abs() < 1e-12);
         assert!((prior(-Vector3::z(), 0.7) - 2.0).abs() < 1e-12);
         assert!((prior(Vector3::x(), 0.7) - 2.0_f64.sqrt()).abs() < 1e-12);
