@@ -61,7 +61,7 @@ register_functions! {
     /// The larger of two numbers, the first if they are equal.
     fn max(a: f64, b: f64) -> f64 { if b > a { b } else { a } }
 
-    /// A branch: `a` if the condition is positive, otherwise `b`. Its derivative is taken from the selected
+    /// A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected
     /// branch.
     "where" fn branch(positive: f64, a: f64, b: f64) -> f64 { if positive > T::zero() { a } else { b } }
 
@@ -149,7 +149,7 @@ macro_rules! vectors {
             if squared > T::zero() { squared.sqrt() } else { squared }
         }
 
-        /// A branch: `a` if the condition is positive, otherwise `b`. Its derivative is taken from the selected
+        /// A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected
         /// branch.
         "where" fn branch(positive: f64, a: $vector, b: $vector) -> $vector { if positive > T::zero() { a } else { b } }
 
