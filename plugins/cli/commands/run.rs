@@ -38,7 +38,7 @@ pub(crate) struct RunOptions {
     /// The folder for the results. Default: the one in the document.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write into a folder that holds other files, and overwrite files of equal name.
+    /// Write into a folder that holds other files, and overwrite files with the same names.
     #[arg(long)]
     force: bool,
     /// Print JSON: the report that is also written.

@@ -25,7 +25,7 @@ pub(crate) struct Simulate {
     /// Print the frames as lines of JSON instead, for the source `json_lines`.
     #[arg(long, conflicts_with_all = ["out", "force"])]
     lines: bool,
-    /// Write into a folder that holds other files, and overwrite files of equal name.
+    /// Write into a folder that holds other files, and overwrite files with the same names.
     #[arg(long)]
     force: bool,
 }

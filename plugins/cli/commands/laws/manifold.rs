@@ -19,7 +19,7 @@ pub(crate) struct CheckManifold {
     /// Number of random pairs of points.
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     points: u32,
-    /// Seed of the random numbers; equal seeds give equal points.
+    /// Seed of the random numbers; the same seed gives the same points.
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Print JSON: all results.
