@@ -1,4 +1,5 @@
-//! A headless Chromium, driven by its DevTools protocol over two pipes: NUL-terminated JSON on file descriptors 3 and 4.
+//! A headless Chromium, controlled by its DevTools protocol over two pipes: NUL-terminated JSON on file
+//! descriptors 3 and 4.
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
