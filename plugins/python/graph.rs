@@ -34,9 +34,9 @@ impl Graph {
 
     /// Adds a factor between variables, and returns its index in the graph, from 0.
     ///
-    /// `keys` are the names of its variables, in the order of the residual's arguments. Default of `noise`:
-    /// a standard deviation of 1 in every row. Default of `loss`: none. Default of `name`, which reports
-    /// use: the name of the factor's type.
+    /// `keys` are the names of its variables, in the order of the residual's arguments. `noise` defaults to
+    /// a standard deviation of 1 in every row, `loss` to none, and `name`, which reports use, to the name
+    /// of the factor's type.
     #[pyo3(signature = (keys, factor, *, noise = None, loss = None, name = None))]
     fn add(
         &mut self,

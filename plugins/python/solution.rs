@@ -79,9 +79,9 @@ pub(crate) struct Solution {
 /// Solves a graph from these values. Always returns a solution; `solution.converged` is true if the solve
 /// reached a minimum.
 ///
-/// Default of `solver`: `auto`. Default of `start`: the given values. `observer` is called with a dict
-/// after each attempted step, and ends the solve by returning `False`. Other Python threads run meanwhile,
-/// and Ctrl-C interrupts the solve.
+/// `solver` defaults to `auto`, and `start` to the given values. `observer` is called with a dict after
+/// each attempted step, and ends the solve by returning `False`. Other Python threads run meanwhile, and
+/// Ctrl-C interrupts the solve.
 #[pyfunction]
 #[pyo3(signature = (graph, values, solver = None, *, start = None, observer = None))]
 fn solve(

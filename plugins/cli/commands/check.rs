@@ -17,14 +17,14 @@ use manifactor::slam::run::{Mapped, Run as Running};
 use manifactor::solve::{Problem, Silent};
 use serde_json::json;
 
-/// Half the length of an object above which its unit is probably millimetres. Unit: metres.
+/// Semi-axis above which an object is probably given in millimetres. Unit: metres.
 const LARGE: f64 = 30.0;
 
 /// Check a run, an experiment or a graph without solving it, and report every error with its line.
 ///
-/// For a graph, and with --load for a run, the initial values are checked too: factors that are undefined
-/// or not finite, variables without factors, directions that are hardly constrained or not constrained, and
-/// values that look like another unit.
+/// For a graph, and with --load for a run, the initial values are checked too: undefined or non-finite
+/// factors, variables without factors, unconstrained or hardly constrained directions, and values with a
+/// suspicious unit.
 #[derive(Debug, Args)]
 pub(crate) struct Check {
     #[command(flatten)]

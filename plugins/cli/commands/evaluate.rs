@@ -32,7 +32,7 @@ pub(crate) struct Evaluate {
     /// Alignment of the estimate to the frame of the truth.
     #[arg(long, value_enum, default_value = "se3")]
     align: Align,
-    /// Largest time difference of two matched poses, in seconds.
+    /// Largest time difference between two matched poses, in seconds.
     #[arg(long, value_name = "SECONDS", default_value = "0.02", value_parser = positive, allow_negative_numbers = true)]
     within: Positive,
     /// Number of poses between the two ends of a relative error.
@@ -53,7 +53,7 @@ fn positive(text: &str) -> Result<Positive, String> {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Align {
-    /// Rotation and translation that minimize the distances of the positions.
+    /// Rotation and translation that minimize the distances between the positions.
     Se3,
     /// Rotation, translation and scale.
     Sim3,

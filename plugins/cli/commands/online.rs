@@ -36,8 +36,8 @@ pub(crate) struct Online {
     /// after a kill the same command continues with the same map.
     #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
-    /// Report every N-th frame on stderr, and the frame that is located in a prior map; with --json, as one
-    /// line of JSON each.
+    /// Report every N-th frame on stderr, and the frame of the relocalization in a prior map; with --json,
+    /// as one line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
     /// Serve a live page of the map, and print its address on stderr. Default: a free port, for browsers on

@@ -2,8 +2,9 @@
 use manifactor::config::{Field, Node, Section, SourceText, Table, Value};
 use serde::de::DeserializeOwned;
 
-/// Reads `field` from a document's table. The command line's `argument`, such as `--solver`, has priority
-/// and keeps the document's settings; then comes the type in the document, then `default`.
+/// Reads `field` from a document's table. The type named by the command line's `argument`, such as
+/// `--solver`, has priority and uses the document's settings for that type. Next come the type in the
+/// document, and `default`.
 pub(crate) fn choose<K: ?Sized>(
     section: &mut Section<'_>,
     field: &str,

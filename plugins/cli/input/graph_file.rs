@@ -19,8 +19,7 @@ pub(crate) struct Reading {
     /// Treatment of edges in a pose graph whose information matrix is not positive definite.
     #[arg(long, value_enum, default_value = "error")]
     repair: RepairChoice,
-    /// Do not fix the first pose of a pose graph without a gauge, nor the scale if only images constrain
-    /// it.
+    /// Do not fix a free gauge: neither the first pose, nor the scale if only images constrain it.
     #[arg(long)]
     no_anchor: bool,
     /// Skip lines with unknown tags and report them; by default they are an error.

@@ -102,7 +102,7 @@ impl Look {
 
 /// Progress of the pictures of a run.
 pub(crate) struct Drawn {
-    /// Number of pictures, including missing ones of an interrupted variant.
+    /// Number of pictures. Valid only if none is missing.
     pub(crate) pictures: usize,
     /// Variants whose pictures are incomplete because of an interrupt.
     pub(crate) missing: Vec<String>,

@@ -30,7 +30,7 @@ except ImportError:
     jnp = None
 
 RUNS = 5
-#: Of what is timed by the solver's own clock: short, so that some of them are not disturbed.
+#: Number of runs timed by the solver's own clock. They are short, so some of them are undisturbed.
 SHORT_RUNS = 60
 
 

@@ -15,7 +15,7 @@ pub(crate) struct Columns {
 }
 
 struct Column {
-    /// Index of the field in each table on the way.
+    /// Indices of the fields on the path to the number.
     path: Vec<usize>,
     numbers: Numbers,
 }

@@ -72,9 +72,9 @@ class Graph:
         """Adds a factor between variables, and returns its index in the graph, from 0.
 
         `keys` are the names of its variables, in the order of the residual's arguments. `noise` may be a
-        number, which is a sigma for all rows. Default of `noise`: a standard deviation of 1 in every row.
-        Default of `loss`: none. Default of `name`, which reports use: the name of the factor's type. A
-        wrong number of keys, a repeated key and noise of a wrong size raise a `GraphError`."""
+        number, which is a sigma for all rows. `noise` defaults to a standard deviation of 1 in every row,
+        `loss` to none, and `name`, which reports use, to the name of the factor's type. A wrong number of
+        keys, a repeated key and noise of a wrong size raise a `GraphError`."""
     def add_many(
         self,
         factor: str | Factor | Callable[..., Factor],
@@ -283,7 +283,7 @@ def solve(
     """Solves a graph from these values. Always returns a solution; `solution.converged` is true if the
     solve reached a minimum.
 
-    Default of `solver`: `auto`. Default of `start`: the given values. `observer` is called with a dict
+    `solver` defaults to `auto`, and `start` to the given values. `observer` is called with a dict
     after each attempted step, and ends the solve by returning `False`. Other Python threads run meanwhile,
     and Ctrl-C interrupts the solve. A process that was forked after a solve of its parent solves on one
     thread, with identical results, and warns about it once."""

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 /// Places an object in the middle of its shelf: r = c · along - middle, in metres.
 ///
-/// c is the object's centroid. Motion orthogonal to `along`, rotation and growth leave r unchanged. Smooth and defined
-/// everywhere.
+/// c is the object's centroid. Motion orthogonal to `along`, rotation and growth leave r unchanged. Smooth
+/// and defined everywhere.
 ///
 /// ```toml
 /// [[factors]]

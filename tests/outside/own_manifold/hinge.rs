@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 /// A door that hangs in its frame, open by an angle: r = Log((F A Rz(angle))⁻¹ D), (rx, ry, rz, x, y, z).
 ///
-/// F is the frame's pose, D the door's, and A the hinge in the frame, its axis along z. The residual jumps if two
-/// rotations are half a turn apart, because there are two shortest paths between them.
+/// F is the frame's pose, D the door's, and A the hinge in the frame, its axis along z. The residual jumps if
+/// two rotations are half a turn apart, because there are two shortest paths between them.
 ///
 /// ```toml
 /// [[factors]]

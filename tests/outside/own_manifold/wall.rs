@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 /// A wall, seen from above: the points p of the plane with p · n = distance and n = (cos angle, sin angle).
 /// Tangent (angle, distance), in radians and metres.
 ///
-/// Adding half a turn and changing the sign of the distance gives the same wall, so an initial value on the wrong
-/// side stays there.
+/// Adding half a turn and changing the sign of the distance gives the same wall, so an initial value on the
+/// wrong side stays there.
 ///
 /// ```toml
 /// value = { type = "wall", angle = 1.5, distance = 2.0 }

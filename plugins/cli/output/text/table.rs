@@ -19,7 +19,7 @@ pub(crate) struct Table {
 }
 
 enum Kind {
-    /// Columns except for the first by decreasing priority, and the number of left-aligned columns with
+    /// All columns except the first, by decreasing priority, and the number of left-aligned columns with
     /// names.
     Numbers {
         kept_first: Vec<usize>,

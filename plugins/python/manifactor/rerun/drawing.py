@@ -10,9 +10,9 @@ import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
-#: The timeline of the frames' seconds, and that of the steps of a solve or the updates of a session.
+#: The timelines: the timestamps of the frames, and the steps of a solve or the updates of a session.
 TIME, ITERATION = "time", "iteration"
-#: By what is shown.
+#: Colours by meaning.
 COLOURS = {"estimate": (31, 119, 180), "initial": (255, 127, 14), "odometry": (160, 160, 160), "truth": (44, 160, 44)}
 
 

@@ -17,7 +17,7 @@ from .drawing import ITERATION, TIME
 
 Array = NDArray[np.float64]
 
-#: Factors with a `box` of an image and its `camera`, between a pose and an object.
+#: Types of factors between a pose and an object, with fields `box` and `camera`.
 BOXES = ("bounding_box", "tangent_planes")
 
 
@@ -38,9 +38,9 @@ class Live:
         self.session, self.every, self.updates = session, every, 0
         self.recording = drawing.recording(path, name)
         self._at = rr.escape_entity_path_part(name)
-        #: Each pose where it was last seen, shape (3,), by key.
+        #: Last known position of each pose by key, shape (3,).
         self._path: dict[str, Array] = {}
-        #: Objects and their boxes, by the pose that saw them, since the map was last shown.
+        #: Objects and their boxes by the pose that saw them, since the map was last drawn.
         self._seen: dict[str, list[tuple[str, list[float]]]] = {}
         self._camera: dict[str, Any] | None = None
 
