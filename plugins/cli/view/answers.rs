@@ -13,7 +13,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
-/// Shortest time between two states, and the longest silence: a comment is then sent to detect closed
+/// Shortest time between two states, and longest silence. After it, a comment is sent to detect closed
 /// connections.
 const PACE: Duration = Duration::from_millis(100);
 const SILENCE: Duration = Duration::from_secs(15);
