@@ -34,8 +34,8 @@ fn closes(entry: &FactorEntry) -> bool {
     entry.keys.len() == 2 && number(&entry.keys[0]).abs_diff(number(&entry.keys[1])) != 1
 }
 
-/// A graph with false closures before or after the true ones of their latest pose, and a flag for each
-/// factor that is false.
+/// A graph with false closures before or after the true ones of their latest pose, and the flags that mark
+/// the false ones.
 struct Misled {
     graph: Graph,
     is_false: Vec<bool>,
