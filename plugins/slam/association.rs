@@ -25,8 +25,8 @@ pub use names::{Merge, Move, Names};
 /// A method of data association.
 #[typetag::serialize(tag = "type")]
 pub trait Association: Debug + Send + Sync {
-    /// Creates the associator. `known` are the objects of a prior map, with their covariances there; empty
-    /// without one.
+    /// Creates the associator. `known` are the objects of a prior map with trusted covariances; empty without
+    /// a prior map.
     fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator>;
 
     /// Returns whether the method takes the object ids of the source. If not, these ids can serve to score

@@ -64,7 +64,7 @@ struct Rounds {
     times: Times,
     history: Vec<IterationRecord>,
     refinement_seconds: f64,
-    /// Number of joint solves so far.
+    /// Number of joint solves so far; `cost` is the cost after the last one.
     joint: usize,
     cost: Option<f64>,
 }
@@ -128,8 +128,8 @@ pub struct Landmark<'a> {
 const SETTLED: f64 = 1e-3;
 
 impl Estimate {
-    /// Solves the graph of a sequence. With [`variance`] components, repeats the solve until the noise is
-    /// known. The graph of the estimate has the noise of its last solve.
+    /// Solves the graph of a sequence. With [`variance`] components, alternates between estimating the noise
+    /// and solving until the noise converges. The graph of the estimate has the noise of its last solve.
     ///
     /// # Errors
     /// If graph and values do not match, or the noise cannot be estimated.

@@ -1,6 +1,6 @@
-//! The vertical direction and the frame of the map.
+//! The up direction and the frame of the map.
 //!
-//! Orientation factors need the vertical direction of the world, and odometry alone does not provide it.
+//! Orientation factors need the up direction of the world, and odometry alone does not provide it.
 use crate::input::sequence::{Frame, Sequence};
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, NoDirection};
@@ -16,16 +16,16 @@ pub use ground_truth::GroundTruthPose;
 pub use source::FromSource;
 pub use vector::UpVector;
 
-/// A method to find the vertical direction. Chosen by name in `[gravity]` of a run.
+/// A method to find the up direction. Chosen by name in `[gravity]` of a run.
 #[typetag::serialize(tag = "type")]
 pub trait Gravity: Debug + Send + Sync {
-    /// Returns the vertical direction and the frame of the map.
+    /// Returns the up direction and the frame of the map.
     ///
     /// # Errors
     /// If the sequence lacks the required data.
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError>;
 
-    /// In a stream: returns the time after the first frame from which later data change nothing, in seconds.
+    /// Returns the time in a stream after which new data change nothing, in seconds after the first frame.
     fn settled_after(&self) -> f64 {
         0.0
     }
@@ -33,7 +33,7 @@ pub trait Gravity: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn Gravity, "gravity");
 
-/// The frame of the map, and the vertical direction in it.
+/// The frame of the map, and the up direction in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapFrame {
     /// Transform from the odometry frame to the map frame.
@@ -49,7 +49,7 @@ impl MapFrame {
     }
 }
 
-/// Reason why the vertical direction is unknown.
+/// Reason why the up direction is unknown.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GravityError {

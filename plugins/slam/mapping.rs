@@ -2,8 +2,7 @@
 //!
 //! Variables are the camera poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics.
 //! Factors, in this order: the prior on the first pose; odometry between consecutive poses; for each object
-//! its boxes, then its semantic factors; last, variables and factors of the run document. If offsets of boxes
-//! are estimated, they come with the noise of the boxes.
+//! its boxes, then its semantic factors; last, variables and factors of the run document.
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::fusion::FusedClass;
 use crate::input::measurement::Errors;
@@ -39,7 +38,7 @@ pub struct Mapping {
     pub graph: Graph,
     /// Initial values.
     pub values: Values,
-    /// Frame of the values, with the vertical direction.
+    /// Frame of the values, with the up direction.
     pub frame: MapFrame,
     /// All detected objects, in the map or not, sorted by id.
     pub objects: Vec<MappedObject>,
@@ -79,7 +78,7 @@ pub enum MappingError {
     /// The sequence has no frames.
     #[error("the sequence has no frames")]
     NoFrames,
-    /// The vertical direction is unknown.
+    /// The up direction is unknown.
     #[error(transparent)]
     Gravity(#[from] GravityError),
     /// A semantic rule cannot be applied.
@@ -106,7 +105,7 @@ impl Mapping {
     /// Creates the graph of a sequence.
     ///
     /// # Errors
-    /// If there is no frame, or a rule needs the vertical direction and it is unknown.
+    /// If there is no frame, or a rule needs the up direction and it is unknown.
     pub fn new(sequence: &Sequence, settings: &Settings) -> Result<Self, MappingError> {
         let first = sequence.frames.first().ok_or(MappingError::NoFrames)?;
         let located = settings.gravity.locate(sequence)?;

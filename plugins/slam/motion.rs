@@ -40,7 +40,7 @@ pub trait MotionModel: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn MotionModel, "motion");
 
-/// A step for which a motion model has no factor.
+/// A step without a factor in the motion model.
 #[derive(Debug, thiserror::Error)]
 #[error("no motion from frame {from} to frame {to}, {seconds} s later: {why}")]
 pub struct MotionError {

@@ -68,7 +68,7 @@ pub struct Mapper {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// The timestamp is not later than that of the previous frame.
+    /// The timestamp is not later than the one before.
     #[error("the frame at {timestamp} s is left out: it does not come after the one before, at {before} s")]
     Time {
         /// Timestamp of the frame, in seconds.
@@ -85,7 +85,7 @@ pub enum FrameError {
         /// Timestamp of the frame, in seconds.
         timestamp: f64,
     },
-    /// The vertical direction is unknown.
+    /// The up direction is unknown.
     #[error(transparent)]
     Gravity(#[from] GravityError),
     /// A semantic rule cannot be applied.

@@ -144,7 +144,7 @@ impl<'a> Run<'a> {
         Self { document, folders, loaded: vec![], journal: None, began: Instant::now(), reports: vec![] }
     }
 
-    /// Writes the frames of a stream to a file, after replaying the frames that it already has; see
+    /// Writes the frames of a stream to a file, after replaying the frames that the file already has; see
     /// [`journal`](crate::journal).
     pub fn keep_frames(&mut self, journal: PathBuf) {
         self.journal = Some(journal);

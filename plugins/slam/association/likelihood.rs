@@ -54,7 +54,7 @@ pub struct Likelihood {
     /// Factor on the standard deviation of a single box compared with a prediction, because the errors of a
     /// detector persist over many frames. A fit, which averages many boxes, does not use it.
     pub lasting: Positive,
-    /// Assumed distance of a new object until the distances of mapped objects are known. Unit: metres.
+    /// Assumed distance of a new object until the distances of other objects are known. Unit: metres.
     pub depth: Positive,
     /// Standard deviation of the logarithm of `depth`.
     pub depth_spread: Positive,
@@ -113,7 +113,7 @@ impl Likelihood {
         BoxNoise { px: *self.box_sigma, of_size: *self.box_sigma_of_size, others }
     }
 
-    /// Returns the likelihood of a class for an object of which it has this share of the votes.
+    /// Returns the likelihood of a class, given its share of the votes of an object.
     fn likelihood(&self, share: f64) -> f64 {
         (1.0 - *self.class_error) * share + *self.class_error / CLASSES
     }

@@ -89,7 +89,7 @@ pub(crate) fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Look
     all.into_iter().map(|(id, counted)| (id, counted.looked)).collect()
 }
 
-/// A frame in which an object is visible.
+/// A frame with a visible object.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sight {
     pub(crate) id: ObjectId,
@@ -98,7 +98,7 @@ pub(crate) struct Sight {
     pub(crate) pose: Se3,
     /// Vector from the centre of the object to the camera.
     from: Vector3<f64>,
-    /// Whether a new opportunity begins here.
+    /// True if a new opportunity begins here.
     pub(crate) begins: bool,
 }
 
@@ -137,7 +137,8 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    /// `least_px` is the size of its smallest box: the square root of the area, in pixels.
+    /// Creates the entry of an object. `least_px` is the size of its smallest box: the square root of the
+    /// area, in pixels.
     pub(crate) fn new(id: ObjectId, quadric: DualQuadric, least_px: Option<f64>) -> Self {
         Self { id, quadric, area: (FAR * least_px.unwrap_or_default()).powi(2) }
     }

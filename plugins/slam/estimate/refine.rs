@@ -80,7 +80,7 @@ pub(crate) fn refined(
     best.1
 }
 
-/// Returns the graph of one object with its factors and its start value. The further variables of these
+/// Returns the graph of one object with its factors and its initial value. The further variables of these
 /// factors are fixed.
 pub(super) fn alone<'a>(
     key: &Key,
@@ -126,7 +126,8 @@ fn upright(up: Option<Direction>) -> So3 {
     rotation.map_or_else(So3::identity, |rotation| So3::from_matrix(rotation.matrix()))
 }
 
-/// Undefined factors, then the cost. An undefined factor lowers the cost, but it is a loss.
+/// Returns the number of undefined factors, then the cost. An undefined factor lowers the cost, but it is a
+/// loss.
 fn rank(problem: &Problem) -> (usize, f64) {
     let factors = problem.inspect();
     let cost: f64 = factors.iter().map(|factor| factor.cost).sum();

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The vertical direction is the mean of accelerometer readings.
+/// The up direction is the mean of accelerometer readings.
 ///
 /// At rest, an accelerometer measures 9.8 m/s² upwards. A hand-held camera is never at rest. So each reading
 /// is rotated into the odometry frame by the pose of the nearest frame. The mean over the window cancels

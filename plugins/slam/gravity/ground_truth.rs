@@ -5,7 +5,7 @@ use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The vertical direction is the z axis of the ground truth.
+/// The up direction is the z axis of the ground truth.
 ///
 /// The ground-truth pose nearest in time to the first frame moves the map into the frame of the ground truth,
 /// as in the paper. Only for experiments, because a robot has no ground truth.

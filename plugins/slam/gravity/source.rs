@@ -4,7 +4,7 @@ use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The vertical direction comes from the data source. Simulators provide it, real data seldom do.
+/// The up direction comes from the data source. Simulators provide it, real data seldom do.
 ///
 /// The map stays in the odometry frame.
 ///

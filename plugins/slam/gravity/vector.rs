@@ -4,7 +4,7 @@ use manifactor_graph::{Direction, register};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The vertical direction is a given vector in the odometry frame.
+/// The up direction is a given vector in the odometry frame.
 ///
 /// The odometry of a camera often begins with the identity. Then its frame is the frame of the first camera,
 /// with y down, and a camera held level has `up = [0, -1, 0]`.
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UpVector {
-    /// Vertical direction, up positive. Any length except zero.
+    /// Up direction. Any length except zero.
     pub up: Direction,
 }
 

@@ -15,7 +15,7 @@ pub struct PosePair {
 }
 
 /// Pairs each pose of the shorter trajectory with the nearest in time of the longer one, if that is within
-/// `within` seconds; the earlier one if two are equally near. Like in evo, each pose of the shorter
+/// `within` seconds; the earlier one if two are equally near. As in evo, each pose of the shorter
 /// trajectory is used, and a pose of the longer one may be used twice. Both have to be sorted by time.
 ///
 /// # Errors

@@ -55,7 +55,7 @@ fn drawn(sums: &[[f64; 2]], of: fn([f64; 2]) -> f64, resamples: usize, seed: u64
 /// Length of the blocks, in seconds. Errors of a trajectory are correlated in time, so whole blocks are
 /// resampled.
 const BLOCK: f64 = 10.0;
-/// Number of resamples.
+/// Number of resamples, and the seed of the draws.
 const RESAMPLES: usize = 2000;
 const SEED: u64 = 1;
 

@@ -36,7 +36,7 @@ pub struct IdentityScores {
     pub objects: usize,
 }
 
-/// Number of boxes from which an object counts.
+/// Smallest number of boxes of an object that counts.
 pub const ENOUGH: usize = 3;
 
 /// Scores boxes in the order of time. Each has its true object and its assigned object; a box without an

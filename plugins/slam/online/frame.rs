@@ -63,7 +63,7 @@ pub(super) struct Seen {
     pub boxes: BTreeMap<ObjectId, ObjectBox>,
     /// Corrections to earlier frames.
     pub learned: Learned,
-    /// Whether the vertical direction changed.
+    /// True if the up direction changed.
     pub up_moved: bool,
 }
 
@@ -141,7 +141,7 @@ impl Mapper {
         taken
     }
 
-    /// Adds a frame after the vertical direction is known.
+    /// Adds a frame, with the up direction already updated.
     fn take_located(
         &mut self,
         observation: &Observation,
@@ -285,7 +285,7 @@ impl Mapper {
         Ok(owners.into_iter().zip(self.session.push(&graph, &Values::new())?).collect())
     }
 
-    /// Checks that no semantic rule lacks the vertical direction.
+    /// Checks that no semantic rule lacks the up direction.
     fn check_rules(&self, up: Option<Direction>) -> Result<(), RuleError> {
         let waiting = self.settings.semantics.iter().find(|rule| up.is_none() && rule.factor.wants_up());
         match waiting {

@@ -1,12 +1,12 @@
-//! Online estimate of the vertical direction.
+//! Online estimate of the up direction.
 use crate::gravity::{GravityError, MapFrame};
 use crate::input::sequence::{Observation, Opening, Sequence};
 use crate::settings::Settings;
 
-/// Change of the vertical direction at which factors are created again: half a degree in radians.
+/// Change of the up direction at which factors are created again: half a degree in radians.
 const MOVED: f64 = 0.01;
 
-/// The vertical direction from the first frames, until it is final.
+/// The up direction from the first frames, until it is final.
 #[derive(Debug, Clone)]
 pub(super) struct Up {
     /// Relevant data of the frames so far.
@@ -30,7 +30,7 @@ impl Up {
         (!self.is_settled).then(|| self.clone())
     }
 
-    /// Adds the next frame. Returns whether the vertical direction changed, so that the factors that use it
+    /// Adds the next frame. Returns whether the up direction changed, so that the factors that use it
     /// have to be created again.
     pub(super) fn look(
         &mut self,

@@ -38,8 +38,8 @@ pub struct Located {
 const UNKNOWN: f64 = 0.04;
 
 impl Mapper {
-    /// Finds the start pose in `map` from the mapped objects. The covariances of the prior objects count as
-    /// trusted. `None` as long as the result is ambiguous.
+    /// Finds the start pose in `map` from the mapped objects. The covariances in `map` are used unchanged.
+    /// `None` as long as the result is ambiguous.
     pub fn locate(&self, map: &PriorMap) -> Option<Located> {
         let first = self.pose_of(0)?;
         let marks = self.objects().filter_map(|(measured, quadric)| self.mark(measured, &quadric));

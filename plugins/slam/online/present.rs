@@ -13,7 +13,7 @@ impl Mapper {
         &self.camera
     }
 
-    /// Returns the vertical direction in the map; `None` if unknown.
+    /// Returns the up direction in the map; `None` if unknown.
     pub fn up(&self) -> Option<Direction> {
         self.up.frame().and_then(|frame| frame.up)
     }

@@ -92,9 +92,9 @@ impl Fitter<'_> {
         (are_good && !a.fitted.is_where(&b.fitted)).then_some(parts)
     }
 
-    /// Assigns all boxes of an object to one of two parts. The first result is the half nearest to the object
-    /// in the prior map, else the half with more boxes. `None` if one half has too few boxes, or both belong
-    /// to one object of a complex shape.
+    /// Assigns all boxes of an object to one of two parts. For an object of a prior map, the half nearest to
+    /// it there comes first, otherwise the half with more boxes. `None` if one half has too few boxes, or
+    /// both belong to one object of a complex shape.
     fn halves(&self, track: &Track, [a, b]: [Part; 2], map: &dyn Map) -> Option<[Track; 2]> {
         let is_of_first = |seen: &Seen| {
             let seen = map.pose(seen.frame()).map(|pose| seen.from(pose));

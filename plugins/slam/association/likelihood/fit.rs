@@ -59,7 +59,7 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// Returns whether one of two ellipsoids contains the centre of the second.
+    /// Returns whether one of two ellipsoids contains the centre of the other.
     pub(super) fn is_where(&self, other: &Self) -> bool {
         let (own, others) = (&self.quadric, &other.quadric);
         own.contains(&others.centroid()) || others.contains(&own.centroid())
@@ -77,7 +77,7 @@ const STEPS: usize = 8;
 const ENOUGH: f64 = 1e-3;
 /// Squared scale of Cauchy's loss: squared residuals beyond it are down-weighted.
 const WIDTH: f64 = 9.0;
-/// Cost of a box for which the ellipsoid has no projection.
+/// Cost of a box if the ellipsoid has no projection in its image.
 const LOST: f64 = 40.0;
 
 impl BoxNoise {
@@ -89,8 +89,8 @@ impl BoxNoise {
 }
 
 impl Belief {
-    /// Prior of an object seen once: distance along the ray in metres, and the standard deviation of its
-    /// logarithm.
+    /// Returns the prior of an object seen once, at `depth` metres, with the standard deviation `spread` of
+    /// its logarithm.
     pub(super) fn new(seen: &Sighting, camera: &Camera, depth: f64, spread: f64) -> Self {
         let b = &seen.bounding_box;
         let ray = camera.ray(b.centre());
@@ -103,7 +103,7 @@ impl Belief {
         Self::Seen(FirstSight { quadric, eye, distance: (centre - eye).norm(), spread })
     }
 
-    /// Prior of an object with the mean and covariance of an estimate.
+    /// Returns the prior of an object with the mean and covariance of an estimate.
     pub(super) fn known(fitted: &Fitted) -> Self {
         let information = Cholesky::new(fitted.covariance).map(|factor| factor.inverse());
         let root = information.and_then(Cholesky::new).map(|factor| factor.l().transpose());
@@ -133,7 +133,7 @@ impl Belief {
 }
 
 impl FirstSight {
-    /// Residual of the distance, three semi-axes and three angles. The last two rows are zero.
+    /// Returns the residual of the distance, three semi-axes and three angles. The last two rows are zero.
     fn rows(&self, quadric: &DualQuadric) -> (Vector9, Matrix9) {
         let away = quadric.centroid() - self.eye;
         let log = (away.norm().max(1e-6) / self.distance).ln();

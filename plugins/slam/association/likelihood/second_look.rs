@@ -80,8 +80,8 @@ impl Tracker {
         self.tracks.retain(|track| !(left(track.id) && track.boxes.is_empty() && !track.is_known()));
     }
 
-    /// Removes a box from its object. Returns `None` for the twin of a box, since an object keeps one box per
-    /// frame.
+    /// Removes a box from its object. Returns `None` if the object did not keep the box, because it has a
+    /// twin in the frame.
     fn take_box(&mut self, moved: &Move) -> Option<Seen> {
         let track = self.tracks.iter_mut().find(|track| track.id == moved.from)?;
         track.vote(&moved.detection.scores, &self.aliases, -1.0);

@@ -46,8 +46,8 @@ impl Sightings {
         &self.0
     }
 
-    /// Adds a sighting of an object whose centre is known. The previous one stays only if it adds information
-    /// to the rest.
+    /// Adds a sighting of an object at `centre`. The previous one stays only if it adds information to the
+    /// rest.
     pub(super) fn add(&mut self, sighting: Sighting, centre: &Vector3<f64>) {
         if let Some((last, rest)) = self.0.split_last() {
             let from = |s: &Sighting| s.world_from_camera.translation - centre;

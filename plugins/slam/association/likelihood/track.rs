@@ -108,7 +108,7 @@ impl Track {
         matches!(self.belief, Belief::Known { .. })
     }
 
-    /// Returns whether one of two objects contains the centre of the second, and both places are known well
+    /// Returns whether one of two objects contains the centre of the other, and both places are known well
     /// enough.
     pub(super) fn is_where(&self, other: &Self) -> bool {
         self.fitted.is_where(&other.fitted) && self.spread(other) < VAGUE * self.sizes(other)

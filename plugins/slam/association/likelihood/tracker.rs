@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// Maximum number of boxes per frame; those with the highest scores are used. It bounds the time if a
 /// detector floods the frame.
 const BOXES: usize = 200;
-/// Number of boxes below which an object is forgotten when it is not seen for [`PATIENCE`].
+/// Number of boxes below which an object is forgotten when it is not seen for `PATIENCE`.
 pub(super) const FIRM: usize = 3;
 /// Time without a sighting after which such an object is forgotten, in seconds.
 const PATIENCE: f64 = 10.0;

@@ -17,17 +17,17 @@ struct Union {
 }
 
 /// Two objects visible in one frame are distinct. This share of the frames of the object with fewer boxes is
-/// tolerated, for detector errors.
+/// tolerated.
 const TOGETHER: f64 = 0.05;
 /// Distance of the centres at which two objects may still be one, in standard deviations. Their sizes are
 /// added to it.
 const APART: f64 = 3.0;
-/// Similarity of classes below which the limit is divided by [`STRICTER`].
+/// Similarity of classes below which the limit is divided by `STRICTER`.
 const ALIKE: f64 = 0.1;
 /// Divides `merge_error` for objects of different classes.
 const STRICTER: f64 = 1.4;
-/// Similarity of classes above which the limit is multiplied by [`LOOSER`], if one object has its centre in
-/// the second and both places are known well enough.
+/// Similarity of classes above which the limit is multiplied by `LOOSER`, if one object contains the centre
+/// of the other and both places are known well enough.
 pub(super) const SAME: f64 = 0.5;
 /// Multiplies `merge_error` for objects of one class in one place: no ellipsoid explains all boxes of a
 /// complex shape.
@@ -105,7 +105,7 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
     let rank = |track: &Track| (track.is_known(), track.boxes.len());
     let (more, fewer) = if rank(one) >= rank(two) { (one, two) } else { (two, one) };
     let (noise, mut sightings) = (settings.noise(), more.sightings.and(&fewer.sightings));
-    // fit from both ellipsoids, since boxes of one object may look like outliers from the second
+    // start from both ellipsoids, since boxes of one object may look like outliers from the other
     let starts = [more, fewer].into_iter().filter_map(|start| {
         let mut fitted = start.fitted;
         // the way from the ellipsoid of one object to the common one may be long

@@ -30,14 +30,14 @@ const MEDIAN: f64 = 0.674_489_750_196_081_7;
 const MEDIAN_VARIANCE: f64 = 0.5 / 0.3678;
 /// Redundancy 1 - h below which a row has no information about its noise.
 const LEAST_REDUNDANCY: f64 = 1e-9;
-/// Number of bins of box sizes, at most.
+/// Number of bins of box sizes, at most; `LEAST_OF_PART` is the smallest number of errors in a bin.
 const PARTS: usize = 8;
 const LEAST_OF_PART: usize = 20;
 /// Variance of the squared sizes, relative to their mean square, below which all sizes count as equal.
 const ALIKE: f64 = 1e-6;
 
 impl BoxComponent {
-    /// `size` is the mean size of boxes, in pixels.
+    /// Creates the noise of a group. `size` is the mean size of its boxes, in pixels.
     pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, size: f64) -> Self {
         let new = Self { sigma_px, of_size, correlation_time, effective_px: 0.0 };
         Self { effective_px: new.at(size) * new.inflation(), ..new }

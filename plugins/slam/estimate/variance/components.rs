@@ -107,8 +107,8 @@ impl Components {
         Ok(found)
     }
 
-    /// Sets this noise in the graph. The loss of boxes gets a scale in units of their own σ: ρ(τs)/τ. So a
-    /// single box is an outlier by its own error, not by the error of an average of τ boxes.
+    /// Sets this noise in the graph. The loss of boxes becomes ρ(τs)/τ, with its scale in units of the σ of a
+    /// single box. So a box is an outlier by its own error, not by the error of an average of τ boxes.
     ///
     /// # Errors
     /// If a standard deviation is zero or not finite.

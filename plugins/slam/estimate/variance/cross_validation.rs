@@ -23,7 +23,7 @@ const LEAST_OBJECTS: usize = 4;
 /// Significance threshold in standard errors. It is high because the best of about twenty candidates is
 /// selected.
 const CLEAR: f64 = 2.0;
-/// A solve ends after this number of iterations, or at the relative decrease [`SETTLED`] of the cost: scores
+/// A solve ends after this number of iterations, or at the relative decrease `SETTLED` of the cost: scores
 /// differ by whole nats.
 const ITERATIONS: usize = 10;
 const SETTLED: f64 = 1e-4;

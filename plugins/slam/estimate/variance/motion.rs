@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 /// The noise of a motion: a rotation about a point in front of the camera, and a translation of that point.
 ///
-/// The error of visual odometry is mostly a rotation about the observed scene: a rotation error comes with a
+/// Visual odometry errs by rotating about the observed scene: a rotation that is too large comes with the
 /// translation that keeps the scene in view. If the pivot is the camera itself, rotation and translation are
 /// independent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -41,8 +41,8 @@ pub struct MotionChoice {
 const KEPT: f64 = 1e-5;
 
 impl MotionComponent {
-    /// Noise of the residual (ω, v) of a motion, in the frame of the later camera: v = p × ω + ε with the
-    /// pivot p.
+    /// Returns the noise of the residual (ω, v) of a motion, in the frame of the later camera: v = p × ω + ε
+    /// with the pivot p.
     pub(super) fn noise(&self) -> Result<Noise, NoiseError> {
         let Self { rotation: turn, translation: shift, pivot } = *self;
         if pivot == 0.0 {

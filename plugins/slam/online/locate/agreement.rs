@@ -42,7 +42,7 @@ impl Agreement {
 
 /// Number of boxes per object that are compared with projections, at most.
 const BOXES: usize = 20;
-/// Number of last frames in which prior objects are expected.
+/// Number of last frames that are searched for prior objects.
 const FRAMES: usize = 300;
 /// Intersection over union at which a box shows a prior object.
 const SHOWN: f64 = 0.3;

@@ -1,6 +1,6 @@
 //! Relocalization by the classes and the layout of objects.
 //!
-//! If the vertical direction is known, two pairs of objects with similar classes and equal distances in both
+//! If the up direction is known, two pairs of objects with similar classes and equal distances in both
 //! maps give a hypothesis; otherwise three pairs do. Its score counts the other objects that match, and those
 //! that should match and do not. The best hypothesis is accepted if no other one has a similar score.
 use super::agreement::Agreement;
@@ -34,7 +34,7 @@ pub(crate) struct Mark {
 pub(crate) struct Layout {
     local: Vec<Mark>,
     known: Vec<Mark>,
-    /// Vertical direction in both.
+    /// Up direction in both.
     up: Option<[Direction; 2]>,
     /// Pairs that may show one object.
     pairs: Vec<Pair>,
@@ -49,8 +49,8 @@ pub(crate) struct Layout {
 struct Pair {
     local: usize,
     known: usize,
-    /// Prior log-likelihood ratio in nats: similarity of the classes, and one of all known marks by chance.
-    /// Zero if names identify the mark.
+    /// Log-likelihood ratio of the match before poses are compared, in nats: from the classes, minus the
+    /// logarithm of the number of known marks. Zero if equal ids identify the mark.
     evidence: f64,
     /// Standard deviation of the offset between both, in metres.
     sigma: f64,
@@ -67,15 +67,15 @@ pub(crate) struct Aligned {
     centre: Vector3<f64>,
     /// Standard deviations in rad and m, at the centre of the matched local marks.
     sigmas: [f64; 2],
-    /// Vertical direction in the prior map, if known in both.
+    /// Up direction in the prior map, if known in both.
     up: Option<Direction>,
 }
 
 /// Standard deviation added to the centre of an object, relative to its mean semi-axis.
 const OF_SIZE: f64 = 0.5;
-/// Similarity of classes from which two marks may match (Bhattacharyya coefficient).
+/// Smallest similarity of the classes of matching marks (Bhattacharyya coefficient).
 const ALIKE: f64 = 0.3;
-/// Share of boxes with a random class, one of [`CLASSES`].
+/// Share of boxes with a random class, one of `CLASSES`.
 const CLASS_ERROR: f64 = 0.1;
 const CLASSES: f64 = 20.0;
 /// Distance of matching marks, at most, in standard deviations.
@@ -96,7 +96,7 @@ const MOST: f64 = 0.6;
 /// `docs/decisions/prior-maps.md`.
 const LEAD: f64 = 12.0;
 
-/// Weight of the vertical direction relative to all marks together.
+/// Weight of the up direction relative to all marks together.
 const UP: f64 = 10.0;
 /// Standard deviation of the tilt, in radians. Without it, the trajectory tilted by up to 13° on fr1
 /// (`docs/decisions/prior-maps.md`).
@@ -119,7 +119,7 @@ impl Mark {
 }
 
 impl Layout {
-    /// Creates the layout of local marks in a prior map. `up` is the vertical direction of the local marks.
+    /// Creates the layout of local marks in a prior map. `up` is the up direction of the local marks.
     /// With `by_name`, equal ids are the same object.
     pub(crate) fn new(local: Vec<Mark>, up: Option<Direction>, map: &PriorMap, by_name: bool) -> Self {
         let mark = |object: &Arc<PriorObject>| {
@@ -268,7 +268,7 @@ impl Layout {
         let weighted = |pair: &Pair| (centres(pair).0, centres(pair).1, pair.sigma.powi(-2));
         let mut points = PointPairs::new(pairs.iter().map(weighted));
         if let Some([u, v]) = self.up {
-            // the vertical direction is more accurate than any mark
+            // the up direction is more accurate than any mark
             points.add_direction(&u, &v, UP);
         }
         points.rigid(FLAT).map(|found| Se3::new(found.rotation, found.translation))

@@ -8,7 +8,7 @@ const HYPOTHESES: usize = 2000;
 const GROUPS: usize = 2000;
 
 impl Layout {
-    /// Returns poses at which two local marks match known ones; three if the vertical direction is unknown.
+    /// Returns poses at which two local marks match known ones; three if the up direction is unknown.
     /// Each group of local marks is tried with all possible matches. Sampling a few pairs per mark would
     /// rarely contain two right ones if many objects share a class.
     pub(super) fn hypotheses(&self) -> Vec<Se3> {
