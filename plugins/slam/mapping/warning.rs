@@ -19,7 +19,7 @@ pub enum Warning {
     },
     /// The odometry looks like different units or a different order of numbers.
     Implausible {
-        /// Description of the sign.
+        /// Description of the problem.
         what: String,
     },
     /// Detections of the source that are not used.

@@ -98,8 +98,8 @@ const LEAD: f64 = 12.0;
 
 /// Weight of the up direction relative to all marks together.
 const UP: f64 = 10.0;
-/// Standard deviation of the tilt, in radians. Without it, the trajectory tilted by up to 13° on fr1
-/// (`docs/decisions/prior-maps.md`).
+/// Standard deviation of the tilt, in radians. With equal σ in all directions, the trajectory tilted by up to
+/// 13° on fr1 (`docs/decisions/prior-maps.md`).
 const TILT: f64 = 0.01;
 /// Relative spread of the marks below which a direction is undetermined.
 const FLAT: f64 = 1e-3;
