@@ -224,7 +224,8 @@ pub struct MeasurementKind {
 
 inventory::collect!(MeasurementKind);
 
-/// Registers a [`Measurement`](crate::measurement::Measurement) that serde can read: `register_measurement!("depth", Depth);`
+/// Registers a [`Measurement`](crate::measurement::Measurement) that serde can read:
+/// `register_measurement!("depth", Depth);`
 #[macro_export]
 macro_rules! register_measurement {
     ($name:literal, $type:ty) => {

@@ -25,7 +25,7 @@ pub struct RuleFactor {
     pub(super) rows: Option<usize>,
 }
 
-/// Error when the factor of a rule is created.
+/// Error while creating the factor of a rule.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RuleError {

@@ -19,7 +19,8 @@ pub struct DetectionSettings {
     pub loss: Option<Arc<dyn Loss>>,
     /// Part of an object that its box encloses: the whole object, or the part inside the image.
     pub model: BoxModel,
-    /// Treatment of boxes with sides at the image border.
+    /// Treatment of boxes with sides at the image border: drop the box, mask its cut sides, or keep all
+    /// sides.
     pub cut_sides: CutSides,
     /// Sides this close to the image border count as cut. Unit: pixels.
     pub border_px: NotNegative,

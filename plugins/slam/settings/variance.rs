@@ -12,8 +12,8 @@ pub struct VarianceSettings {
     pub rounds: NonZeroUsize,
     /// Rounds end when no standard deviation changes by more than this share.
     pub tolerance: NotNegative,
-    /// Boxes that share a noise. The noises of several groups are shrunk towards each other, as far as their
-    /// differences can be due to chance.
+    /// Boxes that share a noise; with `given`, boxes keep their given noise. The noises of several groups are
+    /// shrunk towards each other, as far as their differences can be due to chance.
     pub boxes: BoxGroups,
     /// Lets the noise of a box grow with its width and height.
     pub size: bool,

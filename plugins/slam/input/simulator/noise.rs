@@ -23,7 +23,8 @@ pub struct MotionNoise {
     pub translation: NotNegative,
     /// Standard deviation as a share of the rotation.
     pub rotation: NotNegative,
-    /// Reference of the shares.
+    /// Length that the shares refer to: the length of the motion, for the whole error or for each axis, or
+    /// the component of the motion along each axis.
     pub spread: Spread,
 }
 
