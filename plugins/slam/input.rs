@@ -1,4 +1,4 @@
-//! What a run is told: sequences of frames, where they come from, and the classes of objects.
+//! Input of a run: sequences of frames, their sources, and the classes of objects.
 pub mod class;
 pub mod fusion;
 pub mod journal;

@@ -1,8 +1,8 @@
 //! Object SLAM: from a camera's odometry and a detector's boxes to a map of objects.
 //!
-//! A [`RunDocument`](run_document::RunDocument) says what to do. A [`Source`](source::Source) gives a
-//! [`Sequence`](sequence::Sequence); a [`Mapping`](mapping::Mapping) makes a graph of it; a solver an
-//! [`Estimate`](estimate::Estimate), which is compared with the truth in a [`report`].
+//! A [`RunDocument`](run_document::RunDocument) describes a run. A [`Source`](source::Source) provides a
+//! [`Sequence`](sequence::Sequence), and a [`Mapping`](mapping::Mapping) turns it into a factor graph. A
+//! solver computes an [`Estimate`](estimate::Estimate), which a [`report`] compares with ground truth.
 #[doc(hidden)]
 pub mod __private {
     pub use {inventory, serde_json};

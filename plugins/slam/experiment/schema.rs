@@ -1,4 +1,4 @@
-//! JSON Schema of a run, for editors to complete and check by: that of the types that read it.
+//! JSON Schema of a run for completion and checks in editors, generated from the types that read it.
 use crate::experiment::ExperimentDocument;
 use crate::semantics::{RulesDocument, SemanticsDocument};
 use crate::settings::Settings;
@@ -6,8 +6,8 @@ use crate::settings::run_document::Header;
 use manifactor_config::{Definitions, graph_root};
 use serde_json::{Value, json};
 
-/// The schema of a [`RunDocument`](crate::settings::run_document::RunDocument), with everything registered that it can name; its
-/// definitions are put among the others.
+/// Returns the schema of a [`RunDocument`](crate::settings::run_document::RunDocument), with all registered
+/// types that it can name. Its definitions are added to `definitions`.
 pub fn run_root(definitions: &mut Definitions) -> Value {
     let mut root = definitions.of::<Settings>();
     let mut header = definitions.of::<Header>();
@@ -26,13 +26,15 @@ pub fn run_root(definitions: &mut Definitions) -> Value {
     titled(root, "A run", "Where data come from, how a graph is built of them, how it is solved.")
 }
 
-/// The schema of a file of semantic rules, which runs name; its definitions are put among the others.
+/// Returns the schema of a file of semantic rules, which runs can name. Its definitions are added to
+/// `definitions`.
 pub fn rules_root(definitions: &mut Definitions) -> Value {
     let description = "Rules that runs name: semantics = \"this_file.toml\".";
     titled(definitions.of::<RulesDocument>(), "Semantic rules", description)
 }
 
-/// The schema of an [`Experiment`](crate::experiment::Experiment); its definitions are put among the others.
+/// Returns the schema of an [`Experiment`](crate::experiment::Experiment). Its definitions are added to
+/// `definitions`.
 pub fn experiment_root(definitions: &mut Definitions) -> Value {
     let root = definitions.of::<ExperimentDocument>();
     titled(root, "An experiment", "A run over a grid of settings and seeds.")
