@@ -1,14 +1,15 @@
 //! Manifactor: nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 //!
-//! # What to import
-//! - [`prelude`]: what most programs and all plugins need, under the names of this page.
-//! - [`geometry`], [`quadric`], [`semantic`]: variables and factors. [`expression`] makes factors of formulas.
-//! - [`config`]: graphs as documents. [`solve`] and [`graph`]: all of the core, for solvers and tools.
-//! - `formats`, `slam` and `viz`, by the cargo feature of that name or `full`: files, runs and pictures.
+//! # Imports
+//! - [`prelude`]: the names that most programs and all plugins need, as used on this page.
+//! - [`geometry`], [`quadric`], [`semantic`]: variables and factors. [`expression`] creates factors from
+//!   formulas.
+//! - [`config`]: graphs as documents. [`solve`] and [`graph`]: the complete core, for solvers and tools.
+//! - `formats`, `slam` and `viz`, enabled by the cargo feature of that name or `full`: files, runs and pictures.
 //!
-//! Linking a plugin is all that it takes to use its types by name in a document.
+//! A document can use the types of every linked plugin by name, without further setup.
 //!
-//! # A graph, solved
+//! # Solving a graph
 //! ```
 //! use manifactor::prelude::*;
 //! use manifactor::geometry::{Between, Prior, Se2};
@@ -29,8 +30,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # A factor of one's own
-//! The residual is written once, over a scalar that is a number or a dual number; its Jacobian follows.
+//! # Defining a factor
+//! The residual is written once, generic over a scalar that is a number or a dual number. The Jacobian is
+//! derived from it.
 //! ```
 //! use manifactor::prelude::*;
 //! use manifactor::geometry::Point2;
@@ -49,11 +51,12 @@
 //!     }
 //! }
 //! ```
-//! With serde's derives and one line, [`register_factor!`], a document can name it: `docs/authors-guide.md` goes on from here
-//! to its documentation and its laws.
+//! With serde's derives and one line, [`register_factor!`], a document can use it by name.
+//! `docs/authors-guide.md` continues with its documentation and its laws.
 //!
-//! # A loop that changes measurements
-//! A graph is compiled once; measurements, noise and weights of the compiled [`Problem`](solve::Problem) can be changed.
+//! # Changing measurements in a loop
+//! A graph is compiled once. Measurements, noise and weights of the compiled [`Problem`](solve::Problem) can
+//! be changed.
 //! ```
 //! use manifactor::prelude::*;
 //! use manifactor::geometry::{Point1, Prior};
@@ -70,8 +73,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # A graph that grows
-//! A [`Session`](smoother::Session) keeps the estimate up to date while variables and factors come and go.
+//! # Incremental smoothing
+//! A [`Session`](smoother::Session) updates the estimate while variables and factors are added and removed.
 //! ```
 //! use manifactor::geometry::{Between, LieGroup, Se2};
 //! use manifactor::smoother::{Session, Settings};
@@ -97,17 +100,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # Traits in threes
-//! What can be chosen by name has three traits. Authors implement the first; a macro, the second; the core, the third.
+//! # Groups of three traits
+//! Each kind of type that can be selected by name has three traits. Authors implement the first, a macro
+//! implements the second, and the core implements the third.
 //!
-//! | authors implement | by name, in graphs and values | inside, without its type |
+//! | implemented by authors | selected by name, in graphs and values | used internally, without the type |
 //! | --- | --- | --- |
 //! | [`Residual`](graph::Residual) | [`Factor`](graph::Factor), by [`register_factor!`] | [`ErasedResidual`](graph::ErasedResidual) |
 //! | [`Manifold`](graph::Manifold) | [`Variable`](graph::Variable), by [`register_manifold!`] | [`ErasedManifold`](graph::ErasedManifold) |
 //! | [`RobustLoss`](graph::loss::RobustLoss) | [`Loss`](graph::loss::Loss), by [`register_loss!`] | [`ErasedLoss`](graph::loss::ErasedLoss) |
 //!
-//! # Where to go on
-//! The book, `docs/SUMMARY.md`: concepts, the author's guide, graphs from documents, how other libraries say the same.
+//! # Further reading
+//! The book, `docs/SUMMARY.md`: concepts, the author's guide, graphs from documents, and a comparison with
+//! other libraries.
 pub use manifactor_config as config;
 pub use manifactor_graph as graph;
 pub use manifactor_smoother as smoother;
@@ -136,10 +141,10 @@ pub use manifactor_graph::{
     register_quantity,
 };
 
-/// For traits that [`register!`] enters: `use manifactor::typetag;`, then `#[typetag::serialize(name = "…")]` on the `impl`.
+/// For traits registered with [`register!`]: `use manifactor::typetag;`, then `#[typetag::serialize(name = "…")]` on the `impl`.
 pub use manifactor_graph::__private::typetag;
 
-/// The names that most programs and most plugins need.
+/// Names that most programs and plugins need.
 pub mod prelude {
     pub use manifactor_graph::prelude::*;
     pub use manifactor_solve::{
@@ -148,7 +153,7 @@ pub mod prelude {
     };
 }
 
-// a crate that nothing names is not linked, and its registrations are gone
+// The linker drops a crate that no code names, and its registrations are lost.
 #[cfg(feature = "expression")]
 use manifactor_expression as _;
 #[cfg(feature = "formats")]
@@ -164,7 +169,7 @@ use manifactor_slam as _;
 #[cfg(feature = "viz")]
 use manifactor_viz as _;
 
-/// The blocks of Rust in the book are tests.
+/// Runs the Rust code blocks of the book as tests.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../README.md")]

@@ -1,4 +1,5 @@
-//! The workspace as a whole: its layers, its catalogue, numbers at their limits, and the fuzzers' corpus.
+//! Tests of the whole workspace: its layers, its catalogue, numbers at their limits, and the corpus of the
+//! fuzzers.
 #![allow(
     missing_docs,
     clippy::unwrap_used,

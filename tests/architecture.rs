@@ -1,9 +1,9 @@
-//! Which way things depend on one another: the arrows of the design, as `cargo metadata` sees them.
+//! Dependencies between packages: the layers of the design, checked with `cargo metadata`.
 use cargo_metadata::{MetadataCommand, Package};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// From the bottom up: a plugin may build on those before it.
+/// From the bottom up: a plugin may depend on the plugins before it.
 const PLUGINS: [&str; 15] = [
     "geometry",
     "quadric",
@@ -21,7 +21,7 @@ const PLUGINS: [&str; 15] = [
     "viz",
     "expression",
 ];
-/// What a plugin may take from the core.
+/// Packages of the core that a plugin may depend on.
 const FOR_PLUGINS: [&str; 6] = ["document", "graph", "solve", "smoother", "config", "testing"];
 
 fn packages() -> Vec<Package> {
@@ -29,22 +29,22 @@ fn packages() -> Vec<Package> {
     MetadataCommand::new().manifest_path(manifest).no_deps().exec().unwrap().packages
 }
 
-/// `solve` for `manifactor-solve`, `manifactor` for the facade; `None` for what is not ours.
+/// `solve` for `manifactor-solve`, `manifactor` for the facade; `None` for foreign packages.
 fn short(name: &str) -> Option<&str> {
     name.strip_prefix("manifactor-").or((name == "manifactor").then_some(name))
 }
 
-/// By package of the workspace, the packages of the workspace that it depends on, for tests or not.
+/// Dependencies within the workspace by package, including those for tests.
 fn arrows() -> BTreeMap<String, Vec<String>> {
     let ours = |p: &Package| {
         let deps = p.dependencies.iter().filter_map(|d| short(&d.name)).map(str::to_owned);
-        // a package's own tests may ask for another feature of itself
+        // the tests of a package may enable a feature of the package itself
         deps.filter(|d| Some(d.as_str()) != short(&p.name)).collect()
     };
     packages().iter().filter_map(|p| Some((short(&p.name)?.to_owned(), ours(p)))).collect()
 }
 
-/// Fails for the first arrow that is not among those allowed.
+/// Fails at the first dependency that is not allowed.
 fn only(from: &str, allowed: &[&str]) {
     for to in &arrows()[from] {
         assert!(allowed.contains(&to.as_str()), "{from} must not depend on {to}, only on {allowed:?}");
@@ -85,7 +85,7 @@ fn plugins_build_on_core_and_on_the_plugins_below() {
 #[test]
 fn the_command_line_knows_the_facade_alone() {
     only("cli", &["manifactor"]);
-    // an example makes a binary of its own
+    // an example builds a separate binary
     let allowed: Vec<_> = FOR_PLUGINS.iter().chain(&PLUGINS).chain(&["cli"]).copied().collect();
     only("manifactor", &allowed);
 }

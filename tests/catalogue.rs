@@ -1,4 +1,4 @@
-//! What every registered type has to have, checked by walking the catalogue.
+//! Requirements for every registered type, checked over the whole catalogue.
 use manifactor::config::{Definitions, Document, Format, Node, Value};
 use manifactor::geometry::AnyCamera;
 use manifactor::graph::catalogue::{Entry, Kind, all, entries};
@@ -16,7 +16,7 @@ use manifactor_testing::catalogue::{documentation_law, factor_law, loss_law, man
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value as Json;
 
-/// `geometry.between_se3` and the like, for messages.
+/// An identifier for messages, such as `geometry.between_se3`.
 fn id(entry: &Entry) -> String {
     format!("{} `{}` of {}", entry.kind, entry.name, entry.module)
 }
@@ -133,7 +133,7 @@ fn example(entry: &Entry) -> Document {
     Document::parse(id(entry), text, Format::Toml).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// All tables in a document whose `type` is that name.
+/// Returns all tables in a document whose `type` is this name.
 fn tables_of_type<'a>(node: &'a Node, name: &str) -> Vec<&'a Node> {
     match &node.value {
         Value::Table(table) => {
@@ -146,7 +146,7 @@ fn tables_of_type<'a>(node: &'a Node, name: &str) -> Vec<&'a Node> {
     }
 }
 
-/// One arm for each kind: a new kind has to be added here.
+/// Calls a function with the type of a kind. A new kind needs a new arm.
 macro_rules! for_kind {
     ($kind:expr, $call:ident($($argument:expr),*)) => {
         match $kind {
@@ -166,7 +166,7 @@ macro_rules! for_kind {
     };
 }
 
-/// What is read out of a table, written again.
+/// Reads a table, and writes the result again.
 fn again(entry: &Entry, tagged: &Json) -> Result<Json, serde_json::Error> {
     fn of<T: Serialize + DeserializeOwned>(tagged: &Json) -> Result<Json, serde_json::Error> {
         serde_json::to_value(serde_json::from_value::<T>(tagged.clone())?)
@@ -181,7 +181,7 @@ fn round_trip(entry: &Entry, tagged: &Json) {
     assert_eq!(written, twice, "{}", id(entry));
 }
 
-/// A default that stands in a schema is the one that is read where a document says nothing.
+/// Checks that a default in a schema is the value that is read when a document omits the field.
 fn defaults_are_those_read(schema: &Json, root: &Json, read: &Json, at: &str) -> usize {
     let named = schema.get("$ref").and_then(Json::as_str).and_then(|r| r.strip_prefix('#'));
     let schema = named.and_then(|pointer| root.pointer(pointer)).unwrap_or(schema);
@@ -198,7 +198,7 @@ fn defaults_are_those_read(schema: &Json, root: &Json, read: &Json, at: &str) ->
     compared
 }
 
-/// Equal, where nothing, an empty list and an empty table are not written.
+/// Compares values; null, an empty list and an empty table count as absent.
 fn same(a: &Json, b: &Json) -> bool {
     let is_nothing = |x: &Json| {
         matches!(x, Json::Null | Json::Bool(false))
@@ -246,7 +246,7 @@ fn the_defaults_of_every_schema_are_those_that_are_read() {
                 .as_object_mut()
                 .unwrap()
                 .retain(|name, _| name == "type" || required.contains(&name.as_str()));
-            // some need one of two fields, which no list of required ones says
+            // some types need one of two fields, which a list of required fields cannot express
             if let Ok(read) = again(entry, &least) {
                 compared += defaults_are_those_read(&schema, &schema, &read, &id(entry));
             }

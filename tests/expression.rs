@@ -1,4 +1,4 @@
-//! Formulas beside the built-in factors that say the same, and in the examples.
+//! Formulas compared with the equivalent built-in factors, and in the examples.
 use manifactor::config::{Document, Format, graph_schema, read_graph, to_toml, write_graph};
 use manifactor::geometry::{Point1, Se3};
 use manifactor::prelude::*;
@@ -86,7 +86,7 @@ fn documents_round_trip_to_the_letter() {
         let (again, values) = read_graph(&Document::parse("again", text.clone(), format).unwrap()).unwrap();
         assert_eq!(write_graph(&again, &values, format).unwrap(), text);
     }
-    // a constant that is a pose, and an up of one's own
+    // a pose as a constant, and a custom up direction
     let text = r#"{"type":"expression","variables":{"x":"se3"},"residual":["log(inverse(goal) * x)","dot(up, position(x))"],"constants":{"goal":{"type":"se3","translation":[0.1,0.2,0.3],"rotation":[0.0,0.6,0.0,0.8]}},"up":[0.0,0.6,0.8],"domain":["z(position(x)) + 1"]}"#;
     let factor: Box<dyn Factor> = serde_json::from_str(text).unwrap();
     assert_eq!(serde_json::to_string(&factor).unwrap(), text);

@@ -1,11 +1,12 @@
-//! Scales, offsets and weights at the ends of what a robot meets: a solve gives the scaled answer, or says why not.
+//! Scales, offsets and weights at the limits of robotics: a solve returns the scaled answer, or the reason
+//! for its failure.
 use manifactor::geometry::{Between, Prior, Se2, Se3};
 use manifactor::prelude::*;
 use manifactor::solve::Auto;
 use proptest::prelude::*;
 
-/// Poses around a ring, and edges between neighbours and across, consistent but for a bias; lengths in units of `unit` metres, from
-/// `offset` on.
+/// Poses on a ring, with edges between neighbours and across, consistent except for a bias. Lengths are in
+/// units of `unit` metres, and the ring is moved by `offset`.
 fn ring(count: usize, unit: f64, offset: f64, sigma: impl Fn(usize) -> f64) -> (Graph, Values) {
     let pose = |i: usize| {
         let angle = std::f64::consts::TAU * i as f64 / count as f64;
@@ -32,7 +33,7 @@ fn ring(count: usize, unit: f64, offset: f64, sigma: impl Fn(usize) -> f64) -> (
     (graph, values)
 }
 
-/// Standard deviations of a rotation and, in units, of a translation.
+/// Noise of a rotation and, in units, of a translation.
 fn noise(sigma: f64, unit: f64) -> Noise {
     Noise::sigmas(&[sigma, sigma, sigma, sigma * unit, sigma * unit, sigma * unit]).unwrap()
 }
@@ -89,7 +90,7 @@ proptest! {
         let solution = solved(&graph, &values);
         match solution.outcome.termination {
             Termination::Converged { .. } => prop_assert!(solution.outcome.final_cost < solution.outcome.initial_cost),
-            // it says why, and has lost nothing
+            // the outcome has the reason, and the cost has not increased
             other => prop_assert!(solution.outcome.final_cost <= solution.outcome.initial_cost, "{other:?}"),
         }
     }

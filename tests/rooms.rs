@@ -1,10 +1,11 @@
-//! Which way the folders of a crate depend on one another: the rooms of a house, in floors.
+//! Dependencies between the folders of a crate: the rooms of a house, in floors.
 //!
-//! A room is a module at the root of a crate, with all that lies in its folder. Rooms that need each other are one room.
+//! A room is a module at the root of a crate, with its folder. Rooms that depend on each other are one
+//! room.
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Files of source that a folder may have: what a reader takes in at a glance.
+/// Largest number of source files in a folder, small enough for an overview.
 const FILES: usize = 14;
 
 fn root() -> &'static Path {
@@ -42,7 +43,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The first names behind `crate::` in what a file imports or names, without its comments and its tests.
+/// Returns the first names after `crate::` in the imports and paths of a file, without comments and tests.
 fn named(source: &str) -> BTreeSet<String> {
     let code: String = source
         .split("#[cfg(test)]\nmod")
@@ -74,7 +75,7 @@ fn named(source: &str) -> BTreeSet<String> {
     names
 }
 
-/// By name that a crate shows at its root: the room that it comes from.
+/// Returns the room of each name that a crate exports at its root.
 fn shown(lib: &str) -> BTreeMap<String, String> {
     let uses = lib.split(';').filter_map(|part| part.rsplit_once("pub use ")).map(|(_, path)| path);
     let mut shown = BTreeMap::new();
@@ -86,7 +87,7 @@ fn shown(lib: &str) -> BTreeMap<String, String> {
     shown
 }
 
-/// By room: those that it needs.
+/// Returns the rooms that each room needs.
 fn needs(of_crate: &Path) -> BTreeMap<String, BTreeSet<String>> {
     let lib = std::fs::read_to_string(of_crate.join("lib.rs")).unwrap();
     let shown = shown(&lib);
@@ -117,7 +118,8 @@ fn needs(of_crate: &Path) -> BTreeMap<String, BTreeSet<String>> {
     needs
 }
 
-/// The rooms of a crate, floor by floor from the ground; and those that need each other, or need such, with what they need.
+/// Returns the rooms of a crate by floor, from the ground up. The remaining rooms depend on each other, or
+/// on such rooms; they are returned with their needs.
 fn floors(of_crate: &Path) -> (Vec<BTreeSet<String>>, BTreeMap<String, BTreeSet<String>>) {
     let (mut left, mut floors) = (needs(of_crate), vec![]);
     loop {

@@ -1,4 +1,5 @@
-//! Ten thousand solves in one process leave no more behind than a hundred; the steps of a large one take no more and no more.
+//! Ten thousand solves in one process leave no more memory allocated than a hundred, and the steps of a
+//! large solve need no increasing memory.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stderr)]
 use manifactor::geometry::{Between, Prior, Se2};
 use manifactor::prelude::*;
@@ -27,13 +28,13 @@ fn solve_one(seed: usize) -> f64 {
     solution.outcome.final_cost
 }
 
-/// Bytes that are allocated now and were not at the beginning of a region.
+/// Returns the bytes allocated since the beginning of a region and not freed.
 fn held(region: &Region<'_, System>) -> i64 {
     let change = region.change();
     change.bytes_allocated as i64 - change.bytes_deallocated as i64
 }
 
-/// Poses on a square, with an edge to each neighbour, each measured with an error of its own.
+/// Poses on a square grid with an edge to each neighbour. Each measurement has a different error.
 fn square(side: usize) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let (key, at) = (|x, y| Key::indexed("x", x + y * side), |x: usize, y: usize| (x as f64, y as f64));
@@ -64,7 +65,7 @@ fn memory_is_flat() {
     steps_take_no_more_than_the_second();
 }
 
-/// `MANIFACTOR_SOAK=320` makes it 102,400 poses.
+/// `MANIFACTOR_SOAK=320` solves 102,400 poses.
 fn steps_take_no_more_than_the_second() {
     let side = std::env::var("MANIFACTOR_SOAK").map_or(40, |side| side.parse().unwrap());
     let region = Region::new(ALLOCATOR);
@@ -83,7 +84,7 @@ fn steps_take_no_more_than_the_second() {
         steps
     };
     let steps = solve_it();
-    // threads get their room once the first pass is known to be long
+    // threads allocate memory after the first pass, once it is known to be long
     let (second, last) = (steps[1], steps[steps.len() - 1]);
     eprintln!(
         "{} poses, {} steps: {second} bytes at the second, {last} at the last",
@@ -91,7 +92,7 @@ fn steps_take_no_more_than_the_second() {
         steps.len()
     );
     assert!(steps.len() >= 3 && last - second < 10_000, "{steps:?}");
-    // what large products keep for each thread is there by now
+    // by now, the per-thread memory of large products is allocated
     let before = held(&region);
     solve_it();
     let left = held(&region) - before;
@@ -105,7 +106,7 @@ fn small_solves_leave_nothing() {
         assert!(cost < 1e-6, "{cost}");
         held(&region)
     };
-    // what is made once and kept: registries, threads
+    // permanent allocations: registries, threads
     left_by(100);
     let left = left_by(10_000);
     assert!(left.abs() < 100_000, "{left} bytes are left");

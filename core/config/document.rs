@@ -1,4 +1,4 @@
-//! A document that was read from a file or a text.
+//! Documents from files and texts.
 use crate::format::{Format, MAX_BYTES};
 use crate::overrides::apply;
 use manifactor_document::Fault;
@@ -10,7 +10,7 @@ use manifactor_document::{Diagnostic, Diagnostics, Errors};
 use std::io::Read;
 use std::path::Path;
 
-/// A document: what its text says, with the place of everything.
+/// A parsed document with the position of each value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Document {
     source: SourceText,
@@ -18,10 +18,11 @@ pub struct Document {
 }
 
 impl Document {
-    /// Reads a file; its extension tells the format.
+    /// Reads a file. Its extension selects the format.
     ///
     /// # Errors
-    /// An unknown extension, a file that cannot be read, and everything that is wrong with the syntax.
+    /// If the extension is unknown, the file cannot be read, or its syntax is wrong. All syntax errors are
+    /// returned.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Diagnostics> {
         let path = path.as_ref();
         let name = path.display().to_string();
@@ -31,7 +32,7 @@ impl Document {
         let unreadable = |error: std::io::Error| fail(Fault::Unreadable(error.to_string()));
         let mut bytes = Vec::new();
         let file = std::fs::File::open(path).map_err(unreadable)?;
-        // one byte more than allowed, so that too long a file is told from the longest one
+        // one byte more than allowed, to detect files that are too long
         file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
         tracing::debug!(file = name, bytes = bytes.len(), "read");
         let text = String::from_utf8(bytes).map_err(|error| {
@@ -43,37 +44,37 @@ impl Document {
         Document::parse(name, text, format)
     }
 
-    /// Reads a text; `name` is what its places are called.
+    /// Reads a text. `name` is shown in its positions.
     ///
     /// # Errors
-    /// Everything that is wrong with the syntax.
+    /// All syntax errors.
     pub fn parse(
         name: impl Into<String>,
         text: impl Into<String>,
         format: Format,
     ) -> Result<Self, Diagnostics> {
         let text = text.into();
-        // editors on Windows put a byte order mark first
+        // editors on Windows write a byte order mark first
         let source = SourceText::new(name, text.strip_prefix('\u{feff}').unwrap_or(&text));
         let root = format.parse(&source)?;
         Ok(Document { source, root })
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn source(&self) -> &SourceText {
         &self.source
     }
 
-    /// What it says.
+    /// Returns the root of the document.
     pub fn root(&self) -> &Node {
         &self.root
     }
 
-    /// Applies overrides in order: `solver.max_iterations=50`, `factors[2].noise.sigma=0.1`. A value is read as TOML,
-    /// and where it is none, taken as text. Tables that are missing are made.
+    /// Applies overrides in order, such as `solver.max_iterations=50` and `factors[2].noise.sigma=0.1`. A
+    /// value is parsed as TOML, or taken as a string if it is not valid TOML. Missing tables are created.
     ///
     /// # Errors
-    /// Overrides that cannot be read or have no place in the document, all of them.
+    /// All overrides that cannot be parsed or do not fit the document.
     pub fn set<S: AsRef<str>>(&mut self, overrides: &[S]) -> Result<(), Diagnostics> {
         let errors = Errors::new();
         for text in overrides {
@@ -82,12 +83,12 @@ impl Document {
         errors.finish(Some(()))
     }
 
-    /// Puts another document over this one, as [`merge`] does.
+    /// Merges a document into this one, as [`merge`] does.
     pub fn merge(&mut self, patch: Document) {
         merge(&mut self.root, patch.root);
     }
 
-    /// The document as a table to be read; an error if it is none.
+    /// Starts to read the document as a table. Any other value is an error.
     ///
     /// ```
     /// use manifactor_config::{Document, Errors, Format};

@@ -1,4 +1,4 @@
-//! The formats that a document may have, told by the file's extension.
+//! The formats of documents, selected by file extension.
 mod json;
 pub(crate) mod toml;
 mod yaml;
@@ -10,13 +10,13 @@ use manifactor_document::{Place, SourceText};
 use std::fmt;
 use std::path::Path;
 
-/// The most bytes that a document may have.
+/// Largest size of a document. Unit: bytes.
 pub const MAX_BYTES: u64 = 256 * 1024 * 1024;
 
-/// How a document is written.
+/// A format of documents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Format {
-    /// TOML 1.1, the first choice for what people write.
+    /// TOML 1.1, preferred for documents written by hand.
     Toml,
     /// Strict JSON: no comments, no trailing commas.
     Json,
@@ -25,10 +25,10 @@ pub enum Format {
 }
 
 impl Format {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Format; 3] = [Format::Toml, Format::Json, Format::Yaml];
 
-    /// By extension: `toml`, `json`, `yaml` or `yml`, in any case.
+    /// Selects the format by extension: `toml`, `json`, `yaml` or `yml`, in any case.
     pub fn of_path(path: impl AsRef<Path>) -> Option<Self> {
         let extension = path.as_ref().extension()?.to_str()?.to_ascii_lowercase();
         match extension.as_str() {
@@ -39,7 +39,7 @@ impl Format {
         }
     }
 
-    /// `TOML`, `JSON`, `YAML`.
+    /// Returns `TOML`, `JSON` or `YAML`.
     pub fn name(self) -> &'static str {
         match self {
             Format::Toml => "TOML",
@@ -48,7 +48,7 @@ impl Format {
         }
     }
 
-    /// The text as a tree; errors if it is not of this format.
+    /// Parses a text. Returns errors if it is not valid in this format.
     pub fn parse(self, source: &SourceText) -> Result<Node, Diagnostics> {
         let bytes = source.text().len() as u64;
         if bytes > MAX_BYTES {
@@ -69,7 +69,7 @@ impl fmt::Display for Format {
     }
 }
 
-/// Reports a node nested deeper than [`MAX_DEPTH`].
+/// Creates the error for a node nested deeper than [`MAX_DEPTH`].
 pub(crate) fn too_deep(place: Place) -> Diagnostic {
     Diagnostic::new(place, Fault::TooDeep { limit: MAX_DEPTH })
 }

@@ -1,4 +1,4 @@
-//! The literal graph: every variable and every factor by key, in TOML, JSON or YAML.
+//! Graph documents: all variables and factors by key, in TOML, JSON or YAML.
 mod check;
 mod read;
 mod write;

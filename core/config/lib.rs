@@ -1,10 +1,11 @@
-//! Documents in TOML, JSON and YAML, and errors that point at the line.
+//! Documents in TOML, JSON and YAML, with errors that name the line.
 //!
-//! A [`Document`] is a tree of [`Node`]s that know their [`Place`]s, the same for all formats. A [`Section`] reads a
-//! table of it field by field, serde types and registered trait objects alike, and collects in [`Errors`] everything
-//! that is wrong; [`Diagnostics`] is that list, each entry with its place and what to do about it.
-//! [`read_graph`] and [`write_graph`] are the two ways of a literal graph, [`graph_schema`] describes it to editors.
-// strangers' input comes in here: no place of it is taken for granted
+//! A [`Document`] is a tree of [`Node`]s with [`Place`]s, independent of the format. A [`Section`] reads a
+//! table field by field, both serde types and registered trait objects, and collects all errors in
+//! [`Errors`]. [`Diagnostics`] is the list of these errors, each with its position and a remedy.
+//! [`read_graph`] and [`write_graph`] read and write graph documents, and [`graph_schema`] describes these to
+//! editors.
+// documents are untrusted input, so indexing that can panic is not allowed
 #![warn(clippy::indexing_slicing)]
 mod document;
 mod format;

@@ -1,4 +1,4 @@
-//! Single values set from outside, as `--set solver.max_iterations=50` does.
+//! Overrides of single values, such as `--set solver.max_iterations=50`.
 use crate::format::toml::parse_value;
 use crate::format::too_deep;
 use manifactor_document::Errors;
@@ -7,14 +7,14 @@ use manifactor_document::{Field, MAX_DEPTH, Node, Table, Value};
 use manifactor_document::{Place, SourceText};
 use std::ops::Range;
 
-/// One step into a document.
+/// One step of a path.
 #[derive(Debug, Clone, PartialEq)]
 enum Step {
     Key(String, Range<usize>),
     Index(usize, Range<usize>),
 }
 
-/// Applies `path=value` to a document; what is wrong with it is reported at the override.
+/// Applies `path=value` to a document. Errors are reported at the override.
 pub(crate) fn apply(root: &mut Node, text: &str, errors: &Errors) {
     let source = SourceText::argument("--set", text);
     match split(text) {
@@ -32,7 +32,7 @@ pub(crate) fn apply(root: &mut Node, text: &str, errors: &Errors) {
     }
 }
 
-/// The value as TOML, or as the text that it is.
+/// Parses the value as TOML, or returns it as a string.
 fn read(source: &SourceText, span: Range<usize>, errors: &Errors) -> Option<Node> {
     let text = source.text().get(span.clone()).unwrap_or_default();
     match parse_value(source, span.clone()) {
@@ -45,7 +45,7 @@ fn read(source: &SourceText, span: Range<usize>, errors: &Errors) -> Option<Node
     }
 }
 
-/// The steps of `a.b[2]."c d" = value`, and where the value is.
+/// Splits `a.b[2]."c d" = value` into its steps and the range of the value.
 fn split(text: &str) -> Result<(Vec<Step>, Range<usize>), (usize, String)> {
     let mut steps = Vec::new();
     let mut at = 0;
@@ -91,7 +91,7 @@ fn split(text: &str) -> Result<(Vec<Step>, Range<usize>), (usize, String)> {
     }
 }
 
-/// Walks to the last step and puts the value there.
+/// Walks to the last step and sets the value there.
 fn put(root: &mut Node, steps: &[Step], value: Node, source: &SourceText) -> Result<(), (Place, Fault)> {
     let mut node = root;
     let mut done = 0;

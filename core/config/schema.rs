@@ -1,7 +1,8 @@
-//! One JSON Schema for a whole document, for editors to complete and check by.
+//! One JSON Schema for a whole document, for completion and checks in editors.
 //!
-//! Each registered type's schema is that of its fields. Its tag `type` is put in among them: a schema that denies other
-//! properties would deny the tag if it stood beside (`allOf`).
+//! The schema of a registered type describes its fields. The tag `type` is added to these properties. A
+//! separate schema in `allOf` would not work, because a schema that denies additional properties would deny
+//! the tag.
 use crate::graph_document::{FactorDocument, VariableDocument};
 use indexmap::IndexMap;
 use manifactor_graph::catalogue::{Entry, entries};
@@ -10,14 +11,14 @@ use serde_json::{Map, Value, json};
 
 const DRAFT: &str = "https://json-schema.org/draft/2020-12/schema";
 
-/// The schema of [literal graphs](crate::read_graph), with every factor, manifold and loss that is linked.
+/// Returns the schema of [graph documents](crate::read_graph), with all linked factors, manifolds and losses.
 pub fn graph_schema() -> Value {
     let mut definitions = Definitions::new();
     let root = graph_root(&mut definitions);
     definitions.document(root)
 }
 
-/// [`graph_schema`] without its definitions, which are put among the others.
+/// Returns [`graph_schema`] without its definitions, which are added to `definitions`.
 pub fn graph_root(definitions: &mut Definitions) -> Value {
     let (variable, factor) = (definitions.of::<VariableDocument>(), definitions.of::<FactorDocument>());
     let (start, solver) = (definitions.kind("start"), definitions.kind("solver"));
@@ -36,17 +37,17 @@ pub fn graph_root(definitions: &mut Definitions) -> Value {
     })
 }
 
-/// The `$defs` of a schema that is being put together out of many.
+/// The `$defs` of a schema that is composed of several schemas.
 #[derive(Debug, Default)]
 pub struct Definitions(IndexMap<String, Value>);
 
 impl Definitions {
-    /// None.
+    /// Creates an empty set.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A reference to one of the registered types of a kind, told by `type`.
+    /// Returns a reference to the registered types of a kind. The field `type` selects one.
     pub fn kind(&mut self, kind: &str) -> Value {
         if !self.0.contains_key(kind) {
             self.0.insert(kind.to_owned(), Value::Null);
@@ -54,7 +55,7 @@ impl Definitions {
             let names: Vec<&str> = entries.iter().map(|entry| entry.name).collect();
             let each: Vec<Value> = entries.into_iter().map(|entry| self.chosen(entry)).collect();
             let any = match names.is_empty() {
-                // where nothing is linked, nothing fits
+                // without linked types, no value is valid
                 true => json!(false),
                 false => json!({
                     "type": "object",
@@ -68,12 +69,12 @@ impl Definitions {
         reference(kind)
     }
 
-    /// The schema of a serde type.
+    /// Returns the schema of a serde type.
     pub fn of<T: JsonSchema>(&mut self) -> Value {
         self.hoist(schema_for!(T), T::schema_name().as_ref())
     }
 
-    /// The whole schema: the root of the document with these definitions.
+    /// Returns the whole schema: the root of the document with these definitions.
     pub fn document(self, root: Value) -> Value {
         let mut schema = Map::from_iter([("$schema".to_owned(), json!(DRAFT))]);
         if let Value::Object(root) = root {
@@ -83,8 +84,8 @@ impl Definitions {
         Value::Object(schema)
     }
 
-    /// A registered type, where it is the one that `type` names: so a mistake in its fields is told once, and not as one of
-    /// each type that the table is not.
+    /// Returns the schema of a registered type on the condition that `type` names it. An error in its fields
+    /// is then reported once, and not again for each type of the kind.
     fn chosen(&mut self, entry: &Entry) -> Value {
         let name = format!("{}.{}", entry.kind, entry.name);
         let mut schema = self.hoist((entry.schema)(), &name);
@@ -94,7 +95,7 @@ impl Definitions {
         json!({ "if": named, "then": reference(&name) })
     }
 
-    /// Puts in the kinds of registered types that a schema refers to.
+    /// Adds the kinds of registered types that a schema refers to.
     fn kinds_of(&mut self, schema: &Value) {
         match schema {
             Value::Object(object) => {
@@ -110,8 +111,8 @@ impl Definitions {
         }
     }
 
-    /// The schema without its own definitions, which move here; those whose name is taken by another get one with
-    /// `owner` before it.
+    /// Moves the definitions of a schema here and returns the schema without them. If a name is already taken
+    /// by a different definition, it gets `owner` as a prefix.
     fn hoist(&mut self, schema: Schema, owner: &str) -> Value {
         let mut schema = Value::from(schema);
         let Some(object) = schema.as_object_mut() else { return schema };
@@ -144,7 +145,7 @@ fn reference(name: &str) -> Value {
     json!({ "$ref": format!("#/$defs/{name}") })
 }
 
-/// Puts the tag among the properties of an object, and of each of its alternatives.
+/// Adds the tag to the properties of an object and of each of its alternatives.
 fn tag(schema: &mut Value, name: &str, definitions: &IndexMap<String, Value>) {
     if let Some(target) = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix("#/$defs/"))
     {

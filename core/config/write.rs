@@ -1,66 +1,70 @@
-//! Documents written. What is written reads back as the same bits.
+//! Writing of documents. Reading them restores all values bit for bit.
 use crate::format::Format;
 use ::toml::Value;
 use manifactor_graph::Key;
 use serde::Serialize;
 
-/// Why a value could not be written as a document.
+/// Error of writing a document.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// An infinity or NaN, which documents cannot hold.
+    /// A number that is infinite or NaN, which documents cannot contain.
     #[error("`{path}` is {value}: documents hold finite numbers only")]
     NotFinite {
-        /// Where in the value.
+        /// Path within the value.
         path: String,
         /// The number.
         value: f64,
     },
-    /// A graph that holds a variable which has no value.
+    /// A graph with a held variable that has no value.
     #[error("the graph holds `{key}` fixed, but there is no value for it")]
     FixedWithoutValue {
         /// The variable.
         key: Key,
     },
-    /// Something that not all formats can say: null in an array, whole numbers past 64 bits, keys that are not texts.
+    /// A value that is not possible in all formats: null in an array, integers beyond 64 bits, or keys that
+    /// are not strings.
     #[error("cannot be written as {format}: {message}")]
     Inexpressible {
         /// The format.
         format: Format,
-        /// The serializer's words.
+        /// Message of the serializer.
         message: String,
     },
 }
 
-/// A value as TOML.
+/// Writes a value as TOML.
 ///
 /// # Errors
-/// Numbers that are not finite, and what TOML cannot say.
+/// If a number is not finite, or TOML cannot represent the value.
 pub fn to_toml(value: &impl Serialize) -> Result<String, WriteError> {
     Format::Toml.write(value)
 }
 
-/// A value as JSON, indented.
+/// Writes a value as indented JSON.
 ///
 /// # Errors
-/// Numbers that are not finite, and what TOML cannot say, so that all formats hold the same documents.
+/// If a number is not finite, or TOML cannot represent the value. The limits of TOML apply to all formats, so
+/// that every format holds the same documents.
 pub fn to_json(value: &impl Serialize) -> Result<String, WriteError> {
     Format::Json.write(value)
 }
 
-/// A value as YAML.
+/// Writes a value as YAML.
 ///
 /// # Errors
-/// Numbers that are not finite, and what TOML cannot say, so that all formats hold the same documents.
+/// If a number is not finite, or TOML cannot represent the value. The limits of TOML apply to all formats, so
+/// that every format holds the same documents.
 pub fn to_yaml(value: &impl Serialize) -> Result<String, WriteError> {
     Format::Yaml.write(value)
 }
 
 impl Format {
-    /// A value as a document of this format.
+    /// Writes a value in this format.
     ///
     /// # Errors
-    /// Numbers that are not finite, and what TOML cannot say, so that all formats hold the same documents.
+    /// If a number is not finite, or TOML cannot represent the value. The limits of TOML apply to all formats,
+    /// so that every format holds the same documents.
     pub fn write(self, value: &impl Serialize) -> Result<String, WriteError> {
         let value = tree(self, value)?;
         let text = match self {
@@ -72,7 +76,7 @@ impl Format {
     }
 }
 
-/// The value as a tree of finite numbers.
+/// Converts a value to a tree of finite numbers.
 pub(crate) fn tree(format: Format, value: &impl Serialize) -> Result<Value, WriteError> {
     let value = Value::try_from(value)
         .map_err(|error| WriteError::Inexpressible { format, message: error.to_string() })?;

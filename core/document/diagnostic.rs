@@ -1,49 +1,49 @@
-//! Errors with a place, and lists of them.
+//! Errors with a position, and lists of them.
 use crate::fault::Fault;
 use crate::source::{Place, SourceText};
 use std::cell::RefCell;
 use std::fmt;
 
-/// One thing that is wrong, and where. Displays as `file:line:column: what (what to do)`.
+/// One error with its position. Displays as `file:line:column: error (remedy)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnostic {
-    /// Where: at most one line.
+    /// Position of the error, at most one line long.
     pub place: Place,
-    /// What.
+    /// The error.
     pub fault: Fault,
-    /// A second place that belongs to it, and what is there: `first given here`.
+    /// A second position that belongs to the error, with a label such as `first given here`.
     pub related: Option<(Place, String)>,
 }
 
 impl Diagnostic {
-    /// A fault at a place, of which the first line is kept.
+    /// Creates a diagnostic for the first line of a position.
     pub fn new(place: Place, fault: Fault) -> Self {
         Diagnostic { place: place.first_line(), fault, related: None }
     }
 
-    /// The second of two things of one name, of which there may be one only.
+    /// Creates the error for a name that is given twice but must be unique.
     pub fn duplicate(what: &str, name: &str, second: Place, first: Place) -> Self {
         let fault = Fault::Duplicate { what: what.into(), name: name.into() };
         let related = Some((first, "first given here".into()));
         Diagnostic { related, ..Diagnostic::new(second, fault) }
     }
 
-    /// The line, from 1.
+    /// Returns the line, counted from 1.
     pub fn line(&self) -> usize {
         self.place.line()
     }
 
-    /// The column in characters, from 1.
+    /// Returns the column in characters, counted from 1.
     pub fn column(&self) -> usize {
         self.place.column()
     }
 
-    /// What is wrong, without the place.
+    /// Returns the error without its position.
     pub fn message(&self) -> String {
         self.fault.to_string()
     }
 
-    /// What to do about it.
+    /// Returns the remedy, if there is one.
     pub fn help(&self) -> Option<String> {
         self.fault.help()
     }
@@ -65,10 +65,10 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// Diagnostics that are shown; of further ones, the number.
+/// Largest number of diagnostics in a list. Further ones are only counted.
 const TOLD: usize = 200;
 
-/// Everything that is wrong with a document, sorted by place. Never empty.
+/// All errors of a document, sorted by position. Never empty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnostics {
     list: Vec<Diagnostic>,
@@ -76,7 +76,8 @@ pub struct Diagnostics {
 }
 
 impl Diagnostics {
-    /// Sorted by place, each once; none if there are none. After the first 200, the others are only counted.
+    /// Sorts diagnostics by position and removes duplicates. Returns `None` for an empty list. After the
+    /// first 200, further ones are only counted.
     pub fn from_list(mut list: Vec<Diagnostic>) -> Option<Self> {
         list.sort_by(|a, b| a.order().cmp(&b.order()));
         list.dedup();
@@ -85,18 +86,18 @@ impl Diagnostics {
         (!list.is_empty()).then_some(Diagnostics { list, omitted })
     }
 
-    /// In order of place.
+    /// Returns an iterator in the order of positions.
     pub fn iter(&self) -> std::slice::Iter<'_, Diagnostic> {
         self.list.iter()
     }
 
-    /// How many are listed: at least one.
+    /// Returns the number of listed diagnostics, at least one.
     #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// How many more there were than are listed.
+    /// Returns the number of diagnostics beyond the listed ones.
     pub fn omitted(&self) -> usize {
         self.omitted
     }
@@ -138,42 +139,43 @@ impl fmt::Display for Diagnostics {
 
 impl std::error::Error for Diagnostics {}
 
-/// Collects what is wrong while a document is read, so that all of it can be said at once.
+/// A collector of the errors of a document, so that all of them are reported at once.
 #[derive(Debug, Default)]
 pub struct Errors(RefCell<Vec<Diagnostic>>);
 
 impl Errors {
-    /// None yet.
+    /// Creates an empty collector.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds one.
+    /// Adds a diagnostic.
     pub fn push(&self, diagnostic: Diagnostic) {
         self.0.borrow_mut().push(diagnostic);
     }
 
-    /// Adds a problem at a place.
+    /// Adds a fault at a position.
     pub fn report(&self, place: Place, fault: Fault) {
         self.push(Diagnostic::new(place, fault));
     }
 
-    /// Adds all of a list.
+    /// Adds all diagnostics of a list.
     pub fn extend(&self, diagnostics: impl IntoIterator<Item = Diagnostic>) {
         self.0.borrow_mut().extend(diagnostics);
     }
 
-    /// Returns whether nothing is wrong so far.
+    /// Returns whether there is no error so far.
     pub fn is_empty(&self) -> bool {
         self.0.borrow().is_empty()
     }
 
-    /// How many so far.
+    /// Returns the number of errors so far.
     pub fn len(&self) -> usize {
         self.0.borrow().len()
     }
 
-    /// What was read, if nothing was wrong. Every reader that returns `None` has reported why.
+    /// Returns the value if there were no errors. A reader that returns `None` has always reported the
+    /// reason.
     pub fn finish<T>(self, value: Option<T>) -> Result<T, Diagnostics> {
         match (Diagnostics::from_list(self.0.into_inner()), value) {
             (None, Some(value)) => Ok(value),

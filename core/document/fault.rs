@@ -1,48 +1,49 @@
-//! What can be wrong with a document, and what to do about it.
+//! Faults of documents, with remedies.
 use crate::suggest::{advice, list};
 
-/// What is wrong at a place. Its text says what and what was expected; [`help`](Fault::help) says what to do.
+/// A fault at a position. Its text names the fault and the expected value; [`help`](Fault::help) returns the
+/// remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// The text is not of its format.
+    /// The text violates the syntax of its format.
     #[error("not valid {format}: {message}")]
     Syntax {
-        /// The format's name.
+        /// Name of the format.
         format: &'static str,
-        /// The parser's words.
+        /// Message of the parser.
         message: String,
     },
-    /// The file's extension says no format that is known.
+    /// The extension of the file is not of a known format.
     #[error("the extension of this file names no known format")]
     UnknownFormat,
-    /// The file is not there, or could not be read; what it says does not matter.
+    /// The file does not exist or cannot be read.
     #[error("cannot be read: {0}")]
     Unreadable(String),
-    /// The text is longer than any document should be.
+    /// The text is longer than the limit for documents.
     #[error("{bytes} bytes are more than the {limit} that a document may have")]
     TooLarge {
-        /// Its length.
+        /// Length of the text.
         bytes: u64,
-        /// The largest length.
+        /// Largest allowed length.
         limit: u64,
     },
-    /// Tables and arrays within one another, too many.
+    /// Tables and arrays are nested too deeply.
     #[error("nested more than {limit} levels deep")]
     TooDeep {
-        /// The greatest depth.
+        /// Largest allowed depth.
         limit: usize,
     },
-    /// YAML aliases that stand for more values than a document should have.
+    /// YAML aliases expand to too many values.
     #[error("the aliases stand for more than {limit} values")]
     TooManyAliases {
-        /// The greatest number of values.
+        /// Largest allowed number of values.
         limit: usize,
     },
-    /// A name is given twice where each may be given once.
+    /// A name that must be unique is given twice.
     #[error("{what} `{name}` is given twice")]
     Duplicate {
-        /// `key`, `variable`, …
+        /// Kind of the name: `key`, `variable`, …
         what: String,
         /// The name.
         name: String,
@@ -52,66 +53,66 @@ pub enum Fault {
     UnknownField {
         /// The field.
         field: String,
-        /// The fields that are read here.
+        /// The possible fields.
         known: Vec<String>,
     },
-    /// A name that stands for nothing.
+    /// A name that does not exist.
     #[error("unknown {what} `{name}`")]
     UnknownName {
-        /// `factor`, `loss`, `variable`, …
+        /// Kind of the name: `factor`, `loss`, `variable`, …
         what: String,
         /// The name.
         name: String,
-        /// The names that exist.
+        /// The existing names.
         known: Vec<String>,
     },
-    /// A field that has to be there is not.
+    /// A required field is missing.
     #[error("missing field `{field}`")]
     MissingField {
         /// The field.
         field: String,
     },
-    /// A value of another type than the one expected.
+    /// A value of an unexpected type.
     #[error("expected {expected}, found {found}")]
     WrongType {
-        /// What was expected, in words.
+        /// Expected type in words.
         expected: String,
-        /// What stands there, in words.
+        /// Value in the document in words.
         found: String,
     },
-    /// An infinity, or not a number at all.
+    /// A number that is infinite or NaN.
     #[error("`{text}` is not a finite number")]
     NotFinite {
-        /// What is written.
+        /// Text of the number.
         text: String,
     },
-    /// Anything else, in the words of the type that was read or of the caller.
+    /// Any further error, with a message of the type or of the caller.
     #[error("{message}")]
     Invalid {
-        /// What is wrong.
+        /// The error.
         message: String,
-        /// What to do about it.
+        /// The remedy.
         help: Option<String>,
     },
 }
 
 impl Fault {
-    /// A problem in the caller's own words.
+    /// Creates a fault from a message.
     pub fn invalid(message: impl Into<String>) -> Self {
         Fault::Invalid { message: message.into(), help: None }
     }
 
-    /// A problem in the caller's own words, and what to do about it.
+    /// Creates a fault from a message and a remedy.
     pub fn with_help(message: impl Into<String>, help: impl Into<String>) -> Self {
         Fault::Invalid { message: message.into(), help: Some(help.into()) }
     }
 
-    /// A value of another type than the one expected.
+    /// Creates the fault for a value of an unexpected type.
     pub fn wrong_type(expected: impl Into<String>, found: impl Into<String>) -> Self {
         Fault::WrongType { expected: expected.into(), found: found.into() }
     }
 
-    /// What to do about it, where that can be said.
+    /// Returns the remedy, if there is one.
     pub fn help(&self) -> Option<String> {
         match self {
             Fault::UnknownFormat => Some("use .toml, .json, .yaml or .yml".into()),
@@ -126,7 +127,7 @@ impl Fault {
     }
 }
 
-/// `` `a`, `b` and `c` ``, for messages that name several things.
+/// Formats names for messages: `` `a`, `b` and `c` ``.
 pub fn quoted_list(names: &[String]) -> String {
     list(names)
 }

@@ -1,8 +1,9 @@
-//! Types that are read from a whole [`Node`] rather than from serde's data model, wherever serde meets them.
+//! Types that serde reads from a whole [`Node`] instead of its data model.
 //!
-//! A trait object is told by its `type`, and only the node knows the places of its fields. Serde has no way to hand a
-//! node to a type. So the type leaves its function here and asks for a newtype struct of a name that no other type has;
-//! a [`Reader`](crate::Reader) that is asked for it runs the function on its node and leaves the result.
+//! A trait object is chosen by its field `type`, and only the node has the positions of its fields. Serde
+//! cannot pass a node to a type. The type therefore stores its function in a thread-local slot and requests a
+//! newtype struct with a reserved name. A [`Reader`](crate::Reader) that receives this request runs the
+//! function on its node and stores the result in the slot.
 use crate::node::Node;
 use crate::read_error::ReadError;
 use crate::source::Place;
@@ -13,7 +14,7 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::ops::Deref;
 
-/// The name that is asked for.
+/// The reserved name.
 pub(crate) const NODE: &str = "$manifactor::Node";
 
 type Run = fn(&Node) -> Result<Box<dyn Any>, ReadError>;
@@ -28,7 +29,7 @@ thread_local! {
     static SLOT: RefCell<Slot> = const { RefCell::new(Slot::Empty) };
 }
 
-/// Runs the function that was left, if there is one, and leaves its result.
+/// Runs the stored function, if there is one, and stores its result.
 pub(crate) fn run(node: &Node) -> Result<(), ReadError> {
     if let Slot::Run(run) = SLOT.replace(Slot::Empty) {
         let done = run(node)?;
@@ -37,11 +38,11 @@ pub(crate) fn run(node: &Node) -> Result<(), ReadError> {
     Ok(())
 }
 
-/// `impl Deserialize` for a type that is read from a node: `read` returns a boxed `T`. From another deserializer than a
-/// [`Reader`](crate::Reader), the node is made first, and has no places.
+/// Implements `Deserialize` for a type that is read from a node. `read` returns a boxed `T`. With any
+/// deserializer except [`Reader`](crate::Reader), the value is first converted to a node without positions.
 ///
 /// # Errors
-/// Those of `read`; at their places, where the deserializer is a [`Reader`](crate::Reader).
+/// The errors of `read`. With a [`Reader`](crate::Reader) they have positions.
 pub fn deserialize_with<'de, T: 'static, D: Deserializer<'de>>(
     deserializer: D,
     read: Run,
@@ -65,7 +66,7 @@ impl<'de, T: 'static> Visitor<'de> for Handed<T> {
         f.write_str("a table")
     }
 
-    /// A [`Reader`](crate::Reader) has run the function.
+    /// Returns the result, after a [`Reader`](crate::Reader) has run the function.
     fn visit_unit<E: Error>(self) -> Result<T, E> {
         match SLOT.replace(Slot::Empty) {
             Slot::Done(done) => Self::unpack(done),
@@ -73,7 +74,7 @@ impl<'de, T: 'static> Visitor<'de> for Handed<T> {
         }
     }
 
-    /// Any other deserializer.
+    /// Runs the function on a node without positions, for all remaining deserializers.
     fn visit_newtype_struct<D: Deserializer<'de>>(self, deserializer: D) -> Result<T, D::Error> {
         SLOT.set(Slot::Empty);
         let node = Node::without_places(deserializer)?;
@@ -81,12 +82,12 @@ impl<'de, T: 'static> Visitor<'de> for Handed<T> {
     }
 }
 
-/// A value and where it is written, for what can be wrong with it only beside others.
+/// A value with its position, for errors that only show together with other values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placed<T> {
-    /// Where it is written.
+    /// Position of the value.
     pub place: Place,
-    /// What is written.
+    /// The value.
     pub value: T,
 }
 
@@ -106,7 +107,7 @@ impl<'de, T: DeserializeOwned + 'static> Deserialize<'de> for Placed<T> {
     }
 }
 
-/// As it is written, with its places; from any other format, without.
+/// Reads a node from a document with its positions, or from a different format without positions.
 impl<'de> Deserialize<'de> for Node {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserialize_with(deserializer, |node| Ok(Box::new(node.clone())))

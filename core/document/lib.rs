@@ -1,9 +1,9 @@
-//! Documents as trees that know their places, and types read out of them.
+//! Documents as trees with text positions, and readers for types.
 //!
-//! A [`Node`] is a value and its [`Place`] in a [`SourceText`], the same for all formats. [`Node::read`] reads a serde type out
-//! of it; a [`Section`] reads a table field by field. Everything that is wrong is collected in [`Errors`], and each
-//! [`Diagnostic`] has its place and what to do about it.
-// strangers' input comes in here: no place of it is taken for granted
+//! A [`Node`] is a value with its [`Place`] in a [`SourceText`], independent of the format. [`Node::read`]
+//! reads a serde type from it, and a [`Section`] reads a table field by field. All errors are collected in
+//! [`Errors`]; each [`Diagnostic`] has a position and a remedy.
+// documents are untrusted input, so indexing that can panic is not allowed
 #![warn(clippy::indexing_slicing)]
 mod diagnostic;
 mod fault;

@@ -1,8 +1,8 @@
-//! One document over another, as variants of a run are.
+//! Merging of two documents, as for the variants of a run.
 use crate::node::{Node, Table, Value};
 
-/// Puts `patch` over `base`: tables are merged field by field, all other values are replaced. A table whose `type` differs
-/// replaces the other as well, since its fields belong to another type.
+/// Merges `patch` into `base`. Tables are merged field by field; all other values are replaced. A table with
+/// a different `type` is also replaced, because its fields belong to a different type.
 pub fn merge(base: &mut Node, patch: Node) {
     match (&mut base.value, patch.value) {
         (Value::Table(old), Value::Table(new)) if same_type(old, &new) => {

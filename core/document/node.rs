@@ -1,4 +1,4 @@
-//! A document as a tree in which everything knows its place: one type for all formats.
+//! A document as a tree with positions, independent of the format.
 use crate::diagnostic::Diagnostic;
 use crate::source::Place;
 use crate::text_error::TextError;
@@ -8,30 +8,30 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use serde::{Serialize, Serializer};
 use std::fmt;
 
-/// Tables and arrays may be nested this deep.
+/// Largest nesting depth of tables and arrays.
 pub const MAX_DEPTH: usize = 64;
 
-/// A value and its place.
+/// A value and its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
-    /// Where it is written.
+    /// Position of the value.
     pub place: Place,
-    /// What it is.
+    /// The value.
     pub value: Value,
 }
 
-/// What TOML, JSON and YAML can all say.
+/// The values that TOML, JSON and YAML have in common.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
-    /// Nothing; TOML has none.
+    /// Null. TOML does not have it.
     Null,
-    /// True or false.
+    /// A boolean.
     Bool(bool),
-    /// A whole number.
+    /// An integer.
     Integer(i64),
-    /// Any other number; may be infinite or NaN until it is read.
+    /// Any other number. It may be infinite or NaN until it is read.
     Float(f64),
-    /// A text.
+    /// A string.
     String(String),
     /// Values in order.
     Array(Vec<Node>),
@@ -39,31 +39,31 @@ pub enum Value {
     Table(Table),
 }
 
-/// Named values, in the order of the document. Boxed: most nodes of a large document are numbers, and a node is as large as
-/// the largest of its kinds.
+/// Named values, in the order of the document. They are boxed to keep [`Value`] small, because most nodes of
+/// a large document are numbers.
 pub type Table = Box<IndexMap<String, Field, RandomState>>;
 
-/// A named value: the name is the table's key.
+/// A named value. Its name is the key in the table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// Where the name is written.
+    /// Position of the name.
     pub key: Place,
     /// The value.
     pub node: Node,
 }
 
 impl Node {
-    /// A value at a place.
+    /// Creates a node.
     pub fn new(place: Place, value: Value) -> Self {
         Node { place, value }
     }
 
-    /// A table of no fields and no place.
+    /// Returns an empty table without a position.
     pub fn empty_table() -> Self {
         Node::new(Place::nowhere(), Value::Table(Table::default()))
     }
 
-    /// A field of a table.
+    /// Returns a field of a table.
     pub fn field(&self, name: &str) -> Option<&Node> {
         match &self.value {
             Value::Table(table) => table.get(name).map(|field| &field.node),
@@ -71,14 +71,14 @@ impl Node {
         }
     }
 
-    /// Keeps the fields of a table whose names are wanted.
+    /// Keeps the fields of a table whose name is `wanted`.
     pub fn retain(&mut self, mut wanted: impl FnMut(&str) -> bool) {
         if let Value::Table(table) = &mut self.value {
             table.retain(|name, _| wanted(name));
         }
     }
 
-    /// The elements of a field that is an array; none elsewhere.
+    /// Returns the elements of a field that is an array; empty for any other field.
     pub fn items(&self, name: &str) -> &[Node] {
         match self.field(name) {
             Some(Node { value: Value::Array(items), .. }) => items,
@@ -86,7 +86,7 @@ impl Node {
         }
     }
 
-    /// As JSON, in which serde types are read; every number that is not finite is an error.
+    /// Converts the node to JSON for reading serde types. Each number that is infinite or NaN is an error.
     pub fn to_json(&self) -> Result<serde_json::Value, Vec<Diagnostic>> {
         let mut errors = Vec::new();
         let json = self.json(&mut errors);
@@ -113,8 +113,8 @@ impl Node {
         }
     }
 
-    /// The place that an error within one of the texts below this node means; the whole text, where it is written with
-    /// escapes; `None`, where there is no such text.
+    /// Returns the position of an error within a string below this node. For a string with escapes, this is
+    /// the whole string. Returns `None` if no string matches.
     pub(crate) fn place_in_text(&self, error: &TextError) -> Option<Place> {
         match &self.value {
             Value::String(text) if TextError::line(text) == error.text => {
@@ -131,7 +131,7 @@ impl Node {
         }
     }
 
-    /// The place of a name below this node.
+    /// Returns the position of a name below this node.
     pub(crate) fn place_of_name(&self, name: &str) -> Option<Place> {
         match &self.value {
             Value::Table(table) => match table.get(name) {
@@ -143,7 +143,7 @@ impl Node {
         }
     }
 
-    /// In words, for messages: `the number 3`, `a table`.
+    /// Describes the value for messages: `the number 3`, `a table`.
     pub fn in_words(&self) -> String {
         match &self.value {
             Value::Null => "nothing".into(),
@@ -157,8 +157,8 @@ impl Node {
     }
 }
 
-/// As it was read, without places; what is null is left out of tables. `Format::write` of the crate `manifactor-config` writes a
-/// document so after overrides.
+/// Serializes the value without positions, and tables without null values. `Format::write` of the crate
+/// `manifactor-config` writes a document with overrides in this form.
 impl Serialize for Node {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match &self.value {
@@ -176,7 +176,7 @@ impl Serialize for Node {
     }
 }
 
-/// A part of what is read from another format.
+/// A part of a value from a different format.
 struct Part(Node);
 
 impl<'de> Deserialize<'de> for Part {
@@ -186,7 +186,7 @@ impl<'de> Deserialize<'de> for Part {
 }
 
 impl Node {
-    /// From any other format.
+    /// Converts a value of a different format to a node without positions.
     pub(crate) fn without_places<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Anything;
         impl<'de> Visitor<'de> for Anything {
@@ -237,7 +237,7 @@ impl Node {
     }
 }
 
-/// The start of a text, so that messages stay short.
+/// Returns the start of a text, so that messages stay short.
 pub(crate) fn cut(text: &str) -> String {
     match text.char_indices().nth(60) {
         Some((end, _)) => text.get(..end).unwrap_or_default().to_owned() + "…",

@@ -1,4 +1,4 @@
-//! Reads a serde type out of a node, with every error at its exact place.
+//! Reading of a serde type from a node, with an exact position for each error.
 use crate::diagnostic::{Diagnostic, Errors};
 use crate::fault::Fault;
 use crate::node::{Node, Value};
@@ -9,15 +9,15 @@ use crate::suggest::nearest;
 use serde::de::DeserializeOwned;
 
 impl Node {
-    /// Reads a serde type; what is wrong goes to `errors`. Serde stops at the first error, so the field that has it is taken
-    /// out and reading goes on: all errors are found.
+    /// Reads a serde type and adds all errors to `errors`. Serde stops at the first error, so this function
+    /// removes the field with the error and reads again.
     pub fn read<T: DeserializeOwned>(&self, errors: &Errors) -> Option<T> {
         let before = errors.len();
         self.read_what_is_right(&[], errors).filter(|_| errors.len() == before)
     }
 
-    /// The same, and what could be read without the fields that have errors: for checks that do not need those. `others` are
-    /// fields of this table that are read elsewhere.
+    /// Reads a serde type like [`read`](Self::read), but returns a value even if fields with errors had to be
+    /// removed, for checks that do not need them. `others` are fields of this table that are read elsewhere.
     pub fn read_what_is_right<T: DeserializeOwned>(&self, others: &[String], errors: &Errors) -> Option<T> {
         let before = errors.len();
         self.report_not_finite(errors);
@@ -55,15 +55,15 @@ impl Node {
         }
     }
 
-    /// Reads a serde type, up to the first error.
+    /// Reads a serde type and stops at the first error.
     ///
     /// # Errors
-    /// Whatever serde finds, at its place.
+    /// The error of serde, with its position.
     pub fn try_read<T: DeserializeOwned>(&self) -> Result<T, ReadError> {
         T::deserialize(Reader::new(self)).map_err(|error| error.at(self))
     }
 
-    /// Every number that is infinite, or none.
+    /// Reports each number that is infinite or NaN.
     fn report_not_finite(&self, errors: &Errors) {
         match &self.value {
             Value::Float(value) if !value.is_finite() => errors.push(self.not_finite(*value)),
@@ -82,20 +82,20 @@ impl Node {
     }
 }
 
-/// Errors of one type that are looked for: each takes another reading.
+/// Largest number of errors per type. Each one costs a further reading.
 const MOST: usize = 100;
 
-/// What is left of a node once the fields with errors are taken out of it.
+/// The remaining node after fields with errors were removed.
 struct Rest {
     node: Node,
-    /// Tables and arrays from which something was taken, directly or within; and the field by which.
+    /// Tables and arrays that lost a part, directly or below, each with the field that leads to it.
     cut: Vec<(Place, String)>,
-    /// What unknown fields should have been called.
+    /// Probable names of unknown fields.
     meant: Vec<String>,
 }
 
 impl Rest {
-    /// Returns whether an error only says that something is missing which was taken out, or was called otherwise.
+    /// Returns whether an error is only a consequence of a removed field or a misspelled name.
     fn explains(&self, place: &Place, fault: &Fault) -> bool {
         let is_cut =
             |by: &str| self.cut.iter().any(|(at, field)| at == place && (by.is_empty() || by == field));
@@ -106,7 +106,8 @@ impl Rest {
         }
     }
 
-    /// Takes out the field that an error is of; whether there is one. `unread`: its name is there, and nothing reads it.
+    /// Removes the field that has an error. Returns whether it was found. `unread` is true for a field that
+    /// no type reads.
     fn cut(&mut self, place: &Place, fault: &Fault, unread: bool) -> bool {
         let Fault::UnknownField { field, known } = fault else {
             return cut_around(&mut self.node, place, &mut self.cut) == Cut::Done;
@@ -114,13 +115,13 @@ impl Rest {
         self.meant.extend(nearest(field, known.iter().map(String::as_str)).map(str::to_owned));
         match unread {
             true => cut_named(&mut self.node, field, place),
-            // the name of a variant: without it, nothing is left of the value
+            // the field is the name of a variant: without it, no value remains
             false => cut_around(&mut self.node, place, &mut self.cut) == Cut::Done,
         }
     }
 }
 
-/// Takes out the field whose name is written there; whether it was found.
+/// Removes the field whose name is at this position. Returns whether it was found.
 fn cut_named(node: &mut Node, field: &str, key: &Place) -> bool {
     match &mut node.value {
         Value::Array(items) => items.iter_mut().any(|item| cut_named(item, field, key)),
@@ -134,15 +135,15 @@ fn cut_named(node: &mut Node, field: &str, key: &Place) -> bool {
 
 #[derive(PartialEq)]
 enum Cut {
-    /// The place is not of this node.
+    /// The position is not in this node.
     Elsewhere,
-    /// It is this node that has to go.
+    /// This node has to be removed.
     This,
-    /// It is gone.
+    /// The part is removed.
     Done,
 }
 
-/// Takes out the innermost field, or table in an array, that a place is of.
+/// Removes the innermost field that contains a position, or the innermost table in an array.
 fn cut_around(node: &mut Node, place: &Place, cut: &mut Vec<(Place, String)>) -> Cut {
     let (mut through, mut found) = (String::new(), Cut::Elsewhere);
     match &mut node.value {
@@ -196,7 +197,7 @@ mod tests {
         size: f64,
     }
 
-    /// How many errors a list is told to have in which each size is a text.
+    /// Returns the number of errors that are reported for a list with a string for each size.
     fn errors_of(count: usize) -> usize {
         let source = SourceText::new("sizes", "x".repeat(2 * count));
         let item = |at: usize| {
@@ -214,7 +215,8 @@ mod tests {
     #[test]
     fn all_errors_are_told_up_to_a_bound() {
         assert_eq!(errors_of(MOST - 1), MOST - 1);
-        // each takes a reading of all: without a bound, a large file of errors would take hours. One says that there are more
+        // each error costs a reading of everything; without a limit, a large file of errors would take hours.
+        // The last error reports that there are more
         assert_eq!(errors_of(3 * MOST), MOST + 1);
     }
 }

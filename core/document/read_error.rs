@@ -1,4 +1,4 @@
-//! What serde says of a node, as a fault at a place, in words of documents rather than of Rust.
+//! Errors of serde as faults with positions, in terms of documents instead of Rust.
 use crate::fault::Fault;
 use crate::node::{Node, Value};
 use crate::source::Place;
@@ -6,13 +6,13 @@ use crate::text_error::TextError;
 use serde::de::{Error, Expected, Unexpected};
 use std::fmt;
 
-/// Why a type could not be read, and where.
+/// Error of reading a type, with its position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadError(Box<Inner>);
 
 #[derive(Debug, Clone, PartialEq)]
 enum Inner {
-    /// The node is not known yet.
+    /// An error without a position so far.
     Unplaced(What),
     Placed {
         place: Place,
@@ -21,7 +21,7 @@ enum Inner {
     },
 }
 
-/// What serde says before it is known of which node.
+/// An error of serde before its node is known.
 #[derive(Debug, Clone, PartialEq)]
 enum What {
     Type { expected: String, found: String },
@@ -34,12 +34,12 @@ enum What {
 }
 
 impl ReadError {
-    /// A fault at a place.
+    /// Creates an error from a fault and its position.
     pub fn new(place: Place, fault: Fault) -> Self {
         Self(Box::new(Inner::Placed { place, fault, unread: false }))
     }
 
-    /// What is wrong.
+    /// Returns the fault.
     pub fn fault(&self) -> Fault {
         match &*self.0 {
             Inner::Unplaced(what) => what.fault(None),
@@ -47,7 +47,7 @@ impl ReadError {
         }
     }
 
-    /// Where, if that is known.
+    /// Returns the position, if it is known.
     pub fn place(&self) -> Option<&Place> {
         match &*self.0 {
             Inner::Unplaced(_) => None,
@@ -55,12 +55,12 @@ impl ReadError {
         }
     }
 
-    /// Returns whether a field is there that nothing reads: without it, reading may go on.
+    /// Returns whether the error is a field that no type reads. Reading can go on without it.
     pub(crate) fn is_unread_field(&self) -> bool {
         matches!(&*self.0, Inner::Placed { unread: true, .. })
     }
 
-    /// The error of this node, or of a part of it that is known already.
+    /// Adds the position of this node, unless the error already has a position.
     #[must_use]
     pub fn at(self, node: &Node) -> Self {
         let Inner::Unplaced(what) = &*self.0 else { return self };
@@ -97,7 +97,7 @@ impl What {
                 let found = if found == 1 { "1 element".to_owned() } else { format!("{found} elements") };
                 Fault::WrongType { expected: in_words(&expected), found }
             }
-            // { sigma = 1 } names its variant as a field
+            // `{ sigma = 1 }` names its variant as a field
             Self::Variant { name, known } if is_table => Fault::UnknownField { field: name, known },
             Self::Variant { name, known } => Fault::UnknownName { what: "value".into(), name, known },
             Self::Field { name, known } => Fault::UnknownField { field: name, known },
@@ -144,7 +144,7 @@ impl Error for ReadError {
     }
 }
 
-/// A fault within a text of the node that is read.
+/// Converts a fault within a string of the node.
 impl From<TextError> for ReadError {
     fn from(error: TextError) -> Self {
         Self::unplaced(What::Text(error))
@@ -168,7 +168,7 @@ fn owned(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).to_owned()).collect()
 }
 
-/// What serde expected, without Rust's types.
+/// Translates the expectation of serde into terms of documents.
 fn in_words(expected: &str) -> String {
     let words = match expected {
         "f64" | "f32" => "a number",
@@ -197,7 +197,7 @@ fn in_words(expected: &str) -> String {
     }
 }
 
-/// `3` of `an array of length 3`, `a tuple of size 3`, `tuple struct Box with 3 elements`.
+/// Returns `3` for `an array of length 3`, `a tuple of size 3`, `tuple struct Box with 3 elements`.
 fn size(expected: &str) -> Option<&str> {
     expected.split_whitespace().find(|word| word.bytes().all(|b| b.is_ascii_digit()))
 }

@@ -1,4 +1,4 @@
-//! Serde's way into a node.
+//! The serde deserializer of a node.
 use crate::hand_over::{self, NODE};
 use crate::node::{Field, Node, Table, Value};
 use crate::read_error::ReadError;
@@ -9,21 +9,21 @@ use serde::de::{
 };
 use serde::forward_to_deserialize_any;
 
-/// Deserializes a [`Node`]; each error gets the place of the node that it arose at.
+/// A deserializer of a [`Node`]. Each error has the position of its node.
 #[derive(Debug, Clone, Copy)]
 pub struct Reader<'a> {
     node: &'a Node,
-    /// A field of the node that is passed over.
+    /// A field of the node that is skipped.
     tag: Option<&'static str>,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads all of a node.
+    /// Creates a reader of a whole node.
     pub fn new(node: &'a Node) -> Self {
         Self { node, tag: None }
     }
 
-    /// Passes over a field, which has told the type.
+    /// Creates a reader that skips the field `tag`, which has already selected the type.
     pub fn without(node: &'a Node, tag: &'static str) -> Self {
         Self { node, tag: Some(tag) }
     }
@@ -133,7 +133,7 @@ fn visit_table<'de, V: Visitor<'de>>(
 struct Fields<'de> {
     rest: indexmap::map::Iter<'de, String, Field>,
     tag: Option<&'static str>,
-    /// Of the key that was read last.
+    /// The value of the last key.
     value: Option<&'de Node>,
 }
 
@@ -159,12 +159,12 @@ impl<'de> MapAccess<'de> for Fields<'de> {
     }
 }
 
-/// What a type says of a value once it has read it is of the value, too.
+/// Reads a value. An error that the type reports afterwards also has the position of this value.
 fn read_seed<'de, T: DeserializeSeed<'de>>(seed: T, node: &'de Node) -> Result<T::Value, ReadError> {
     seed.deserialize(Reader::new(node)).map_err(|error| error.at(node))
 }
 
-/// `{ name = value }`
+/// An enum variant `{ name = value }`.
 struct Variant<'de> {
     name: &'de str,
     field: &'de Field,

@@ -1,53 +1,54 @@
-//! Texts with a name, and places in them.
+//! Texts with a name, and positions in them.
 use std::fmt;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-/// A text that was read, and where it came from. Cloning shares it.
+/// A text and the name of its origin. Clones share the text.
 #[derive(Clone)]
 pub struct SourceText(Arc<Text>);
 
 struct Text {
     name: String,
     text: String,
-    /// Given on the command line: the name says it all, lines and columns nothing.
+    /// True for a text from the command line, which has no meaningful lines and columns.
     argument: bool,
-    /// Byte offsets at which lines begin; found when the first place is shown.
+    /// Byte offsets of the line starts, computed when the first position is displayed.
     lines: OnceLock<Vec<usize>>,
 }
 
 impl SourceText {
-    /// `name`, the path of a file, is shown before every place.
+    /// Creates a source. `name` is the path of a file and is shown before each position.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         let (name, text) = (name.into(), text.into());
         SourceText(Arc::new(Text { name, text, argument: false, lines: OnceLock::new() }))
     }
 
-    /// The argument of a command line option, as in `--set a=1`. Shown whole in place of a line.
+    /// Creates a source from the argument of a command line option, such as `--set a=1`. Messages show the
+    /// whole argument instead of a line.
     pub fn argument(option: &str, text: impl Into<String>) -> Self {
         let text = text.into();
         let name = format!("{option} {text}");
         SourceText(Arc::new(Text { name, text, argument: true, lines: OnceLock::new() }))
     }
 
-    /// The path of the file, or what else stands for it.
+    /// Returns the path of the file or the name that replaces it.
     pub fn name(&self) -> &str {
         &self.0.name
     }
 
-    /// The whole text.
+    /// Returns the whole text.
     pub fn text(&self) -> &str {
         &self.0.text
     }
 
-    /// A place in this text, cut to its length.
+    /// Returns a position in this text, clipped to its length.
     pub fn place(&self, span: Range<usize>) -> Place {
         let end = span.end.min(self.text().len());
         // a text of 4 GiB is never read: see `MAX_BYTES` of `manifactor_config`
         Place { source: self.clone(), start: span.start.min(end) as u32, end: end as u32 }
     }
 
-    /// Line and column of a byte offset, both from 1; the column counts characters.
+    /// Returns line and column of a byte offset, both counted from 1. The column counts characters.
     pub(crate) fn line_and_column(&self, offset: usize) -> (usize, usize) {
         let text = self.text();
         let lines = self.0.lines.get_or_init(|| {
@@ -72,38 +73,38 @@ impl fmt::Debug for SourceText {
     }
 }
 
-/// Some bytes of a source: what a value was written as.
+/// A range of bytes in a source.
 #[derive(Clone, PartialEq)]
 pub struct Place {
-    /// The text.
+    /// The source.
     pub source: SourceText,
     start: u32,
     end: u32,
 }
 
 impl Place {
-    /// For what was not read from a text.
+    /// Returns the position of a value that does not come from a text.
     pub fn nowhere() -> Self {
         static NOWHERE: OnceLock<SourceText> = OnceLock::new();
         NOWHERE.get_or_init(|| SourceText::new("document", "")).place(0..0)
     }
 
-    /// The bytes.
+    /// Returns the range of bytes.
     pub fn span(&self) -> Range<usize> {
         self.start as usize..self.end as usize
     }
 
-    /// The line, from 1.
+    /// Returns the line, counted from 1.
     pub fn line(&self) -> usize {
         self.source.line_and_column(self.span().start).0
     }
 
-    /// The column in characters, from 1.
+    /// Returns the column in characters, counted from 1.
     pub fn column(&self) -> usize {
         self.source.line_and_column(self.span().start).1
     }
 
-    /// The part on the first line, so that a message about a long table does not show all of it.
+    /// Returns the part on the first line, so that a message does not show a whole table.
     #[must_use]
     pub(crate) fn first_line(mut self) -> Place {
         if let Some(length) = self.text().find(['\n', '\r']) {
@@ -112,7 +113,8 @@ impl Place {
         self
     }
 
-    /// Returns whether all of another place is within this one, or is this one. What was not read from a text is nowhere.
+    /// Returns whether a position is equal to this one or within it. The result is false for positions
+    /// without a text.
     pub fn contains(&self, other: &Place) -> bool {
         self.start <= other.start
             && other.end <= self.end
@@ -120,7 +122,7 @@ impl Place {
             && self.source == other.source
     }
 
-    /// What is written there.
+    /// Returns the text at this position.
     pub fn text(&self) -> &str {
         self.source.text().get(self.span()).unwrap_or_default()
     }

@@ -1,12 +1,12 @@
-//! The nearest of the names that exist, for one that does not.
+//! Suggestions of existing names for an unknown name.
 
-/// How many names a message lists before it stops.
+/// Largest number of names in a message.
 const LISTED: usize = 30;
 
-/// Letters that make a beginning.
+/// Smallest number of letters that count as the beginning of a name.
 const BEGINNING: usize = 3;
 
-/// The known name most like `name`, if one is alike enough to be what was meant, or begins with it.
+/// Returns the known name that is closest to `name`, if it is similar enough or begins with `name`.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted = normal(name);
     let letters = wanted.chars().count();
@@ -19,12 +19,12 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, k)| k)
 }
 
-/// Case and the kind of hyphen are what people most often get wrong.
+/// Normalizes case and hyphens, which cause most mistakes.
 fn normal(name: &str) -> String {
     name.chars().take(64).map(|c| if c == '-' || c == ' ' { '_' } else { c.to_ascii_lowercase() }).collect()
 }
 
-/// ``did you mean `a`? known: `a`, `b` ``
+/// Formats advice such as ``did you mean `a`? there are `a` and `b` ``.
 pub fn advice(name: &str, known: &[String]) -> Option<String> {
     let near = nearest(name, known.iter().map(String::as_str));
     let list = list(known);
@@ -37,7 +37,7 @@ pub fn advice(name: &str, known: &[String]) -> Option<String> {
     }
 }
 
-/// `` `a`, `b` and `c` ``
+/// Formats a list: `` `a`, `b` and `c` ``.
 pub(crate) fn list(names: &[String]) -> String {
     let quoted: Vec<String> = names.iter().take(LISTED).map(|n| format!("`{n}`")).collect();
     match (names.len().saturating_sub(LISTED), quoted.split_last()) {

@@ -1,8 +1,8 @@
-//! What is wrong within a text of a document, such as a formula.
+//! Errors within a string of a document, such as a formula.
 use std::fmt;
 use std::ops::Range;
 
-/// Something wrong at a place within a text. Displays with the text and a caret under the place:
+/// An error at a position within a string. Displays with the string and a caret under the position:
 ///
 /// ```text
 /// unknown function `dto`
@@ -10,24 +10,24 @@ use std::ops::Range;
 ///           ^^^
 /// did you mean `dot`?
 /// ```
-/// A type that is read with [`deserialize_with`](crate::deserialize_with) returns it as a [`ReadError`](crate::ReadError), which has the place
-/// in the document.
+/// A type that is read with [`deserialize_with`](crate::deserialize_with) returns it as a
+/// [`ReadError`](crate::ReadError), which has the position in the document.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TextError {
-    /// The text, on one line.
+    /// The string, on one line.
     pub text: String,
-    /// The bytes of it that are wrong; none, at the end.
+    /// The range of bytes with the error; empty at the end of the string.
     pub span: Range<usize>,
-    /// What is wrong, in a line.
+    /// The error, on one line.
     pub message: String,
-    /// What to do about it, in a line.
+    /// The remedy, on one line.
     pub help: Option<String>,
 }
 
 impl std::error::Error for TextError {}
 
 impl TextError {
-    /// A text without its line breaks, byte for byte at the same places.
+    /// Replaces line breaks and tabs by spaces, so that byte positions do not change.
     pub fn line(text: &str) -> String {
         text.replace(['\n', '\r', '\t'], " ")
     }

@@ -1,4 +1,4 @@
-//! Scalars that are numbers or dual numbers, and blocks whose dimensions are known when they are compiled.
+//! Scalars (numbers or dual numbers) and matrix blocks with compile-time dimensions.
 mod dimension;
 mod direction;
 mod scalar;

@@ -1,4 +1,4 @@
-//! Factors in a graph: any registered residual, with its keys, noise and loss.
+//! Factors of a graph: a registered residual with its keys, noise and loss.
 pub mod batch;
 mod dynamic;
 pub mod invariance;
@@ -30,10 +30,11 @@ pub use dynamic::{Dynamic, DynamicBlocks, DynamicResidual, MAX_ROWS, WrongRows};
 )]
 #[typetag::serialize(tag = "type")]
 pub trait Factor: Debug + Send + Sync {
-    /// The type-erased view of its residual.
+    /// Returns the type-erased view of the residual.
     fn erased(&self) -> &dyn ErasedResidual;
 
-    /// The same with this up, where it takes the world's [`Up`](crate::Up) and its document leaves that open; `None` elsewhere.
+    /// Returns a copy with this up direction. `None` if the factor has no [`Up`](crate::Up), or its
+    /// document sets the direction.
     fn with_up(&self, _up: Direction) -> Option<Box<dyn Factor>> {
         None
     }
@@ -47,28 +48,28 @@ crate::kind!(dyn Factor, "factor");
 pub struct FactorEntry {
     /// The variables that it connects, in the order of the residual's arguments.
     pub keys: Vec<Key>,
-    /// What reports call it. Default: the name of its type.
+    /// Label in reports. Default: the name of its type.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<Arc<str>>,
     /// The residual and its parameters.
     pub factor: Arc<dyn Factor>,
-    /// What its residual is measured in.
+    /// Noise of the residual. Default: unit.
     #[serde(default, skip_serializing_if = "Noise::is_default")]
     pub noise: Noise,
-    /// How much of a large residual counts; all of it, where there is none.
+    /// Robust loss. Default: none, so that the residual counts in full.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub loss: Option<Arc<dyn Loss>>,
 }
 
 impl FactorEntry {
-    /// What reports call it: its name, or else that of its type.
+    /// Returns the label in reports: the factor's name, or else the name of its type.
     pub fn label(&self) -> Cow<'static, str> {
         match &self.name {
             Some(name) => Cow::Owned((**name).to_owned()),
             None => Cow::Borrowed(self.factor.typetag_name()),
         }
     }
-    /// Sets what reports call it.
+    /// Sets the label in reports.
     pub fn name(&mut self, name: &str) -> &mut Self {
         self.name = Some(name.into());
         self
@@ -85,46 +86,46 @@ impl FactorEntry {
     }
 }
 
-/// A residual and its Jacobian blocks, one for each variable, not whitened.
+/// An unwhitened residual and its Jacobian, one block for each variable.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Linearization {
     /// The residual.
     pub residual: Vec<f64>,
-    /// Rows × tangent dimension, by variable.
+    /// One block for each variable: rows × tangent dimension.
     pub jacobians: Vec<DMatrix<f64>>,
 }
 
-/// The object-safe face of [`Residual`], implemented once for all of them.
+/// The object-safe view of [`Residual`], implemented once for all residuals.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a residual, so it cannot be registered as a factor",
     note = "implement `Residual` for `{Self}`: `type Variables`, `type Dim` and `fn residual`"
 )]
 pub trait ErasedResidual: Send + Sync {
-    /// For a downcast to the concrete type.
+    /// Returns the residual for a downcast to the concrete type.
     fn as_any(&self) -> &dyn Any;
-    /// The concrete type.
+    /// Returns the concrete type.
     fn type_id(&self) -> TypeId;
-    /// Rows and variables.
+    /// Returns the number of rows and the types of the variables.
     fn signature(&self) -> Signature;
-    /// An empty batch for factors of this type, with noise and loss of the given kinds.
+    /// Returns an empty batch for factors of this type, with noise and loss of the given kinds.
     fn new_batch(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> Box<dyn Batch>;
-    /// The residual; `None` where number or types of variables do not fit.
+    /// Evaluates the residual; `None` if the number or the types of the variables do not fit.
     fn residual(&self, variables: &[&dyn Variable]) -> Option<Vec<f64>>;
-    /// Returns whether the residual means anything there; `None` where variables do not fit.
+    /// Returns whether the residual is defined at these values; `None` if the variables do not fit.
     fn is_defined(&self, variables: &[&dyn Variable]) -> Option<bool>;
-    /// The residual with its Jacobian, analytic where the author wrote one.
+    /// Evaluates the residual and its Jacobian, which is analytic if the author wrote one.
     fn linearize(&self, variables: &[&dyn Variable]) -> Option<Linearization>;
-    /// The residual with its Jacobian by automatic differentiation.
+    /// Evaluates the residual and its Jacobian by automatic differentiation.
     fn autodiff(&self, variables: &[&dyn Variable]) -> Option<Linearization>;
 }
 
-/// What the catalogue says of a factor.
+/// Returns the signature of a residual for the catalogue.
 pub fn signature<R: Residual>() -> Signature {
     let (variables, many) = R::Variables::types();
     Signature { rows: Some(R::Dim::N), row_names: R::ROWS, variables, many, tangent: &[] }
 }
 
-/// Runs one of the two ways to linearize over blocks that are poisoned first.
+/// Runs `run`, analytic or automatic differentiation, on blocks that are filled with NaN first.
 fn linearization<R: Residual>(
     residual: &R,
     variables: &[&dyn Variable],

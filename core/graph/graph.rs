@@ -1,4 +1,4 @@
-//! The dynamic view of a graph: what people build, edit, read and write.
+//! The dynamic view of a graph, for building, editing, reading and writing.
 mod version;
 
 use crate::factor::{Factor, FactorEntry};
@@ -19,25 +19,25 @@ use std::sync::Arc;
 
 pub use version::Version;
 
-/// Factors between named variables, and which variables are held.
+/// Factors between named variables, and the set of fixed variables.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Graph {
     factors: Vec<FactorEntry>,
     #[serde(skip_serializing_if = "IndexMap::is_empty")]
     fixed: IndexMap<Key, Fixed>,
-    /// Renewed by every method that lets the content be changed.
+    /// Renewed by every method that gives mutable access to the content.
     #[serde(skip)]
     version: Version,
 }
 
-/// How much of a variable is held at its initial value.
+/// The fixed part of a variable, which stays at its initial value.
 #[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
 pub enum Fixed {
     /// All of it (`true`), or nothing.
     Whole(bool),
-    /// These directions of its tangent space, by name.
+    /// These directions of the tangent space, by name.
     Directions(Vec<String>),
 }
 
@@ -67,7 +67,7 @@ impl Default for Fixed {
 }
 
 impl Fixed {
-    /// A bit for each direction of a tangent space that is held.
+    /// Returns one bit for each tangent direction, set if the direction is fixed.
     pub fn bits(&self, tangent: &[&str]) -> u32 {
         let bit = |name: &str| tangent.iter().position(|t| *t == name).map_or(0, |i| 1 << i);
         match self {
@@ -77,7 +77,7 @@ impl Fixed {
         }
     }
 
-    /// Finds directions that a tangent space does not have.
+    /// Reports directions that the tangent space does not have.
     pub fn check(&self, key: &Key, tangent: &'static [&'static str], errors: &mut Vec<GraphError>) {
         if let Self::Directions(directions) = self {
             let unknown = directions.iter().filter(|d| !tangent.contains(&d.as_str()));
@@ -90,7 +90,7 @@ impl Fixed {
     }
 }
 
-/// What is wrong between a graph and its values. `factor` counts from 0 in the order of the graph.
+/// An error between a graph and its values. `factor` is the index in the graph, from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GraphError {
@@ -99,9 +99,9 @@ pub enum GraphError {
     MissingVariable {
         /// The factor.
         factor: usize,
-        /// Its type's name.
+        /// Name of its type.
         name: &'static str,
-        /// Which of its keys, from 0.
+        /// Index among the factor's keys, from 0.
         position: usize,
         /// The key.
         key: Key,
@@ -111,52 +111,52 @@ pub enum GraphError {
     WrongArity {
         /// The factor.
         factor: usize,
-        /// Its type's name.
+        /// Name of its type.
         name: &'static str,
-        /// Number of its residual's variables.
+        /// Number of variables of its residual.
         expected: usize,
         /// Number of its keys.
         found: usize,
     },
-    /// A factor on a variable of another type.
+    /// A factor on a variable of the wrong type.
     #[error("factor {factor} ({name}): variable `{key}` is of type {found}, expected {expected}")]
     WrongType {
         /// The factor.
         factor: usize,
-        /// Its type's name.
+        /// Name of its type.
         name: &'static str,
-        /// Which of its keys, from 0.
+        /// Index among the factor's keys, from 0.
         position: usize,
         /// The key.
         key: Key,
-        /// The type that the residual takes there.
+        /// The type that the residual requires.
         expected: &'static str,
-        /// The type that the variable has.
+        /// The type of the variable.
         found: &'static str,
     },
-    /// A factor on the same variable twice.
+    /// A factor that names a variable twice.
     #[error("factor {factor} ({name}) names the variable `{key}` twice")]
     RepeatedVariable {
         /// The factor.
         factor: usize,
-        /// Its type's name.
+        /// Name of its type.
         name: &'static str,
-        /// Which of its keys, from 0.
+        /// Index among the factor's keys, from 0.
         position: usize,
         /// The key.
         key: Key,
     },
-    /// A noise that does not fit.
+    /// A noise that does not fit the residual.
     #[error("factor {factor} ({name}): {source}")]
     Noise {
         /// The factor.
         factor: usize,
-        /// Its type's name.
+        /// Name of its type.
         name: &'static str,
-        /// What is wrong with it.
+        /// The error of the noise.
         source: NoiseError,
     },
-    /// A variable that is held, and is not there.
+    /// A fixed variable that does not exist.
     #[error("`{key}` is to be held fixed, but there is no such variable")]
     MissingFixed {
         /// The key.
@@ -167,9 +167,9 @@ pub enum GraphError {
     UnknownDirection {
         /// The key.
         key: Key,
-        /// What was asked for.
+        /// The requested direction.
         direction: String,
-        /// What there is.
+        /// The directions of the variable.
         tangent: &'static [&'static str],
     },
     /// A value with a coordinate that is not finite.
@@ -181,7 +181,7 @@ pub enum GraphError {
 }
 
 impl GraphError {
-    /// The first of a list, a line each, and how many more there are.
+    /// Formats the first errors, one per line, and the number of the remaining ones.
     pub fn list(errors: &[Self]) -> String {
         const SHOWN: usize = 20;
         let mut text: String = errors.iter().take(SHOWN).map(|e| format!("\n  {e}")).collect();
@@ -193,7 +193,7 @@ impl GraphError {
 }
 
 impl Graph {
-    /// No factors.
+    /// Makes an empty graph.
     pub fn new() -> Self {
         Self::default()
     }
@@ -220,26 +220,26 @@ impl Graph {
         let last = self.factors.len() - 1;
         &mut self.factors[last]
     }
-    /// The factors, in order.
+    /// Returns the factors, in order.
     pub fn factors(&self) -> &[FactorEntry] {
         &self.factors
     }
-    /// The factors, to be changed.
+    /// Returns the factors for modification.
     pub fn factors_mut(&mut self) -> &mut Vec<FactorEntry> {
         self.version = Version::default();
         &mut self.factors
     }
-    /// Holds a variable at its initial value.
+    /// Fixes a variable at its initial value.
     pub fn fix(&mut self, key: impl Into<Key>) {
         self.set_fixed(key, Fixed::Whole(true));
     }
-    /// Holds some directions of a variable's tangent space, by name. The directions are those at the
-    /// variable's own estimate.
+    /// Fixes some directions of a variable's tangent space, by name. The directions are those at the
+    /// current estimate of the variable.
     pub fn fix_directions(&mut self, key: impl Into<Key>, directions: &[&str]) {
         let directions = directions.iter().map(|d| (*d).to_owned()).collect();
         self.set_fixed(key, Fixed::Directions(directions));
     }
-    /// Sets how much of a variable is held.
+    /// Sets the fixed part of a variable.
     pub fn set_fixed(&mut self, key: impl Into<Key>, fixed: Fixed) {
         self.version = Version::default();
         match fixed {
@@ -247,24 +247,24 @@ impl Graph {
             fixed => self.fixed.insert(key.into(), fixed),
         };
     }
-    /// The variables that are held, wholly or in part.
+    /// Returns the variables that are fixed, completely or in part.
     pub fn fixed(&self) -> &IndexMap<Key, Fixed> {
         &self.fixed
     }
-    /// Tells whether the graph has been changed: see [`Version`].
+    /// Returns the version, which changes with the graph: see [`Version`].
     pub fn version(&self) -> Version {
         self.version
     }
 
-    /// Everything that is wrong between this graph and `values`; empty, where it can be compiled.
+    /// Returns all errors between this graph and `values`; empty if the graph can be compiled.
     pub fn check(&self, values: &Values) -> Vec<GraphError> {
         self.resolve(values).err().unwrap_or_default()
     }
 
-    /// Looks up every factor's variables, and checks that all of them fit.
+    /// Looks up the variables of every factor, and checks that all of them fit.
     ///
     /// # Errors
-    /// Everything that is wrong between this graph and `values`.
+    /// All errors between this graph and `values`.
     pub fn resolve(&self, values: &Values) -> Result<Vec<Resolved>, Vec<GraphError>> {
         let mut errors = vec![];
         let mut resolved = Vec::with_capacity(self.factors.len());
@@ -285,21 +285,21 @@ impl Graph {
     }
 }
 
-/// Places of a factor's variables among the values. Up to four, nothing is allocated.
+/// Indices of a factor's variables among the values. Up to four need no allocation.
 pub type VariableIndices = SmallVec<[u32; 4]>;
 
-/// What a factor needs, looked up.
+/// A factor's variables and noise, looked up and checked.
 #[derive(Debug, Clone)]
 pub struct Resolved {
-    /// Places of its variables among the values.
+    /// Indices of its variables among the values.
     pub variables: VariableIndices,
     /// Its noise.
     pub whitener: Whitener,
 }
 
 impl FactorEntry {
-    /// Returns the squared norm of the whitened residual at the values that `point` gives, without the loss. `None` if a variable is
-    /// missing or has a wrong type, or if the factor is not defined there.
+    /// Returns the squared norm of the whitened residual at the values from `point`, without the loss.
+    /// `None` if a variable is missing or has the wrong type, or if the factor is undefined there.
     pub fn squared(&self, point: impl Fn(&Key) -> Option<Box<dyn Variable>>) -> Option<f64> {
         let points: Vec<Box<dyn Variable>> = self.keys.iter().map(point).collect::<Option<_>>()?;
         let points: Vec<&dyn Variable> = points.iter().map(|point| &**point).collect();
@@ -310,8 +310,9 @@ impl FactorEntry {
         Some((whitener * DVector::from_vec(r)).norm_squared())
     }
 
-    /// Looks up the variables, and checks that they fit: `find` gives the place and the type of a key. `factor` is the
-    /// place in the graph that errors name. `None` where something is wrong, which is added to `errors`.
+    /// Looks up the variables, and checks that they fit. `find` returns the index and the type of a key.
+    /// `factor` is the index in the graph for error messages. Adds each error to `errors`, and then returns
+    /// `None`.
     pub fn resolve(
         &self,
         factor: usize,

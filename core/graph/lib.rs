@@ -1,11 +1,11 @@
-//! Factor graphs: what a variable is, what a factor is, and how the two are named and stored.
+//! Factor graphs: variables, factors, their names and their storage.
 //!
-//! Two views of one graph. *Dynamic, for people*: [`Graph`] and [`Values`] hold trait objects by
-//! [`Key`], from Rust or from documents. *Columnar, for the machine*: [`batch::Batch`] and
-//! [`column::Column`] hold each concrete type contiguously; the loop over them is monomorphised
-//! where a type is registered.
+//! A graph has two views. The *dynamic* view is for people: [`Graph`] and [`Values`] hold trait objects by
+//! [`Key`], from Rust or from documents. The *columnar* view is for the machine: [`batch::Batch`] and
+//! [`column::Column`] store each concrete type contiguously. The loop over them is monomorphised at the
+//! registration of a type.
 //!
-//! The way in for authors is [`Residual`]; for new types of variables, [`Manifold`].
+//! Authors of factors begin with [`Residual`], authors of variable types with [`Manifold`].
 mod algebra;
 mod factor;
 mod graph;

@@ -1,8 +1,8 @@
-//! Robust losses: how much of a large residual counts.
+//! Robust losses, which limit the influence of large residuals.
 //!
-//! One convention throughout. A factor with whitened residual r costs ½ρ(s), s = ‖r‖², and enters
-//! the normal equations with the weight ρ'(s). Each ρ has ρ(0) = 0 and, but for L1, ρ(s) ≈ s near 0:
-//! a small residual costs what it costs without a loss.
+//! All losses follow one convention. A factor with whitened residual r costs ½ρ(s) with s = ‖r‖², and has
+//! weight ρ'(s) in the normal equations. Each ρ has ρ(0) = 0. All except L1 have ρ(s) ≈ s near 0, so that a
+//! small residual costs as much as without a loss.
 use crate::registry::checked::Positive;
 use crate::variable::column::Plain;
 use std::any::{Any, TypeId};
@@ -14,15 +14,18 @@ mod tempered;
 pub use kernels::{Cauchy, Dcs, Fair, GemanMcClure, Huber, L1, L2, Tukey, Welsch};
 pub use tempered::Tempered;
 
-/// The author's trait: ρ and its derivative. Register it with [`register_loss!`](crate::register_loss).
+/// The trait for authors: ρ and its derivative. Register a loss with
+/// [`register_loss!`](crate::register_loss).
 pub trait RobustLoss: Debug + Clone + Send + Sync + 'static {
-    /// (ρ(s), ρ'(s)) at the squared norm `s` of a whitened residual.
+    /// Returns (ρ(s), ρ'(s)) at the squared norm `s` of a whitened residual.
     fn rho(&self, s: f64) -> (f64, f64);
 
-    /// ρ(τs)/τ as a loss of the same type: the loss of a residual that was whitened by √τ times its σ, because τ of its
-    /// kind say as much as one alone. A loss with one scale k, in σ's, has it with the scale k/√τ.
+    /// Returns ρ(τs)/τ as a loss of this type. It serves residuals that are whitened by √τ times their σ,
+    /// because τ of them carry the information of one. A loss with one scale k, in σ's, has it with the
+    /// scale k/√τ.
     ///
-    /// The default is `None`: the loss is put into a [`Tempered`], which is as exact and costs one virtual call a factor.
+    /// The default is `None`: the loss is wrapped in a [`Tempered`], which is as exact and costs one
+    /// virtual call per factor.
     fn tempered(&self, tau: Positive) -> Option<Self> {
         let _ = tau;
         None
@@ -32,21 +35,21 @@ pub trait RobustLoss: Debug + Clone + Send + Sync + 'static {
 /// A robust loss, chosen by name.
 #[typetag::serialize(tag = "type")]
 pub trait Loss: Debug + Send + Sync {
-    /// The type-erased view of it.
+    /// Returns the type-erased view of the loss.
     fn erased(&self) -> &dyn ErasedLoss;
 }
 
 crate::kind!(dyn Loss, "loss");
 
-/// The object-safe face of [`RobustLoss`], implemented once for all of them.
+/// The object-safe view of [`RobustLoss`], implemented once for all losses.
 pub trait ErasedLoss: Send + Sync {
-    /// For a downcast to the concrete type.
+    /// Returns the loss for a downcast to the concrete type.
     fn as_any(&self) -> &dyn Any;
-    /// Room for the losses of a batch.
+    /// Returns an empty column for the losses of a batch.
     fn column(&self) -> Box<dyn LossColumn>;
-    /// (ρ(s), ρ'(s)).
+    /// Returns (ρ(s), ρ'(s)).
     fn rho(&self, s: f64) -> (f64, f64);
-    /// ρ(τs)/τ, see [`RobustLoss::tempered`].
+    /// Returns the loss ρ(τs)/τ, see [`RobustLoss::tempered`].
     fn tempered(&self, tau: Positive) -> Arc<dyn Loss>;
 }
 
@@ -68,15 +71,15 @@ impl<L: RobustLoss + Loss> ErasedLoss for L {
     }
 }
 
-/// The losses of a batch's factors, one type: called once for a chunk of factors.
+/// The losses of a batch, all of one type. One call handles a chunk of factors.
 pub trait LossColumn: Send + Sync {
-    /// The type of its losses.
+    /// Returns the type of its losses.
     fn loss_type(&self) -> TypeId;
-    /// Appends a loss of that type; others are left out.
+    /// Appends a loss of that type. A loss of a different type is ignored.
     fn push(&mut self, loss: &dyn Loss);
-    /// Puts the last loss in place of the `index`-th.
+    /// Replaces loss `index` by the last one.
     fn swap_remove(&mut self, index: usize);
-    /// Turns the squared norms of factors `first..` into weights; returns ½ Σ ρ.
+    /// Replaces the squared norms of the factors from `first` on by weights. Returns ½ Σ ρ.
     fn weigh(&self, first: usize, squared: &mut [f64]) -> f64;
 }
 

@@ -1,7 +1,7 @@
-//! Gaussian noise of a measurement, and whitening by it.
+//! Gaussian noise of a measurement, and whitening.
 //!
-//! A closed set: every Gaussian noise is one of four forms of a square-root information W, with
-//! whitened residual W r and Ω = WᵀW. Rows that are not observed have a zero row and column in W.
+//! Every Gaussian noise has one of four forms of a square-root information W. The whitened residual is W r,
+//! the information Ω = WᵀW. Rows that are not observed have a zero row and column in W.
 mod whiteners;
 
 use nalgebra::{Cholesky, DMatrix};
@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use whiteners::Whiteners;
 
-/// The noise of a measurement. Default: unit.
+/// Noise of a measurement. Default: unit.
 ///
 /// In documents one of `{ sigma = 0.1 }`, `{ sigmas = [0.1, 0.2] }`, `{ covariance = [[…], […]] }`,
-/// `{ information = [[…], […]] }` or `{}`; with `observed = [true, false, …]` where some rows of the
-/// residual were not measured.
+/// `{ information = [[…], […]] }` or `{}`. Add `observed = [true, false, …]` if some rows of the residual
+/// were not measured.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Spec", into = "Spec")]
 #[schemars(with = "Spec")]
@@ -33,12 +33,12 @@ enum Model {
     Information(DMatrix<f64>),
 }
 
-/// Noise, as documents write it.
+/// Noise, as written in documents.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Noise")]
 struct Spec {
-    /// Standard deviation of every row, in the row's units.
+    /// Standard deviation of every row, in the units of the row.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     sigma: Option<f64>,
     /// Standard deviation of each row.
@@ -50,12 +50,12 @@ struct Spec {
     /// Information matrix, by rows: symmetric and positive definite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     information: Option<Vec<Vec<f64>>>,
-    /// Which rows of the residual were measured. Default: all.
+    /// Mask of the measured rows of the residual. Default: all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     observed: Option<Vec<bool>>,
 }
 
-/// What is wrong with a noise.
+/// An error in a noise model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoiseError {
@@ -72,7 +72,7 @@ pub enum NoiseError {
         /// Its length.
         columns: usize,
     },
-    /// A matrix with an entry that is not a number.
+    /// A matrix with an entry that is infinite or NaN.
     #[error("entry ({0}, {1}) of the matrix is not finite")]
     NotFinite(usize, usize),
     /// A matrix that differs from its transpose.
@@ -84,10 +84,10 @@ pub enum NoiseError {
         column: usize,
         /// The entry.
         upper: f64,
-        /// The entry on the other side of the diagonal.
+        /// The entry mirrored at the diagonal.
         lower: f64,
     },
-    /// A matrix with a direction of no or negative variance.
+    /// A matrix with a direction of zero or negative variance.
     #[error("the matrix is not positive definite: its smallest eigenvalue is {smallest:e}")]
     NotPositiveDefinite {
         /// Smallest eigenvalue.
@@ -96,23 +96,23 @@ pub enum NoiseError {
     /// More than one form at once.
     #[error("expected one of sigma, sigmas, covariance, information; got {0}")]
     Ambiguous(String),
-    /// A noise of one size for a residual of another.
+    /// A noise whose size differs from the number of residual rows.
     #[error("the noise has {}, the residual {expected}{}", rows(.found), in_parentheses(.names))]
     Dimension {
         /// Rows of the residual.
         expected: usize,
         /// Rows of the noise.
         found: usize,
-        /// Names of the residual's rows, where it has any.
+        /// Names of the residual's rows, if it has any.
         names: &'static [&'static str],
     },
-    /// A measurement of nothing.
+    /// A measurement without an observed row.
     #[error("no row is observed; leave the factor out instead")]
     NothingObserved,
 }
 
 impl NoiseError {
-    /// The same, with the names of the residual's rows.
+    /// Returns the error with the names of the residual's rows.
     #[must_use]
     pub fn with_names(self, rows: &'static [&'static str]) -> Self {
         match self {
@@ -131,11 +131,11 @@ fn in_parentheses(names: &[&str]) -> String {
 }
 
 fn sigma(s: f64) -> Result<f64, NoiseError> {
-    // 1/σ has to be a number too
+    // 1/σ must be finite too
     if s > 0.0 && s.is_finite() && (1.0 / s).is_finite() { Ok(s) } else { Err(NoiseError::NotPositive(s)) }
 }
 
-/// The matrix, checked to be symmetric and positive definite.
+/// Checks that the matrix is symmetric and positive definite, and returns it.
 fn spd(m: DMatrix<f64>) -> Result<DMatrix<f64>, NoiseError> {
     let n = m.nrows();
     let scale = m.amax();
@@ -162,48 +162,49 @@ fn spd(m: DMatrix<f64>) -> Result<DMatrix<f64>, NoiseError> {
 }
 
 impl Noise {
-    /// Standard deviation 1 in every row.
+    /// Makes the noise with standard deviation 1 in every row.
     pub fn unit() -> Self {
         Self::default()
     }
-    /// The same standard deviation in every row.
+    /// Makes a noise with equal standard deviation in every row.
     ///
     /// # Errors
     /// If it is not a positive number.
     pub fn sigma(s: f64) -> Result<Self, NoiseError> {
         Ok(Model::Isotropic(sigma(s)?).into())
     }
-    /// A standard deviation for each row.
+    /// Makes a noise with one standard deviation for each row.
     ///
     /// # Errors
     /// If one is not a positive number.
     pub fn sigmas(s: &[f64]) -> Result<Self, NoiseError> {
         Ok(Model::Diagonal(s.iter().map(|s| sigma(*s)).collect::<Result<_, _>>()?).into())
     }
-    /// A covariance matrix.
+    /// Makes a noise from a covariance matrix.
     ///
     /// # Errors
     /// If it is not symmetric and positive definite.
     pub fn covariance(m: DMatrix<f64>) -> Result<Self, NoiseError> {
         Ok(Model::Covariance(spd(m)?).into())
     }
-    /// An information matrix, the inverse of a covariance.
+    /// Makes a noise from an information matrix, the inverse of a covariance.
     ///
     /// # Errors
     /// If it is not symmetric and positive definite.
     pub fn information(m: DMatrix<f64>) -> Result<Self, NoiseError> {
         Ok(Model::Information(spd(m)?).into())
     }
-    /// The same noise, of a measurement that has only these rows. The others are marginalised.
+    /// Returns this noise for a measurement of the marked rows only. The remaining rows are marginalised.
     #[must_use]
     pub fn observing(mut self, rows: &[bool]) -> Self {
         self.observed = Some(rows.to_vec());
         self
     }
-    /// The same noise, of a measurement that counts `weight` times: its information, multiplied.
+    /// Returns this noise with its information multiplied by `weight`, as for a measurement that counts
+    /// `weight` times.
     ///
     /// # Errors
-    /// If that is not positive and finite.
+    /// If the result is not positive and finite.
     pub fn weighted(&self, weight: f64) -> Result<Self, NoiseError> {
         let spread = sigma(weight)?.sqrt().recip();
         let model = match &self.model {
@@ -217,19 +218,19 @@ impl Noise {
         };
         Ok(Self { model, observed: self.observed.clone() })
     }
-    /// Which rows were measured; `None` for all.
+    /// Returns the mask of the measured rows; `None` for all.
     pub fn observed(&self) -> Option<&[bool]> {
         self.observed.as_deref()
     }
-    /// Returns whether it is the unit noise of all rows.
+    /// Returns whether this is unit noise on all rows.
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// W, in its cheapest form, for a residual of `rows` rows.
+    /// Returns W in its cheapest form, for a residual with `rows` rows.
     ///
     /// # Errors
-    /// If the noise has another number of rows, or observes none.
+    /// If the noise has a different number of rows, or observes none.
     pub fn whitener(&self, rows: usize) -> Result<Whitener, NoiseError> {
         let check = |found: usize| match found == rows {
             true => Ok(()),
@@ -253,7 +254,8 @@ impl Noise {
         self.model.whitener(Some(observed))
     }
 
-    /// The information matrix Ω for a residual of `rows` rows; zero in rows that are not observed.
+    /// Returns the information matrix Ω for a residual with `rows` rows; zero in rows that are not
+    /// observed.
     ///
     /// # Errors
     /// As [`Noise::whitener`].
@@ -297,7 +299,8 @@ fn cholesky(m: &DMatrix<f64>) -> Result<Cholesky<f64, nalgebra::Dyn>, NoiseError
     Cholesky::new(m.clone()).ok_or_else(|| not_positive_definite(m))
 }
 
-/// Upper triangular W with WᵀW = m: Cholesky by rows, in one allocation, since a graph has one for each factor.
+/// Returns the upper triangular W with WᵀW = m. Cholesky by rows in a single allocation, since a graph has
+/// one W for each factor.
 fn root(m: &DMatrix<f64>) -> Result<DMatrix<f64>, NoiseError> {
     let (n, mut w) = (m.nrows(), m.clone());
     for k in 0..n {
@@ -323,7 +326,7 @@ fn not_positive_definite(m: &DMatrix<f64>) -> NoiseError {
     NoiseError::NotPositiveDefinite { smallest: m.clone().symmetric_eigenvalues().min() }
 }
 
-/// Upper triangular W with WᵀW = m⁻¹: m = U Uᵀ by a Cholesky from the last row up, W = U⁻¹.
+/// Returns the upper triangular W with WᵀW = m⁻¹: m = U Uᵀ by Cholesky from the last row up, W = U⁻¹.
 fn inverse_root(m: &DMatrix<f64>) -> Result<DMatrix<f64>, NoiseError> {
     let n = m.nrows();
     let flip = |m: &DMatrix<f64>| DMatrix::from_fn(n, n, |r, c| m[(n - 1 - r, n - 1 - c)]);
@@ -332,7 +335,7 @@ fn inverse_root(m: &DMatrix<f64>) -> Result<DMatrix<f64>, NoiseError> {
     w.ok_or(NoiseError::NotPositiveDefinite { smallest: 0.0 })
 }
 
-/// W of the observed rows of a covariance; zero elsewhere.
+/// Returns W for the observed rows of a covariance; zero elsewhere.
 fn marginal_root(covariance: &DMatrix<f64>, observed: &[bool]) -> Result<DMatrix<f64>, NoiseError> {
     let rows: Vec<usize> = (0..observed.len()).filter(|i| observed[*i]).collect();
     let small = DMatrix::from_fn(rows.len(), rows.len(), |r, c| covariance[(rows[r], rows[c])]);
@@ -395,21 +398,21 @@ fn matrix(rows: &[Vec<f64>]) -> Result<DMatrix<f64>, NoiseError> {
     }
 }
 
-/// W of one factor.
+/// The square-root information W of one factor.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Whitener {
     /// The identity.
     Unit,
     /// A multiple of the identity.
     Isotropic(f64),
-    /// The diagonal; zero where a row is not observed.
+    /// The diagonal; zero in rows that are not observed.
     Diagonal(Vec<f64>),
     /// Upper triangular.
     Full(DMatrix<f64>),
 }
 
 impl Whitener {
-    /// As a matrix of that many rows.
+    /// Returns W as a matrix with `rows` rows.
     pub fn matrix(&self, rows: usize) -> DMatrix<f64> {
         match self {
             Whitener::Unit => DMatrix::identity(rows, rows),

@@ -1,5 +1,5 @@
-//! What a file with a factor, a manifold or a loss needs: `use manifactor_graph::prelude::*;`. Outside of this repository
-//! `manifactor::prelude` has all of it, and the solvers.
+//! Imports for a file with a factor, a manifold or a loss: `use manifactor_graph::prelude::*;`. Outside of
+//! this repository use `manifactor::prelude`, which also has the solvers.
 pub use crate::__private::typetag;
 pub use crate::checked::Positive;
 pub use crate::loss::{Loss, RobustLoss};

@@ -1,25 +1,26 @@
-//! What formulas compute with: numbers, vectors, rotations and whatever else a plugin registers.
+//! Quantities, the values in formulas: numbers, vectors, rotations, and types registered by plugins.
 //!
-//! A [`Quantity`] is a type with a flat form: a fixed number of scalars. A [`Manifold`](crate::Manifold) whose points are
-//! quantities is entered by [`register_quantity!`](crate::register_quantity), and functions of quantities by
-//! [`register_functions!`](crate::register_functions): with both, a formula in a config can use them by name.
+//! A [`Quantity`] is a type with a flat form: a fixed number of scalars.
+//! [`register_quantity!`](crate::register_quantity) registers a [`Manifold`](crate::Manifold) whose points
+//! are quantities. [`register_functions!`](crate::register_functions) registers functions of quantities.
+//! Formulas in a config can then use both by name.
 use crate::algebra::Dimension;
 use crate::algebra::{JetOf, Scalar};
 use nalgebra::{Const, SVector, U3};
 use std::any::{Any, TypeId};
 use std::fmt;
 
-/// The dual number that formulas are differentiated with: [`LANES`] directions at a time.
+/// The dual number that differentiates formulas, [`LANES`] directions at a time.
 pub type Lanes = JetOf<U3>;
-/// Directions of a [`Lanes`].
+/// Number of directions of a [`Lanes`].
 pub const LANES: usize = <Const<3> as Dimension>::N;
 
 /// The name of a type of quantities, and the length of its flat form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Shape {
-    /// What it is called in formulas, and no other type is.
+    /// Name in formulas, unique among the types.
     pub name: &'static str,
-    /// How many scalars it takes.
+    /// Number of scalars in the flat form.
     pub size: usize,
 }
 
@@ -44,11 +45,11 @@ impl fmt::Display for Shape {
 pub trait Quantity: 'static {
     /// Its name and size.
     const SHAPE: Shape;
-    /// The same type over another scalar.
+    /// The type over the scalar `T`.
     type Of<T: Scalar>;
-    /// From its flat form, of which `from` is at least as long.
+    /// Reads a value from its flat form. `from` may be longer.
     fn read<T: Scalar>(from: &[T]) -> Self::Of<T>;
-    /// Into its flat form, of which `to` is as long.
+    /// Writes a value to its flat form. `to` has exactly its length.
     fn write<T: Scalar>(x: &Self::Of<T>, to: &mut [T]);
 }
 
@@ -71,7 +72,7 @@ const VECTORS: [&str; 10] = [
     "vector9",
 ];
 
-/// Up to nine entries.
+/// Vectors of up to nine entries.
 impl<const N: usize> Quantity for SVector<f64, N> {
     const SHAPE: Shape = Shape { name: VECTORS[N], size: N };
     type Of<T: Scalar> = SVector<T, N>;
@@ -85,17 +86,18 @@ impl<const N: usize> Quantity for SVector<f64, N> {
     }
 }
 
-/// A type of variables that formulas can take. Made by [`register_quantity!`](crate::register_quantity).
+/// A type of variables that formulas accept. Created by [`register_quantity!`](crate::register_quantity).
 pub struct VariableQuantity {
     /// The type of the variables.
     pub type_id: fn() -> TypeId,
-    /// What they are in formulas.
+    /// The quantity that represents them in formulas.
     pub shape: Shape,
     /// Dimension of their tangent space.
     pub dimension: usize,
-    /// Writes a variable's flat form. A variable of another type is left out.
+    /// Writes the flat form of a variable. A variable of a different type is ignored.
     pub values: fn(&dyn Any, &mut [f64]),
-    /// Writes the derivative of the flat form by the tangent, at zero: the gradient of each scalar, one after the other.
+    /// Writes the derivative of the flat form with respect to the tangent, at zero: the gradient of each
+    /// scalar, one after the next.
     pub gradients: fn(&dyn Any, &mut [f64]),
 }
 inventory::collect!(VariableQuantity);
@@ -105,20 +107,20 @@ pub fn with<A, B>(x: A, f: impl FnOnce(A) -> B) -> B {
     f(x)
 }
 
-/// What variables of a type are in formulas; `None` for a type that is not registered as a quantity.
+/// Returns the quantity for variables of a type; `None` if the type is not registered as a quantity.
 pub fn variable_quantity(id: TypeId) -> Option<&'static VariableQuantity> {
     inventory::iter::<VariableQuantity>.into_iter().find(|q| (q.type_id)() == id)
 }
 
-/// A function of formulas. Made by [`register_functions!`](crate::register_functions).
+/// A function for formulas. Created by [`register_functions!`](crate::register_functions).
 pub struct Function {
-    /// What formulas call it; `+` and the like are operators. Several functions may have one name.
+    /// Name in formulas; `+` and the like are operators. Functions may be overloaded.
     pub name: &'static str,
     /// Its arguments: names and types.
     pub arguments: &'static [(&'static str, Shape)],
-    /// What it returns.
+    /// The type of its result.
     pub result: Shape,
-    /// What it means, in a sentence.
+    /// Its meaning, in one sentence.
     pub summary: &'static str,
     /// The module that registered it.
     pub module: &'static str,
@@ -129,29 +131,31 @@ pub struct Function {
 }
 inventory::collect!(Function);
 
-/// A function over flat forms: of the arguments, each beginning somewhere in one array, and of the result.
+/// A function over flat forms. `at` gives the start of each argument in `from`; the result is written to
+/// `to`.
 pub type Call<T> = fn(from: &[T], at: &[u32], to: &mut [T]);
 
 impl Function {
-    /// `dot(a: vector3, b: vector3) -> number`
+    /// Formats the signature: `dot(a: vector3, b: vector3) -> number`
     pub fn signature(&self) -> String {
         let arguments = self.arguments.iter().map(|(name, shape)| format!("{name}: {shape}"));
         format!("{}({}) -> {}", self.name, arguments.collect::<Vec<_>>().join(", "), self.result)
     }
 }
 
-/// Every function that is linked, by name and arguments.
+/// Returns every linked function, sorted by name and arguments.
 pub fn functions() -> Vec<&'static Function> {
     let mut all: Vec<_> = inventory::iter::<Function>.into_iter().collect();
-    // inventory's order differs between builds
+    // the order of inventory differs between builds
     all.sort_by_key(|f| {
         (f.name, f.arguments.len(), f.arguments.first().map(|(_, shape)| shape.name), f.signature())
     });
     all
 }
 
-/// Says that formulas can take variables of a type, as quantities of the same type or of another of the same points:
-/// `register_quantity!(Se3);`, `register_quantity!(Point3 as Vector3<f64>);`, `register_quantity!(Point1 as f64, |p| p.x);`
+/// Lets formulas use variables of a type, as quantities of this type or of a given one with equal points:
+/// `register_quantity!(Se3);`, `register_quantity!(Point3 as Vector3<f64>);`,
+/// `register_quantity!(Point1 as f64, |p| p.x);`
 #[macro_export]
 macro_rules! register_quantity {
     ($type:ty) => {
@@ -196,7 +200,7 @@ macro_rules! register_quantity {
     };
 }
 
-/// Enters functions of quantities under their names, or as operators, for formulas. Bodies are over a scalar `T`:
+/// Registers functions of quantities for formulas, by name or as operators. Bodies are over a scalar `T`:
 ///
 /// ```
 /// # use manifactor_graph::register_functions;

@@ -1,4 +1,4 @@
-//! What can be chosen by name, and how it is read out of a document.
+//! The registry of types that documents choose by name, and their parsing.
 pub mod catalogue;
 pub mod checked;
 mod registered;

@@ -1,4 +1,4 @@
-//! Values in a graph: points of any registered manifold.
+//! Values in a graph: points of registered manifolds.
 pub mod column;
 mod key;
 mod manifold;
@@ -22,32 +22,32 @@ pub use values::{ValueError, Values};
 )]
 #[typetag::serialize(tag = "type")]
 pub trait Variable: Debug + Send + Sync {
-    /// The type-erased view of it.
+    /// Returns the type-erased view of the point.
     fn erased(&self) -> &dyn ErasedManifold;
 }
 
 crate::kind!(dyn Variable, "variable");
 
-/// The name of a registered manifold; its Rust type's name, where it is not registered.
+/// Returns the name of a manifold; a placeholder text if it is not registered.
 pub fn manifold_name(id: TypeId) -> &'static str {
     let kind = <dyn Variable as Kind>::NAME;
     let entry = catalogue::entries(kind).into_iter().find(|e| (e.type_id)() == id);
     entry.map_or("an unregistered manifold", |e| e.name)
 }
 
-/// The way from `dyn Any` back to a registered type of variables. Made by
+/// The cast from `dyn Any` to a registered type of variables. Created by
 /// [`register_manifold!`](crate::register_manifold).
 #[derive(Debug)]
 pub struct AsVariable {
     /// The type.
     pub type_id: fn() -> TypeId,
-    /// The same variable; `None` where it is of another type.
+    /// Casts a variable; `None` if it has a different type.
     pub cast: for<'a> fn(&'a dyn Any) -> Option<&'a dyn Variable>,
 }
 inventory::collect!(AsVariable);
 
-/// How a [`DynamicResidual`](crate::DynamicResidual) gets at its variables as trait objects; `None` for a type that is
-/// not registered.
+/// Returns the cast with which a [`DynamicResidual`](crate::DynamicResidual) gets its variables as trait
+/// objects; `None` for a type that is not registered.
 pub fn as_variable(id: TypeId) -> Option<&'static AsVariable> {
     inventory::iter::<AsVariable>.into_iter().find(|c| (c.type_id)() == id)
 }
@@ -58,25 +58,25 @@ impl Clone for Box<dyn Variable> {
     }
 }
 
-/// The object-safe face of [`Manifold`], implemented once for all of them.
+/// The object-safe view of [`Manifold`], implemented once for all manifolds.
 pub trait ErasedManifold {
-    /// For a downcast to the concrete type.
+    /// Returns the point for a downcast to the concrete type.
     fn as_any(&self) -> &dyn Any;
-    /// The concrete type.
+    /// Returns the concrete type.
     fn type_id(&self) -> TypeId;
-    /// Dimension of the tangent space.
+    /// Returns the dimension of the tangent space.
     fn dim(&self) -> usize;
-    /// Names of the tangent directions.
+    /// Returns the names of the tangent directions.
     fn tangent(&self) -> &'static [&'static str];
-    /// The point that `delta` leads to; `None` where its length is not the dimension.
+    /// Returns the point at `delta`; `None` if its length is not the dimension.
     fn retract(&self, delta: &[f64]) -> Option<Box<dyn Variable>>;
-    /// The tangent vector to `other`; `None` where that has another type.
+    /// Returns the tangent vector to `other`; `None` if that has a different type.
     fn local(&self, other: &dyn Variable) -> Option<Vec<f64>>;
     /// Returns whether every coordinate is finite.
     fn is_finite(&self) -> bool;
-    /// The same point again.
+    /// Returns a copy of the point.
     fn clone_box(&self) -> Box<dyn Variable>;
-    /// An empty column of this type.
+    /// Returns an empty column of this type.
     fn new_column(&self) -> Box<dyn Column>;
 }
 

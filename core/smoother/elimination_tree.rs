@@ -1,13 +1,13 @@
-//! The structure of a persistent multifrontal tree: how an update replaces the top of it.
+//! The structure of a persistent elimination tree of fronts. An update replaces the top of the tree.
 //!
 //! ```text
 //!                      ┌──────┐
-//!                      │ root │  an update redoes the fronts of what it touches,
+//!                      │ root │  an update recomputes the fronts that it touches,
 //!                      └──┬───┘  and all fronts above them
 //!              ┌──────────┴─────┐
 //!          ┌───┴──┐          ┌──┴───┐
-//!          │ redo │          │ keep │  fronts below that stay: their update is
-//!          └───┬──┘          └──────┘  at hand, only their parent is another
+//!          │ redo │          │ keep │  untouched fronts below are kept: their update
+//!          └───┬──┘          └──────┘  is stored, only their parent changes
 //!        ┌─────┴────┐
 //!     ┌──┴───┐   ┌──┴───┐
 //!     │ keep │   │ keep │
@@ -19,86 +19,86 @@ mod saved;
 
 use order::{Group, Order};
 
-/// No front, or no parent.
+/// Marks a missing front or parent.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Variables that are eliminated together, and those of the boundary, which their update goes to.
+/// Variables that are eliminated together, and the boundary variables that receive their update.
 #[derive(Debug, Default)]
 pub(crate) struct Front {
-    /// In the order of elimination, both.
+    /// Variables that this front eliminates, in the order of elimination.
     pub blocks: Vec<u32>,
     pub rows: Vec<u32>,
-    /// Scalars of the blocks and of the rows.
+    /// Number of scalars of `blocks` (`width`) and of `rows` (`below`).
     pub width: usize,
     pub below: usize,
     pub parent: u32,
-    /// By their lowest variable: updates are added in an order that does not depend on history.
+    /// Sorted by `lowest`, so that updates are added in an order that does not depend on history.
     pub children: Vec<u32>,
     pub lowest: u32,
-    /// Multiply-adds to make it again.
+    /// Multiply-adds of one factorization of this front.
     pub operations: f64,
 }
 
 impl Front {
-    /// What follows from its blocks and rows.
+    /// Computes the fields that follow from `blocks` and `rows`.
     fn measure(&mut self, dim: impl Fn(u32) -> usize) {
         self.width = self.blocks.iter().map(|v| dim(*v)).sum();
         self.below = self.rows.iter().map(|v| dim(*v)).sum();
         self.lowest = self.blocks.iter().copied().min().unwrap_or(NONE);
         let (k, m) = (self.width as f64, self.below as f64);
-        // its elimination, and its update into the parent
+        // elimination of the front, and addition of its update to the parent
         self.operations = k * k * k / 3.0 + k * k * m + k * m * m + 0.5 * m * m;
     }
 }
 
-/// Fronts in a slab, and by variable the one that eliminates it.
+/// A slab of fronts, and for each variable the front that eliminates it.
 #[derive(Debug, Default)]
 pub(crate) struct Tree {
     pub fronts: Vec<Front>,
     unused: Vec<u32>,
     front_of: Vec<u32>,
     marked: Vec<bool>,
-    /// By variable, its number in the local graph.
+    /// Number in the local graph, by variable.
     local: Vec<u32>,
     order: Order,
 }
 
-/// The fronts that an update takes away.
+/// The fronts that an update replaces.
 #[derive(Debug, Default)]
 pub(crate) struct Affected(pub Vec<u32>);
 
-/// New fronts, which are to take the place of the affected ones.
+/// New fronts that replace the affected ones.
 #[derive(Debug, Default)]
 pub(crate) struct Redone {
-    /// Children before parents.
+    /// New fronts, children before parents.
     pub new: Vec<u32>,
-    /// Fronts that stay as they are, with their parents among the new.
+    /// Untouched fronts with their new parents.
     pub kept: Vec<(u32, u32)>,
 }
 
-/// What the tree has to know of the graph.
+/// The structure of the factor graph, as the tree needs it.
 pub(crate) trait Couplings {
-    /// Number of variables, those that are not in the tree among them.
+    /// Returns the number of variables, including variables outside of the tree.
     fn variables(&self) -> usize;
-    /// Dimension of a variable's tangent space.
+    /// Returns the dimension of a variable's tangent space.
     fn dim(&self, variable: u32) -> usize;
-    /// Variables that share a factor with this one, whether they are in the tree or not.
+    /// Returns the variables that share a factor with this one, inside or outside of the tree.
     fn coupled(&self, variable: u32) -> impl Iterator<Item = u32>;
 }
 
 impl Tree {
-    /// Makes room for so many variables.
+    /// Makes room for `variables` variables.
     pub(crate) fn resize(&mut self, variables: usize) {
         self.front_of.resize(variables, NONE);
         self.local.resize(variables, NONE);
     }
 
-    /// The front that eliminates a variable; [`NONE`] for one that is not in the tree.
+    /// Returns the front that eliminates a variable; [`NONE`] if the variable is not in the tree.
     pub(crate) fn front_of(&self, variable: u32) -> u32 {
         self.front_of.get(variable as usize).copied().unwrap_or(NONE)
     }
 
-    /// Adds a variable's front and those above it to the affected ones.
+    /// Adds the front of a variable and all fronts above it to the affected ones.
     pub(crate) fn touch(&mut self, variable: u32, affected: &mut Affected) {
         let mut front = self.front_of(variable);
         while front != NONE && !self.marked[front as usize] {
@@ -108,13 +108,15 @@ impl Tree {
         }
     }
 
-    /// Takes fronts out of the affected ones again, all but the first.
+    /// Removes all but the first `first` fronts from the affected ones.
     pub(crate) fn untouch(&mut self, affected: &mut Affected, first: usize) {
         affected.0.drain(first..).for_each(|f| self.marked[f as usize] = false);
     }
 
-    /// Orders the variables of the affected fronts anew, and makes fronts of them. `entering` are variables that were not in
-    /// the tree; `leaves` says of the others which are not to be in it any more, `is_last` which to eliminate last.
+    /// Reorders the variables of the affected fronts and builds new fronts from them.
+    ///
+    /// `entering` are variables that were not in the tree. `leaves` selects variables that drop out of the
+    /// tree, and `is_last` those to eliminate last.
     pub(crate) fn redo(
         &mut self,
         affected: &Affected,
@@ -147,7 +149,7 @@ impl Tree {
         Redone { new, kept }
     }
 
-    /// Merges groups into fronts, and puts them into unused places.
+    /// Merges groups into fronts and stores these in unused slots.
     fn fronts_of(
         &mut self,
         mut groups: Vec<Group>,
@@ -163,7 +165,7 @@ impl Tree {
         let parent = |group: &Group| group.rows.iter().map(|r| group_of[*r as usize]).min().unwrap_or(NONE);
         let mut parents: Vec<u32> = groups.iter().map(parent).collect();
         amalgamation::merge(&mut groups, &mut parents, dim);
-        // by variable its rank in the order of elimination, by group its front
+        // rank in the order of elimination by variable; front by group
         let (mut rank, mut number) = (vec![0_u32; variables.len()], vec![NONE; groups.len()]);
         let (mut ranks, mut new) = (0.., vec![]);
         for (g, group) in groups.iter().enumerate().filter(|(_, group)| !group.blocks.is_empty()) {
@@ -197,7 +199,7 @@ impl Tree {
         new
     }
 
-    /// Tells new fronts their children.
+    /// Adds new and kept fronts to the children of their parents.
     fn adopt(&mut self, new: &[u32], kept: &[(u32, u32)]) {
         let children = new.iter().map(|f| (*f, self.fronts[*f as usize].parent));
         let children: Vec<(u32, u32)> = children.chain(kept.iter().copied()).collect();
@@ -217,12 +219,13 @@ impl Tree {
         self.fronts[front as usize].children = children;
     }
 
-    /// Puts the new fronts in the place of the affected ones.
+    /// Replaces the affected fronts by the new ones.
     pub(crate) fn swap(&mut self, affected: &Affected, redone: &Redone) {
         for f in &affected.0 {
             self.marked[*f as usize] = false;
             self.unused.push(*f);
-            // those that leave; the others are told their new front below
+            // variables that drop out of the tree; the loop below assigns the remaining ones to their new
+            // front
             for b in &self.fronts[*f as usize].blocks {
                 self.front_of[*b as usize] = NONE;
             }
@@ -233,7 +236,7 @@ impl Tree {
         redone.kept.iter().for_each(|(kept, parent)| self.fronts[*kept as usize].parent = *parent);
     }
 
-    /// Drops the new fronts, and leaves the affected ones where they are.
+    /// Drops the new fronts and keeps the affected ones.
     pub(crate) fn drop_new(&mut self, affected: &Affected, redone: &Redone) {
         self.unused.extend(redone.new.iter().rev());
         affected.0.iter().for_each(|f| self.marked[*f as usize] = false);

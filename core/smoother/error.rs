@@ -1,42 +1,42 @@
-//! Why a session refuses something. It is then as it was.
+//! Errors of the smoother. A call that fails leaves the smoother unchanged.
 use crate::factor_id::FactorId;
 use manifactor_graph::{GraphError, Key};
 
-/// Why a change is refused.
+/// Error of a change that the smoother rejects.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChangeError {
-    /// Factors and values do not fit each other or the session: everything that is wrong. Factors count from 0 in the list
-    /// that was given.
+    /// Factors and values contradict each other or the smoother. The list has all errors; factors count from
+    /// 0 in the list that was pushed.
     #[error("the factors do not fit the session:{}", GraphError::list(.0))]
     Graph(Vec<GraphError>),
-    /// A variable that is there already.
+    /// A new variable whose key already exists.
     #[error("there is a variable `{key}` already; push factors on it without a value, or choose another key")]
     Known {
         /// Its key.
         key: Key,
     },
-    /// A variable that is not there.
+    /// A key without a variable.
     #[error("there is no variable `{key}`")]
     NoVariable {
-        /// What was asked for.
+        /// The key of the call.
         key: Key,
     },
-    /// A variable that has left the session: its factors are part of a linear prior, which nothing can be added to.
+    /// A marginalized variable. Its factors are part of a linear prior, and no factor can be added to that.
     #[error(
         "`{key}` has left the session; a factor to it, or another variable of that name, is not possible any more"
     )]
     Gone {
-        /// What was asked for.
+        /// The key of the call.
         key: Key,
     },
-    /// A factor of variables that have left the session.
+    /// A factor whose variables were marginalized.
     #[error("factor {factor} has left the session with its variables: it is part of a linear prior")]
     GoneFactor {
-        /// What was asked for.
+        /// The id of the call.
         factor: FactorId,
     },
-    /// A variable that has to keep its linearization point, as a neighbour of variables that have left.
+    /// A variable that has to keep its linearization point because it is part of a linear prior.
     #[error(
         "`{key}` cannot be held or freed: it is tied to variables that have left, and keeps its linearization point"
     )]
@@ -44,13 +44,13 @@ pub enum ChangeError {
         /// Its key.
         key: Key,
     },
-    /// A factor that is not there, or not any more.
+    /// A factor that never existed here or was removed.
     #[error("there is no factor {factor}: it was removed, or is of another session")]
     NoFactor {
-        /// What was asked for.
+        /// The id of the call.
         factor: FactorId,
     },
-    /// A factor that is to be replaced by one between other variables.
+    /// A replacement that connects different variables than the factor it replaces.
     #[error("factor {factor} is between {}; remove it, and push the new one", names(.expected))]
     Keys {
         /// The factor.
@@ -58,48 +58,48 @@ pub enum ChangeError {
         /// Its variables.
         expected: Vec<Key>,
     },
-    /// A time that cannot come after the one before.
+    /// A time that is not finite or lies before the last one.
     #[error("time {time} s: expected a finite number{}", not_before(.last))]
     Time {
-        /// What was given.
+        /// The time of the call. Unit: seconds.
         time: f64,
-        /// The one that was set before.
+        /// The time of the last successful call. Unit: seconds.
         last: Option<f64>,
     },
-    /// A window by seconds without a clock.
+    /// A window in seconds although no time was ever set.
     #[error(
         "the window is by seconds, and the session does not know the time; call `set_time` before the first `push`, or use \
          `window.poses`"
     )]
     NoTime,
-    /// A weight that no factor can have.
+    /// A weight that is negative or not finite.
     #[error("factor {factor}: expected a finite weight, 0 or more, got {weight}")]
     Weight {
         /// The factor.
         factor: FactorId,
-        /// What was given.
+        /// The weight of the call.
         weight: f64,
     },
 }
 
-/// Why an update failed. All changes since the last update are taken back: the session is as that left it.
+/// Error of an update. All changes since the last successful update are undone.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UpdateError {
-    /// A residual or a derivative that is not finite.
+    /// A residual or a derivative is not finite.
     #[error("not finite: the residual of factor {factor} ({}), or its derivative; the changes are taken back", names(.keys))]
     NonFinite {
-        /// The factor: one of those that were pushed or changed.
+        /// One of the factors that were pushed or changed.
         factor: FactorId,
         /// Its variables.
         keys: Vec<Key>,
     },
-    /// Numbers that are finite, but too large for their sums.
+    /// The terms of a sum are finite, but the sum is not.
     #[error(
         "the linear system overflows at `{key}`; scale the noise of its factors; the changes are taken back"
     )]
     Overflow {
-        /// A variable that is part of it.
+        /// A variable in the sum that overflows.
         key: Key,
     },
 }

@@ -1,8 +1,8 @@
-//! Names of factors.
+//! Ids of factors.
 use serde::Serialize;
 use std::fmt;
 
-/// The name of a factor in a session. It stays the same whatever comes and goes, and is not used again.
+/// The id of a factor in one smoother. It never changes and is never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(transparent)]
 pub struct FactorId(pub(crate) u32);

@@ -1,7 +1,7 @@
-//! The numbers of fronts: panels of the factor, and the updates that fronts hand up, which are kept.
+//! Numerical values of the fronts: panels of the Cholesky factor, and the stored updates to their parents.
 //!
-//! The right-hand side −g is the last row of each front: elimination solves for it on the way, and a front that is kept has
-//! its part of it at hand.
+//! The right-hand side −g is the last row of each front. Elimination therefore includes the forward
+//! substitution, and a kept front already has its part of the result.
 mod assembly;
 mod elimination;
 mod pool;
@@ -16,26 +16,26 @@ use pool::Pool;
 use pulp::Arch;
 use substitution::Backward;
 
-/// A scalar unknown: a variable, and a direction of its tangent space.
+/// A scalar unknown: a variable and a direction of its tangent space.
 pub(crate) type Scalar = (u32, u32);
 
-/// What a front has computed.
+/// The values of one front.
 #[derive(Debug, Default)]
 struct Numbers {
     /// Column-major, `width` columns of `width + below + 1` rows.
     panel: Vec<f64>,
     /// The lower triangle of a square of `below + 1` columns.
     update: Vec<f64>,
-    /// Directions that nothing constrains, as far as f64 can tell, once what is eliminated before is gone.
+    /// Directions that no factor constrains within f64 precision, after all earlier variables are eliminated.
     open: Vec<Scalar>,
 }
 
-/// The numbers of all fronts of a tree.
+/// The values of all fronts of a tree.
 #[derive(Debug)]
 pub(crate) struct Fronts {
     numbers: Vec<Numbers>,
     pool: Pool,
-    /// By variable, its first row in the front that has this stamp.
+    /// By variable: the stamp of a front, and the first row of the variable in that front.
     place: Vec<(u64, u32)>,
     stamp: u64,
     runs: Vec<Run>,
@@ -44,7 +44,7 @@ pub(crate) struct Fronts {
     arch: Arch,
 }
 
-/// Widest front that needs less room of the dense kernels than any wider one.
+/// Front width that sizes the scratch memory of the dense kernels. Wider fronts need no more.
 const WIDEST: usize = 1 << 10;
 
 impl Default for Fronts {
@@ -63,7 +63,7 @@ impl Default for Fronts {
 }
 
 impl Fronts {
-    /// Makes room for so many variables.
+    /// Makes room for `variables` variables.
     pub(crate) fn resize(&mut self, variables: usize) {
         self.place.resize(variables, (0, 0));
     }
@@ -71,7 +71,7 @@ impl Fronts {
     /// Assembles and factorizes new fronts, children before parents.
     ///
     /// # Errors
-    /// If a sum is not finite. The fronts are dropped then.
+    /// If a sum is not finite. The new fronts are dropped.
     pub(crate) fn build(&mut self, tree: &Tree, blocks: &Blocks, new: &[u32]) -> Result<(), Overflow> {
         self.numbers.resize_with(tree.fronts.len(), Numbers::default);
         let arch = self.arch;
@@ -82,7 +82,7 @@ impl Fronts {
         built
     }
 
-    /// Gives back the memory of fronts that are gone.
+    /// Releases the memory of replaced fronts.
     pub(crate) fn drop_all(&mut self, affected: &Affected) {
         self.release(&affected.0);
     }
@@ -95,12 +95,13 @@ impl Fronts {
         }
     }
 
-    /// Directions of a front's variables that nothing constrains.
+    /// Returns the directions of a front's variables that no factor constrains.
     pub(crate) fn open(&self, front: u32) -> &[Scalar] {
         &self.numbers[front as usize].open
     }
 
-    /// The steps of a front's variables, one after the other, from those of its rows: `delta` by scalar of all variables.
+    /// Computes the steps of a front's variables, concatenated, from the steps of its rows. `delta` holds the
+    /// steps of all variables.
     pub(crate) fn solve(&mut self, front: &Front, number: u32, blocks: &Blocks, delta: &[f64]) -> &[f64] {
         self.x.resize(front.width, 0.0);
         for row in &front.rows {
@@ -112,13 +113,13 @@ impl Fronts {
         &self.x
     }
 
-    /// x ← L⁻¹ x of one front: see [`substitution::forward`].
+    /// Computes x ← L⁻¹ x for one front: see [`substitution::forward`].
     pub(crate) fn forward(&self, front: &Front, number: u32, x: &mut [f64], below: &mut [f64]) {
         let panel = &self.numbers[number as usize].panel[..front.width * (front.width + front.below + 1)];
         substitution::forward(panel, x, below);
     }
 
-    /// Bytes of all fronts, and of memory that waits for others.
+    /// Returns the bytes of all fronts and of the free lists.
     pub(crate) fn bytes(&self) -> usize {
         self.pool.bytes()
     }

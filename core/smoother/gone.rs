@@ -1,9 +1,9 @@
-//! What has left a session, so that it is told from what never was there: keys and ids of factors, as runs of numbers. They take no
-//! room for each of them, as both are given one after the other.
+//! Removed keys and factor ids, so that an error can say *removed* instead of *unknown*. Both are stored as
+//! ranges: they are mostly consecutive, so the memory does not grow with their number.
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A set of numbers, as runs: first to end, without it.
+/// A set of numbers as ranges. The map holds the first number and the end (exclusive) of each range.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub(crate) struct Runs(BTreeMap<u64, u64>);
@@ -24,19 +24,19 @@ impl Runs {
     }
 }
 
-/// Names of variables that are gone.
+/// Keys of removed variables.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct GoneKeys {
-    /// Those that end with a number, by what stands before it.
+    /// Keys that end with a number, by the part before it.
     numbered: BTreeMap<String, Runs>,
     others: BTreeSet<String>,
-    /// Those of variables that have left nothing behind: another may have that name. They are few.
+    /// Removed keys that a new variable may use again, because their variables had no factors. They are few.
     #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
     free: BTreeSet<String>,
 }
 
-/// A name, and the number that it ends with; `None` where another name would have the same number.
+/// Splits a key into a name and its final number. Returns `None` if a different key would give equal parts.
 fn split(key: &str) -> Option<(&str, u64)> {
     let name = key.trim_end_matches(|c: char| c.is_ascii_digit());
     let digits = &key[name.len()..];
@@ -52,12 +52,12 @@ impl GoneKeys {
         }
     }
 
-    /// Returns whether a new variable may not have this name.
+    /// Returns whether a new variable may not use this key.
     pub(crate) fn is_taken(&self, key: &str) -> bool {
         self.contains(key) && !self.free.contains(key)
     }
 
-    /// Takes note of a variable that is gone, and whether something of it is left.
+    /// Records a removed variable. `is_left` is false if it had no factors.
     pub(crate) fn insert(&mut self, key: &str, is_left: bool) {
         if is_left {
             self.free.remove(key);
@@ -91,7 +91,7 @@ mod tests {
             for n in 0..32 {
                 prop_assert_eq!(runs.contains(n), numbers.contains(&n));
             }
-            // no two of them meet
+            // no two ranges touch
             let ends: Vec<(u64, u64)> = runs.0.into_iter().collect();
             prop_assert!(ends.windows(2).all(|pair| pair[0].1 < pair[1].0));
         }

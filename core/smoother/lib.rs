@@ -1,8 +1,9 @@
 //! An incremental smoother: a factor graph that grows while it is solved.
 //!
-//! A [`Session`] takes new variables and factors as they come, takes factors away, and keeps the estimate up to date: each
-//! [`update`](Session::update) redoes the part of the factorization that has changed, and linearizes anew what has moved.
-//! [`finish`](Session::finish) solves all of it as one batch.
+//! A [`Session`] accepts new variables and factors, removes factors, and keeps the estimate up to date. Each
+//! [`update`](Session::update) recomputes only the part of the factorization that has changed, and
+//! relinearizes only variables that have moved. [`finish`](Session::finish) solves the whole graph as one
+//! batch.
 //!
 //! ```
 //! # use manifactor_smoother::{Session, Settings};

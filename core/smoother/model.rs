@@ -1,4 +1,4 @@
-//! What is estimated, and from what: variables at their linearization points, and factors with their parts of H and g.
+//! The variables at their linearization points, and the factors with their terms of H and g.
 mod blocks;
 mod counting;
 mod evaluation;
@@ -26,52 +26,53 @@ use smallvec::SmallVec;
 use std::any::TypeId;
 use std::collections::{BTreeSet, HashMap};
 
-/// A sum that is not finite, though its terms are: at this variable.
+/// A sum that is not finite although its terms are. The number is a variable in the sum.
 #[derive(Debug)]
 pub(crate) struct Overflow(pub u32);
 
-/// A variable of a session.
+/// A variable of the smoother.
 #[derive(Debug, Clone)]
 pub(crate) struct Place {
     pub key: Key,
-    /// How many came before it, and how many of its type; and whether it is there still.
+    /// Rank in the order of insertion, among all variables (`born`) and within its type (`ordinal`).
+    /// `is_there` is false after removal.
     pub born: u64,
     pub ordinal: u64,
     pub is_there: bool,
-    /// Which column, and where in it.
+    /// Column of its type, and index in that column.
     pub column: u32,
     pub index: u32,
     pub tangent: &'static [&'static str],
-    /// A bit for each direction that is held.
+    /// One bit per held direction.
     pub held: u32,
-    /// Linear priors that it is part of: it keeps its linearization point, as they do.
+    /// Number of linear priors that contain it. If there are any, it keeps its linearization point.
     pub sealed: u32,
 }
 
 impl Place {
-    /// Returns whether all of it is held.
+    /// Returns whether all directions are held.
     pub(crate) fn is_held(&self) -> bool {
         self.held.count_ones() as usize == self.tangent.len()
     }
 }
 
-/// A factor of a session, or a linear prior that variables have left behind.
+/// A factor of the smoother, or a linear prior that replaces the factors of marginalized variables.
 #[derive(Debug, Clone)]
 pub(crate) struct Factor {
-    /// `None` for a prior, which is in no batch: its region is all that there is.
+    /// `None` for a linear prior. It is in no batch and has only a region.
     pub entry: Option<FactorEntry>,
-    /// In the order of its residual.
+    /// In the order of its residual's arguments.
     variables: VariableIndices,
-    /// Ascending, each with where it begins among the factor's scalars.
+    /// Ascending, each with its first scalar among the factor's scalars.
     members: SmallVec<[(u32, u32); 2]>,
     batch: u32,
     index: u32,
-    /// Where its region is.
+    /// Index of its region.
     region: u32,
     pub weight: f64,
-    /// How much of that counts while it is in doubt.
+    /// Share of the weight that counts during a trial of outliers.
     pub share: f64,
-    /// What a prior costs at the linearization points.
+    /// Cost of a prior at the linearization points.
     pub constant: f64,
 }
 
@@ -90,41 +91,42 @@ impl Factor {
             constant,
         }
     }
-    /// Its variables and its noise, as they were looked up; `None` where that is not possible any more.
+    /// Returns its resolved variables and noise; `None` if it has no entry, or its noise has no whitener.
     pub(crate) fn resolved(&self) -> Option<Resolved> {
         let entry = self.entry.as_ref()?;
         let rows = entry.factor.erased().signature().rows.unwrap_or(0);
         let whitener = entry.noise.whitener(rows).ok()?;
         Some(Resolved { variables: self.variables.clone(), whitener })
     }
-    /// Its variables, ascending.
+    /// Returns its variables, ascending.
     pub(crate) fn variables(&self) -> impl Iterator<Item = u32> {
         self.members.iter().map(|(v, _)| *v)
     }
 }
 
-/// Variables and factors, which come and go.
+/// All variables and factors, with insertion and removal.
 #[derive(Default)]
 pub(crate) struct Model {
     places: Vec<Place>,
     numbers: HashMap<Key, u32, foldhash::fast::RandomState>,
-    /// By column, numbers of variables that are gone.
+    /// Numbers of removed variables, by column.
     unused: Vec<Vec<u32>>,
     born: u64,
-    /// By column, how many variables have come.
+    /// Number of variables ever added, by column.
     ordinals: Vec<u64>,
-    /// Linearization points; and where variables are about to be linearized: the same, but during an update.
+    /// Linearization points, and trial points at which factors are evaluated. Outside of an update both are
+    /// equal.
     points: Columns,
     pub trial: Columns,
     factors: Factors,
     regions: Regions,
     batches: Batches,
     pub blocks: Blocks,
-    /// By batch, factors that are about to be evaluated.
+    /// Scratch lists of factors to evaluate, by batch.
     listed: Vec<Vec<u32>>,
-    /// How many factors have a loss.
+    /// Number of factors with a robust loss.
     robust: usize,
-    /// Factors that are left out as outliers: they couple nothing, and are in no sum.
+    /// Factors rejected as outliers. They couple no variables and are in no sum.
     rejected: BTreeSet<u32>,
     parked: Parked,
     /// Variables and factors that were removed.
@@ -144,18 +146,18 @@ impl Couplings for Model {
 }
 
 impl Model {
-    /// The number of the next new factor.
+    /// Returns the number of the next new factor.
     pub(crate) fn next_factor(&self) -> u32 {
         self.factors.next
     }
-    /// Leaves numbers out: they were those of factors that are gone.
+    /// Skips numbers that removed factors had.
     pub(crate) fn skip_to(&mut self, next: u32) {
         self.factors.next = self.factors.next.max(next);
     }
     pub(crate) fn factor(&self, factor: u32) -> Option<&Factor> {
         self.factors.get(factor)
     }
-    /// The factors that are there, with their numbers; no priors.
+    /// Returns all factors with their numbers, without linear priors.
     pub(crate) fn all_factors(&self) -> impl Iterator<Item = (u32, &Factor, &FactorEntry)> {
         self.factors.iter().filter_map(|(f, factor)| Some((f, factor, factor.entry.as_ref()?)))
     }
@@ -168,7 +170,7 @@ impl Model {
     pub(crate) fn place_mut(&mut self, variable: u32) -> &mut Place {
         &mut self.places[variable as usize]
     }
-    /// Returns whether a variable waits, outside of the tree, for factors that determine it.
+    /// Returns whether a variable is parked: outside of the tree until factors determine it.
     pub(crate) fn is_parked(&self, variable: u32) -> bool {
         self.parked.contains(variable)
     }
@@ -176,31 +178,31 @@ impl Model {
     pub(crate) fn set_parked(&mut self, variable: u32, is_parked: bool) -> bool {
         self.parked.set(variable, is_parked)
     }
-    /// The keys of all parked variables; `None` if these are the same as at the last call.
+    /// Returns the keys of all parked variables; `None` if they are unchanged since the last call.
     pub(crate) fn changed_parked_keys(&mut self) -> Option<Shared<Key>> {
         let has_changed = self.parked.has_changed();
         has_changed.then(|| self.parked.iter().map(|v| self.places[v as usize].key.clone()).collect())
     }
-    /// Returns whether a variable is to be solved for.
+    /// Returns whether a variable is solved for.
     pub(crate) fn is_in_tree(&self, variable: u32) -> bool {
         let place = self.place(variable);
         place.is_there && !self.is_parked(variable) && !place.is_held()
     }
-    /// Number of variables that are there.
+    /// Returns the number of present variables.
     pub(crate) fn present(&self) -> usize {
         self.numbers.len()
     }
-    /// The type of a variable.
+    /// Returns the type of a variable.
     pub(crate) fn type_of(&self, variable: u32) -> Option<TypeId> {
         self.point(variable).map(|point| point.erased().type_id())
     }
-    /// A variable's linearization point.
+    /// Returns the linearization point of a variable.
     pub(crate) fn point(&self, variable: u32) -> Option<Box<dyn Variable>> {
         let place = self.place(variable);
         self.points.column(place.column as usize).get(place.index as usize)
     }
 
-    /// Puts a factor in, under a number that is unused. It is not linearized yet.
+    /// Inserts a factor under an unused number. It is not linearized yet.
     pub(crate) fn insert(&mut self, number: u32, entry: &FactorEntry, resolved: &Resolved, weight: f64) {
         let variables = resolved.variables.clone();
         let mut members: SmallVec<[(u32, u32); 2]> = variables.iter().map(|v| (*v, 0)).collect();
@@ -246,7 +248,8 @@ impl Model {
         self.factors.insert(number, Factor { index: index as u32, ..factor });
     }
 
-    /// By variable of a factor's residual: where it begins in the gradient, and what is held of it.
+    /// Returns, for each variable of the factor's residual, its first scalar in the gradient and its held
+    /// directions.
     fn starts(&self, factor: &Factor, region: Region) -> (SmallVec<[u32; 4]>, SmallVec<[u32; 4]>) {
         let one = |v: &u32| {
             let place = &self.places[*v as usize];
@@ -256,7 +259,7 @@ impl Model {
         factor.variables.iter().map(one).unzip()
     }
 
-    /// By pair of a factor's variables, where its block is.
+    /// Returns the position of the block of each pair of the factor's variables.
     fn slots(&self, factor: &Factor, region: Region) -> SmallVec<[Slot; 3]> {
         let mut slots = SmallVec::new();
         for (n, &a) in factor.variables.iter().enumerate() {
@@ -270,7 +273,7 @@ impl Model {
         slots
     }
 
-    /// Takes a factor out.
+    /// Removes a factor.
     pub(crate) fn remove(&mut self, number: u32) -> Option<Factor> {
         let factor = self.factors.remove(number)?;
         if !self.rejected.remove(&number) {
@@ -299,11 +302,11 @@ impl Place {
 }
 
 impl Factor {
-    /// Returns whether it has a loss.
+    /// Returns whether it has a robust loss.
     pub(super) fn is_robust(&self) -> bool {
         self.entry.as_ref().is_some_and(|entry| entry.loss.is_some())
     }
-    /// Where a variable begins among the factor's scalars.
+    /// Returns the first scalar of a variable among the factor's scalars.
     fn at(&self, variable: u32) -> u32 {
         self.members.iter().find(|(v, _)| *v == variable).map_or(0, |(_, at)| *at)
     }

@@ -1,51 +1,53 @@
-//! What an update did.
+//! The report of an update.
 use crate::factor_id::FactorId;
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// The account of one update.
+/// Report of one update.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Report {
-    /// Variables whose part of the factorization was made again.
+    /// Number of variables whose part of the factorization was recomputed.
     pub redone: usize,
-    /// Variables that were linearized at a new point.
+    /// Number of variables with a new linearization point.
     pub relinearized: usize,
-    /// Variables whose relinearization the budget has put off: they come in the next updates.
+    /// Number of variables whose relinearization exceeds the budget. The next updates relinearize them.
     pub postponed: usize,
-    /// Variables whose step was computed again.
+    /// Number of variables whose step was recomputed.
     pub solved: usize,
-    /// Multiplications and additions of the factorization.
+    /// Multiply-adds of the factorization.
     pub operations: f64,
-    /// Passes: one, and one more for each time that something could not wait.
+    /// Number of passes: one, plus one for each repetition within the update.
     pub passes: usize,
-    /// Where the cost would have risen: variables whose steps were damped, one that was damped twice counting twice.
+    /// Number of dampings of variables whose steps would have raised the cost. A variable that was damped
+    /// twice counts twice.
     pub damped: usize,
-    /// Where many variables had to be: steps that were halved.
+    /// Number of step halvings. They replace damping if many variables step too far.
     pub halved: usize,
-    /// True if the update ended in a batch solve, as neither helped.
+    /// True if neither damping nor halving helped, and the update ended in a batch solve.
     pub solved_batch: bool,
-    /// Variables that wait for factors to determine them. Their own block of H has no full rank, so that they and their
-    /// factors take no part yet.
+    /// Undetermined variables: their diagonal block of H is rank deficient. They and their factors take no
+    /// part until more factors determine them.
     pub parked: Shared<Key>,
-    /// Directions that nothing constrains, by variable and name of the tangent direction: a free gauge, say. They are held
-    /// where they were.
+    /// Directions that no factor constrains, such as a free gauge, by variable and name of the tangent
+    /// direction. They are held at their current value.
     pub undetermined: Vec<(Key, &'static str)>,
-    /// Variables that have left: their factors are part of a linear prior now.
+    /// Marginalized variables. A linear prior replaces their factors.
     pub sealed: Vec<Key>,
-    /// Variables that were to leave and stay, as their linear prior or the sums with it overflow. A window tries them again with
-    /// the next update. Remedy: scale the noise of their factors.
+    /// Variables that could not be marginalized, because their linear prior or its sums overflow. A window
+    /// tries them again with the next update. Remedy: scale the noise of their factors.
     pub stayed: Vec<Key>,
-    /// Factors that were dropped with those that have left, as they took no part.
+    /// Factors that took no part and were dropped together with marginalized variables.
     pub dropped: Vec<FactorId>,
     /// Factors that this update has rejected as outliers.
     pub rejected: Vec<FactorId>,
-    /// Factors that were rejected by an update before, and count again.
+    /// Factors that an earlier update rejected and that count again.
     pub readmitted: Vec<FactorId>,
-    /// Trials of rejected factors: whether these are right, and what counts is wrong.
+    /// Number of trials, which test whether rejected factors are right and accepted ones wrong.
     pub trials: usize,
-    /// Factors that are not defined where they were last linearized, and take no part.
+    /// Number of factors that take no part, because they were not defined at their last linearization or have
+    /// weight 0.
     pub inactive: usize,
 }
 
@@ -54,13 +56,13 @@ pub struct Report {
 pub struct Rejection {
     /// The factor.
     pub factor: FactorId,
-    /// The update that rejected it, the first being 1.
+    /// The update that rejected it. The first update is 1.
     pub since: usize,
-    /// ½ρ(‖r‖²) at the estimate; `None` where it is not defined there.
+    /// ½ρ(‖r‖²) at the estimate; `None` if the factor is not defined there.
     pub cost: Option<f64>,
 }
 
-/// A list that reports share until it changes: it may be long, and most updates leave it as it is.
+/// A list that is shared between reports until it changes. It can be long, and most updates do not change it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Shared<T>(Arc<[T]>);

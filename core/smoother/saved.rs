@@ -1,44 +1,45 @@
-//! A session as text: a line that says what it is, and a JSON document.
+//! A smoother as text: a header line and a JSON document.
 //!
 //! ```text
 //! manifactor session 3 90b4b1a3c2f0d7e1
 //! {"settings":{…},"variables":[…],"factors":[…],"fronts":[…],…}
 //! ```
 //!
-//! What is saved is what history has left: factors, linearization points, steps, and which variables are eliminated together.
-//! The numbers of the factorization are not: from the same points, in the same tree, they have the same bits again.
+//! The document holds the state that depends on history: factors, linearization points, steps, and the
+//! variables of each front. It does not hold the values of the factorization, because equal points in an
+//! equal tree reproduce their bits.
 use crate::gone::{GoneKeys, Runs};
 use crate::settings::Settings;
 use manifactor_graph::{FactorEntry, GraphError, Key, Variable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// The version of the format that this program writes and reads.
+/// Format version that this program writes and reads.
 const VERSION: u32 = 3;
 
-/// Why a session cannot be saved.
+/// Error of saving a smoother.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SaveError {
-    /// Changes that the next update is to make.
+    /// Changes that no update has made yet.
     #[error("there are changes that no update has made yet; update the session, and save it then")]
     Pending,
-    /// A value or a factor that has no text.
+    /// A value or a factor that cannot be written as text.
     #[error("cannot be saved: {0}")]
     Write(String),
 }
 
-/// Why a text is no saved session.
+/// Error of loading a smoother.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
-    /// Something else.
+    /// A text that is not a saved smoother.
     #[error("no saved session: expected a first line `manifactor session {version} …`")]
     Foreign {
         /// The version that this program reads.
         version: u32,
     },
-    /// A text that another version has saved.
+    /// A text of a different format version.
     #[error("saved in version {found}; this program reads version {version}")]
     Version {
         /// The version of the text.
@@ -46,21 +47,21 @@ pub enum LoadError {
         /// The version that this program reads.
         version: u32,
     },
-    /// A text that is not as it was saved.
+    /// A text that was damaged or cut off after it was saved.
     #[error("the saved text is damaged or cut off: its checksum does not fit")]
     Damaged,
-    /// A document that cannot be read: a type that this program does not know, say.
+    /// A document that cannot be read, for example because of a type that this program does not have.
     #[error("cannot read what was saved: {0}")]
     Read(String),
-    /// Factors and values that do not fit each other.
+    /// Factors and values that contradict each other.
     #[error("the saved session contradicts itself:{}", GraphError::list(.0))]
     Graph(Vec<GraphError>),
-    /// Something else that no session can be.
+    /// Any other contradiction.
     #[error("the saved session contradicts itself: {0}")]
     Inconsistent(&'static str),
 }
 
-/// What is saved.
+/// The saved document.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Saved {
@@ -70,29 +71,31 @@ pub(crate) struct Saved {
     pub is_quiet: bool,
     pub next_factor: u32,
     pub postponed: usize,
-    /// By number.
+    /// By variable number.
     pub variables: Vec<SavedVariable>,
     /// By ascending number.
     pub factors: Vec<SavedFactor>,
     /// Children before parents.
     pub fronts: Vec<SavedFront>,
-    /// Variables that have left the region of their linearization, those that have left it far, and those to be judged.
+    /// Number of variables ever added.
     pub born: u64,
-    /// By column, how many variables have come.
+    /// Number of variables ever added, by column.
     pub ordinals: Vec<u64>,
-    /// Numbers of variables that are gone, those that are used again first last.
+    /// Free variable numbers. The last one is reused first.
     pub unused: Vec<u32>,
     pub priors: Vec<SavedPrior>,
     pub gone: GoneKeys,
     pub gone_factors: Runs,
+    /// Variables outside of the region of their linearization (`waiting`), far outside (`urgent`), and parked
+    /// variables to check again (`doubtful`).
     pub waiting: Vec<u32>,
     pub urgent: Vec<u32>,
     pub doubtful: Vec<u32>,
-    /// The bits of the time that was set last.
+    /// Bits of the last time that was set.
     pub time: Option<u64>,
-    /// Of a window by seconds, by variable that it holds, the oldest first: the bits of the time when it came.
+    /// Bits of the insertion time of each variable in a window by seconds, the oldest first.
     pub times: Vec<u64>,
-    /// Variables that have moved since factors that may be wrong were looked at.
+    /// Variables that have moved since the last outlier test.
     pub shaken: BTreeSet<u32>,
 }
 
@@ -100,12 +103,13 @@ pub(crate) struct Saved {
 #[serde(deny_unknown_fields)]
 pub(crate) struct SavedVariable {
     pub key: Key,
-    /// How many came before it, and how many of its type; `None` where it is gone.
+    /// Ranks in the order of insertion, among all variables and within the type; `None` for a removed
+    /// variable.
     pub born: Option<[u64; 2]>,
-    /// Its linearization point, and the bits of its step from there.
+    /// Linearization point, and bits of the step from there.
     pub point: Box<dyn Variable>,
     pub step: Vec<u64>,
-    /// The bits of what its steps are damped by, and whether it still takes a step at each update.
+    /// Bits of the damping, and whether the variable takes a step at each update.
     #[serde(default, skip_serializing_if = "is_none")]
     pub damping: (u64, bool),
     pub held: u32,
@@ -122,24 +126,24 @@ pub(crate) struct SavedFactor {
     pub number: u32,
     pub weight: f64,
     pub entry: FactorEntry,
-    /// What is known of a factor that may be an outlier.
+    /// Present for a candidate of the outlier test.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub suspect: Option<Suspect>,
 }
 
-/// What is known of a factor that may be wrong.
+/// A factor that may be an outlier.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Suspect {
-    /// What ‖r‖² of a right one stays below: the χ² quantile for its rows.
+    /// Upper limit of ‖r‖² for an inlier: the χ² quantile for its rows.
     pub(crate) bound: f64,
-    /// Nats by which it may narrow down alone where its variables are.
+    /// Largest information gain without confirmation by a second factor. Unit: nats.
     pub(crate) gain: f64,
-    /// The update that rejected it; `None` where it counts.
+    /// The update that rejected it; `None` if the factor counts.
     pub(crate) since: Option<usize>,
 }
 
-/// A linear prior, its numbers by their bits.
+/// A linear prior. Numbers are stored as bits.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SavedPrior {
@@ -155,7 +159,7 @@ pub(crate) struct SavedPrior {
 pub(crate) struct SavedFront {
     pub blocks: Vec<u32>,
     pub rows: Vec<u32>,
-    /// Its place among the fronts.
+    /// Index among the saved fronts.
     pub parent: Option<u32>,
 }
 
@@ -185,7 +189,7 @@ impl Saved {
     }
 }
 
-/// FNV-1a, of 64 bits: it finds damage, not malice.
+/// FNV-1a with 64 bits. It detects damage, not manipulation.
 fn checksum(bytes: &[u8]) -> u64 {
     bytes
         .iter()

@@ -1,4 +1,4 @@
-//! A session: what is known so far, and the estimate.
+//! The smoother: its state and its estimate.
 mod changes;
 mod factorization;
 mod finish;
@@ -35,8 +35,8 @@ pub use finish::Finished;
 
 /// A factor graph that grows while it is solved. See the [crate](crate).
 ///
-/// Changes are checked when they are asked for, and made by the next [`update`](Self::update). The estimate of a variable
-/// is its linearization point, moved by a step δ that the factorization gives.
+/// Changes are checked when they are requested, and applied by the next [`update`](Self::update). The
+/// estimate of a variable is its linearization point, moved by a step δ that the factorization gives.
 pub struct Session {
     schedule: Schedule,
     model: Model,
@@ -55,7 +55,7 @@ impl fmt::Debug for Session {
 }
 
 impl Session {
-    /// An empty session.
+    /// Creates an empty smoother.
     pub fn new(settings: Settings) -> Self {
         Self {
             schedule: Schedule::new(settings),
@@ -69,17 +69,17 @@ impl Session {
         }
     }
 
-    /// The estimate of a variable, as of the last update; `None` where it is not there. O(1).
+    /// Returns the estimate of a variable, as of the last update; `None` if there is no such variable. O(1).
     pub fn estimate(&self, key: &str) -> Option<Box<dyn Variable>> {
         let variable = self.model.variable(key)?;
         let point = self.model.point(variable)?;
         point.erased().retract(self.steps.of(&self.model, variable))
     }
 
-    /// The same, of a type that is known.
+    /// Returns the estimate of a variable as a value of type `M`, as of the last update.
     ///
     /// # Errors
-    /// If there is no such variable, or it has another type.
+    /// If there is no such variable, or it has a different type.
     pub fn get<M: Variable + Clone + 'static>(&self, key: &str) -> Result<M, ValueError> {
         let value = self.estimate(key).ok_or_else(|| ValueError::Missing { key: key.into() })?;
         let found = value.erased().as_any().downcast_ref::<M>();
@@ -90,7 +90,7 @@ impl Session {
         })
     }
 
-    /// All estimates, in the order in which the variables came.
+    /// Returns all estimates, in the order in which the variables were added.
     pub fn estimates(&self) -> Values {
         let mut values = Values::new();
         for v in self.model.by_age() {
@@ -102,28 +102,32 @@ impl Session {
         values
     }
 
-    /// Number of variables, those that are parked or held among them.
+    /// Returns the number of variables, including parked and held ones.
     pub fn variables(&self) -> usize {
         self.model.present()
     }
 
-    /// ½ Σ ρ at the estimate, over all factors that took part where they were last linearized and whose variables are not
-    /// parked; of variables that have left, what their linear priors say. It looks at every factor.
+    /// Returns the cost ½ Σ ρ at the estimate.
+    ///
+    /// It includes the factors that took part in their last linearization and have no parked variable, and
+    /// the linear priors of marginalized variables. It evaluates every factor.
     pub fn cost(&mut self) -> f64 {
         let factors: Vec<u32> = self.counted().chain(self.model.priors()).collect();
         self.steps.cost_of(&mut self.model, &factors).cost
     }
 
-    /// The factors that count: none of their variables is parked.
+    /// Returns the factors that count: they are not rejected and have no parked variable.
     fn counted(&self) -> impl Iterator<Item = u32> {
         self.model.all_factors().map(|(f, ..)| f).filter(|f| self.model.is_whole(*f))
     }
 
-    /// The joint covariance of a few variables, in the order of `keys` and of their tangent directions, in the units of the
-    /// noise; what is held has zeros. It is that of the last linearization points, robust weights included.
+    /// Returns the joint covariance of a few variables, in the units of the noise. Rows and columns follow
+    /// `keys` and their tangent directions. Held directions have zeros. The covariance is taken at the last
+    /// linearization points, including robust weights.
     ///
     /// # Errors
-    /// If a variable is not there or parked, or something that it hangs on is undetermined; if a covariance is too large for a number.
+    /// If a variable does not exist or is parked, if it depends on an undetermined direction, or if a
+    /// covariance overflows.
     pub fn covariance(&self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
         let mut variables = vec![];
         for key in keys {
@@ -133,7 +137,7 @@ impl Session {
         self.factorization.covariance(&self.model, &variables)
     }
 
-    /// Bytes of the factorization.
+    /// Returns the size of the factorization in bytes.
     pub fn bytes(&self) -> usize {
         self.factorization.bytes()
     }
@@ -146,7 +150,8 @@ impl Session {
         self.model.place(variable).key.clone()
     }
 
-    /// Parked, undetermined and inactive variables and factors, for a report.
+    /// Adds parked variables, undetermined directions, and the numbers of inactive factors and postponed
+    /// variables to a report.
     fn tell(&mut self, report: &mut Report) {
         report.parked = self.undetermined.list_parked(&mut self.model);
         let name = |(v, d): Scalar| Some((self.key(v), *self.model.place(v).tangent.get(d as usize)?));

@@ -1,4 +1,4 @@
-//! How a session trades time for accuracy.
+//! Settings of the smoother.
 mod window;
 
 use manifactor_graph::checked::NotNegative;
@@ -9,51 +9,57 @@ use std::num::NonZeroUsize;
 
 pub use window::{ManifoldType, NotOneSpan, Span, UnknownManifold, Window};
 
-/// Settings of a session. The defaults are meant for any graph: thresholds are in units of the estimate's own precision.
+/// Settings of the smoother. The defaults suit any graph, because thresholds are in units of the estimate's
+/// precision.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Updates from one relinearization to the next, at least 1. Default: 10.
+    /// Number of updates from one relinearization to the next, at least 1. Default: 10.
     pub relinearize_every: NonZeroUsize,
-    /// Largest error of a linearization, in standard deviations of the factors around. A variable is linearized anew if a component
-    /// of its step δ is larger than √(bend · σ), with σ = 1/√Hᵢᵢ, or if new weights of robust losses change its gradient by more
-    /// than 1/σ. 0 relinearizes every variable that moves. Default: 0.1.
+    /// Relinearization threshold: largest error of a linearization. A variable is relinearized if a component
+    /// of its step δ is larger than √(bend · σ), with σ = 1/√Hᵢᵢ of the surrounding factors. It is also
+    /// relinearized if new weights of robust losses change its gradient by more than 1/σ. 0 relinearizes
+    /// every variable that moves. Default: 0.1. Unit: σ.
     pub bend: NotNegative,
-    /// Changes of a step δ that are not passed on to other variables, in standard deviations σ = 1/√Hᵢᵢ of the factors around. 0 passes on
-    /// every change. Default: 0.01.
+    /// Wildfire threshold: smaller changes of a step δ are not propagated to other variables. 0 propagates
+    /// every change. Default: 0.01. Unit: σ = 1/√Hᵢᵢ of the surrounding factors.
     pub deviation: NotNegative,
-    /// Multiples of the threshold for relinearization from which on a variable does not wait for its turn: the update is
-    /// followed by another pass at once. Default: 10.
+    /// Multiple of the relinearization threshold above which a variable is relinearized at once, by an
+    /// additional pass of the update. Default: 10.
     pub urgent: NotNegative,
-    /// Such passes that one update may take. Default: 1.
+    /// Largest number of additional passes in one update. Default: 1.
     pub passes: usize,
-    /// Multiply-adds that an update may take where it relinearizes, for deadlines. Relinearizations beyond it wait for the next
-    /// updates, those furthest out first; an update that has nothing else to do takes one at least. What new factors need
-    /// is never put off, nor is a step shortened later because of it. Default: no budget.
+    /// Largest number of multiply-adds in an update that relinearizes, for deadlines. Variables with the
+    /// largest errors are relinearized first, the remaining ones by the next updates. An update without other
+    /// work relinearizes at least one. New factors and the shortening of steps are not limited. Default: no
+    /// budget.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub budget: Option<NotNegative>,
-    /// What stays of a graph that grows without end. Default: all of it.
+    /// Window of variables to keep in a graph that grows without end. Default: all variables stay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<Window>,
-    /// Which factors may be wrong, and are tested before they count. Default: none.
+    /// Outlier test of new factors. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outliers: Option<Outliers>,
 }
 
-/// The test that a factor has to pass: what it costs on top of what is known must be below the χ² quantile for its rows.
+/// Outlier test: the additional cost of a candidate, given all accepted factors, must be below the χ²
+/// quantile for its rows.
 ///
-/// Candidates are all factors that couple variables, except odometry. Odometry is the first factor between two variables of one type
-/// that came one after the other; if an update brings several, it is the factor that fits the values of the variables best.
+/// Candidates are all factors that couple variables, except odometry. Odometry is the first factor between
+/// two variables of one type that were added consecutively. If an update adds several such factors, odometry
+/// is the one that fits the values best.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Outliers {
-    /// Share of the right ones that the test keeps. Default: 0.99.
+    /// Share of inliers that pass the test. Default: 0.99.
     pub probability: Probability,
-    /// Nats for each row by which a factor alone may narrow down where its variables are, where as many candidates count as are rejected;
-    /// the logarithm of that ratio is added. What says more is hardly tested by what is known, and waits for another that bears it
-    /// out. Default: 1.5.
+    /// Largest information gain of a factor that is accepted without a second one that confirms it. The limit
+    /// applies to equal numbers of accepted and rejected candidates; otherwise the logarithm of their ratio
+    /// is added. A factor with a larger gain is hardly tested by the estimate. Default: 1.5. Unit: nats per
+    /// residual row.
     pub gain: NotNegative,
-    /// Of the candidates only the factors of these types. Default: all of them.
+    /// Types of factors that can be candidates. Default: all types.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub types: Vec<FactorType>,
 }

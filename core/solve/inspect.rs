@@ -1,4 +1,5 @@
-//! Questions about an estimate: how certain it is, what holds it, and what fits badly.
+//! Analysis of an estimate: covariances, conditioning, undetermined directions and the factors with the
+//! largest costs.
 mod at_start;
 mod condition;
 mod covariance;

@@ -1,8 +1,8 @@
 //! Compiled problems, sparse linear algebra and solvers.
 //!
-//! [`Problem::compile`] turns a [`Graph`] and its [`Values`] into columns of variables, batches of
-//! factors and the structure of their normal equations, once. An [`Optimizer`] moves the problem's
-//! estimate; an [`Observer`] watches. [`solve`] does it all.
+//! [`Problem::compile`] turns a [`Graph`] and its [`Values`] into columns of variables, batches of factors
+//! and the structure of their normal equations, once. An [`Optimizer`] moves the estimate of the problem,
+//! and an [`Observer`] watches. [`solve`] combines these steps.
 mod inspect;
 mod linear;
 mod observer;
@@ -24,7 +24,7 @@ pub use strategy::{
     Truncation, UnknownFactor, is_sequential,
 };
 
-/// The dense kernel of a front, for solvers that keep fronts of their own.
+/// The dense kernel of a front, for solvers that store their fronts themselves.
 #[doc(hidden)]
 pub mod front {
     pub use crate::linear::cholesky::kernel::eliminate;
@@ -34,25 +34,27 @@ pub mod front {
 use manifactor_graph::batch::FactorState;
 use manifactor_graph::{Graph, Values};
 
-/// An estimate, and how it came about.
+/// An estimate, and the outcome of its solve.
 #[derive(Debug, Clone)]
 pub struct Solution {
     /// The estimate: the best found, however the solve ended.
     pub values: Values,
-    /// What the solver has to tell.
+    /// Termination, costs, times and history of the solve.
     pub outcome: Outcome,
     /// Each factor at the estimate, in the order of the graph.
     pub factors: Vec<FactorState>,
-    /// How often the solver has let each factor count, on top of its loss; empty, where it does not weigh them.
+    /// Weight of each factor by the solver, on top of its loss; empty if the solver does not weight
+    /// factors.
     pub weights: Vec<f64>,
-    /// What was solved, for questions about the estimate.
+    /// The solved problem, for queries about the estimate.
     problem: problem::Kept,
 }
 
-/// Compiles and solves.
+/// Compiles and solves a graph.
 ///
 /// # Errors
-/// Graph and values that do not fit each other. Numerical trouble is no error: see [`Outcome::termination`].
+/// If graph and values do not fit each other. Numerical trouble is not an error: see
+/// [`Outcome::termination`].
 pub fn solve(
     graph: &Graph,
     values: &Values,
@@ -67,7 +69,7 @@ pub fn solve(
 }
 
 impl Solution {
-    /// The problem's estimate, at the end of a solve.
+    /// Takes estimate, factors and weights from a problem at the end of a solve.
     fn of(problem: Problem, outcome: Outcome) -> Self {
         let (values, factors, weights) = (problem.values(), problem.inspect(), problem.weights().to_vec());
         Self { values, outcome, factors, weights, problem: problem::Kept::new(problem) }

@@ -1,4 +1,4 @@
-//! The linear systems of steps: their structure, their settings and the methods that solve them.
+//! Linear systems of steps: structure, settings and solution methods.
 mod block_system;
 pub(crate) mod cholesky;
 mod conjugate_gradients;
@@ -15,11 +15,11 @@ pub(crate) use cholesky::Cholesky;
 pub(crate) use conjugate_gradients::{ConjugateGradients, Damped};
 pub(crate) use qr::Qr;
 
-/// The matrix is not positive definite, as far as f64 can tell.
+/// The error for a matrix that is not positive definite, as far as f64 can tell.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NotPositiveDefinite;
 
-/// A linear system by one of the methods.
+/// A linear system with one of the methods.
 #[derive(Debug)]
 pub(crate) enum Method {
     Cholesky(Cholesky),

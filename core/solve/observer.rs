@@ -1,22 +1,22 @@
-//! Watching a solve, and stopping it.
+//! Observers, which watch a solve and can stop it.
 use crate::outcome::IterationRecord;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Sees each step that a solver tries. `Break` ends the solve with the best values so far.
+/// An observer of each step that a solver tries. `Break` ends the solve with the best values so far.
 pub trait Observer {
-    /// After a step was tried.
+    /// Called after each tried step.
     fn iteration(&mut self, record: &IterationRecord) -> ControlFlow<()>;
 
-    /// Within a step that takes long: before each iteration of conjugate gradients, and each refinement. `Break` ends
-    /// the solve with the best values so far.
+    /// Called during long steps: before each iteration of conjugate gradients, and before each refinement.
+    /// `Break` ends the solve with the best values so far.
     fn poll(&mut self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 }
 
-/// Sees nothing.
+/// An observer that does nothing.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
@@ -26,7 +26,7 @@ impl Observer for Silent {
     }
 }
 
-/// Stops the solve once a flag is raised: by Ctrl-C, by another thread.
+/// Stops the solve once a flag is set, for example by Ctrl-C or from a different thread.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt(pub Arc<AtomicBool>);
 
@@ -46,7 +46,7 @@ impl<F: FnMut(&IterationRecord) -> ControlFlow<()>> Observer for F {
     }
 }
 
-/// Several observers, in order; each of them sees each record.
+/// Several observers, called in order; each receives each record.
 pub struct All<'a>(pub Vec<&'a mut dyn Observer>);
 
 impl Observer for All<'_> {
@@ -65,7 +65,7 @@ impl Observer for All<'_> {
     }
 }
 
-/// Sees no record of a solve within a solve, but may end it.
+/// Hides the records of an inner solve from an observer that may still end it.
 pub(crate) struct Quiet<'a>(pub &'a mut dyn Observer);
 
 impl Observer for Quiet<'_> {

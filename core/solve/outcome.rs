@@ -1,4 +1,4 @@
-//! What a solve has to tell.
+//! The outcome of a solve.
 mod moving;
 mod termination;
 mod untouched;
@@ -11,46 +11,48 @@ pub use moving::Moving;
 pub use termination::{Stall, Termination, Tolerance, Undetermined};
 pub use untouched::{InactiveFactor, Untouched};
 
-/// What a solve did and how it ended.
+/// Termination, costs, diagnosis and history of a solve.
 #[derive(Debug, Clone, Serialize)]
 pub struct Outcome {
-    /// ½ Σ ρ at the values that the solve began with.
+    /// ½ Σ ρ at the initial values.
     pub initial_cost: f64,
-    /// ½ Σ ρ at the values that it leaves.
+    /// ½ Σ ρ at the final values.
     pub final_cost: f64,
-    /// Linearizations that were followed by a step.
+    /// Number of linearizations that were followed by a step.
     pub iterations: usize,
-    /// How it ended.
+    /// Reason for the end of the solve.
     pub termination: Termination,
-    /// A direction that nothing but damping constrains.
+    /// A direction that only damping constrains.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub undetermined: Option<Undetermined>,
-    /// What the last step still moved, where iterations ran out.
+    /// The variables that the last step moved most, if the solve ran out of iterations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub moving: Option<Moving>,
-    /// Free variables that no factor which takes part touches. A solve with such is never converged.
+    /// Free variables without an active factor. A solve with such variables is never converged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub untouched: Option<Untouched>,
-    /// Factors in the problem.
+    /// Number of factors in the problem.
     pub factors: usize,
-    /// Factors that are not defined at the final values, and take no part in the cost.
+    /// Number of factors that are undefined at the final values, and excluded from the cost.
     pub inactive: usize,
-    /// The first ten of these.
+    /// The first ten inactive factors.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inactive_factors: Vec<InactiveFactor>,
-    /// Factors that a solver has found to be outliers, in the order of the graph.
+    /// Factors that the solver rejects as outliers, in the order of the graph.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rejected: Vec<Rejected>,
-    /// Where the time went.
+    /// Durations of the stages.
     pub times: Times,
-    /// A record for each step tried.
+    /// A record for each tried step.
     pub history: Vec<IterationRecord>,
 }
 
 impl Outcome {
-    /// The account of two solves of one problem, the first and the `next`, whose end counts if it is `better`.
+    /// Combines the outcomes of two consecutive solves of one problem. The end of `next` counts if it is
+    /// `better`.
     pub(crate) fn then(self, mut next: Self, better: bool) -> Self {
-        // one that takes no step does not look for what is open: that is as the first has left it
+        // a solve without a step does not search for undetermined directions, so the result of the first
+        // one counts
         if next.iterations == 0 {
             next.undetermined = next.undetermined.or_else(|| self.undetermined.clone());
         }
@@ -62,25 +64,25 @@ impl Outcome {
     }
 }
 
-/// A factor that costs more than an inlier may.
+/// A factor whose cost exceeds the inlier bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rejected {
-    /// Its place in the graph, from 0.
+    /// Index in the graph, from 0.
     pub factor: usize,
-    /// Its name, or else that of its type.
+    /// Its name, or else the name of its type.
     pub name: Cow<'static, str>,
     /// Its variables.
     pub keys: Vec<Key>,
-    /// How much it still counts, from 0 to 1.
+    /// Its remaining weight, from 0 to 1.
     pub weight: f64,
-    /// What it would cost with full weight.
+    /// Its cost at full weight.
     pub cost: f64,
 }
 
-/// Seconds by stage.
+/// Durations by stage, in seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Times {
-    /// From graph to problem: columns, batches, ordering, symbolic factorization.
+    /// Compilation of the graph: columns, batches, ordering, symbolic factorization.
     pub compile: f64,
     /// Residuals, Jacobians and normal equations.
     pub linearize: f64,
@@ -90,16 +92,16 @@ pub struct Times {
     pub solve: f64,
     /// Retractions and costs of trial steps.
     pub evaluate: f64,
-    /// The search for directions that nothing constrains, but for its factorizations and solves.
+    /// Search for undetermined directions, without its factorizations and solves.
     pub diagnose: f64,
-    /// All else.
+    /// Everything else.
     pub other: f64,
-    /// All of it, compilation included.
+    /// Total, including compilation.
     pub total: f64,
 }
 
 impl Times {
-    /// Both together.
+    /// Returns the sum of both.
     #[must_use]
     pub fn plus(self, next: Self) -> Self {
         Self {
@@ -114,25 +116,25 @@ impl Times {
         }
     }
 
-    /// Both, of one compilation.
+    /// Returns the sum of two solves that share one compilation.
     fn and(self, next: Self) -> Self {
         self.plus(Self { compile: 0.0, total: next.total - next.compile, ..next })
     }
 
-    /// What the stages of a solve have taken, its compilation excluded.
+    /// Returns the sum of the stages of a solve, without compilation.
     pub(crate) fn stages(&self) -> f64 {
         self.linearize + self.factorize + self.solve + self.evaluate + self.diagnose
     }
 }
 
-/// One step that was tried.
+/// One tried step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IterationRecord {
-    /// From 1; a refused step keeps the number of the linearization that it came from.
+    /// Number of the linearization, from 1. A rejected step has the number of its linearization.
     pub iteration: usize,
     /// Cost at the linearization.
     pub cost: f64,
-    /// Cost after the step; `None` where it left the domain of a factor or was not finite.
+    /// Cost after the step; `None` if the step left the domain of a factor or the cost is not finite.
     pub trial_cost: Option<f64>,
     /// Largest entry of the gradient.
     pub gradient: f64,
@@ -140,10 +142,10 @@ pub struct IterationRecord {
     pub step: f64,
     /// λ of Levenberg-Marquardt, radius of Dogleg, length factor of Gauss-Newton.
     pub control: f64,
-    /// Whether the step was taken.
+    /// Whether the step was accepted.
     pub accepted: bool,
-    /// Factors that take no part.
+    /// Number of inactive factors.
     pub inactive: usize,
-    /// Seconds since the solve began.
+    /// Seconds since the start of the solve.
     pub seconds: f64,
 }

@@ -20,16 +20,16 @@ pub use estimate::WeightError;
 pub(crate) use kept::Kept;
 pub(crate) use model::{FactorPlace, Model};
 
-/// A graph, compiled. The structure lives as long as the problem; solves reuse it.
+/// A compiled graph. The structure lives as long as the problem, and all its solves reuse it.
 pub struct Problem {
     pub(crate) model: Model,
     pub(crate) system: LinearSystem,
     pub(crate) times: Times,
-    /// Of the graph that was compiled; a new one, once a measurement is changed here.
+    /// Version of the compiled graph; renewed when a measurement is changed in the problem.
     version: Version,
-    /// Revision of the model that H and g are of.
+    /// Revision of the model at which H and g were computed.
     linearized: Option<u64>,
-    /// Revision of the model at which the factor of H was found to leave nothing open.
+    /// Revision of the model at which the factor of H showed no undetermined direction.
     pub(crate) determined: Option<u64>,
 }
 
@@ -37,15 +37,16 @@ impl Problem {
     /// Sorts variables into columns and factors into batches, and analyses the linear system.
     ///
     /// # Errors
-    /// Everything that is wrong between graph and values, all at once.
+    /// All errors between graph and values.
     pub fn compile(graph: &Graph, values: &Values) -> Result<Self, CompileError> {
         Self::compile_for(graph, values, &LinearSolver::default())
     }
 
-    /// The same for a linear solver of choice.
+    /// Compiles a graph for a given linear solver; see [`compile`](Self::compile).
     ///
     /// # Errors
-    /// Those of [`compile`](Self::compile), and where the solver does not fit the graph, or its factor into memory.
+    /// As [`compile`](Self::compile), or if the solver does not fit the graph, or its factor does not fit
+    /// into memory.
     pub fn compile_for(graph: &Graph, values: &Values, linear: &LinearSolver) -> Result<Self, CompileError> {
         compile::compile(graph, values, linear)
     }
@@ -54,29 +55,29 @@ impl Problem {
         Self { model, system, times, version, linearized: None, determined: None }
     }
 
-    /// The estimate, in the order of the values that the problem was compiled with.
+    /// Returns the estimate, in the order of the values at compilation.
     pub fn values(&self) -> Values {
         self.model.values()
     }
 
-    /// Number of scalar unknowns.
+    /// Returns the number of scalar unknowns.
     pub fn dim(&self) -> usize {
         self.system.dim()
     }
 
-    /// Number of factors.
+    /// Returns the number of factors.
     pub fn factors(&self) -> usize {
         self.model.factors.len()
     }
 
-    /// Scalar unknowns of a variable: `None` where there is no such variable, or it is held.
+    /// Returns the scalar unknowns of a variable; `None` if there is no such variable, or it is fixed.
     pub fn unknowns(&self, key: &str) -> Option<std::ops::Range<usize>> {
         let place = self.model.place(key)?;
         place.start.map(|s| s..s + place.tangent.len())
     }
 
-    /// Fills H and g at the estimate, and decides which factors take part. Where something is not finite, a factor is
-    /// named that it comes from.
+    /// Computes H and g at the estimate, and decides which factors are active. If a value is not finite,
+    /// the result names a factor that causes it.
     pub fn linearize(&mut self) -> Evaluation {
         let clock = Instant::now();
         let mut total = self.model.linearize(&mut self.system.begin());
@@ -89,7 +90,7 @@ impl Problem {
         total
     }
 
-    /// The same, and the last factor by Cholesky stays: it is that of another H.
+    /// Linearizes, but keeps the last separate Cholesky factor, which belongs to the previous H.
     pub(crate) fn linearize_keeping_factor(&mut self) -> Evaluation {
         let direct = self.system.take_direct();
         let evaluation = self.linearize();
@@ -97,37 +98,37 @@ impl Problem {
         evaluation
     }
 
-    /// Fills H and g, unless they are those of the estimate already.
+    /// Computes H and g, unless they are up to date.
     pub(crate) fn linearize_once(&mut self) {
         if self.linearized != Some(self.model.revision()) {
             self.linearize();
         }
     }
 
-    /// The lower triangle of H = JᵀJ as compressed columns, in the order of elimination, and g = Jᵀr;
-    /// as of the last linearization.
+    /// Returns H = JᵀJ (lower triangle, compressed columns, in elimination order) and g = Jᵀr, as of the
+    /// last linearization.
     pub fn normal_equations(&self) -> (&[usize], &[u32], &[f64], &[f64]) {
         let LinearSystem { layout, h, g, .. } = &self.system;
         (&layout.col_ptr, &layout.row_idx, h, g)
     }
 
-    /// Cost at the estimate, over the factors that took part in the last linearization.
+    /// Evaluates the cost at the estimate, over the factors that were active at the last linearization.
     pub fn cost(&self) -> Evaluation {
         self.model.cost()
     }
 
-    /// ½ρ of each factor at the estimate, in the order of the graph, whatever its weight; zero where it is not
-    /// defined.
+    /// Computes ½ρ of each factor at the estimate, in the order of the graph, without its weight; zero if
+    /// it is undefined.
     pub fn factor_costs(&self, costs: &mut Vec<f64>) {
         self.model.factor_costs(costs);
     }
 
-    /// The weight of each factor, in the order of the graph; empty, where none was set.
+    /// Returns the weight of each factor, in the order of the graph; empty if none was set.
     pub fn weights(&self) -> &[f64] {
         self.model.weights()
     }
 
-    /// Each factor as it stands at the estimate, in the order of the graph.
+    /// Returns the state of each factor at the estimate, in the order of the graph.
     pub fn inspect(&self) -> Vec<FactorState> {
         self.model.inspect()
     }
@@ -137,12 +138,12 @@ impl Problem {
         self.model.rows(visit);
     }
 
-    /// Seconds spent so far.
+    /// Returns the durations so far, in seconds.
     pub fn times(&self) -> Times {
         self.times
     }
 
-    /// Makes `estimate ⊞ step` the trial, and returns its cost.
+    /// Sets the trial to `estimate ⊞ step`, and returns its cost.
     pub(crate) fn try_step(&mut self, step: &[f64]) -> Evaluation {
         let clock = Instant::now();
         let cost = self.model.try_step(step);

@@ -1,4 +1,4 @@
-//! How an estimate is moved to a minimum: one file for each solver, and what they share.
+//! Solvers, one per file, and their common parts.
 mod auto;
 mod descent;
 mod dogleg;

@@ -1,7 +1,7 @@
-//! Laws of whatever is linked, from nothing but its entry in the catalogue.
+//! Laws of all linked types, checked from their catalogue entries.
 //!
-//! A registered type brings an example in its docs. That is a factor to check, or a point around
-//! which others can be drawn, so that no type goes without the laws.
+//! The docs of a registered type have an example. It is a factor to check, or a point around which further
+//! points are drawn. Every type can therefore be checked.
 use crate::error::LawError;
 use crate::example::{example_fields, problem};
 use crate::factor_check::{FactorCheck, FactorReport, Subject};
@@ -14,11 +14,11 @@ use manifactor_graph::{Factor, Variable};
 
 pub use crate::example::example;
 
-/// Checks that an entry has a name in snake case, a summary, an object for a schema, and an example
-/// in TOML that mentions it and can be read.
+/// Checks that an entry has a name in snake case, a summary, a schema that is an object, and a readable TOML
+/// example of the type.
 ///
 /// # Errors
-/// The first that it lacks.
+/// The first missing part.
 pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
     let require = |holds: bool, text: &str| if holds { Ok(()) } else { Err(problem(entry, text.into())) };
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '-';
@@ -30,20 +30,20 @@ pub fn documentation_law(entry: &'static Entry) -> Result<(), LawError> {
     read.map(drop).map_err(|e| problem(entry, format!("its example: {e}")))
 }
 
-/// Checks a factor's example at this number of points, see [`FactorCheck`]. Returns what was found.
+/// Checks the example of a factor at `points` points, see [`FactorCheck`]. Returns the report.
 ///
 /// # Errors
-/// The law that is broken, or what the catalogue lacks.
+/// If a law does not hold, or the catalogue entry is incomplete.
 pub fn factor_law(entry: &'static Entry, points: usize) -> Result<FactorReport, LawError> {
     let report = FactorCheck { points, ..FactorCheck::default() }.run(&Subject::example(entry)?);
     if report.holds() { Ok(report) } else { Err(problem(entry, report.to_string())) }
 }
 
-/// Checks [`documentation_law`] and [`factor_law`] of a registered factor, at 256 points: what
-/// [`factor_laws!`](crate::factor_laws) makes a test of.
+/// Asserts [`documentation_law`] and [`factor_law`] of a registered factor, at 256 points. The tests of
+/// [`factor_laws!`](crate::factor_laws) call this function.
 ///
 /// # Panics
-/// Where one does not hold, with what is wrong: it is an assertion for tests.
+/// If a law does not hold, with its error. It is an assertion for tests.
 #[track_caller]
 pub fn assert_factor_laws(name: &str) {
     let entry = catalogue::find(<dyn Factor as Kind>::NAME, name);
@@ -55,8 +55,8 @@ pub fn assert_factor_laws(name: &str) {
     factor_law(entry, 256).unwrap_or_else(|e| panic!("{e}"));
 }
 
-/// The law of every factor, a test for each, by its registered name: that its docs have what the catalogue shows, that
-/// its Jacobian is right, its residual finite, and that what is stated of it holds. `factor_laws! { rests_on, leans }`
+/// Defines one test for each registered factor name: its docs are complete, its Jacobian is right, its
+/// residual is finite, and its stated invariances hold. Example: `factor_laws! { rests_on, leans }`
 #[macro_export]
 macro_rules! factor_laws {
     ($($name:ident),+ $(,)?) => {
@@ -69,20 +69,20 @@ macro_rules! factor_laws {
     };
 }
 
-/// Checks a manifold at this number of pairs of points, see [`ManifoldCheck`]. Returns what was found.
+/// Checks a manifold at `points` pairs of points, see [`ManifoldCheck`]. Returns the report.
 ///
 /// # Errors
-/// The law that is broken, or what the catalogue lacks.
+/// If a law does not hold, or the catalogue entry is incomplete.
 pub fn manifold_law(entry: &'static Entry, points: usize) -> Result<ManifoldReport, LawError> {
     let report = ManifoldCheck { points, ..ManifoldCheck::default() }.run(entry)?;
     if report.holds() { Ok(report) } else { Err(problem(entry, report.to_string())) }
 }
 
-/// Checks [`documentation_law`] and [`manifold_law`] of a registered manifold, at 256 pairs of points, its `seed` included:
-/// what [`manifold_laws!`](crate::manifold_laws!) makes a test of.
+/// Asserts [`documentation_law`] and [`manifold_law`] of a registered manifold, at 256 pairs of points,
+/// including its `seed`. The tests of [`manifold_laws!`](crate::manifold_laws!) call this function.
 ///
 /// # Panics
-/// Where one does not hold, with what is wrong: it is an assertion for tests.
+/// If a law does not hold, with its error. It is an assertion for tests.
 #[track_caller]
 pub fn assert_manifold_laws(name: &str) {
     let entry = catalogue::find(<dyn Variable as Kind>::NAME, name);
@@ -98,17 +98,17 @@ pub fn assert_manifold_laws(name: &str) {
     );
 }
 
-/// Checks a loss's example at many s: that its weight is the derivative of ρ, and that [tempered], once and twice, it is
-/// ρ(τs)/τ for many τ.
+/// Checks the example of a loss at many s. Its weight has to be the derivative of ρ. The loss, [tempered]
+/// once and twice, has to be ρ(τs)/τ for many τ.
 ///
 /// # Errors
-/// The law that is broken, or what the catalogue lacks.
+/// If a law does not hold, or the catalogue entry is incomplete.
 ///
 /// [tempered]: manifactor_graph::loss::RobustLoss::tempered
 pub fn loss_law(entry: &'static Entry) -> Result<(), LawError> {
     let loss = example::<dyn Loss>(entry)?;
     let rho = |s: f64| loss.erased().rho(s);
-    // between round numbers, where a loss may have its bounds
+    // between round numbers, at which a loss may have its bounds
     let grid = |exponents: std::ops::Range<i32>| exponents.map(|i| 10f64.powf(0.37 * f64::from(i) + 0.013));
     let near = |(a, b): (f64, f64), share: f64| (a - b).abs() <= share * (1.0 + b.abs());
     for s in grid(-40..20) {

@@ -1,4 +1,4 @@
-//! Runs a law over the cases of a strategy.
+//! Checks of a law on the cases of a strategy.
 use crate::error::LawError;
 use crate::jacobian::jacobian_law;
 use crate::manifold::manifold_laws;
@@ -7,14 +7,14 @@ use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, TestCaseError, TestError, TestRunner};
 use std::fmt::Debug;
 
-/// The least number of cases; `PROPTEST_CASES` asks for more.
+/// Smallest number of cases. `PROPTEST_CASES` can increase it.
 const CASES: u32 = 256;
 
-/// Checks a law for at least 256 cases of a strategy. Cases where a factor is not defined are drawn
-/// again, to a limit.
+/// Checks a law for at least 256 cases of a strategy. Cases with an undefined factor are drawn again, up to a
+/// limit.
 ///
 /// # Panics
-/// Where the law does not hold, with the simplest case that was found: it is an assertion for tests.
+/// If the law does not hold, with the simplest case that was found. It is an assertion for tests.
 #[track_caller]
 pub fn check<S: Strategy>(cases: S, law: impl Fn(S::Value) -> Result<(), LawError>)
 where
@@ -37,11 +37,11 @@ where
 
 /// A factor with its variables: a tuple of the factor and each variable, or of the factor and [`Each`].
 pub trait Case {
-    /// Hands them on as trait objects.
+    /// Calls a function with the factor and the variables as trait objects.
     fn with<R>(&self, use_them: impl FnOnce(&dyn Factor, &[&dyn Variable]) -> R) -> R;
 }
 
-/// The variables of a factor of any number of them.
+/// The variables of a factor that takes any number of them.
 #[derive(Debug, Clone)]
 pub struct Each<A>(pub Vec<A>);
 
@@ -68,19 +68,19 @@ case!(V1 1, V2 2, V3 3, V4 4);
 case!(V1 1, V2 2, V3 3, V4 4, V5 5);
 case!(V1 1, V2 2, V3 3, V4 4, V5 5, V6 6);
 
-/// [`jacobian_law`] for the cases of a strategy.
+/// Checks [`jacobian_law`] for the cases of a strategy.
 ///
 /// # Panics
-/// As [`check`].
+/// See [`check`].
 #[track_caller]
 pub fn check_jacobians<S: Strategy<Value: Case + Debug>>(cases: S) {
     check(cases, |case| case.with(jacobian_law));
 }
 
-/// [`manifold_laws`] for the cases of a strategy: two points, and a tangent vector at the first.
+/// Checks [`manifold_laws`] for the cases of a strategy: two points, and a tangent vector at the first.
 ///
 /// # Panics
-/// As [`check`].
+/// See [`check`].
 #[track_caller]
 pub fn check_manifolds<S, M, D>(cases: S)
 where
@@ -91,8 +91,8 @@ where
     check(cases, |(x, y, delta)| manifold_laws(&x, &y, delta.as_ref()));
 }
 
-/// Tests that check [`jacobian_law`]: `jacobian_laws! { name: strategy; … }`, where the strategy
-/// yields a factor and its variables as one tuple.
+/// Defines tests of [`jacobian_law`]: `jacobian_laws! { name: strategy; … }`. The strategy yields a factor
+/// and its variables as one tuple.
 #[macro_export]
 macro_rules! jacobian_laws {
     ($($name:ident: $cases:expr);+ $(;)?) => {
@@ -103,11 +103,11 @@ macro_rules! jacobian_laws {
     };
 }
 
-/// The laws of manifolds, a test for each, by registered name: `manifold_laws! { heading, se3 }`. See
+/// Defines one test for each registered manifold name: `manifold_laws! { heading, se3 }`. See
 /// [`assert_manifold_laws`](crate::catalogue::assert_manifold_laws).
 ///
-/// Or [`manifold_laws`] for points of one's own: `manifold_laws! { name: strategy; … }`, where the strategy yields two
-/// points and a tangent vector at the first.
+/// The form `manifold_laws! { name: strategy; … }` checks [`manifold_laws`] for points of a custom strategy,
+/// which yields two points and a tangent vector at the first.
 #[macro_export]
 macro_rules! manifold_laws {
     ($($name:ident),+ $(,)?) => {

@@ -1,23 +1,23 @@
 //! Derivatives by central differences, extrapolated to a step of zero.
 
-/// Number of steps, each half of the one before.
+/// Number of steps. Each is half of the previous one.
 const LEVELS: usize = 16;
 
-/// A derivative, and how far it may be off.
+/// A derivative with an error estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Derivative {
     /// The best estimate.
     pub value: f64,
-    /// How much the estimates around it differ.
+    /// Largest difference from the neighbouring estimates.
     pub error: f64,
 }
 
-/// The derivative at 0 of each row of `f`, from steps of `step` downwards.
+/// Computes the derivative at 0 of each row of `f`, with steps from `step` downwards.
 ///
-/// Richardson extrapolation in the manner of Ridders (1982): of all extrapolations from all steps,
-/// one that agrees well with its neighbours. A jump or a kink nearby spoils the longer steps only.
-/// Those may agree with each other, on the wrong value: shorter steps, though less exact, overrule
-/// them. Steps where `f` is `None` are left out; `None` comes back where all are.
+/// It uses Richardson extrapolation as in Ridders (1982) and selects an extrapolation that agrees well with
+/// its neighbours. A jump or a kink nearby only affects the longer steps. These may agree on a wrong value,
+/// so shorter steps overrule them although they are less accurate. Steps at which `f` is `None` are left out.
+/// Returns `None` if no step remains.
 pub fn differentiate(rows: usize, step: f64, f: impl Fn(f64) -> Option<Vec<f64>>) -> Option<Vec<Derivative>> {
     // the error of a central difference is even in h
     extrapolate(rows, step, 4.0, |h| {
@@ -26,7 +26,8 @@ pub fn differentiate(rows: usize, step: f64, f: impl Fn(f64) -> Option<Vec<f64>>
     })
 }
 
-/// The derivative from one side: for the positive `side` 1, or the negative -1. [`differentiate`] says how.
+/// Computes the one-sided derivative: `side` is 1 for the positive side and -1 for the negative one. See
+/// [`differentiate`].
 pub fn differentiate_from(
     side: f64,
     rows: usize,
@@ -40,9 +41,9 @@ pub fn differentiate_from(
     })
 }
 
-/// How far each row of `f` jumps from 0 to the one `side`; 0 where it is continuous.
+/// Returns the jump of each row of `f` from 0 to the given `side`; 0 for a continuous row.
 ///
-/// A row that jumps changes as much over a step as over one sixteen times as long.
+/// A row jumps if its change over a step is similar to its change over a step sixteen times as long.
 pub fn jumps(side: f64, rows: usize, step: f64, f: impl Fn(f64) -> Option<Vec<f64>>) -> Option<Vec<f64>> {
     let shortest = step / f64::from(1 << (LEVELS - 1));
     let (middle, near, far) = (f(0.0)?, f(side * shortest)?, f(side * shortest * 16.0)?);
@@ -54,13 +55,14 @@ pub fn jumps(side: f64, rows: usize, step: f64, f: impl Fn(f64) -> Option<Vec<f6
     Some((0..rows).map(of).collect())
 }
 
-/// A difference over its step, and what rounding does to it.
+/// Returns a difference quotient with its rounding error.
 fn quotient(after: f64, before: f64, h: f64) -> Derivative {
     let error = 2.0 * f64::EPSILON * after.abs().max(before.abs()) / h.abs();
     Derivative { value: (after - before) / h, error }
 }
 
-/// Quotients at steps of `step`, half of it, …, extrapolated to 0, where each power of the error falls by `base`.
+/// Extrapolates quotients at steps of `step`, half of it, … to 0. Each extrapolation reduces the error term
+/// by `base`.
 fn extrapolate(
     rows: usize,
     step: f64,
@@ -74,7 +76,7 @@ fn extrapolate(
             previous.clear();
             continue;
         };
-        // table[j]: extrapolated j times
+        // table[j] is extrapolated j times
         let mut table = vec![first.iter().map(|d| d.value).collect::<Vec<_>>()];
         let mut power = 1.0;
         for j in 0..previous.len() {
@@ -88,8 +90,8 @@ fn extrapolate(
     levels.into_iter().rev().reduce(|shorter, longer| shorter.into_iter().zip(longer).map(merge).collect())
 }
 
-/// Of all extrapolations in `table` of row `i`, the one that agrees best with its neighbours there and
-/// in the table of the step before.
+/// Returns the extrapolation in `table` of row `i` that agrees best with its neighbours and with the table of
+/// the previous step.
 fn best(table: &[Vec<f64>], previous: &[Vec<f64>], i: usize, rounding: f64) -> Derivative {
     let mut best = Derivative { value: table[0][i], error: f64::INFINITY };
     for j in 1..table.len() {
@@ -102,7 +104,8 @@ fn best(table: &[Vec<f64>], previous: &[Vec<f64>], i: usize, rounding: f64) -> D
     best
 }
 
-/// The more exact of two estimates, unless the one from longer steps contradicts the other.
+/// Returns the more accurate estimate, unless the estimate from longer steps contradicts the one from shorter
+/// steps.
 fn merge((shorter, longer): (Derivative, Derivative)) -> Derivative {
     let apart = (shorter.value - longer.value).abs();
     // the errors are estimates themselves

@@ -1,11 +1,11 @@
-//! What a broken law says: the worst entry, and the point to reproduce it.
+//! Errors of broken laws, with the worst entry and the point that reproduces it.
 use manifactor_graph::{Factor, Variable};
 
-/// A law that does not hold. Points and factors are JSON, as documents write them.
+/// A law that does not hold. Points and factors are JSON, as in documents.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LawError {
-    /// Variables that the factor does not take; nothing was checked.
+    /// Variables that do not fit the factor. Nothing was checked.
     #[error("the factor {factor} does not take these variables: {point}")]
     WrongVariables {
         /// The factor.
@@ -13,7 +13,7 @@ pub enum LawError {
         /// The variables.
         point: Box<str>,
     },
-    /// A point where the factor says it is not defined; nothing was checked.
+    /// A point at which the factor is not defined. Nothing was checked.
     #[error("the factor {factor} is not defined at {point}")]
     NotDefined {
         /// The factor.
@@ -24,13 +24,13 @@ pub enum LawError {
     /// Two residuals that should be equal.
     #[error("{law}: row {row} is {found} and should be {expected}\n  factor {factor}\n  at {point}")]
     Residual {
-        /// Which two.
+        /// Name of the comparison.
         law: &'static str,
-        /// The row that differs most, from 0.
+        /// The row with the largest difference, counted from 0.
         row: usize,
-        /// What it is.
+        /// Actual value.
         found: f64,
-        /// What it should be.
+        /// Expected value.
         expected: f64,
         /// The factor.
         factor: Box<str>,
@@ -43,78 +43,78 @@ pub enum LawError {
          factor {factor}\n  at {point}"
     )]
     Jacobian {
-        /// Which two.
+        /// Name of the comparison.
         law: &'static str,
-        /// The row of the entry that differs most, from 0.
+        /// The row of the entry with the largest difference, counted from 0.
         row: usize,
-        /// The variable's position, from 0.
+        /// Position of the variable, counted from 0.
         variable: usize,
-        /// The name of its type.
+        /// Name of its type.
         of: &'static str,
-        /// The tangent direction's name.
+        /// Name of the tangent direction.
         direction: &'static str,
-        /// What the entry is.
+        /// Actual entry.
         found: f64,
-        /// What it should be.
+        /// Expected entry.
         expected: f64,
         /// The factor.
         factor: Box<str>,
         /// The variables.
         point: Box<str>,
     },
-    /// A residual that is not a number, or infinite, where the factor says that it is defined.
+    /// A residual that is NaN or infinite although the factor is defined at the point.
     #[error(
         "row {row} of the residual is {found}: keep such points out with `is_defined`, or write it so that it is \
          finite\n  factor {factor}\n  at {point}"
     )]
     NotFinite {
-        /// The row, from 0.
+        /// The row, counted from 0.
         row: usize,
-        /// What it is.
+        /// Actual value.
         found: f64,
         /// The factor.
         factor: Box<str>,
         /// The variables.
         point: Box<str>,
     },
-    /// A manifold's law.
+    /// A law of a manifold.
     #[error("{law}: off by {error:e}\n  x = {x}\n  y = {y}\n  delta = {delta:?}")]
     Manifold {
-        /// Which law.
+        /// Name of the law.
         law: &'static str,
-        /// By how much.
+        /// Size of the violation.
         error: f64,
-        /// A point.
+        /// First point.
         x: String,
-        /// Another point.
+        /// Second point.
         y: String,
         /// A tangent vector at `x`.
         delta: Vec<f64>,
     },
-    /// A registered type whose catalogue entry lacks something.
+    /// A registered type with an incomplete catalogue entry.
     #[error("{kind} `{name}`: {problem}")]
     Entry {
-        /// Factor, variable, loss, …
+        /// Kind of the type: factor, variable, loss, …
         kind: &'static str,
-        /// Its name.
+        /// Name of the type.
         name: &'static str,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
     },
 }
 
-/// A variable, as a document writes it.
+/// Formats a variable as in a document.
 pub(crate) fn json_of(variable: &dyn Variable) -> String {
     serde_json::to_string(variable).unwrap_or_else(|error| format!("{variable:?} ({error})"))
 }
 
-/// Variables, as a document writes them.
+/// Formats variables as in a document.
 pub(crate) fn json_of_all(variables: &[&dyn Variable]) -> Box<str> {
     let all: Vec<String> = variables.iter().map(|v| json_of(*v)).collect();
     format!("[{}]", all.join(", ")).into()
 }
 
-/// A factor, as a document writes it.
+/// Formats a factor as in a document.
 pub(crate) fn json_of_factor(factor: &dyn Factor) -> Box<str> {
     serde_json::to_string(factor).unwrap_or_else(|error| format!("{factor:?} ({error})")).into()
 }

@@ -1,4 +1,4 @@
-//! The examples in the docs of registered types.
+//! Examples in the docs of registered types.
 use crate::error::LawError;
 use manifactor_document::Node;
 use manifactor_graph::Variable;
@@ -6,7 +6,7 @@ use manifactor_graph::catalogue::{self, Entry, Kind};
 use serde_json::Value;
 use std::any::TypeId;
 
-/// The example in the docs of a registered type.
+/// Reads the example in the docs of a registered type.
 ///
 /// # Errors
 /// If there is none, or it cannot be read.
@@ -14,14 +14,14 @@ pub fn example<K: Kind + ?Sized>(entry: &'static Entry) -> Result<Box<K>, LawErr
     entry.read::<K>(&example_fields(entry)?).map_err(|e| problem(entry, format!("its example: {e}")))
 }
 
-/// The example of a manifold, for a factor of this entry.
+/// Reads the example of a manifold, for a factor of this entry.
 pub(crate) fn example_point(of: &'static Entry, id: TypeId) -> Result<Box<dyn Variable>, LawError> {
     let kind = <dyn Variable as Kind>::NAME;
     let entry = catalogue::entries(kind).into_iter().find(|e| (e.type_id)() == id);
     example(entry.ok_or_else(|| problem(of, "one of its variables is of no registered type".into()))?)
 }
 
-/// The fields of the example: the table in it whose `type` is the entry's name.
+/// Returns the fields of the example: its table with the entry's name as `type`.
 pub(crate) fn example_fields(entry: &'static Entry) -> Result<Node, LawError> {
     let missing = || problem(entry, format!("its example has no table with type = \"{}\"", entry.name));
     let table = table_of_type(&example_document(entry)?, entry.name).ok_or_else(missing)?;
@@ -35,7 +35,7 @@ fn example_document(entry: &'static Entry) -> Result<Value, LawError> {
     serde_json::to_value(document).map_err(|e| problem(entry, e.to_string()))
 }
 
-/// The keys beside a factor in its example; none, where it shows the factor alone.
+/// Returns the keys of a factor in its example; empty if the example only has the factor.
 pub(crate) fn example_keys(entry: &'static Entry) -> Vec<String> {
     let document = example_document(entry).unwrap_or_default();
     let factors = document.get("factors").and_then(Value::as_array).cloned().unwrap_or_default();

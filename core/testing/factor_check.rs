@@ -1,4 +1,4 @@
-//! Everything that can be said of a factor before a solver meets it.
+//! Check of a factor before it is used in a solver.
 mod report;
 mod scan;
 mod subject;
@@ -17,17 +17,17 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use report::Gathered;
 
-/// How many Jacobians the rank is taken from.
+/// Number of Jacobians for the rank.
 const FOR_RANK: usize = 32;
-/// How often a point where a law is broken is made simpler.
+/// Largest number of attempts to simplify a point with a broken law.
 const SIMPLER: usize = 512;
 
-/// How a factor is checked.
+/// Settings of a factor check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FactorCheck {
-    /// How many points are drawn.
+    /// Number of points.
     pub points: usize,
-    /// Where the random numbers begin: the same seed draws the same points.
+    /// Seed of the random numbers. Equal seeds give equal points.
     pub seed: u64,
     /// Tolerances.
     pub law: JacobianLaw,
@@ -40,12 +40,13 @@ impl Default for FactorCheck {
 }
 
 impl FactorCheck {
-    /// Checks a factor at random points: around the ones that it came with, anywhere that its manifolds' registered
-    /// strategies draw, at their singular points and near them.
+    /// Checks a factor at random points: around its example, at points of the registered strategies of its
+    /// manifolds, and at and near their singular points.
     ///
-    /// Its residual has to be finite, analytic, automatic and numeric Jacobian to agree, up to kinks and jumps, which
-    /// are reported with their size; and what its author says leaves it unchanged has to. What directions it leaves
-    /// free is reported, and jumps along a line through each point. The first point where something is broken is made as simple as it gets.
+    /// The residual has to be finite. The analytic, automatic and numeric Jacobian have to agree, except at
+    /// kinks and jumps, which are reported with their size. Stated invariances have to hold. The report also
+    /// has the free directions, and jumps along a line through each point. The first point with a broken law
+    /// is simplified as far as possible.
     pub fn run(&self, subject: &Subject) -> FactorReport {
         let mut gathered = Gathered::new(subject, self.seed);
         let stated = invariances(subject.factor.erased().as_any().type_id());
@@ -56,7 +57,7 @@ impl FactorCheck {
         let mut runner = TestRunner::new_with_rng(Config::default(), self.rng(0));
         let points = any_point(&subject.around);
         for round in 1..self.points {
-            // nothing is filtered, so nothing is refused
+            // nothing is filtered, so no case is rejected
             let Ok(mut tree) = points.new_tree(&mut runner) else { continue };
             let drawn = tree.current();
             if let Some(mut broken) = self.look(subject, &stated, &drawn, round, &mut gathered) {
@@ -81,7 +82,7 @@ impl FactorCheck {
         gathered.finish(subject)
     }
 
-    /// Looks at one point; what is broken there, if anything is.
+    /// Checks one point. Returns the broken law, if any.
     fn look(
         &self,
         subject: &Subject,
@@ -98,7 +99,7 @@ impl FactorCheck {
             Err(broken) => return Some(broken),
             Ok(examined) => examined,
         };
-        // a motion of its own for each round, and the same for all simpler points of it
+        // each round has a different motion, but all simplified points of a round have an equal one
         let mut rng = self.rng(1 + round as u64);
         for (i, invariance) in stated.iter().enumerate() {
             let mut random = |size: f64| rng.random_range(-1.0..1.0) * size;

@@ -1,40 +1,42 @@
-//! What a factor leaves free: the directions that its residual does not see.
+//! Free directions of a factor, which do not change its residual.
 use manifactor_graph::Linearization;
 use nalgebra::DMatrix;
 
-/// Below this share of the largest singular value a direction is not seen.
+/// A direction with a singular value below this share of the largest one is free.
 const UNSEEN: f64 = 1e-9;
 
-/// The rank of a Jacobian over all variables, and what its null space is made of.
+/// The rank of a Jacobian over all variables, and the structure of its null space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Freedom {
-    /// Directions of all variables together.
+    /// Number of directions of all variables together.
     pub directions: usize,
-    /// Directions that the residual sees.
+    /// Number of directions that change the residual.
     pub rank: usize,
-    /// Free directions: single ones, and the number of combinations of several. Positions are over all variables, in order.
+    /// Free directions and free combinations of several directions. Positions count over all variables, in
+    /// order.
     pub free: Vec<Free>,
 }
 
 /// A part of a null space.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Free {
-    /// How many combinations of the directions are free; all of them, where it is as many as there are.
+    /// Number of free combinations. If it equals the number of directions, all of them are free.
     pub count: usize,
     /// Directions, by position over all variables.
     pub among: Vec<usize>,
 }
 
 impl Freedom {
-    /// How many are free.
+    /// Returns the number of free directions.
     pub fn count(&self) -> usize {
         self.directions - self.rank
     }
 }
 
-/// What a residual leaves free, to first order, as far as Jacobians at several points agree on it.
+/// Returns the free directions of a residual, to first order, from Jacobians at several points.
 ///
-/// The rank is the largest at any of the points: elsewhere something vanishes. Directions go together where the null space mixes them at one of those.
+/// The rank is the largest one at any of the points. At the remaining points a derivative vanishes, so they
+/// are not used. Directions belong together if the null space at one of the points mixes them.
 pub fn freedom(linearizations: &[Linearization]) -> Option<Freedom> {
     let spaces: Vec<_> = linearizations.iter().filter_map(null_space).collect();
     let usual = spaces.iter().map(|(rank, _)| *rank).max()?;
@@ -63,12 +65,12 @@ pub fn freedom(linearizations: &[Linearization]) -> Option<Freedom> {
     Some(Freedom { directions, rank: usual, free })
 }
 
-/// The rank, and the projection onto the null space; `None` where an entry is not finite.
+/// Returns the rank and the projection onto the null space; `None` if an entry is not finite.
 fn null_space(linearization: &Linearization) -> Option<(usize, DMatrix<f64>)> {
     let blocks = &linearization.jacobians;
     let columns: usize = blocks.iter().map(DMatrix::ncols).sum();
     let rows = linearization.residual.len();
-    // rows of zeros, so that all right singular vectors come out
+    // add rows of zeros to get all right singular vectors
     let mut j = DMatrix::zeros(rows.max(columns), columns);
     let mut at = 0;
     for block in blocks {

@@ -1,12 +1,13 @@
-//! The invariance law: what leaves a residual unchanged.
+//! The invariance law: motions that do not change a residual.
 use crate::error::{LawError, json_of_all, json_of_factor};
 use crate::jacobian::same_residual;
 use manifactor_graph::{Factor, Variable};
 
-/// Checks that the residual is the same at `moved` as at `variables`, to 1e-9 of its size or of 1.
+/// Checks that the residuals at `moved` and at `variables` are equal, to 1e-9 of their size or of 1.
 ///
 /// # Errors
-/// The row that differs most; [`LawError::NotDefined`] where the factor is not defined at one of the two.
+/// The row with the largest difference; [`LawError::NotDefined`] if the factor is not defined at one of the
+/// points.
 pub fn invariance_law(
     factor: &dyn Factor,
     variables: &[&dyn Variable],
@@ -15,7 +16,7 @@ pub fn invariance_law(
     unchanged("invariance", factor, variables, moved)
 }
 
-/// [`invariance_law`], for a motion that has a name.
+/// Checks [`invariance_law`] for a named motion.
 pub(crate) fn unchanged(
     motion: &'static str,
     factor: &dyn Factor,

@@ -8,20 +8,20 @@ use manifactor_graph::{Factor, Linearization, Variable};
 pub use kink::Kink;
 use kink::{hull, sides};
 
-/// How far points are away, in units of the tangent, that tell what a residual is like around one.
+/// Distance of the nearby points that describe the residual around a point, in units of the tangent.
 const NEARBY: f64 = 1e-4;
 
-/// How the Jacobian law is checked. Tolerances are relative to the largest entry, or to 1.
+/// Settings of the Jacobian law. Tolerances are relative to the largest entry, or to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JacobianLaw {
-    /// The longest step of the differences, in units of the tangent; the shortest is its 32768th.
+    /// Longest step of the differences, in units of the tangent. The shortest step is 1/32768 of it.
     pub step: f64,
-    /// Between the analytic and the automatic Jacobian.
+    /// Tolerance between the analytic and the automatic Jacobian.
     pub analytic: f64,
-    /// Between the automatic Jacobian and differences.
+    /// Tolerance between the automatic and the numeric Jacobian.
     pub numeric: f64,
-    /// Whether a residual may have a kink or a jump at the point: its derivative there is to lie between those of the
-    /// two sides.
+    /// If true, the residual may have a kink or a jump at the point. The derivative there must then lie
+    /// between the derivatives of both sides.
     pub kinks: bool,
 }
 
@@ -31,39 +31,40 @@ impl Default for JacobianLaw {
     }
 }
 
-/// [`JacobianLaw::check`] with the usual tolerances.
+/// Checks [`JacobianLaw::check`] with the default tolerances.
 ///
 /// # Errors
-/// As there.
+/// See [`JacobianLaw::check`].
 pub fn jacobian_law(factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<(), LawError> {
     JacobianLaw::default().check(factor, variables)
 }
 
-/// What was found at a point where the law holds.
+/// The result at a point at which the law holds.
 #[derive(Debug, Clone)]
 pub struct Examined {
-    /// The residual and the Jacobian in use.
+    /// The residual and the Jacobian that solvers use.
     pub linearization: Linearization,
-    /// The entry that differs most from differences; `None` where there was nothing to compare.
+    /// The entry with the largest difference from numeric differentiation; `None` if there was no entry to
+    /// compare.
     pub worst: Option<JacobianEntry>,
-    /// Entries that have no derivative here.
+    /// Entries without a derivative at this point.
     pub kinks: Vec<Kink>,
 }
 
-/// An entry of a Jacobian, by two ways.
+/// An entry of a Jacobian, computed in two ways.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JacobianEntry {
-    /// The variable's position, from 0.
+    /// Position of the variable, counted from 0.
     pub variable: usize,
-    /// The tangent direction, from 0.
+    /// The tangent direction, counted from 0.
     pub column: usize,
-    /// The row, from 0.
+    /// The row, counted from 0.
     pub row: usize,
-    /// What it is.
+    /// Actual value.
     pub found: f64,
-    /// What it should be.
+    /// Expected value.
     pub expected: f64,
-    /// The difference, relative to the largest entry of the block, or to 1; infinite where one is not a number.
+    /// Difference, relative to the largest entry of the block or to 1; infinite if it is NaN.
     pub error: f64,
 }
 
@@ -74,22 +75,23 @@ pub(crate) struct At<'a> {
 }
 
 impl JacobianLaw {
-    /// Checks that the Jacobian in use agrees with the automatic one, and that with differences
-    /// through `retract`; that every entry is written and finite; that all ways give one residual.
+    /// Checks that the Jacobian in use agrees with the automatic one, and that this agrees with differences
+    /// through `retract`. Every entry has to be written and finite, and all methods have to give equal
+    /// residuals.
     ///
-    /// That differences go through `retract` makes it a law of the manifolds' seeds too.
+    /// The differences through `retract` also test the seeds of the manifolds.
     ///
     /// # Errors
-    /// The entry that is off most. [`LawError::NotDefined`] where the factor is not defined, so that
-    /// there was nothing to check.
+    /// The entry with the largest difference. [`LawError::NotDefined`] if the factor is not defined, so that
+    /// nothing was checked.
     pub fn check(&self, factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<(), LawError> {
         self.examine(factor, variables).map(|_| ())
     }
 
-    /// [`JacobianLaw::check`], and what there is to say of a point where the law holds.
+    /// Checks the law like [`JacobianLaw::check`] and returns the details of a point at which it holds.
     ///
     /// # Errors
-    /// As there.
+    /// See [`JacobianLaw::check`].
     pub fn examine(&self, factor: &dyn Factor, variables: &[&dyn Variable]) -> Result<Examined, LawError> {
         let (residual, point, at) = (factor.erased(), || json_of_all(variables), At { factor, variables });
         let wrong = || LawError::WrongVariables { factor: json_of_factor(factor), point: point() };
@@ -117,7 +119,7 @@ impl JacobianLaw {
             .collect();
         let entries = compare(&automatic, |v, c, r| numeric[v][c].as_ref().map(|column| column[r].value));
         let (entries, kinks) = if self.kinks {
-            // near a pole the steps are too long for their own good, and know it
+            // close to a singularity the finite difference is inaccurate; its own error estimate says so
             let inexact = |e: &JacobianEntry| {
                 numeric[e.variable][e.column].as_ref().is_some_and(|c| {
                     10.0 * c[e.row].error > (e.found - e.expected).abs() && c[e.row].error.is_finite()
@@ -132,7 +134,7 @@ impl JacobianLaw {
         Ok(Examined { linearization: used, worst, kinks })
     }
 
-    /// Takes out the entries that differ because there is no derivative: kinks and jumps.
+    /// Separates the entries that differ because there is no derivative: kinks and jumps.
     fn set_aside(&self, at: &At<'_>, entries: Vec<JacobianEntry>) -> (Vec<JacobianEntry>, Vec<Kink>) {
         let rows = entries.iter().map(|e| e.row + 1).max().unwrap_or(0);
         let mut kinks = vec![];
@@ -151,7 +153,7 @@ impl JacobianLaw {
 }
 
 impl At<'_> {
-    /// The residual `h` along a tangent direction; `None` where it is not defined.
+    /// Returns the residual at distance `h` along a tangent direction; `None` if it is not defined there.
     pub(crate) fn along(&self, variable: usize, column: usize, h: f64) -> Option<Vec<f64>> {
         let moved = self.step(variable, column, h)?;
         let mut variables = self.variables.to_vec();
@@ -160,7 +162,7 @@ impl At<'_> {
         if residual.is_defined(&variables)? { residual.residual(&variables) } else { None }
     }
 
-    /// The variables `h` along a tangent direction.
+    /// Returns the variables at distance `h` along a tangent direction.
     pub(crate) fn moved(&self, variable: usize, column: usize, h: f64) -> Option<Vec<Box<dyn Variable>>> {
         let mut variables: Vec<_> = self.variables.iter().map(|x| x.erased().clone_box()).collect();
         variables[variable] = self.step(variable, column, h)?;
@@ -173,12 +175,12 @@ impl At<'_> {
         self.variables[variable].erased().retract(&delta)
     }
 
-    /// The same entry at points around, as the automatic Jacobian has it: where three pieces of a residual meet, they say
-    /// more than the two sides along one direction.
+    /// Returns this entry of the automatic Jacobian at points nearby. If three pieces of a residual meet,
+    /// these show more than both sides along one direction.
     fn nearby(&self, entry: &JacobianEntry) -> Vec<f64> {
         let at = |round: usize| {
             let moved = self.variables.iter().enumerate().map(|(v, x)| {
-                // any spread over directions will do
+                // any spread over directions is sufficient
                 let part = |i: usize| NEARBY * ((31 * round + 17 * i + 7 * v + 1) as f64).sin();
                 let delta: Vec<f64> = (0..x.erased().dim()).map(part).collect();
                 x.erased().retract(&delta)
@@ -193,7 +195,7 @@ impl At<'_> {
         (0..16).filter_map(at).collect()
     }
 
-    /// The entry that differs most, if by no more than `tolerance`.
+    /// Returns the entry with the largest difference, or an error if it exceeds `tolerance`.
     fn require(
         &self,
         law: &'static str,
@@ -221,7 +223,8 @@ impl At<'_> {
     }
 }
 
-/// Each entry beside `expected(variable, column, row)`; one that cannot be had is left out.
+/// Compares each entry with `expected(variable, column, row)`. Entries without an expected value are left
+/// out.
 fn compare(
     found: &Linearization,
     expected: impl Fn(usize, usize, usize) -> Option<f64>,
@@ -234,7 +237,7 @@ fn compare(
                 let found = block[(row, column)];
                 let Some(expected) = expected(variable, column, row) else { continue };
                 let error = (found - expected).abs() / scale;
-                // so written that NaN is the worst of all
+                // NaN counts as the largest error
                 let error = if error.is_nan() { f64::INFINITY } else { error };
                 entries.push(JacobianEntry { variable, column, row, found, expected, error });
             }
@@ -243,7 +246,7 @@ fn compare(
     entries
 }
 
-/// Fails where two residuals differ by more than `tolerance`, relative to the larger of their norm and 1.
+/// Fails if two residuals differ by more than `tolerance`, relative to the largest entry or to 1.
 pub(crate) fn same_residual(
     law: &'static str,
     factor: &dyn Factor,

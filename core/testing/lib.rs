@@ -1,11 +1,12 @@
-//! Strategies and laws that every manifold and factor is tested by.
+//! Strategies and laws for tests of manifolds and factors.
 //!
-//! The laws work on trait objects, so they need nothing but a registered type: tests of plugins use
-//! them through [`jacobian_laws!`] and [`manifold_laws!`], the command line on whatever is linked
-//! (see [`catalogue`]).
+//! The laws work on trait objects and only need a registered type. Tests of plugins use them through
+//! [`jacobian_laws!`] and [`manifold_laws!`]; the command line applies them to all linked types (see
+//! [`catalogue`]).
 //!
-//! A plugin's test is a line. By the name of a factor or a manifold, from its example in the catalogue and the points that
-//! are registered; or for a strategy of one's own, that yields a factor and its variables, or two points and a tangent vector:
+//! A test of a plugin is one line. It names a factor or a manifold, and uses the example of the catalogue and
+//! the registered points. Alternatively, it has a custom strategy that yields a factor and its variables, or
+//! two points and a tangent vector:
 //! ```text
 //! factor_laws! { rests_on }
 //! manifold_laws! { heading }

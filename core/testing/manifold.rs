@@ -1,25 +1,26 @@
-//! The laws of a manifold.
+//! The laws of manifolds.
 use crate::differences::differentiate;
 use crate::error::{LawError, json_of};
 use manifactor_graph::Variable;
 use manifactor_graph::quantity::variable_quantity;
 use serde_json::Value;
 
-/// How far two points may be apart to be the same, relative to the largest coordinate or to 1.
+/// Largest distance of two points that count as equal, relative to the largest coordinate or to 1.
 const TOLERANCE: f64 = 1e-9;
-/// The longest step of differences.
+/// Longest step of the differences.
 const STEP: f64 = 1e-2;
-/// How far the derivatives of `seed` may be from differences, relative to the largest or to 1.
+/// Largest difference between the derivatives of `seed` and numeric ones, relative to the largest derivative
+/// or to 1.
 const SEED: f64 = 1e-6;
 
-/// Checks the laws of a manifold at two of its points, and for a tangent vector `delta` at the first
-/// that is inside of the chart (for rotations: shorter than π).
+/// Checks the laws of a manifold at two points, and for a tangent vector `delta` at the first. `delta` has to
+/// be inside of the chart (for rotations: shorter than π).
 ///
-/// `x ⊞ 0 = x`; `x ⊞ (y ⊟ x) = y`; `(x ⊞ δ) ⊟ x = δ`; everything stays finite; a name for each
-/// direction; a document of x reads back as the very same document; [`seed_law`].
+/// The laws are `x ⊞ 0 = x`; `x ⊞ (y ⊟ x) = y`; `(x ⊞ δ) ⊟ x = δ`; all results are finite; each direction has
+/// a name; a document of x reads back as an equal document; [`seed_law`].
 ///
 /// # Errors
-/// The first law that is broken.
+/// The first law that does not hold.
 pub fn manifold_laws(x: &dyn Variable, y: &dyn Variable, delta: &[f64]) -> Result<(), LawError> {
     let broken =
         |law, error| LawError::Manifold { law, error, x: json_of(x), y: json_of(y), delta: delta.to_vec() };
@@ -67,12 +68,12 @@ pub fn manifold_laws(x: &dyn Variable, y: &dyn Variable, delta: &[f64]) -> Resul
     seed_law(x).map(drop)
 }
 
-/// Checks that the derivatives of a point's `seed` are those of `retract`: by how much they differ at most, relative to the
-/// largest, or to 1. `None` where that cannot be seen, as the manifold is not registered as a quantity by
-/// [`register_quantity!`](manifactor_graph::register_quantity).
+/// Checks that the derivatives of a point's `seed` agree with `retract`. Returns the largest difference,
+/// relative to the largest derivative or to 1. Returns `None` if the manifold is not registered by
+/// [`register_quantity!`](manifactor_graph::register_quantity), because its values are unknown then.
 ///
 /// # Errors
-/// The direction in which they differ most, as `delta`.
+/// The direction with the largest difference, as `delta`.
 pub fn seed_law(x: &dyn Variable) -> Result<Option<f64>, LawError> {
     let (from, law) = (x.erased(), "the derivative of x.seed() is that of x.retract(delta)");
     let Some(quantity) = variable_quantity(from.type_id()) else { return Ok(None) };
@@ -82,7 +83,7 @@ pub fn seed_law(x: &dyn Variable) -> Result<Option<f64>, LawError> {
         (quantity.values)(point.erased().as_any(), &mut numbers);
         numbers
     };
-    // by number of the flat form, its derivatives by each direction
+    // derivatives by each direction, for each number of the flat form
     let mut seeded = vec![0.0; size * dim];
     (quantity.gradients)(from.as_any(), &mut seeded);
     let scale = seeded.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
@@ -97,7 +98,7 @@ pub fn seed_law(x: &dyn Variable) -> Result<Option<f64>, LawError> {
             let apart = (seeded[row * dim + direction] - numeric.value).abs();
             let error = if apart.is_nan() { f64::INFINITY } else { apart / scale };
             largest = f64::max(largest, error);
-            // near a pole the steps are too long for their own good, and know it
+            // close to a singularity the finite difference is inaccurate; its own error estimate says so
             let is_exact = apart > 10.0 * numeric.error || apart.is_nan();
             if is_exact && error > SEED && broken.is_none_or(|(worst, _)| error > worst) {
                 broken = Some((error, direction));
@@ -114,12 +115,12 @@ pub fn seed_law(x: &dyn Variable) -> Result<Option<f64>, LawError> {
     }
 }
 
-/// Largest absolute entry; infinite where one is not a number.
+/// Returns the largest absolute entry; infinite if an entry is NaN.
 fn norm(v: &[f64]) -> f64 {
     v.iter().fold(0.0, |max: f64, x| if x.is_nan() { f64::INFINITY } else { max.max(x.abs()) })
 }
 
-/// Largest absolute number in the document of a variable.
+/// Returns the largest absolute number in the document of a variable.
 fn largest(variable: &dyn Variable) -> f64 {
     fn of(value: &Value) -> f64 {
         match value {

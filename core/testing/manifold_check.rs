@@ -1,4 +1,4 @@
-//! Everything that can be said of a manifold before a factor meets it.
+//! Check of a manifold before it is used in factors.
 use crate::error::LawError;
 use crate::example::example;
 use crate::manifold::{manifold_laws, seed_law};
@@ -11,17 +11,17 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
 
-/// How far points are drawn from the example, in each direction.
+/// Distances of drawn points from the example, in each direction.
 const NEAR: f64 = 1.0;
 const FAR: f64 = 10.0;
 const TINY: f64 = 1e-6;
 
-/// How a manifold is checked.
+/// Settings of a manifold check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ManifoldCheck {
-    /// How many pairs of points are drawn.
+    /// Number of pairs of points.
     pub points: usize,
-    /// Where the random numbers begin: the same seed draws the same points.
+    /// Seed of the random numbers. Equal seeds give equal points.
     pub seed: u64,
 }
 
@@ -31,21 +31,21 @@ impl Default for ManifoldCheck {
     }
 }
 
-/// What a check found.
+/// Report of a manifold check.
 #[derive(Debug, Clone, Serialize)]
 pub struct ManifoldReport {
-    /// The manifold's registered name.
+    /// Registered name of the manifold.
     pub manifold: &'static str,
-    /// Where the random numbers began.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// How many pairs of points were looked at.
+    /// Number of examined pairs of points.
     pub drawn: usize,
-    /// The names of its tangent directions.
+    /// Names of its tangent directions.
     pub tangent: &'static [&'static str],
-    /// How far the derivatives of `seed` are from those of `retract` at most, relative to the largest, or to 1; `None` where
-    /// that cannot be seen, see [`seed_law`].
+    /// Largest difference between the derivatives of `seed` and of `retract`, relative to the largest
+    /// derivative or to 1. `None` if it cannot be checked, see [`seed_law`].
     pub seed_error: Option<f64>,
-    /// The law that does not hold, and where.
+    /// The law that does not hold, with its point.
     pub broken: Option<String>,
 }
 
@@ -57,11 +57,11 @@ impl ManifoldReport {
 }
 
 impl ManifoldCheck {
-    /// Checks [`manifold_laws`] of a registered manifold at random points: around the example in its docs, near it and far
-    /// from it, anywhere that its registered strategy draws, and at its singular points.
+    /// Checks [`manifold_laws`] of a registered manifold at random points: near and far from the example in
+    /// its docs, at points of its registered strategy, and at its singular points.
     ///
     /// # Errors
-    /// What the catalogue lacks.
+    /// If the catalogue entry is incomplete.
     pub fn run(&self, entry: &'static Entry) -> Result<ManifoldReport, LawError> {
         let origin = example::<dyn Variable>(entry)?;
         let (tangent, dim) = (origin.erased().tangent(), origin.erased().dim());
@@ -95,7 +95,7 @@ impl ManifoldCheck {
     }
 }
 
-/// Points of the manifold of one that is known.
+/// Returns a strategy for points of the manifold of `origin`.
 fn any_of(origin: &dyn Variable) -> BoxedStrategy<Box<dyn Variable>> {
     let around = |reach: f64| {
         let (origin, dim) = (origin.erased().clone_box(), origin.erased().dim());
@@ -110,7 +110,7 @@ fn any_of(origin: &dyn Variable) -> BoxedStrategy<Box<dyn Variable>> {
     Union::new_weighted(sources).boxed()
 }
 
-/// Tangent vectors with entries of this size.
+/// Returns a strategy for tangent vectors with entries of this size.
 fn steps(dim: usize, reach: f64) -> impl Strategy<Value = Vec<f64>> + Clone {
     proptest::collection::vec(-reach..reach, dim)
 }

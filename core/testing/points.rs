@@ -1,27 +1,27 @@
-//! Where a manifold's points are drawn from, and where formulas on it tend to break.
+//! Strategies for the points of manifolds, and points at which formulas often fail.
 use manifactor_graph::__private::inventory;
 use manifactor_graph::Variable;
 use proptest::prelude::*;
 use std::any::TypeId;
 use std::fmt::Debug;
 
-/// Points of a manifold. Made by [`register_points!`](crate::register_points).
+/// Points of a manifold, registered by [`register_points!`](crate::register_points).
 pub struct Points {
     /// The type of the points.
     pub type_id: fn() -> TypeId,
-    /// Points anywhere.
+    /// Strategy for arbitrary points.
     pub anywhere: fn() -> BoxedStrategy<Box<dyn Variable>>,
-    /// Points where something is singular: no rotation, half a turn, equal semi-axes.
+    /// Singular points: no rotation, half a turn, equal semi-axes.
     pub singular: fn() -> Vec<Box<dyn Variable>>,
 }
 inventory::collect!(Points);
 
-/// What is registered for a type.
+/// Returns the registered points of a type.
 pub fn points_of(id: TypeId) -> Option<&'static Points> {
     inventory::iter::<Points>.into_iter().find(|p| (p.type_id)() == id)
 }
 
-/// Registers the strategy that a manifold's points are drawn from, and its singular points, for the checks of all
+/// Registers the strategy for the points of a manifold, and its singular points, for the checks of all
 /// factors on it: `register_points!(So3, any_so3(), [So3::identity(), So3::exp(&half_a_turn)]);`
 #[macro_export]
 macro_rules! register_points {
@@ -41,24 +41,24 @@ macro_rules! register_points {
     };
 }
 
-/// A factor's variables, as a check draws them.
+/// Variables of a factor that a check has drawn.
 #[derive(Debug, Clone)]
 pub(crate) struct Drawn {
     /// The variables.
     pub variables: Vec<Box<dyn Variable>>,
-    /// Whether one of them is at a singular point, or so near that differences feel it.
+    /// True if one of them is at a singular point, or so close that it affects the differences.
     pub singular: bool,
 }
 
 impl Drawn {
-    /// By reference.
+    /// Returns references to the variables.
     pub(crate) fn refs(&self) -> Vec<&dyn Variable> {
         self.variables.iter().map(|x| &**x).collect()
     }
 }
 
-/// Points for a factor's variables: around some where it is known to mean something, anywhere, and with one of them at
-/// a singular point of its manifold, or near it.
+/// Returns a strategy for the variables of a factor: around a given point at which it is defined, at
+/// arbitrary points, and with one variable at or near a singular point of its manifold.
 pub(crate) fn any_point(around: &[Box<dyn Variable>]) -> BoxedStrategy<Drawn> {
     let near_start: Vec<_> = around.iter().map(|x| moved(x.clone(), -1.0..1.0f64)).collect();
     let mut sources = vec![(24, all(near_start.clone(), false))];
@@ -72,7 +72,7 @@ pub(crate) fn any_point(around: &[Box<dyn Variable>]) -> BoxedStrategy<Drawn> {
     }
     for (i, points) in registered.iter().enumerate() {
         for singular in points.map(|p| (p.singular)()).unwrap_or_default() {
-            // from where differences just feel it to where they do not
+            // from distances at which differences are just affected to distances at which they are not
             let exponents = -5.0..-2.0f64;
             let near = exponents
                 .prop_flat_map({
@@ -90,7 +90,7 @@ pub(crate) fn any_point(around: &[Box<dyn Variable>]) -> BoxedStrategy<Drawn> {
     proptest::strategy::Union::new_weighted(sources).boxed()
 }
 
-/// Points whose distance in each direction is within a range.
+/// Returns a strategy for points whose distance from `x` in each direction is within a range.
 fn moved(
     x: Box<dyn Variable>,
     range: impl Strategy<Value = f64> + Clone + 'static,

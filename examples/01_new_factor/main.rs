@@ -1,4 +1,4 @@
-//! A factor of one's own, and a command line that knows it.
+//! An example of a new factor, and a command line that includes it.
 //!
 //! ```sh
 //! cargo run --release --example 01_new_factor -- explain rests_on

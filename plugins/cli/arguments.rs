@@ -14,19 +14,20 @@ use std::num::NonZero;
 
 /// Nonlinear least squares on factor graphs, and object-level SLAM on top of it.
 ///
-/// Exit codes: 0 done; 1 a solve ended without converging (its best values are written), nothing that was detected is mapped, or a factor
-/// or a type of variables breaks a law; 2 the command line or a document is wrong; 3 a file is not there, or it or standard output could not be read or written;
-/// 130 interrupted before all was done (the best values so far are written).
+/// Exit codes: 0 success; 1 a solve did not converge (its best values are written), objects were detected
+/// but none is in the map, or a factor or a type of variables breaks a law; 2 the command line or a
+/// document is invalid; 3 a file is missing, or a file or standard output could not be read or written; 130
+/// interrupted (the best values so far are written).
 #[derive(Debug, Parser)]
 #[command(name = "manifactor", version, max_term_width = 100)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Threads to compute with, 1 to 1024; else what RAYON_NUM_THREADS says, else all processors. Results are the same for
-    /// any number.
+    /// Number of threads, 1 to 1024. Default: RAYON_NUM_THREADS if it is set, else the number of
+    /// processors. The results do not depend on it.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=i64::from(MOST_THREADS)))]
     threads: Option<u16>,
-    /// Say more on stderr: each step (-v), then all that is read, compiled and written (-vv).
+    /// Print more on stderr: each step (-v), or everything that is read, compiled and written (-vv).
     #[arg(long, short, global = true, action = ArgAction::Count)]
     verbose: u8,
 }
@@ -54,13 +55,13 @@ enum Command {
 }
 
 impl Cli {
-    /// Does what the command says.
+    /// Runs the command.
     ///
     /// # Errors
-    /// Whatever keeps the command from doing it.
+    /// If the command fails, for any reason.
     pub fn run(&self) -> Result<Status, Failure> {
         watch::log(self.verbose);
-        // this thread is one of them: what it has in its caches stays there
+        // the calling thread belongs to the pool, so its warm caches are used
         let pool = rayon::ThreadPoolBuilder::new().use_current_thread();
         let threads = self.threads()?;
         let pool = pool.num_threads(threads).build_global();
@@ -91,8 +92,9 @@ impl Cli {
         }
     }
 
-    /// The least limit of memory at which a command ends with an error, if it has too little, and not by the allocator. Measured
-    /// with 1 to 8 threads: each reserves addresses for its allocator, and that of an experiment for its trials as well.
+    /// Smallest memory limit at which a command that runs out of memory fails with an error and not in the
+    /// allocator. Measured with 1 to 8 threads: every thread reserves address space for its allocator, and
+    /// the trials of an experiment reserve more.
     fn least_memory(&self, threads: usize) -> u64 {
         let of_thread: u64 = match &self.command {
             Command::Run(_) | Command::Online(_) => 64 << 20,
@@ -102,13 +104,13 @@ impl Cli {
         PROGRAM + of_thread * threads as u64
     }
 
-    /// How many threads to compute with.
+    /// Returns the number of threads to use.
     fn threads(&self) -> Result<usize, Failure> {
         let asked = match self.threads {
             Some(threads) => Some(threads.into()),
             None => asked_of_rayon(std::env::var("RAYON_NUM_THREADS").ok().as_deref())?,
         };
-        // rayon would look at variables of its own, and take any number
+        // rayon's own default reads further environment variables and accepts any number
         Ok(asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, NonZero::get)))
     }
 
@@ -137,10 +139,10 @@ impl Cli {
     }
 }
 
-/// A thread takes a stack and buffers, whether it has work or not: more than this is a mistake.
+/// A thread allocates a stack and buffers even if it is idle, so a larger number is a mistake.
 const MOST_THREADS: u16 = 1024;
 
-/// Threads by RAYON_NUM_THREADS. As rayon has it, 0 and what is no number ask for nothing.
+/// Number of threads from RAYON_NUM_THREADS. As in rayon, 0 and text that is not a number count as unset.
 fn asked_of_rayon(variable: Option<&str>) -> Result<Option<usize>, Failure> {
     let Some(text) = variable.map(str::trim).filter(|text| !text.is_empty()) else { return Ok(None) };
     let whole = text.bytes().all(|digit| digit.is_ascii_digit());
@@ -155,10 +157,10 @@ fn asked_of_rayon(variable: Option<&str>) -> Result<Option<usize>, Failure> {
     }
 }
 
-/// Bytes for code, stacks and the buffers of two threads.
+/// Memory for code, stacks and the buffers of two threads. Unit: bytes.
 const PROGRAM: u64 = 256 << 20;
 
-/// Refuses to begin if not even the program itself is sure to have room.
+/// Returns an error if the memory limit is too small for the program itself.
 fn check_limit(limit: Option<u64>, least: u64, threads: usize) -> Result<(), Failure> {
     match limit {
         Some(limit) if limit < least => Err(Failure::with_help(

@@ -1,4 +1,4 @@
-//! The commands, a file each: what it takes, and what it does.
+//! The commands: one file for each, with its arguments and its implementation.
 mod about;
 mod check;
 mod evaluate;

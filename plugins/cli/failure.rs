@@ -1,4 +1,4 @@
-//! What keeps a command from doing what it was asked to do, and how it is shown.
+//! Failures of a command, and their presentation.
 use crate::output::{self, text};
 use manifactor::config::{Diagnostic, Diagnostics, Fault, SourceText};
 use manifactor::formats::journal::JournalError;
@@ -11,63 +11,63 @@ use serde_json::{Value, json};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-/// What keeps a command from doing what it was asked to do.
+/// The reason why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// Documents that are not as they should be: exit code 2; that cannot be read, all of them: exit code 3.
+    /// Documents with errors: exit code 2, or 3 if none of them could be read.
     #[error("{0}")]
     Documents(Diagnostics),
-    /// Anything else that is wrong with the input, in its own words: exit code 2.
+    /// Any other error in the input, with its own message: exit code 2.
     #[error("{message}")]
     Input {
-        /// What is wrong.
+        /// The error.
         message: String,
-        /// What to do about it.
+        /// A remedy.
         help: Option<String>,
     },
-    /// A folder of data that is not there: exit code 3.
+    /// A folder of data that does not exist: exit code 3.
     #[error("{message}")]
     NotThere {
-        /// Which, where it was looked for, and what to do about it.
+        /// The folder, the places searched, and a remedy.
         message: String,
     },
-    /// A file that could not be written or read: exit code 3.
+    /// A file that could not be read or written: exit code 3.
     #[error("{}: {source}", path.display())]
     File {
-        /// The file.
+        /// The path.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
 }
 
 impl Failure {
-    /// Something wrong with the input.
+    /// Creates an error of the input.
     pub fn input(error: impl std::fmt::Display) -> Self {
         Self::Input { message: error.to_string(), help: None }
     }
 
-    /// Something wrong with the input, and what to do about it.
+    /// Creates an error of the input, with a remedy.
     pub fn with_help(error: impl std::fmt::Display, help: impl Into<String>) -> Self {
         Self::Input { message: error.to_string(), help: Some(help.into()) }
     }
 
-    /// For `map_err` on what touches a file.
+    /// Returns a function for `map_err` after an access to the file `path`.
     pub fn at(path: &Path) -> impl Fn(std::io::Error) -> Self {
         move |source| Self::File { path: path.to_owned(), source }
     }
 
-    /// That of a command line that is wrong: 2.
+    /// The exit code of an invalid command line: 2.
     pub(crate) fn usage() -> u8 {
         2
     }
 
-    /// That of files that could not be written or read: 3.
+    /// The exit code of files that could not be read or written: 3.
     pub(crate) fn files() -> u8 {
         3
     }
 
-    /// 2 for bad input, 3 for files that are not there or cannot be read or written, whoever names them.
+    /// Returns 2 for invalid input, and 3 for files that do not exist or cannot be read or written.
     pub fn exit_code(&self) -> u8 {
         let unreadable = |one: &Diagnostic| matches!(one.fault, Fault::Unreadable(_));
         match self {
@@ -77,7 +77,7 @@ impl Failure {
         }
     }
 
-    /// Says it on stderr, with the source line under it; and as JSON on stdout, where that was asked for.
+    /// Prints the failure on stderr with its source line, and also as JSON on stdout if `as_json` is set.
     pub fn show(&self, as_json: bool) {
         if as_json {
             output::json(&self.to_json());
@@ -105,7 +105,7 @@ impl Failure {
         }
     }
 
-    /// How many errors there are besides those that are told.
+    /// Number of errors beyond those that are listed.
     fn omitted(&self) -> usize {
         match self {
             Self::Documents(list) => list.omitted(),
@@ -191,7 +191,7 @@ impl From<FormatError> for Failure {
     }
 }
 
-/// The lines of a file that are wrong, with what is written there.
+/// Converts the malformed lines of a file to diagnostics with their positions.
 fn places(mut malformed: Malformed) -> Diagnostics {
     let text = std::mem::take(&mut malformed.text);
     let source = SourceText::new(malformed.path.display().to_string(), text);
@@ -200,7 +200,7 @@ fn places(mut malformed: Malformed) -> Diagnostics {
         .problems
         .iter()
         .map(|problem| {
-            // the first word is enough to mark a line; line 0 is the file as a whole
+            // the first word is enough to mark a line; line 0 means the whole file
             let before = text.split_inclusive('\n').take(problem.line.saturating_sub(1)).map(str::len).sum();
             let rest = text.get(before..).unwrap_or_default();
             let indent = rest.len() - rest.trim_start_matches([' ', '\t']).len();
@@ -227,7 +227,7 @@ fn place_as_json(diagnostic: &Diagnostic) -> Value {
     })
 }
 
-/// A warning that has a place, with its source line.
+/// Formats a warning together with its source line.
 pub(crate) fn render(diagnostic: &Diagnostic) -> String {
     let source = &diagnostic.place.source;
     let help = diagnostic.help();
@@ -255,10 +255,10 @@ pub(crate) fn render(diagnostic: &Diagnostic) -> String {
     fancy(report.with_source_code(NamedSource::new(name, text::same_length(source.text()))))
 }
 
-/// Bytes beyond which a line is not shown: a place and a message say more.
+/// Longest line that is shown. For a longer one, position and message are more useful. Unit: bytes.
 const LONG: usize = 500;
 
-/// The lines of a place, and those before and after it.
+/// The lines of a span, and one line before and after it.
 fn lines_around<'a>(text: &'a str, span: &std::ops::Range<usize>) -> &'a str {
     let line = |end: usize| text.get(..end).and_then(|before| before.rfind('\n')).unwrap_or(0);
     let begin = line(line(span.start.min(text.len())));
@@ -275,7 +275,7 @@ fn plain(message: &str, help: Option<&str>) -> MietteDiagnostic {
     }
 }
 
-/// Colours where somebody looks; plain text in files and pipes.
+/// Colours on a terminal; plain text in files and pipes.
 #[expect(clippy::needless_pass_by_value, reason = "it is shown and done with")]
 fn fancy(report: Report) -> String {
     let theme = match std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none() {

@@ -1,4 +1,5 @@
-//! What a command line names: files of graphs and runs, solvers, changes to either, and how pictures look.
+//! Arguments that name the input: files of graphs and runs, solvers, changes to either, and the style of
+//! pictures.
 pub(crate) mod choice;
 pub(crate) mod destination;
 pub(crate) mod document;

@@ -1,4 +1,4 @@
-//! A graph to look at: what is connected to what, and what each factor costs before and after a solve.
+//! A graph for display: its connections, and the cost of each factor before and after a solve.
 mod dot;
 mod svg;
 
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 pub(crate) struct Inspection {
     pub variables: Vec<VariableRow>,
     pub factors: Vec<FactorRow>,
-    /// By key, the numbers of its factors.
+    /// Numbers of the factors of each key.
     pub factors_by_key: BTreeMap<String, Vec<usize>>,
     pub cost: Costs,
 }
@@ -34,7 +34,7 @@ pub(crate) struct VariableRow {
 
 #[derive(Debug, Serialize)]
 pub(crate) struct FactorRow {
-    /// Its place in the graph, from 0.
+    /// Index of the factor in the graph, from 0.
     pub number: usize,
     #[serde(rename = "type")]
     pub of_type: &'static str,
@@ -47,20 +47,20 @@ pub(crate) struct FactorRow {
 }
 
 impl FactorRow {
-    /// Its name, or else that of its type.
+    /// Name of the factor, or else of its type.
     pub(crate) fn label(&self) -> &str {
         self.name.as_deref().unwrap_or(self.of_type)
     }
 }
 
-/// A factor at some values.
+/// A factor evaluated at some values.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct State {
-    /// Not whitened; empty where it is not defined.
+    /// Residual before whitening; empty if it is undefined.
     pub residual: Vec<f64>,
-    /// ½ρ.
+    /// Half the robust loss, ½ρ.
     pub cost: f64,
-    /// How much it counts.
+    /// Weight from the robust loss.
     pub weight: f64,
 }
 
@@ -72,7 +72,7 @@ pub(crate) struct Costs {
 }
 
 impl Inspection {
-    /// Looks at a graph at its values, and at the estimate with the states that a solver left, where there is one.
+    /// Evaluates a graph at its values, and at the estimate of a solver with its states if there is one.
     pub(crate) fn new(
         graph: &Graph,
         before: &Values,
@@ -104,13 +104,13 @@ impl Inspection {
         Ok(Self { variables: variables.collect(), factors, factors_by_key, cost })
     }
 
-    /// Puts the factors that cost most first; those that cost the same stay in the order of the graph.
+    /// Sorts the factors by decreasing cost; equal costs keep the order of the graph.
     pub(crate) fn sort_by_cost(&mut self) {
         let cost = |row: &FactorRow| row.after.as_ref().unwrap_or(&row.before).cost;
         self.factors.sort_by(|a, b| cost(b).total_cmp(&cost(a)));
     }
 
-    /// The factors of each key, with what they cost.
+    /// A table of the factors with their keys and costs.
     pub(crate) fn table(&self) -> String {
         let header = ["factor", "keys", "cost before", "after", "weight", "residual"];
         let mut table = Table::of_numbers(&header);
@@ -130,18 +130,18 @@ impl Inspection {
         format!("{}\ncost {:.6}{after}\n", table.text(), self.cost.before)
     }
 
-    /// In the language of Graphviz.
+    /// The graph as Graphviz.
     pub(crate) fn dot(&self) -> String {
         dot::write(self)
     }
 
-    /// A picture, seen from above.
+    /// The graph as a picture, seen from above.
     pub(crate) fn svg(&self) -> String {
         svg::write(self)
     }
 }
 
-/// What each factor costs in a problem, in the order of the graph.
+/// State of each factor in a solved problem, in the order of the graph.
 pub(crate) fn states(problem: &Problem, graph: &Graph) -> Vec<State> {
     let mut states = vec![State::default(); graph.factors().len()];
     for found in problem.inspect() {

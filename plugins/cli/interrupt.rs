@@ -1,10 +1,10 @@
-//! Signals: Ctrl-C, of which the first ends the solve with the best values so far and the second ends the program; and
-//! the one that comes with a file that may not grow.
+//! Signals. The first Ctrl-C ends the solve with the best values so far, the second ends the program.
+//! SIGXFSZ, for a file that reaches its size limit, becomes an error.
 use crate::output;
 use manifactor::solve::Interrupt;
 use std::sync::atomic::Ordering;
 
-/// An observer that stops a solve once Ctrl-C is pressed.
+/// Returns an observer that stops a solve after Ctrl-C.
 pub(crate) fn on_ctrl_c() -> Interrupt {
     let interrupt = Interrupt::default();
     let flag = interrupt.0.clone();
@@ -20,15 +20,16 @@ pub(crate) fn on_ctrl_c() -> Interrupt {
     interrupt
 }
 
-/// Makes a file that reaches the limit of `ulimit -f` a write that fails, with a message, where the signal that the
-/// system sends would end the program without a word.
+/// Turns a write beyond the limit of `ulimit -f` into an error with a message. By default the system's
+/// signal would end the program silently.
 #[cfg(unix)]
 pub(crate) fn fail_at_the_limit_of_files() {
     use signal_hook::{consts::SIGXFSZ, flag};
-    // the flag is never read: with any handler the write fails with EFBIG; without one the signal ends the program
+    // the flag is never read: with any handler the write fails with EFBIG; without one the signal ends the
+    // program
     let _ = flag::register(SIGXFSZ, std::sync::Arc::default());
 }
 
-/// Other systems have no such signal.
+/// Does nothing: this system has no such signal.
 #[cfg(not(unix))]
 pub(crate) fn fail_at_the_limit_of_files() {}

@@ -1,4 +1,4 @@
-//! The command line of Manifactor, as a library that an outside plugin can make its own binary with.
+//! The command line of Manifactor, as a library with which an external plugin builds its own binary.
 //!
 //! ```no_run
 //! use my_plugin as _; // links it, and with it all that it registers
@@ -9,8 +9,8 @@
 //! }
 //! ```
 //!
-//! Exit codes are those of [`Status`] and [`Failure`]; `docs/reliability.md` has a table of them.
-// strangers' input comes in here: no place of it is taken for granted
+//! The exit codes are documented at [`Status`] and [`Failure`], and in a table in `docs/reliability.md`.
+// this crate reads untrusted input, so no index may be taken for granted
 #![warn(clippy::indexing_slicing)]
 mod arguments;
 #[allow(clippy::indexing_slicing, reason = "its own names and objects")]
@@ -30,7 +30,7 @@ pub use commands::experiment::write_experiment;
 pub use failure::Failure;
 pub use status::Status;
 
-/// Parts that the fuzz targets call (`tests/fuzz`).
+/// Functions that the fuzz targets call (`tests/fuzz`).
 #[doc(hidden)]
 pub mod __private {
     pub use crate::view::{address, answer};
@@ -41,19 +41,19 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::process::ExitCode;
 
-/// Reads the command line, does what it says, and says how it ended.
+/// Runs the command line of the process and returns its exit code.
 pub fn main() -> ExitCode {
     main_with(std::env::args_os()).into()
 }
 
-/// The same for a command line that is given, the name of the program first. It returns the exit code as a number, for a
-/// host that is no Rust program.
+/// Runs the given command line, which begins with the name of the program. Returns the exit code as a
+/// number, for hosts that are not written in Rust.
 pub fn main_with(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> u8 {
     interrupt::fail_at_the_limit_of_files();
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) if error.use_stderr() => {
-            // it quotes arguments, however long they are
+            // clap quotes arguments of any length
             let text = error.render().to_string();
             let lines: Vec<String> = text.trim_end().lines().map(output::text::shortened).collect();
             output::say(&lines.join("\n"));

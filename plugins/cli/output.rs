@@ -1,6 +1,7 @@
-//! Output: results on standard output, all else on standard error.
+//! Output: results on standard output, everything else on standard error.
 //!
-//! Nothing else in this crate writes to the two: `print!` and `eprintln!` panic where they cannot write.
+//! No other code of this crate writes to the two, because `print!` and `eprintln!` panic if they cannot
+//! write.
 pub(crate) mod report;
 #[allow(clippy::indexing_slicing, reason = "cells that it has made")]
 pub(crate) mod summary_table;
@@ -12,10 +13,10 @@ use serde::Serialize;
 use std::io::{self, ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether results were lost on their way out.
+/// Whether results could not be written.
 static LOST: AtomicBool = AtomicBool::new(false);
 
-/// Returns whether standard output could not take all that was printed.
+/// Returns whether some of the results could not be written to standard output.
 pub(crate) fn is_lost() -> bool {
     LOST.load(Ordering::Relaxed)
 }
@@ -26,17 +27,17 @@ pub(crate) fn print(text: &str) {
     printed(out.write_all(text::printable(text).as_bytes()).and_then(|()| out.flush()));
 }
 
-/// Prints a text of the program's own as it is, byte for byte.
+/// Prints the program's own text byte for byte.
 pub(crate) fn print_as_is(text: &[u8]) {
     let mut out = io::stdout().lock();
     printed(out.write_all(text).and_then(|()| out.flush()));
 }
 
-/// Keeps in mind that something could not be printed, and says so.
+/// Records and reports a failed write to standard output.
 pub(crate) fn printed(result: io::Result<()>) {
     let Err(error) = result else { return };
     LOST.store(true, Ordering::Relaxed);
-    // a reader that has heard enough, such as `head`, needs no message
+    // a reader that has closed the pipe, such as `head`, needs no message
     if error.kind() != ErrorKind::BrokenPipe {
         say(&format!("cannot write to standard output: {error}"));
     }
@@ -50,7 +51,7 @@ pub(crate) fn json(value: &impl Serialize) {
     }
 }
 
-/// Prints one JSON document on a line of its own.
+/// Prints one JSON document on a single line.
 pub(crate) fn json_line(value: &impl Serialize) {
     match serde_json::to_string(value) {
         Ok(text) => print(&(text::json(&text) + "\n")),
@@ -58,18 +59,18 @@ pub(crate) fn json_line(value: &impl Serialize) {
     }
 }
 
-/// Says something on standard error, and ends the line.
+/// Prints a line on standard error.
 pub(crate) fn say(text: &str) {
     say_styled(&text::printable(text));
 }
 
-/// The same for text with colours: what others wrote in it was made printable before it got them.
+/// Prints a line with colours on standard error. The caller has to make foreign text printable first.
 pub(crate) fn say_styled(text: &str) {
-    // one write, so that lines of two threads do not mix; the work goes on if it fails
+    // a single write keeps the lines of two threads apart; a failure must not stop the work
     let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }
 
-/// Says something that is worth knowing.
+/// Prints a note on standard error.
 pub(crate) fn note(note: &str) {
     say(&format!("note: {}", text::shortened(note)));
 }

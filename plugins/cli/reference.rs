@@ -1,6 +1,6 @@
-//! The config reference: every document and every name that is linked, as Markdown.
+//! The config reference: every document and every linked name, as Markdown.
 //!
-//! It begins with what there is, name by name, so that a reader finds the way from a document to a type and back.
+//! It begins with an index by name, with links from a document to its types and back.
 pub(crate) mod fields;
 
 use crate::input::graph_file;
@@ -29,7 +29,7 @@ For completion and checks in an editor, write the schema of a kind of document t
 /// A kind of document, and the root of its schema.
 type Root = fn(&mut Definitions) -> Value;
 
-/// The whole page.
+/// Returns the whole page.
 pub(crate) fn markdown() -> String {
     let roots: [(&str, Root); 4] = [
         ("A literal graph", graph_file::root),
@@ -55,7 +55,7 @@ pub(crate) fn markdown() -> String {
     out += &format!("\n## Noise\n{docs}\n{}", table(&fields(&noise.document(schema))));
     let shared = shared();
     for of_kind in catalogue::all().chunk_by(|a, b| a.kind == b.kind) {
-        // not the kind alone, which a type of another kind may have for its name
+        // `Every` keeps the heading different from a type with the same name as the kind
         out += &format!("\n## Every {}\n", of_kind.first().map_or("", |e| e.kind));
         for entry in of_kind {
             out += &format!("\n### `{}`\n{}\n", entry.name, section(entry, &shared));
@@ -68,8 +68,8 @@ pub(crate) fn markdown() -> String {
     out
 }
 
-/// Settings that are a table of their own, alike in several types, as `stop` and `linear` are in solvers: by name, their
-/// fields. They are described once.
+/// Tables of settings that are equal in several types, such as `stop` and `linear` in solvers: their fields
+/// by name. The reference describes them once.
 fn shared() -> BTreeMap<String, Vec<Field>> {
     let mut met: BTreeMap<String, Vec<(Vec<Field>, usize)>> = BTreeMap::new();
     for entry in catalogue::all() {
@@ -90,13 +90,13 @@ fn shared() -> BTreeMap<String, Vec<Field>> {
     met.into_iter().filter_map(common).collect()
 }
 
-/// The fields of the table that is called so.
+/// The fields of the table `name`.
 fn within(fields: &[Field], name: &str) -> Vec<Field> {
     let prefix = format!("{name}.");
     fields.iter().filter(|field| field.name.starts_with(&prefix)).cloned().collect()
 }
 
-/// A type's own fields: of those that it shares, the table's name alone, with a link.
+/// A type's own fields. A shared table has only its name and a link.
 fn own(fields: Vec<Field>, shared: &BTreeMap<String, Vec<Field>>) -> Vec<Field> {
     let is_shared: Vec<String> = shared
         .iter()
@@ -111,8 +111,8 @@ fn own(fields: Vec<Field>, shared: &BTreeMap<String, Vec<Field>>) -> Vec<Field> 
     own
 }
 
-/// Each name with a link to where it is described. Names that several kinds have are numbered as they come, as in the anchors
-/// of GitHub and of mdBook.
+/// A link for each name. Names that occur in several kinds are numbered in order, as in the anchors of
+/// GitHub and mdBook.
 fn contents() -> String {
     let mut met: HashMap<&str, usize> = HashMap::new();
     let mut link = |name: &'static str| {
@@ -138,7 +138,7 @@ fn section(entry: &Entry, shared: &BTreeMap<String, Vec<Field>>) -> String {
     out + &table(&own(fields((entry.schema)().as_value()), shared))
 }
 
-/// What a type has beyond its docs: variables, rows, directions, invariances.
+/// Facts about a type beyond its docs: variables, rows, directions, invariances.
 pub(crate) fn notes(entry: &Entry) -> Vec<String> {
     let signature = (entry.signature)();
     let mut notes = vec![];
@@ -173,7 +173,7 @@ fn table(fields: &[Field]) -> String {
     format!("\n| field | type | default | what it is |\n| --- | --- | --- | --- |\n{rows}")
 }
 
-/// A kind of registered types, or noise, as a link to its section.
+/// A link to the section of a kind of registered types, or of noise.
 fn linked(kind: &str) -> String {
     match kind == "noise" || catalogue::all().iter().any(|entry| entry.kind == kind) {
         true if kind == "noise" => "[noise](#noise)".into(),

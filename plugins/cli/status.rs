@@ -3,25 +3,25 @@ use manifactor::slam::mapping::Warning;
 use manifactor::slam::report::{RunReport, VariantReport};
 use manifactor::solve::{Stall, Termination};
 
-/// How a command ended that did what it was asked to do.
+/// Outcome of a command that did its work.
 ///
-/// In order: of several, the last counts.
+/// The variants are ordered by severity: if several apply, the last one counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
-    /// All went well: exit code 0. An estimate beside a jump of the cost counts: it is the least there is nearby, and
-    /// the report says what it is.
+    /// Success: exit code 0. This includes an estimate at a jump of the cost, which is the lowest cost
+    /// nearby; the report describes it.
     Done,
-    /// A solve ended without a minimum; its best values are written all the same: exit code 1.
+    /// A solve did not reach a minimum; its best values are written: exit code 1.
     NotConverged,
-    /// Objects were detected, and none is in the map: exit code 1.
+    /// Objects were detected, but none is in the map: exit code 1.
     NothingMapped,
     /// More detections were left out than the source expects: exit code 1.
     DetectionsLeftOut,
-    /// A factor was checked, and breaks a law: exit code 1.
+    /// A factor or a type of variables breaks a law: exit code 1.
     Broken,
-    /// All is written but a journal, which lacks frames: exit code 3.
+    /// Everything is written except for a journal that lacks frames: exit code 3.
     JournalIncomplete,
-    /// Ctrl-C before all was done; the best values so far are written: exit code 130.
+    /// Ctrl-C ended the command early; the best values so far are written: exit code 130.
     Interrupted,
 }
 
@@ -36,7 +36,7 @@ impl From<&Termination> for Status {
 }
 
 impl From<&RunReport> for Status {
-    /// That of its worst variant. A signal that comes when all is done interrupts nothing.
+    /// The status of the worst variant. A signal after the end of the work interrupts nothing.
     fn from(report: &RunReport) -> Self {
         let variants = report.variants.iter().map(Self::from).max().unwrap_or(Self::Done);
         if report.complete { variants } else { Self::Interrupted }

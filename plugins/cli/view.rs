@@ -1,7 +1,8 @@
-//! The live view: a page of the map as it grows, served to browsers while a command works.
+//! The live view: a page that shows the map as it grows, served to browsers while a command works.
 //!
-//! The command changes the [state](LiveMap); a server in a thread of its own sends each browser the newest whenever that has taken
-//! the one before, and so skips what a slow browser has no time for. The command never waits for it, but at the end.
+//! The command changes the [state](LiveMap). A server in a separate thread sends each browser the newest
+//! state as soon as the browser has read the previous one, so a slow browser skips states. The command
+//! waits for the server only at the end.
 mod access;
 mod address;
 mod answers;
@@ -28,25 +29,26 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
-/// What a command shows of its work.
+/// The live view of a command.
 pub(crate) struct View {
     map: watch::Sender<Arc<LiveMap>>,
     server: JoinHandle<()>,
     url: String,
     is_everywhere: bool,
     is_told: bool,
-    /// When the whole map is looked at again.
+    /// Time of the next refresh of the whole map.
     due: Cell<Instant>,
 }
 
-/// The whole map is looked at no more often than this, and in no more than this share of the time.
+/// Shortest time between two refreshes of the whole map, and its smallest ratio to the duration of a
+/// refresh.
 const REFRESH: (Duration, u32) = (Duration::from_millis(500), 50);
 
 impl View {
-    /// Serves the page on this address from now on; port 0 is one that is free.
+    /// Serves the page on this address from now on; port 0 selects a free port.
     ///
     /// # Errors
-    /// If the address cannot be listened at.
+    /// If the address cannot be opened.
     pub(crate) fn open(address: SocketAddr) -> Result<Self, Failure> {
         let failed = |error: std::io::Error| {
             let help = "choose another with --view=ADDRESS; with port 0, or --view alone, the system chooses a free one";
@@ -61,12 +63,12 @@ impl View {
         Ok(Self { map, server, url, is_everywhere, is_told: false, due: Cell::new(Instant::now()) })
     }
 
-    /// It is copied only while a browser's state is made of it.
+    /// Changes the state. It is copied only while the server encodes it for a browser.
     fn change(&self, change: impl FnOnce(&mut LiveMap)) {
         self.map.send_modify(|map| change(Arc::make_mut(map)));
     }
 
-    /// A run of this title begins with a variant. The first time, the address is told.
+    /// Begins a variant of the run `title`. The first call prints the address.
     pub(crate) fn begin(&mut self, title: &str, variant: &str, as_json: bool) {
         self.change(|map| *map = LiveMap::new(title, variant));
         if std::mem::replace(&mut self.is_told, true) {
@@ -80,7 +82,7 @@ impl View {
         output::say(&format!("the map as it grows: {}{elsewhere}", self.url));
     }
 
-    /// Shows what came of a frame.
+    /// Shows the result of a frame.
     pub(crate) fn frame(
         &self,
         report: Result<&FrameReport, &FrameError>,
@@ -97,21 +99,21 @@ impl View {
         }
     }
 
-    /// Shows all of the map as it is now.
+    /// Shows the current state of the whole map.
     pub(crate) fn refresh(&self, mapper: &mut Mapper) {
         self.change(|map| map.refresh(mapper));
     }
 
-    /// Shows the map that all frames together give.
+    /// Shows the map estimated from all frames.
     pub(crate) fn settle(&self, estimate: &Estimate) {
         self.change(|map| map.settle(estimate));
     }
 
-    /// Tells browsers how it ended, and waits for them, though not for long.
+    /// Sends the outcome to the browsers, and waits for them for a limited time.
     pub(crate) fn end(self, words: &str) {
         self.change(|map| map.enter(Phase::Ended(words.to_owned()), None));
         drop(self.map);
-        // a server that has panicked has told why
+        // a panic of the server has already printed its message
         let _ = self.server.join();
     }
 }

@@ -1,4 +1,4 @@
-//! Formulas that were compiled already: factors that differ in constants alone share them.
+//! Cache of compiled formulas; factors that differ only in constants share a program.
 use crate::compile::compile;
 use crate::program::Program;
 use crate::scope::{Named, Scope};
@@ -8,23 +8,23 @@ use std::any::TypeId;
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-/// Formulas that are kept. A program has a few; what makes ever new ones begins anew.
+/// Maximum number of cached formulas. A typical process has a few; if it is full, the cache is cleared.
 const MOST: usize = 256;
 
-/// What a program follows from, but for the values of its constants.
+/// Inputs that determine a program, except for the values of its constants.
 #[derive(PartialEq, Eq, Hash)]
 struct Formulas {
-    /// Names, types of the variables and shapes of the constants.
+    /// Names with their shapes, and the types of the variables.
     names: Vec<(String, &'static str, Option<TypeId>)>,
     define: Vec<(String, String)>,
     residual: Vec<String>,
     domain: Vec<String>,
 }
 
-/// Programs, and whether they use `up`.
+/// Compiled programs, with a flag that is true if they use `up`.
 static COMPILED: Mutex<Option<HashMap<Formulas, (Program, bool)>>> = Mutex::new(None);
 
-/// The program of formulas, and whether they use `up`.
+/// Returns the program of formulas, and whether they use `up`.
 pub(crate) fn program(
     scope: &Scope,
     define: &IndexMap<String, String>,
@@ -32,7 +32,7 @@ pub(crate) fn program(
     domain: &[String],
 ) -> Result<(Program, bool), TextError> {
     let names = scope.names.iter().map(|(name, named)| match named {
-        // several types of variables may have one shape
+        // Several types of variables may have equal shapes.
         Named::Variable(quantity) => (name.clone(), quantity.shape.name, Some((quantity.type_id)())),
         Named::Constant(shape, _) => (name.clone(), shape.name, None),
     });
@@ -54,7 +54,7 @@ pub(crate) fn program(
         if let Some(program) = program.with(constants) {
             return Ok((program, uses_up));
         }
-        // compiled again, for a message that points to what is not finite
+        // Compiled again, for a message that points to the value that is not finite.
     }
     let compiled = compile(scope, define, residual, domain)?;
     let mut known = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);

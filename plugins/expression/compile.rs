@@ -1,4 +1,5 @@
-//! From formulas to a program: every call resolved by the types of its arguments, constants folded, nothing twice.
+//! Compiles formulas to a program: resolves every call by its argument types, folds constants and shares
+//! common subexpressions.
 use crate::mistake::Mistake;
 use crate::program::{Code, Pass, Program, Step};
 use crate::resolve::Library;
@@ -10,12 +11,12 @@ use manifactor_graph::quantity::{Function, Quantity, Shape};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
-/// A value of the program that is being made.
+/// A value of the program under construction.
 #[derive(Debug, Clone, Copy)]
 struct Value {
     shape: Shape,
     at: usize,
-    /// A bit for each variable that it depends on; none for constants.
+    /// One bit per variable that the value depends on; zero for constants.
     depends: u32,
 }
 
@@ -25,7 +26,7 @@ impl Value {
     }
 }
 
-/// Compiles formulas, and says whether they use `up`.
+/// Compiles formulas, and returns whether they use `up`.
 pub(crate) fn compile(
     scope: &Scope,
     define: &IndexMap<String, String>,
@@ -52,16 +53,16 @@ struct Compiler<'a> {
     scope: &'a Scope,
     library: &'static Library,
     code: Code,
-    /// Constants and what follows from them; room for what depends on variables.
+    /// Constants, values computed from constants only, and space for values that depend on variables.
     values: Vec<f64>,
-    /// In the order in which they came, for messages.
+    /// Names in the order of their definition, for messages.
     names: IndexMap<&'a str, Value>,
     uses_up: bool,
-    /// The arguments and the result of each call.
+    /// Arguments and result of each call.
     calls: Vec<(Vec<Value>, Value)>,
-    /// What each row depends on.
+    /// Dependencies of each row, one bit per variable.
     rows: Vec<u32>,
-    /// What has been computed, by function and places of arguments.
+    /// Computed values, by function and indices of the arguments.
     known: HashMap<(*const Function, Vec<u32>), Value>,
 }
 
@@ -91,7 +92,7 @@ impl<'a> Compiler<'a> {
         Self { scope, library, code, values, names, uses_up: false, calls, rows, known }
     }
 
-    /// Checks the name of a part of formulas.
+    /// Checks the name of a `define` entry.
     fn define(&self, name: &str) -> Result<(), Mistake> {
         check_name(name)?;
         match self.names.contains_key(name) {
@@ -103,7 +104,7 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    /// Rows of the residual.
+    /// Adds the rows of a residual formula.
     fn residual(&mut self, text: &str) -> Result<(), Mistake> {
         let formula = parse(text)?;
         let value = self.value(&formula)?;
@@ -121,7 +122,7 @@ impl<'a> Compiler<'a> {
         Ok(())
     }
 
-    /// A number that has to be above zero.
+    /// Adds a condition: a number that must be positive.
     fn condition(&mut self, text: &str) -> Result<(), Mistake> {
         let formula = parse(text)?;
         let value = self.value(&formula)?;
@@ -197,7 +198,7 @@ impl<'a> Compiler<'a> {
         Ok(value)
     }
 
-    /// What it takes to differentiate the rows, by each variable.
+    /// Collects the steps that differentiate the rows, for each variable.
     fn passes(&mut self) -> Result<(), TextError> {
         for (variable, name) in self.scope.variables().enumerate() {
             let depends = |on: u32| on >> variable & 1 == 1;

@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3, Vector6};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A number, a vector of two, three or six numbers, or a value of any type of variables with its `type`.
+/// A number, a vector of two, three or six numbers, or a value of any variable type with its `type`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a number, a list of 2, 3 or 6 numbers, or a value with its `type`")]
 pub enum Constant {
@@ -18,7 +18,7 @@ pub enum Constant {
 }
 
 impl Constant {
-    /// What it is in formulas, and its flat form; otherwise, what was expected.
+    /// Returns the shape and the flat form, or the expected input as an error message.
     pub(crate) fn flat(&self) -> Result<(Shape, Vec<f64>), String> {
         match self {
             Self::Number(x) => Ok((f64::SHAPE, vec![*x])),

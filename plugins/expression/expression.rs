@@ -1,4 +1,4 @@
-//! The factor.
+//! The factor `expression`.
 use crate::cache::program;
 use crate::constant::Constant;
 use crate::language::page;
@@ -11,8 +11,8 @@ use schemars::JsonSchema;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// A factor whose residual is written as formulas. The catalogue has the language, with every function that is linked:
-/// `manifactor explain expression`.
+/// A factor whose residual is given by formulas. `manifactor explain expression` documents the language and
+/// lists every linked function.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 #[serde(into = "Document")]
 #[schemars(with = "Document", description = page())]
@@ -25,46 +25,46 @@ pub struct Expression {
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Expression")]
 struct Document {
-    /// Names of the variables, in the order of the factor's keys, and the type of each.
+    /// Names of the variables, in the order of the factor's keys, with the type of each.
     #[schemars(with = "std::collections::BTreeMap<String, String>")]
     variables: IndexMap<String, String>,
-    /// Formulas, each a row or, where it is a vector, several.
+    /// Formulas of the residual. Each gives one row, or several if it is a vector.
     residual: Vec<String>,
-    /// Parts of formulas by name, for all formulas and for the parts behind them.
+    /// Named parts of formulas, usable in all formulas and in later parts.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     #[schemars(with = "std::collections::BTreeMap<String, String>")]
     define: IndexMap<String, String>,
-    /// Numbers, vectors and other values that formulas use by name.
+    /// Numbers, vectors and other values that formulas refer to by name.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     #[schemars(with = "std::collections::BTreeMap<String, Constant>")]
     constants: IndexMap<String, Constant>,
-    /// The world's up, of any length but zero. Default: z.
+    /// The world's up direction, of any length but zero. Default: z.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     up: Option<Up>,
-    /// Formulas that are above zero wherever the factor means something.
+    /// Formulas that must be positive for the factor to be defined.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     domain: Vec<String>,
 }
 
-/// Why formulas make no factor.
+/// The reason why formulas do not form a factor.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExpressionError {
-    /// No formula at all.
+    /// There is no formula.
     #[error("`residual` is empty: expected at least one formula, such as \"norm(position(x)) - 1\"")]
     NoResidual,
-    /// No variables, or too many.
+    /// There are no variables, or too many.
     #[error("expected 1 to {most} variables, such as variables = {{ q = \"dual_quadric\" }}, found {0}", most = MOST)]
     WrongVariables(usize),
-    /// Something within a formula, a name or a type.
+    /// A formula, a name or a type is invalid.
     #[error(transparent)]
     Text(#[from] TextError),
-    /// More rows than a factor may have.
+    /// The residual has more rows than a factor may have.
     #[error("`residual`: {0}")]
     WrongRows(#[from] WrongRows),
 }
 
-/// The most variables of a factor.
+/// Maximum number of variables of a factor.
 const MOST: usize = 32;
 
 impl TryFrom<Document> for Expression {
@@ -80,13 +80,13 @@ impl TryFrom<Document> for Expression {
         let scope = Scope::new(variables, constants, *up.unwrap_or_default())?;
         let (program, uses_up) = program(&scope, define, residual, domain)?;
         let program = Dynamic::new(program)?;
-        // written down with the up that it uses, so that the document is complete
+        // Store the `up` that the formulas use, so that the written document is complete.
         document.up = document.up.or(uses_up.then(Up::default));
         Ok(Self { document, program })
     }
 }
 
-/// From the node itself, so that a fault in a formula keeps its place.
+/// Deserializes from the document's node, so that an error in a formula keeps its position.
 impl<'de> Deserialize<'de> for Expression {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserialize_with(deserializer, |node| {
@@ -101,7 +101,7 @@ impl<'de> Deserialize<'de> for Expression {
     }
 }
 
-/// The field that names the type of a factor.
+/// Name of the field with the type of a factor.
 const TAG: &str = "type";
 
 impl From<Expression> for Document {
@@ -111,20 +111,20 @@ impl From<Expression> for Document {
 }
 
 impl Expression {
-    /// Compiles formulas of named variables of named types.
+    /// Compiles formulas of variables, given as pairs of name and type.
     ///
     /// # Errors
-    /// What is wrong with a formula, with the place in it.
+    /// If a formula is invalid; the error contains the position.
     pub fn new<'a>(
         variables: impl IntoIterator<Item = (&'a str, &'a str)>,
         residual: impl IntoIterator<Item = &'a str>,
     ) -> Result<Self, ExpressionError> {
         Self::with_constants(variables, [], residual)
     }
-    /// Compiles formulas of named variables of named types, with constants of their own.
+    /// Compiles formulas of variables, given as pairs of name and type, with named constants.
     ///
     /// # Errors
-    /// What is wrong with a formula, with the place in it.
+    /// If a formula is invalid; the error contains the position.
     pub fn with_constants<'a>(
         variables: impl IntoIterator<Item = (&'a str, &'a str)>,
         constants: impl IntoIterator<Item = (&'a str, Constant)>,
@@ -136,7 +136,7 @@ impl Expression {
         Document { variables, residual, define: IndexMap::new(), constants, up: None, domain: vec![] }
             .try_into()
     }
-    /// With another direction for up.
+    /// Sets a different up direction.
     ///
     /// # Errors
     /// As [`Expression::new`].
@@ -144,7 +144,7 @@ impl Expression {
         self.document.up = Some(up.into());
         self.document.try_into()
     }
-    /// What runs.
+    /// Returns the compiled program.
     pub fn program(&self) -> &Program {
         self.program.get()
     }
@@ -156,7 +156,7 @@ impl Factor for Expression {
         &self.program
     }
     fn with_up(&self, up: Direction) -> Option<Box<dyn Factor>> {
-        // read once already, so it is read again
+        // The document was read successfully before, so compiling it again cannot fail.
         let is_open = self.document.up.is_some_and(|mut open| open.fill(up));
         let filled = is_open.then(|| self.clone().with_up(up).ok()).flatten()?;
         Some(Box::new(filled))

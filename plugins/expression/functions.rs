@@ -1,36 +1,37 @@
-//! Functions of numbers and vectors. Those of rotations, poses and objects are registered where these are defined.
+//! Functions of numbers and vectors. The crates of rotations, poses and objects register the functions of
+//! those types.
 use manifactor_graph::register_functions;
 use nalgebra::{Vector2, Vector3, Vector6};
 
 register_functions! {
-    /// Sum.
+    /// The sum.
     "+" fn add(a: f64, b: f64) -> f64 { a + b }
 
-    /// Difference.
+    /// The difference.
     "-" fn subtract(a: f64, b: f64) -> f64 { a - b }
 
-    /// The other sign.
+    /// The negative.
     "-" fn negate(a: f64) -> f64 { -a }
 
-    /// Product.
+    /// The product.
     "*" fn multiply(a: f64, b: f64) -> f64 { a * b }
 
-    /// Quotient.
+    /// The quotient.
     "/" fn divide(a: f64, b: f64) -> f64 { a / b }
 
-    /// A power; the exponent has to be constant.
+    /// The power; the exponent must be constant.
     "^" fn power(a: f64, exponent: f64) -> f64 {
         let n = exponent.re();
         if n.fract() == 0.0 && n.abs() <= 64.0 { a.powi(n as i32) } else { a.powf(exponent) }
     }
 
-    /// The absolute value. At zero it has a kink; the derivative taken there is that of a > 0.
+    /// The absolute value. It has a kink at zero; the derivative for a > 0 is used there.
     fn abs(a: f64) -> f64 { if a < T::zero() { -a } else { a } }
 
     /// The square root. Its derivative at zero is infinite.
     fn sqrt(a: f64) -> f64 { a.sqrt() }
 
-    /// The exponential.
+    /// The exponential function.
     fn exp(a: f64) -> f64 { a.exp() }
 
     /// The natural logarithm.
@@ -45,28 +46,29 @@ register_functions! {
     /// The tangent of an angle in radians.
     fn tan(a: f64) -> f64 { a.tan() }
 
-    /// The angle of a sine, in radians. Its derivative at ±1 is infinite.
+    /// The arcsine, in radians. Its derivative at ±1 is infinite.
     fn asin(a: f64) -> f64 { a.asin() }
 
-    /// The angle of a cosine, in radians. Its derivative at ±1 is infinite: `angle(a, b)` has no such place but 0 and π.
+    /// The arccosine, in radians. Its derivative at ±1 is infinite; `angle(a, b)` has kinks only at 0 and π.
     fn acos(a: f64) -> f64 { a.acos() }
 
-    /// The angle of a tangent, in radians.
+    /// The arctangent, in radians.
     fn atan(a: f64) -> f64 { a.atan() }
 
-    /// The lesser of two, the first of equals.
+    /// The smaller of two numbers, the first if they are equal.
     fn min(a: f64, b: f64) -> f64 { if b < a { b } else { a } }
 
-    /// The greater of two, the first of equals.
+    /// The larger of two numbers, the first if they are equal.
     fn max(a: f64, b: f64) -> f64 { if b > a { b } else { a } }
 
-    /// A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
+    /// A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected
+    /// branch.
     "where" fn branch(positive: f64, a: f64, b: f64) -> f64 { if positive > T::zero() { a } else { b } }
 
-    /// The vector of these; `[x, y]` is short for it.
+    /// The vector of two components; `[x, y]` is short for it.
     fn vector(x: f64, y: f64) -> Vector2<f64> { Vector2::new(x, y) }
 
-    /// The vector of these; `[x, y, z]` is short for it.
+    /// The vector of three components; `[x, y, z]` is short for it.
     fn vector(x: f64, y: f64, z: f64) -> Vector3<f64> { Vector3::new(x, y, z) }
 
     /// The first component.
@@ -84,13 +86,13 @@ register_functions! {
     /// The third component.
     fn z(v: Vector3<f64>) -> f64 { v.z }
 
-    /// The vector product.
+    /// The cross product.
     fn cross(a: Vector3<f64>, b: Vector3<f64>) -> Vector3<f64> { a.cross(&b) }
 
-    /// The area between two vectors, with its sign.
+    /// The signed area of the parallelogram between two vectors.
     fn cross(a: Vector2<f64>, b: Vector2<f64>) -> f64 { a.x * b.y - a.y * b.x }
 
-    /// Where a point is seen, in the frame of a camera that looks along z: (x, y)/z.
+    /// The projection (x, y)/z of a point in the frame of a camera that looks along z.
     fn project(v: Vector3<f64>) -> Vector2<f64> { v.xy() / v.z }
 
     /// The logarithm of each component.
@@ -102,61 +104,62 @@ register_functions! {
 
 macro_rules! vectors {
     ($($vector:ty),+) => { $(register_functions! {
-        /// Sum.
+        /// The sum.
         "+" fn add(a: $vector, b: $vector) -> $vector { a + b }
 
-        /// Difference.
+        /// The difference.
         "-" fn subtract(a: $vector, b: $vector) -> $vector { a - b }
 
-        /// The other way.
+        /// The vector in the opposite direction.
         "-" fn negate(v: $vector) -> $vector { -v }
 
-        /// The vector, scaled.
+        /// The scaled vector.
         "*" fn scale(v: $vector, by: f64) -> $vector { v * by }
 
-        /// The vector, scaled.
+        /// The scaled vector.
         "*" fn scale(by: f64, v: $vector) -> $vector { v * by }
 
-        /// The vector, divided by a number.
+        /// The vector divided by a number.
         "/" fn shorten(v: $vector, by: f64) -> $vector { v / by }
 
-        /// Component by component.
+        /// The componentwise product.
         fn multiply(a: $vector, b: $vector) -> $vector { a.component_mul(&b) }
 
-        /// Component by component.
+        /// The componentwise quotient.
         fn divide(a: $vector, b: $vector) -> $vector { a.component_div(&b) }
 
         /// The scalar product.
         fn dot(a: $vector, b: $vector) -> f64 { a.dot(&b) }
 
-        /// The sum of the squares.
+        /// The squared length.
         fn norm_squared(v: $vector) -> f64 { v.norm_squared() }
 
-        /// The length. At zero it has a kink; the derivative taken there is zero.
+        /// The length. It has a kink at zero; the derivative returned there is zero.
         fn norm(v: $vector) -> f64 {
             let squared = v.norm_squared();
             if squared > T::zero() { squared.sqrt() } else { squared }
         }
 
-        /// The vector, one long.
+        /// The vector, normalized to length one.
         fn unit(v: $vector) -> $vector { v / v.norm_squared().sqrt() }
 
-        /// How far apart two points are. Where they meet, its derivative is taken as zero.
+        /// The distance between two points. If they coincide, the derivative returned is zero.
         fn distance(a: $vector, b: $vector) -> f64 {
             let squared = (a - b).norm_squared();
             if squared > T::zero() { squared.sqrt() } else { squared }
         }
 
-        /// A branch: `a` where the first is above zero, `b` elsewhere. Its derivative is that of the one that is taken.
+        /// A branch: `a` if `positive` is above zero, otherwise `b`. Its derivative is taken from the selected
+        /// branch.
         "where" fn branch(positive: f64, a: $vector, b: $vector) -> $vector { if positive > T::zero() { a } else { b } }
 
         /// The sum of the components.
         fn sum(v: $vector) -> f64 { v.iter().fold(T::zero(), |sum, x| sum + *x) }
 
-        /// The greatest component, the first of equals.
+        /// The largest component, the first of equal ones.
         fn largest(v: $vector) -> f64 { v.iter().fold(v[0], |most, x| if *x > most { *x } else { most }) }
 
-        /// The least component, the first of equals.
+        /// The smallest component, the first of equal ones.
         fn smallest(v: $vector) -> f64 { v.iter().fold(v[0], |least, x| if *x < least { *x } else { least }) }
     })+ };
 }

@@ -1,4 +1,4 @@
-//! The language of formulas, as the catalogue explains it.
+//! Documentation of the formula language for the catalogue.
 use crate::resolve::is_word;
 use manifactor_graph::quantity::{Function, functions};
 use std::fmt::Write;
@@ -24,7 +24,7 @@ noise  = { sigma = 0.1 }
 ```
 ";
 
-/// The page of the catalogue: what is meant, and every function that is linked.
+/// Returns the page of the catalogue: the language and every linked function.
 pub(crate) fn page() -> String {
     let all = functions();
     let (words, operators): (Vec<&Function>, Vec<&Function>) = all.into_iter().partition(|f| is_word(f.name));
@@ -41,7 +41,7 @@ pub(crate) fn page() -> String {
     text.trim_end().to_owned()
 }
 
-/// `a * b: number * vector3 -> vector3` for an operator, the signature of a function.
+/// Formats the signature of a function, for example `a * b: number * vector3 -> vector3` for an operator.
 fn written(function: &Function) -> String {
     let types: Vec<&str> = function.arguments.iter().map(|(_, shape)| shape.name).collect();
     match (is_word(function.name), types.as_slice()) {

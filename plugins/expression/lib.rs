@@ -1,9 +1,9 @@
-//! A factor that is written as a formula in a config.
+//! A factor that is written as formulas in a config.
 //!
-//! A formula is parsed, checked and compiled once, to a program of calls over flat
-//! values, which runs over numbers and over dual numbers. What it can call is registered by the crate with the geometry:
-//! see [`manifactor_graph::quantity`].
-// strangers' input comes in here: no place of it is taken for granted
+//! Formulas are parsed, checked and compiled once, to a program of calls over flat values. The program runs
+//! over numbers and over dual numbers. The crates that define the types register the functions: see
+//! [`manifactor_graph::quantity`].
+// Formulas are untrusted input: no index is taken for granted.
 #![warn(clippy::indexing_slicing)]
 mod cache;
 #[allow(clippy::indexing_slicing, reason = "a formula is checked by now")]

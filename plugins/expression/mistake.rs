@@ -1,10 +1,10 @@
-//! What is wrong with a formula, and where.
+//! Errors in a formula, with their position.
 use manifactor_graph::TextError;
 use std::ops::Range;
 use winnow::error::ParserError;
 use winnow::stream::{LocatingSlice, Location, Stream};
 
-/// Something wrong at some bytes of a formula.
+/// An error at a byte range of a formula.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Mistake {
     pub span: Range<usize>,
@@ -19,14 +19,14 @@ impl Mistake {
     pub(crate) fn help(self, help: impl Into<String>) -> Self {
         Self { help: Some(help.into()), ..self }
     }
-    /// With the formula that it is in.
+    /// Adds the formula that contains the mistake.
     pub(crate) fn within(self, formula: &str) -> TextError {
         let Self { span, message, help } = self;
         TextError { text: TextError::line(formula), span, message, help }
     }
 }
 
-/// What is being parsed.
+/// Input of the parser.
 pub(crate) type Input<'i> = LocatingSlice<&'i str>;
 
 impl ParserError<Input<'_>> for Mistake {

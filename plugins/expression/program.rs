@@ -6,15 +6,15 @@ use std::cell::RefCell;
 use std::fmt;
 use std::sync::Arc;
 
-/// Formulas, compiled: each call writes its result behind all that was there before. Cheap to clone.
+/// Compiled formulas: each call appends its result to the values before it. Cheap to clone.
 ///
-/// Jacobians come by forward differentiation, [`LANES`] directions of a variable at a time; what does not depend on
-/// that variable is computed once, over plain numbers. Factors that differ in constants alone share their code: a thousand of
-/// them fit into a processor's cache.
+/// Jacobians are computed by forward differentiation, [`LANES`] directions of a variable at a time. Values
+/// that do not depend on the variable are computed once, over plain numbers. Factors that differ only in
+/// constants share their code, so a thousand of them fit into the cache of a processor.
 #[derive(Clone)]
 pub struct Program {
     code: Arc<Code>,
-    /// The values at the start: constants, what follows from them, and room for all else.
+    /// Initial values: constants, values computed from constants only, and space for all remaining values.
     values: Arc<[f64]>,
 }
 
@@ -22,42 +22,42 @@ pub struct Program {
 pub(crate) struct Code {
     pub types: Vec<TypeId>,
     pub dimensions: Vec<usize>,
-    /// By variable, what it is and where its flat form begins.
+    /// For each variable, its type and the index at which its flat form begins.
     pub inputs: Vec<(&'static VariableQuantity, usize)>,
-    /// Where the constants that have a name begin, in the order of their scope.
+    /// Indices of the named constants, in the order of their scope.
     pub constants: Vec<usize>,
-    /// Calls that take constants alone: made once, for each set of constants.
+    /// Calls with constant arguments only, evaluated once per set of constants.
     pub folded: Vec<Step>,
     pub calls: Vec<Step>,
-    /// By variable, what it takes to differentiate by it.
+    /// For each variable, the steps that differentiate with respect to it.
     pub passes: Vec<Pass>,
-    /// Where each row is.
+    /// Index of each row.
     pub rows: Vec<usize>,
-    /// Where those numbers are that have to be above zero.
+    /// Indices of the numbers that must be positive.
     pub domain: Vec<usize>,
 }
 
-/// One call.
+/// A single function call.
 pub(crate) struct Step {
     pub numbers: Call<f64>,
     pub lanes: Call<Lanes>,
     pub at: Box<[u32]>,
-    /// Where its result begins and ends.
+    /// Index range of the result.
     pub to: std::ops::Range<usize>,
 }
 
-/// What it takes to differentiate by one variable.
+/// The steps that differentiate with respect to one variable.
 #[derive(Default)]
 pub(crate) struct Pass {
-    /// Calls that depend on it.
+    /// Calls that depend on the variable.
     pub calls: Vec<usize>,
-    /// Values that those calls take and that do not depend on it.
+    /// Arguments of those calls that do not depend on the variable.
     pub lifted: Vec<usize>,
-    /// Of each row, whether it depends on it.
+    /// Whether each row depends on the variable.
     pub rows: Vec<bool>,
 }
 
-/// Room to compute in. One for each thread: evaluating allocates nothing.
+/// Work space, one per thread, so that evaluation allocates nothing.
 #[derive(Default)]
 struct Room {
     numbers: Vec<f64>,
@@ -70,7 +70,7 @@ thread_local! {
 }
 
 impl Step {
-    /// Makes the call; whether its result is finite.
+    /// Runs the call, and returns whether its result is finite.
     pub(crate) fn run(&self, values: &mut [f64]) -> bool {
         let (from, to) = values.split_at_mut(self.to.start);
         let to = &mut to[..self.to.len()];
@@ -83,7 +83,8 @@ impl Program {
     pub(crate) fn new(code: Code, values: Vec<f64>) -> Self {
         Self { code: Arc::new(code), values: values.into() }
     }
-    /// The same formulas with other constants, of the same shapes; `None` where something that follows from them is not finite.
+    /// Returns the program with different constants of equal shapes; `None` if a value computed from them is
+    /// not finite.
     pub(crate) fn with<'c>(&self, constants: impl Iterator<Item = &'c [f64]>) -> Option<Self> {
         let mut values = self.values.to_vec();
         for (at, flat) in self.code.constants.iter().zip(constants) {
@@ -92,11 +93,11 @@ impl Program {
         let finite = self.code.folded.iter().all(|step| step.run(&mut values));
         finite.then(|| Self { code: self.code.clone(), values: values.into() })
     }
-    /// Number of calls.
+    /// Returns the number of calls.
     pub fn len(&self) -> usize {
         self.code.calls.len()
     }
-    /// Returns whether it computes nothing.
+    /// Returns whether the program computes nothing.
     pub fn is_empty(&self) -> bool {
         self.code.calls.is_empty()
     }
@@ -109,7 +110,7 @@ impl fmt::Debug for Program {
 }
 
 impl Code {
-    /// All values, over numbers.
+    /// Computes all values over plain numbers.
     fn run(&self, values: &[f64], variables: &[&dyn Any], numbers: &mut Vec<f64>) {
         numbers.clear();
         numbers.extend_from_slice(values);
@@ -122,7 +123,7 @@ impl Code {
         }
     }
 
-    /// The block of a variable, where all values are known.
+    /// Computes the Jacobian block of a variable, once all values are known.
     fn differentiate(&self, variable: usize, x: &dyn Any, room: &mut Room, block: &mut [f64]) {
         let Room { numbers, lanes, gradients } = room;
         let (pass, (quantity, at), rows) = (&self.passes[variable], self.inputs[variable], self.rows.len());
@@ -130,7 +131,7 @@ impl Code {
         if lanes.len() < numbers.len() {
             lanes.resize(numbers.len(), Lanes::from(0.0));
         }
-        // lanes past the last direction hold anything: they are not looked at
+        // Lanes past the last direction are arbitrary and never read.
         gradients.resize(size * dimension + LANES, 0.0);
         (quantity.gradients)(x, &mut gradients[..size * dimension]);
         for slot in &pass.lifted {

@@ -1,4 +1,4 @@
-//! Which function a call means, and what to say where there is none.
+//! Resolves calls to functions, with error messages for calls that match none.
 use crate::mistake::Mistake;
 use crate::scope::{Named, Scope};
 use manifactor_config::nearest;
@@ -6,20 +6,20 @@ use manifactor_graph::quantity::{Function, Quantity, Shape, functions};
 use std::ops::Range;
 use std::sync::OnceLock;
 
-/// How many signatures a message lists.
+/// Maximum number of signatures in a message.
 const LISTED: usize = 6;
 
-/// Every function that is linked.
+/// All linked functions.
 pub(crate) struct Library {
-    /// By name.
+    /// Functions sorted by name.
     functions: Vec<&'static Function>,
 }
 
-/// A call's arguments: what they are, and where.
+/// Arguments of a call, with the shape and the span of each.
 type Arguments<'a> = &'a [(Shape, Range<usize>)];
 
 impl Library {
-    /// Found once for all formulas.
+    /// Returns the library; it is collected once for all formulas.
     pub(crate) fn linked() -> &'static Self {
         static LINKED: OnceLock<Library> = OnceLock::new();
         LINKED.get_or_init(|| Self { functions: functions() })
@@ -31,7 +31,7 @@ impl Library {
         self.functions.get(first..end).unwrap_or_default()
     }
 
-    /// The function of that name that takes these arguments.
+    /// Returns the function with this name and these argument types.
     pub(crate) fn resolve(
         &self,
         name: &str,
@@ -60,7 +60,7 @@ impl Library {
             let message = format!("`{name}` takes {}, found {}", counts(named), arguments.len());
             return Err(Mistake::new(whole.clone(), message).help(signatures(named)));
         }
-        // the first argument that none of them takes there, the others before it being as they are
+        // Find the first argument that no candidate accepts, given the arguments before it.
         let mut left = of_arity.clone();
         for (i, (found, span)) in arguments.iter().enumerate() {
             let taken: Vec<_> = left.iter().copied().filter(|f| argument(f, i) == Some(*found)).collect();
@@ -70,7 +70,7 @@ impl Library {
                 expected.dedup();
                 let message =
                     format!("`{name}` takes {} here, found {}", one_of(&expected), with_article(found.name));
-                // numbers and vectors need no explanation
+                // Numbers and vectors need no explanation.
                 let takers = match found.is_vector() || *found == f64::SHAPE {
                     true => String::new(),
                     false => format!("; {}", self.takers(*found)),
@@ -94,7 +94,7 @@ impl Library {
         Mistake::new(at, message).help(help)
     }
 
-    /// A name that is neither a variable nor a constant.
+    /// Returns the error for a name that is neither a variable nor a constant.
     pub(crate) fn unknown_name<'n>(
         &self,
         name: &str,
@@ -113,7 +113,7 @@ impl Library {
         Mistake::new(at, format!("unknown name `{name}`")).help(help)
     }
 
-    /// What can be done with a value.
+    /// Lists the functions that accept a value as first argument.
     pub(crate) fn takers(&self, shape: Shape) -> String {
         let takes =
             |f: &&&'static Function| is_word(f.name) && f.arguments.first().is_some_and(|(_, s)| *s == shape);
@@ -130,12 +130,12 @@ impl Library {
     }
 }
 
-/// Returns whether it is a function rather than an operator.
+/// Returns whether the name belongs to a function rather than an operator.
 pub(crate) fn is_word(name: &str) -> bool {
     name.starts_with(char::is_alphabetic)
 }
 
-/// The type of an argument by place, where there is one.
+/// Returns the type of the argument at an index, if there is one.
 fn argument(function: &Function, place: usize) -> Option<Shape> {
     function.arguments.get(place).map(|(_, shape)| *shape)
 }

@@ -1,4 +1,4 @@
-//! The names that formulas use: variables, constants, `up` and `pi`.
+//! Names in formulas: variables, constants, `up` and `pi`.
 use crate::constant::Constant;
 use crate::mistake::Mistake;
 use indexmap::IndexMap;
@@ -8,18 +8,18 @@ use manifactor_graph::quantity::{Quantity, Shape, VariableQuantity, variable_qua
 use manifactor_graph::{Direction, TextError, Variable};
 use nalgebra::Vector3;
 
-/// The name of the world's up.
+/// Name of the world's up direction.
 pub(crate) const UP: &str = "up";
 /// Reserved names.
 const TAKEN: [&str; 2] = [UP, "pi"];
-/// What a name stands for.
+/// Meaning of a name.
 pub(crate) enum Named {
     Variable(&'static VariableQuantity),
-    /// What it is, and its flat form.
+    /// Shape and flat form of the value.
     Constant(Shape, Vec<f64>),
 }
 
-/// Variables first, in the order of a factor's keys.
+/// Names with their meaning; variables come first, in the order of a factor's keys.
 #[derive(Default)]
 pub(crate) struct Scope {
     pub names: IndexMap<String, Named>,
@@ -55,7 +55,7 @@ impl Scope {
         Ok(scope)
     }
 
-    /// Names of the variables.
+    /// Returns the names of the variables.
     pub(crate) fn variables(&self) -> impl Iterator<Item = &str> {
         let variables = self.names.iter().filter(|(_, named)| matches!(named, Named::Variable(_)));
         variables.map(|(name, _)| name.as_str())
@@ -71,7 +71,7 @@ impl Scope {
     }
 }
 
-/// Checks that a name can be one of a formula's own.
+/// Checks that a document may define a name.
 pub(crate) fn check_name(name: &str) -> Result<(), Mistake> {
     let wrong = |message: String| Mistake::new(0..name.len(), message);
     let letter = |c: char| c.is_alphabetic() || c == '_';

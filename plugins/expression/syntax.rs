@@ -1,4 +1,4 @@
-//! From text to a tree: numbers, names, calls, operators, vectors in brackets.
+//! Parser of formulas to a syntax tree: numbers, names, calls, operators, vectors in brackets.
 use crate::mistake::{Input, Mistake};
 use std::ops::Range;
 use winnow::ascii::multispace0;
@@ -8,12 +8,12 @@ use winnow::stream::{Location, Stream};
 use winnow::token::{any, take_while};
 use winnow::{ModalResult, Parser};
 
-/// The longest formula, in bytes: what reads a formula calls itself for each of its levels.
+/// Maximum length of a formula, in bytes. The parser is recursive, so its depth has to be limited.
 const LONGEST: usize = 2000;
-/// Parentheses and brackets within one another.
+/// Maximum nesting depth of parentheses and brackets.
 const DEEPEST: usize = 64;
 
-/// A formula, or a part of one.
+/// A formula or a part of it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Formula {
     pub span: Range<usize>,
@@ -64,7 +64,7 @@ fn inner(error: ErrMode<Mistake>) -> Mistake {
     }
 }
 
-/// What stands where an operator or the end should.
+/// Returns the error for an unexpected character in place of an operator or the end.
 fn left_over(at: usize, c: char) -> Mistake {
     let span = at..at + c.len_utf8();
     match c {
@@ -78,7 +78,7 @@ fn left_over(at: usize, c: char) -> Mistake {
     }
 }
 
-/// Where parentheses are nested too deep, if they are.
+/// Returns the position at which the nesting is too deep, if there is one.
 fn too_deep(text: &str) -> Option<usize> {
     let mut depth = 0usize;
     text.bytes().position(|b| {
@@ -107,7 +107,7 @@ fn formula(input: &mut Input<'_>) -> Parsed<Formula> {
 fn prefix<'i>(input: &mut Input<'i>) -> Parsed<Prefix<Input<'i>, Formula, ErrMode<Mistake>>> {
     multispace0.parse_next(input)?;
     '-'.parse_next(input)?;
-    // binds less than ^: -x^2 is -(x^2)
+    // Binds weaker than ^: -x^2 is -(x^2).
     Ok(Prefix(5, |_, a| Ok(call("-", a.span.clone(), vec![a]))))
 }
 
@@ -152,7 +152,7 @@ fn operand(input: &mut Input<'_>) -> Parsed<Formula> {
     }
 }
 
-/// A name, or a call.
+/// Parses a name or a call.
 fn named(input: &mut Input<'_>) -> Parsed<Formula> {
     let (name, at) =
         take_while(1.., |c: char| c.is_alphanumeric() || c == '_').with_span().parse_next(input)?;
@@ -167,7 +167,7 @@ fn named(input: &mut Input<'_>) -> Parsed<Formula> {
     Ok(Formula { span, node: Node::Call { name: name.to_owned(), at, arguments } })
 }
 
-/// What stands between parentheses or brackets, the opening one included.
+/// Parses the arguments between parentheses or brackets, including the opening one.
 fn arguments(input: &mut Input<'_>, closing: char) -> Parsed<Vec<Formula>> {
     let start = input.current_token_start();
     any.parse_next(input)?;
@@ -189,7 +189,7 @@ fn arguments(input: &mut Input<'_>, closing: char) -> Parsed<Vec<Formula>> {
     }
 }
 
-/// The closing parenthesis or bracket of the one at `start`.
+/// Parses the closing parenthesis or bracket of the opening one at `start`.
 fn close(input: &mut Input<'_>, start: usize, closing: char) -> Parsed<()> {
     if opt(closing).parse_next(input)?.is_some() {
         return Ok(());
@@ -226,7 +226,7 @@ fn number(input: &mut Input<'_>) -> Parsed<Formula> {
 mod tests {
     use super::*;
 
-    /// The tree in prefix form.
+    /// The syntax tree in prefix form.
     fn tree(text: &str) -> String {
         fn show(formula: &Formula) -> String {
             match &formula.node {

@@ -1,31 +1,32 @@
-//! Readings of an accelerometer as TUM RGB-D writes them: `timestamp ax ay az`, one a line.
+//! Accelerometer readings in TUM RGB-D format: `timestamp ax ay az`, one reading per line.
 //!
-//! Several readings may share a time stamp (the sensor is read in bursts), but time does not run back.
+//! Several readings may share a timestamp, because the sensor is read in bursts, but timestamps must not
+//! decrease.
 use crate::error::{FormatError, Mistake, Problems};
 use crate::lines::{Fields, lines};
 use crate::text::read_text;
 use nalgebra::Vector3;
 use std::path::Path;
 
-/// A reading at a time.
+/// An accelerometer reading with its timestamp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Acceleration {
-    /// Seconds.
+    /// Timestamp, in seconds.
     pub timestamp: f64,
-    /// m/s² in the sensor's frame; at rest it points up.
+    /// Acceleration in the sensor's frame, in m/s²; at rest it points up.
     pub acceleration: Vector3<f64>,
 }
 
-/// Reads the readings.
+/// Reads a file of accelerometer readings.
 ///
 /// # Errors
-/// All malformed lines; time that runs back.
+/// If a line is malformed or timestamps decrease; the error lists all such lines.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<Acceleration>, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path)
 }
 
-/// As [`read`], of a text; `path` is what errors name.
+/// Works like [`read`], for a given text; `path` is used only in errors.
 ///
 /// # Errors
 /// As [`read`].

@@ -1,20 +1,20 @@
-//! BAL: problems of bundle adjustment in the large (Agarwal et al., ECCV 2010).
+//! BAL files: problems of bundle adjustment in the large (Agarwal et al., ECCV 2010).
 //!
 //! | lines | fields |
 //! | --- | --- |
-//! | the first | cameras points observations: how many there are |
-//! | one each observation | camera point x y: numbers from 0; pixels from the image's centre, x right and y up |
-//! | nine numbers each camera | rotation vector (3), translation (3), f, k1, k2 |
-//! | three numbers each point | x y z |
+//! | the first | number of cameras, points and observations |
+//! | one per observation | camera point x y: indices from 0; pixels from the image centre, x right and y up |
+//! | nine numbers per camera | rotation vector (3), translation (3), f, k1, k2 |
+//! | three numbers per point | x y z |
 //!
-//! Rotation and translation take points from the world's frame to the camera's, which looks along -z; a
-//! [`BalCamera`] has the inverse. Cameras get the keys `c<number>`, points `p<number>`, observations become
-//! `projection_bal` factors with a standard deviation of one pixel.
+//! Rotation and translation map points from the world frame to the camera's frame, which looks along -z; a
+//! [`BalCamera`] stores the inverse. Cameras get the keys `c<number>`, points `p<number>`. Observations
+//! become `projection_bal` factors with a standard deviation of one pixel.
 //!
-//! Nothing in such a file says where the whole is, how it is turned, and how large it is: seven directions are free.
-//! Unless told not to, the reader [holds](read) the pose of one camera and, for the scale, one direction of the
-//! camera that is farthest from it; this changes no cost. Gauss-Newton needs it. Damped steps do not, but
-//! end with a note that something is undetermined.
+//! Such a file does not determine the position, orientation and scale of the whole: seven directions are
+//! free. By default, the reader [holds](read) the pose of one camera and, for the scale, one direction of the
+//! camera that is farthest from it. This does not change the cost. Gauss-Newton requires it. Damped solvers
+//! do not, but report an undetermined direction at the end.
 use crate::error::{FormatError, Mistake, Problems};
 use crate::graph_format::{GraphFormat, GraphRead};
 use crate::lines::{Fields, lines, number};
@@ -29,28 +29,28 @@ mod gauge;
 mod write;
 pub use write::{Omitted, format, write};
 
-/// A problem from a file, with initial values for all of its variables.
+/// A problem from a file, with initial values for all its variables.
 #[derive(Debug, Clone, Default)]
 pub struct Bundle {
-    /// The observations; held variables.
+    /// Observations as factors, and held variables.
     pub graph: Graph,
-    /// Cameras, then points, in the file's order.
+    /// Cameras, then points, in file order.
     pub values: Values,
-    /// What the file did not say.
+    /// Assumptions that the reader made.
     pub report: Report,
 }
 
-/// What a file did not say.
+/// Assumptions that the reader made.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Report {
-    /// Cameras of which the pose, or a direction, is held, as nothing in the file fixes the gauge.
+    /// Cameras with a held pose or direction, as the file does not fix the gauge.
     pub anchored: Vec<Key>,
-    /// Cameras and points without any observation: they are held.
+    /// Cameras and points without any observation; they are held.
     pub unobserved: Vec<Key>,
 }
 
 impl Report {
-    /// In words, what the file left open and how it was filled in.
+    /// Returns the assumptions as text.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if !self.unobserved.is_empty() {
@@ -80,30 +80,30 @@ crate::register_graph_format!(GraphFormat {
     }),
 });
 
-/// Cameras, points and observations, as the first line counts them.
+/// Numbers of cameras, points and observations from the first line.
 struct Counts([usize; 3]);
 
 const CAMERA: usize = 9;
-/// Its place among a camera's numbers.
+/// Index of the focal length among a camera's numbers.
 const FOCAL_LENGTH: usize = 6;
 const POINT: usize = 3;
 
-/// Returns whether a text begins as a BAL file does: with three whole numbers.
+/// Returns whether a text begins like a BAL file: with three whole numbers.
 pub fn begins(text: &str) -> bool {
     lines(text).next().is_some_and(|(_, line)| header(line).is_ok())
 }
 
-/// Reads a BAL file; holds what fixes the gauge, where `anchor` is set.
+/// Reads a BAL file. If `anchor` is set, holds variables to fix the gauge.
 ///
 /// # Errors
-/// All malformed lines; observations of a camera or a point that is not there; fewer or more lines or numbers than
-/// the first line says.
+/// If a line is malformed, if an observation refers to an unknown camera or point, or if the numbers of lines
+/// and values differ from the counts in the first line. The error lists all mistakes.
 pub fn read(path: impl AsRef<Path>, anchor: bool) -> Result<Bundle, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path, anchor)
 }
 
-/// As [`read`], of a text; `path` is what errors name.
+/// Works like [`read`], for a given text; `path` is used only in errors.
 ///
 /// # Errors
 /// As [`read`].
@@ -113,7 +113,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle,
     let first = lines.next().unwrap_or((0, ""));
     let counts = problems.ok(first.0, header(first.1)).unwrap_or(Counts([0; 3]));
     if !problems.is_empty() {
-        // without the counts no other line means anything
+        // Without the counts, the remaining lines cannot be interpreted.
         return problems.finish().map(|()| Bundle::default());
     }
     let Counts([cameras, points, observations]) = counts;
@@ -136,7 +136,7 @@ pub fn parse(text: &str, path: impl AsRef<Path>, anchor: bool) -> Result<Bundle,
         let what = "numbers after the observations, nine for each camera and three for each point";
         problems.push(0, Mistake::Count { what, expected, found: numbers.len() });
     }
-    // without the right number of numbers, none is known to be a focal length
+    // Focal lengths can be located only if the total count of numbers is right.
     let known = if problems.is_empty() { cameras } else { 0 };
     for (i, camera) in numbers.chunks_exact(CAMERA).take(known).enumerate() {
         let found = camera.get(FOCAL_LENGTH).copied().unwrap_or_default();
@@ -159,7 +159,7 @@ fn header(text: &str) -> Result<Counts, Mistake> {
     Ok(Counts([count()?, count()?, count()?]))
 }
 
-/// Numbers of a camera and of a point, and where the one saw the other.
+/// Indices of a camera and a point, and the measured pixel.
 type Observation = (usize, usize, Coordinates<2>);
 
 fn observation(text: &str, Counts([cameras, points, _]): &Counts) -> Result<Observation, Mistake> {

@@ -1,9 +1,10 @@
-//! Boxes that a detector drew in images: CSV with a header, one box a row.
+//! Bounding boxes from a detector: CSV with a header, one box per row.
 //!
-//! Columns `timestamp` (s), `class_name`, `score` (0 to 1), `xmin`, `ymin`, `xmax`, `ymax` (px), in any
-//! order; and, where they are known, `frame_idx`, `frame_idx_as_published`, `object_key` (0 where the
-//! box is associated with no object), `class_id`, `scores`, all classes with a score as
-//! `cup:0.7;bowl:0.2`, and `depth`, that of the object's centre along the optical axis (m). A box without a class has an empty name, and the score 0.
+//! Columns in any order: `timestamp` (s), `class_name`, `score` (0 to 1), `xmin`, `ymin`, `xmax`, `ymax`
+//! (px). Optional columns: `frame_idx`, `frame_idx_as_published`, `object_key` (0 if the box is associated
+//! with no object), `class_id`, `scores` (all classes with a score, as `cup:0.7;bowl:0.2`), and `depth`
+//! (depth of the object's centre along the optical axis, in m). A box without a class has an empty name and
+//! the score 0.
 use crate::error::{FormatError, Mistake, Problems, io_error};
 use crate::text::read_text;
 use crate::whole::write_whole;
@@ -11,40 +12,40 @@ use csv::{ReaderBuilder, StringRecord, Trim, Writer};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A row: one box in one image.
+/// A row: one bounding box in one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Detection {
-    /// Number of the image, from 0.
+    /// Index of the image, from 0.
     #[serde(default)]
     pub frame_idx: Option<u64>,
-    /// When the image was taken, in seconds.
+    /// Timestamp of the image, in seconds.
     pub timestamp: f64,
-    /// The image's number where the detections were published.
+    /// Index of the image in the published detections.
     #[serde(default)]
     pub frame_idx_as_published: Option<u64>,
-    /// The object that it shows; 0 for none.
+    /// Key of the associated object; 0 for none.
     #[serde(default)]
     pub object_key: Option<u32>,
-    /// Number of the class in the detector's list.
+    /// Index of the class in the detector's list.
     #[serde(default)]
     pub class_id: Option<u32>,
-    /// The class with the highest score; empty for a box without one.
+    /// Class with the highest score; empty for a box without a class.
     pub class_name: String,
-    /// Its score, from 0 to 1.
+    /// Score of the class, from 0 to 1.
     pub score: f64,
     /// Left side, in pixels.
     pub xmin: f64,
-    /// Upper side.
+    /// Upper side, in pixels.
     pub ymin: f64,
-    /// Right side.
+    /// Right side, in pixels.
     pub xmax: f64,
-    /// Lower side.
+    /// Lower side, in pixels.
     pub ymax: f64,
-    /// Scores by class, where more than the best are known: `cup:0.7;bowl:0.2`.
+    /// Scores by class, if more than the best are known: `cup:0.7;bowl:0.2`.
     #[serde(default)]
     pub scores: Option<String>,
-    /// How far away the object's centre is along the optical axis, in metres, where that was measured.
+    /// Measured depth of the object's centre along the optical axis, in metres.
     #[serde(default)]
     pub depth: Option<f64>,
 }
@@ -52,10 +53,11 @@ pub struct Detection {
 const REQUIRED: [&str; 7] = ["timestamp", "class_name", "score", "xmin", "ymin", "xmax", "ymax"];
 
 impl Detection {
-    /// The classes and their scores: those of `scores`, or the best alone; none for a box without a class.
+    /// Returns the classes with their scores: all of `scores`, otherwise the best alone. Empty for a box
+    /// without a class.
     ///
     /// # Errors
-    /// If `scores` is not written as it should be.
+    /// If `scores` is malformed.
     pub fn class_scores(&self) -> Result<Vec<(String, f64)>, Mistake> {
         let Some(scores) = self.scores.as_deref().filter(|s| !s.is_empty()) else {
             let named = Some(&self.class_name).filter(|name| !name.is_empty());
@@ -99,16 +101,16 @@ impl Detection {
     }
 }
 
-/// Reads a file of detections, in its order.
+/// Reads a file of detections, in file order.
 ///
 /// # Errors
-/// All malformed rows; a column that is missing.
+/// If a row is malformed or a column is missing; the error lists all such rows.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<Detection>, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path)
 }
 
-/// As [`read`], of a text; `path` is what errors name.
+/// Works like [`read`], for a given text; `path` is used only in errors.
 ///
 /// # Errors
 /// As [`read`].
@@ -142,14 +144,14 @@ fn row(record: &StringRecord, header: &StringRecord) -> Result<Detection, Mistak
     record.deserialize::<Detection>(Some(header)).map_err(|e| Mistake::Row(reason(&e, header)))?.check()
 }
 
-/// The line of a record: csv counts the blank lines and comments before it as its own.
+/// Returns the line of a record. csv counts blank lines and comments before a record as part of it.
 fn line(text: &str, position: &csv::Position) -> usize {
     let rest = text.get(position.byte() as usize..).unwrap_or_default();
     let skipped = rest.lines().take_while(|line| line.is_empty() || line.starts_with('#'));
     position.line() as usize + skipped.count()
 }
 
-/// What is wrong, without csv's own way to say where.
+/// Returns the text of a csv error without csv's description of the position.
 fn reason(e: &csv::Error, header: &StringRecord) -> String {
     match e.kind() {
         csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {

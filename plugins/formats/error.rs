@@ -1,4 +1,4 @@
-//! What can be wrong with a file, and where.
+//! Errors in files, with their position.
 use manifactor_geometry::{NoCoordinates, NotARotation};
 use manifactor_graph::ValueError;
 use manifactor_graph::noise::NoiseError;
@@ -6,175 +6,175 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// How many problems of one file are told; the rest is counted.
+/// Maximum number of reported problems per file; the remaining ones are only counted.
 const TOLD: usize = 20;
 
-/// Why a file could not be read or written.
+/// The reason why a file could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
     /// The file could not be opened, read or written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Its content is not what it should be.
+    /// The content of the file is malformed.
     #[error(transparent)]
     Malformed(#[from] Malformed),
 }
 
-/// Everything that is wrong with the content of one file. Displayed one problem a line.
+/// All mistakes in the content of one file. Displayed with one problem per line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Malformed {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// By line, at most twenty.
+    /// Problems sorted by line, at most twenty.
     pub problems: Vec<BadLine>,
-    /// How many more there are.
+    /// Number of further problems.
     pub more: usize,
-    /// What was read: a pipe cannot be read again to show its lines.
+    /// Text of the file. Stored, because a pipe cannot be read again to show its lines.
     pub text: String,
 }
 
-/// One thing that is wrong.
+/// A mistake with its line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BadLine {
-    /// The line, from 1; 0 where it is the file as a whole.
+    /// Line number from 1; 0 for the file as a whole.
     pub line: usize,
-    /// What is wrong with it.
+    /// The mistake.
     pub mistake: Mistake,
 }
 
-/// What is wrong with a line, and what was expected.
+/// A mistake in a line, with the expected content.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Mistake {
-    /// Too many or too few fields.
+    /// The line has too many or too few fields.
     #[error("expected {expected} fields ({layout}), got {found}")]
     FieldCount {
-        /// How many there should be.
+        /// Expected number of fields.
         expected: usize,
-        /// A name for each.
+        /// Names of the expected fields.
         layout: &'static str,
-        /// How many there are.
+        /// Number of fields found.
         found: usize,
     },
-    /// A field that is not what its place asks for.
+    /// A field has an invalid value.
     #[error("expected {expected}, got `{found}`")]
     Field {
-        /// What should be there.
+        /// Description of a valid value.
         expected: &'static str,
-        /// What is there.
+        /// The value found.
         found: String,
     },
-    /// A rotation that is none.
+    /// A quaternion is not a rotation.
     #[error(transparent)]
     Rotation(#[from] NotARotation),
-    /// A point that is none.
+    /// A point has invalid coordinates.
     #[error(transparent)]
     Coordinates(#[from] NoCoordinates),
-    /// A value of another type than an edge takes it for.
+    /// A value has a different type than an edge requires.
     #[error(transparent)]
     Value(#[from] ValueError),
-    /// A noise that is none.
+    /// An information matrix is invalid.
     #[error("information matrix: {0}; to go on without it, choose the repair `reject` or `clamp`")]
     Noise(#[from] NoiseError),
-    /// The same vertex again.
+    /// A vertex is defined twice.
     #[error("vertex {id} is defined twice, first in line {first}; remove one of the two")]
     DuplicateVertex {
-        /// Its number.
+        /// Number of the vertex.
         id: u64,
-        /// The line of the first definition.
+        /// Line of the first definition.
         first: usize,
     },
-    /// The same sensor again.
+    /// A sensor is defined twice.
     #[error("PARAMS_SE3OFFSET {id} is defined twice, first in line {first}; remove one of the two")]
     DuplicateSensor {
-        /// Its number.
+        /// Number of the sensor.
         id: u64,
-        /// The line of the first definition.
+        /// Line of the first definition.
         first: usize,
     },
-    /// Tags that no reader knows.
+    /// The file contains unknown tags.
     #[error(
         "unknown tags, {lines} {}: {}; check their spelling, or leave these lines out with --lenient",
         if *lines == 1 { "line" } else { "lines" }, tags.join(", ")
     )]
     UnknownTags {
-        /// How many lines have one.
+        /// Number of lines with an unknown tag.
         lines: usize,
-        /// The first few of them.
+        /// The first few unknown tags.
         tags: Vec<String>,
     },
-    /// An edge from a vertex to itself.
+    /// An edge connects a vertex with itself.
     #[error("the edge connects vertex {id} with itself")]
     SelfEdge {
-        /// Its number.
+        /// Number of the vertex.
         id: u64,
     },
-    /// A number that no vertex and no edge has.
+    /// A number refers to an undefined vertex or sensor.
     #[error("there is no {what} {id}")]
     Unknown {
-        /// What is missing.
+        /// Kind of the missing item.
         what: &'static str,
-        /// Its number.
+        /// Number of the missing item.
         id: u64,
     },
-    /// A number above all that a file announces.
+    /// A number exceeds the count in the first line.
     #[error("there is no {what} {id}: the first line says that there are {count}, counted from 0")]
     NoSuch {
-        /// What is missing.
+        /// Kind of the missing item.
         what: &'static str,
-        /// Its number.
+        /// Number of the missing item.
         id: u64,
-        /// How many there are.
+        /// Count in the first line.
         count: usize,
     },
-    /// More or fewer of something than a file announces.
+    /// The number of items differs from the count in the first line.
     #[error("the first line asks for {expected} {what}, found {found}")]
     Count {
-        /// What is counted.
+        /// Kind of the items.
         what: &'static str,
-        /// How many there should be.
+        /// Expected number.
         expected: usize,
-        /// How many there are.
+        /// Number found.
         found: usize,
     },
-    /// A vertex used as another type than it has.
+    /// A vertex is used with a different type than it has.
     #[error("vertex {id} is a {found} (line {first}), but is used as a {expected} here")]
     VertexType {
-        /// Its number.
+        /// Number of the vertex.
         id: u64,
-        /// What the edge needs.
+        /// Type that the edge requires.
         expected: &'static str,
-        /// What it is.
+        /// Type of the vertex.
         found: &'static str,
-        /// Where it was defined, or first used.
+        /// Line of the definition or of the first use.
         first: usize,
     },
-    /// Time that stands still or runs back.
+    /// A timestamp is equal to the previous one, or before it.
     #[error("time stamps have to increase: {found} follows {previous}")]
     NotIncreasing {
-        /// The time stamp before.
+        /// Previous timestamp.
         previous: f64,
-        /// The time stamp of this line.
+        /// Timestamp of this line.
         found: f64,
     },
-    /// Bytes that are not UTF-8.
+    /// The file contains bytes that are not UTF-8.
     #[error("expected text in UTF-8")]
     NotText,
-    /// A file with nothing of what it is read for.
+    /// The file contains none of the expected items.
     #[error("expected {expected}, found none{}", unknown_tags(unknown))]
     Empty {
-        /// What is missing.
+        /// Description of the expected items.
         expected: &'static str,
-        /// Tags that were found instead.
+        /// Unknown tags found in the file.
         unknown: Vec<String>,
     },
-    /// A row of a table that cannot be read.
+    /// A row of a table cannot be read.
     #[error("{0}")]
     Row(String),
 }
@@ -201,7 +201,7 @@ impl fmt::Display for Malformed {
 
 impl std::error::Error for Malformed {}
 
-/// Collects problems while a file is read to its end.
+/// Collector of problems while a file is read to its end.
 pub(crate) struct Problems<'a> {
     path: &'a Path,
     text: &'a str,
@@ -210,7 +210,7 @@ pub(crate) struct Problems<'a> {
 }
 
 impl<'a> Problems<'a> {
-    /// Of a file with this text.
+    /// Creates a collector for a file with this text.
     pub(crate) fn of(path: &'a Path, text: &'a str) -> Self {
         Self { path, text, list: vec![], more: 0 }
     }
@@ -221,7 +221,7 @@ impl<'a> Problems<'a> {
             self.more += 1;
         }
     }
-    /// The value, or the problem with it noted.
+    /// Returns the value of a result, or records its mistake.
     pub(crate) fn ok<T>(&mut self, line: usize, result: Result<T, Mistake>) -> Option<T> {
         result.map_err(|mistake| self.push(line, mistake)).ok()
     }
@@ -233,7 +233,7 @@ impl<'a> Problems<'a> {
     }
     pub(crate) fn into_error(self) -> FormatError {
         let Self { path, text, list: mut problems, more } = self;
-        // passes over a file meet its lines in more than one order
+        // Several passes over a file may report its lines out of order.
         problems.sort_by_key(|p| p.line);
         Malformed { path: path.to_owned(), problems, more, text: text.to_owned() }.into()
     }

@@ -1,4 +1,4 @@
-//! The formats of files that hold a graph, by name: one file of code is one format.
+//! Registry of graph file formats by name; each format is one source file.
 //!
 //! ```
 //! use manifactor_formats::{FormatError, GraphFormat, GraphRead, Reading, register_graph_format};
@@ -28,81 +28,83 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A format of files that hold a graph. [`register_graph_format!`](crate::register_graph_format) enters it.
+/// A file format for graphs, registered with [`register_graph_format!`](crate::register_graph_format).
 #[derive(Debug, Clone, Copy)]
 pub struct GraphFormat {
-    /// What it is called, in messages.
+    /// Name in messages.
     pub name: &'static str,
-    /// Extensions of its files, in lower case. The first is the usual one.
+    /// File extensions, in lower case. The first is the default.
     pub extensions: &'static [&'static str],
-    /// Whether a text is in this format by how it begins, for files whose extension tells nothing.
+    /// Detects the format from the beginning of a text, for files with an unknown extension.
     pub begins: fn(&str) -> bool,
-    /// Reads a text; the path is what errors name.
+    /// Parses a text; the path is used only in errors.
     pub parse: fn(&str, &Path, Reading) -> Result<GraphRead, FormatError>,
-    /// Writes a graph. `None`: the format is only read.
+    /// Formats a graph as text. `None` for a read-only format.
     pub format: Option<GraphWriter>,
 }
 inventory::collect!(GraphFormat);
 
-/// The text of a graph with these values, and in words what the format cannot express.
+/// Writer of a format: returns the text of a graph with its values, and notes about the parts that the format
+/// cannot express.
 pub type GraphWriter = fn(&Graph, &Values) -> (String, Vec<String>);
 
-/// What to do where a file leaves a choice.
+/// Options for cases that a file leaves open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Reading {
-    /// For information matrices that are not positive definite.
+    /// Treatment of information matrices that are not positive definite.
     pub repair: Repair,
-    /// Whether to hold what nothing in the file fixes: a pose, or a scale.
+    /// Whether to hold a pose or a scale if the file does not fix the gauge.
     pub anchor: bool,
-    /// Whether to leave out lines that the format does not know.
+    /// Whether to skip lines that the format does not know.
     pub lenient: bool,
 }
 
-/// What to do with an information matrix that is not positive definite.
+/// Treatment of an information matrix that is not positive definite.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Repair {
-    /// Say so, with its line.
+    /// Report an error with its line.
     #[default]
     Error,
-    /// Leave its edge out.
+    /// Omit the edge.
     Reject,
-    /// Raise its eigenvalues to 1e-9 of the largest; leave the edge out where none is above zero.
+    /// Raise the eigenvalues to 1e-9 of the largest; omit the edge if no eigenvalue is positive.
     Clamp,
 }
 
-/// A graph from a file.
+/// A graph read from a file.
 #[derive(Debug, Clone, Default)]
 pub struct GraphRead {
-    /// Factors; held variables.
+    /// Factors and held variables.
     pub graph: Graph,
     /// Initial values of all variables.
     pub values: Values,
-    /// In words, what the reader had to decide.
+    /// Notes about assumptions that the reader made.
     pub notes: Vec<String>,
 }
 
 impl GraphFormat {
-    /// All that are linked, by name.
+    /// Returns all linked formats, sorted by name.
     pub fn all() -> Vec<&'static Self> {
         let mut all: Vec<_> = inventory::iter::<Self>.into_iter().collect();
         all.sort_by_key(|format| format.name);
         all
     }
 
-    /// The format of a file by its extension.
+    /// Returns the format with the file's extension.
     pub fn of_path(path: &Path) -> Option<&'static Self> {
         let extension = path.extension()?.to_str()?.to_lowercase();
         Self::all().into_iter().find(|format| format.extensions.contains(&extension.as_str()))
     }
 
-    /// The format of a file by its extension, or else by how its text begins.
+    /// Returns the format with the file's extension, otherwise the format that matches the beginning of the
+    /// text.
     pub fn of(path: &Path, text: &str) -> Option<&'static Self> {
         Self::of_path(path).or_else(|| Self::all().into_iter().find(|format| (format.begins)(text)))
     }
 }
 
-/// Enters a [`GraphFormat`] among those that are linked.
+/// Registers a [`GraphFormat`].
 #[macro_export]
 macro_rules! register_graph_format {
     ($format:expr) => {

@@ -1,9 +1,9 @@
 //! File formats: g2o, TORO, BAL, TUM trajectories, detections, tables.
 //!
-//! All readers keep one bargain: nothing in a file is passed over in silence. A malformed line is an
-//! error with file and line; all of a file's errors come at once; what is left out on purpose is
-//! counted in a report. Blank lines, `#` comments, repeated spaces and CRLF are fine everywhere.
-// strangers' input comes in here: no place of it is taken for granted
+//! No reader skips any content silently. A malformed line is an error with file and line. All errors of a
+//! file are reported together. Content omitted on purpose is counted in a report. Blank lines, `#` comments,
+//! repeated spaces and CRLF are accepted everywhere.
+// Files are untrusted input: no index is taken for granted.
 #![warn(clippy::indexing_slicing)]
 pub mod accelerometer;
 pub mod bal;

@@ -1,10 +1,10 @@
-//! Lines of fields between spaces, as most of this field's formats are.
+//! Lines of space-separated fields, the structure of most formats in this crate.
 use crate::error::Mistake;
 use std::str::SplitWhitespace;
 
-/// The lines that say something, numbered from 1, without comments and outer spaces.
+/// Returns the non-empty lines with their number from 1, without comments and outer spaces.
 pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    // a byte order mark is no part of the first field
+    // A byte order mark is not part of the first field.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     text.lines().enumerate().filter_map(|(i, line)| {
         let line = line.split('#').next().unwrap_or_default().trim();
@@ -12,11 +12,11 @@ pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// The fields of a line, from first to last.
+/// The fields of a line, in order.
 pub(crate) struct Fields<'a>(SplitWhitespace<'a>);
 
 impl<'a> Fields<'a> {
-    /// `layout` has a name for each field, between spaces.
+    /// Splits a line into fields; `layout` contains the name of each field, separated by spaces.
     pub(crate) fn of(text: &'a str, layout: &'static str) -> Result<Self, Mistake> {
         let (expected, found) = (layout.split_whitespace().count(), text.split_whitespace().count());
         if expected == found {

@@ -1,13 +1,14 @@
 //! Pose graphs from g2o and TORO files.
 //!
 //! Poses get the keys `x<id>`, landmarks `l<id>`. Edges become `between_se2`, `between_se3` and landmark
-//! factors with the file's information as noise. What a file leaves open is filled in, and reported:
-//! - vertices without a line get their values along a spanning tree of the edges, of [`Options::tree`]'s kind;
-//! - an `EQUIV a b` line says that two poses are the same place as far as the edge between them says so
-//!   (TORO merges the two by that edge). That edge is there already, so nothing is added; where there is
-//!   none, the two are tied by a relative pose of zero with [`Options::equivalence_sigma`];
-//! - in each connected part of the graph that no `FIX` line holds, the first pose is held, unless
-//!   [`Options::anchor`] says not to.
+//! factors with the file's information as noise. The reader completes the following and reports it:
+//! - vertices without a line get initial values along a spanning tree of the edges, of the kind in
+//!   [`Options::tree`];
+//! - an `EQUIV a b` line declares that two poses are one place, as far as the edge between them says so (TORO
+//!   merges the two by that edge). The edge is already in the graph, so no factor is added. Without an edge,
+//!   a relative pose of zero with [`Options::equivalence_sigma`] connects the two;
+//! - in each connected part without a `FIX` line, the first pose is held, unless [`Options::anchor`] is
+//!   false.
 use crate::error::{FormatError, Mistake, Problems};
 use crate::graph_format::{GraphFormat, GraphRead, Reading};
 use crate::lines::lines;
@@ -48,28 +49,28 @@ crate::register_graph_format!(GraphFormat {
     }),
 });
 
-/// A graph from a file, with initial values for all of its variables.
+/// A graph from a file, with initial values for all its variables.
 #[derive(Debug, Clone, Default)]
 pub struct PoseGraph {
-    /// The edges; held variables.
+    /// Edges as factors, and held variables.
     pub graph: Graph,
-    /// The vertices, in the file's order; then those that only edges name, by number.
+    /// Vertices in file order, then vertices that occur only in edges, sorted by number.
     pub values: Values,
-    /// What the file did not say.
+    /// Assumptions that the reader made.
     pub report: Report,
 }
 
-/// What to do where a file leaves a choice.
+/// Options for cases that a file leaves open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Options {
-    /// For information matrices that are not positive definite.
+    /// Treatment of information matrices that are not positive definite.
     pub repair: Repair,
-    /// Hold the first pose of each connected part that nothing else holds.
+    /// Hold the first pose of each connected part that is not held otherwise.
     pub anchor: bool,
-    /// Leave lines with unknown tags out. Otherwise they are an error: the file is more than the graph that is read.
+    /// Skip lines with unknown tags. Otherwise they are an error, because the graph would be incomplete.
     pub lenient: bool,
-    /// For vertices that only edges name.
+    /// Kind of spanning tree for the initial values of vertices that occur only in edges.
     pub tree: Tree,
     /// Standard deviation of an `EQUIV` without an edge, in metres and radians.
     pub equivalence_sigma: Positive,
@@ -87,33 +88,33 @@ impl Default for Options {
     }
 }
 
-/// What a file did not say, or what had to be done to it.
+/// Assumptions and repairs that the reader made.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Report {
-    /// Vertices with a line of their own.
+    /// Number of vertex lines.
     pub vertices: usize,
-    /// Edges with a line of their own, those left out among them.
+    /// Number of edge lines, including omitted edges.
     pub edges: usize,
-    /// Variables that only edges name; their values come from a spanning tree.
+    /// Variables that occur only in edges; their initial values come from a spanning tree.
     pub filled: Vec<Key>,
-    /// Variables that this reader holds, as nothing in the file fixes the gauge.
+    /// Variables that the reader holds, as the file does not fix the gauge.
     pub anchored: Vec<Key>,
-    /// Tags that are not known, and how many lines have each. Those lines are left out.
+    /// Unknown tags with their number of lines. These lines are omitted.
     pub unknown: BTreeMap<String, usize>,
-    /// Lines of edges that were left out, by [`Repair`].
+    /// Lines of edges omitted by [`Repair`].
     pub rejected: Vec<usize>,
-    /// Lines of edges whose information was changed, by [`Repair::Clamp`].
+    /// Lines of edges whose information was changed by [`Repair::Clamp`].
     pub clamped: Vec<usize>,
-    /// `EQUIV` lines whose two poses have an edge between them.
+    /// Number of `EQUIV` lines whose two poses have an edge between them.
     pub equivalences_by_edge: usize,
-    /// `EQUIV` lines for which a factor was added.
+    /// Number of `EQUIV` lines for which a factor was added.
     pub equivalences_added: usize,
-    /// Signs of other units, or of another order of numbers, in words.
+    /// Notes about signs of different units or a different order of numbers.
     pub doubts: Vec<String>,
 }
 
 impl Report {
-    /// In words, what the file left open and how it was filled in.
+    /// Returns the assumptions and repairs as text.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         for (tag, n) in self.unknown.iter().take(SHOWN_TAGS) {
@@ -152,22 +153,22 @@ impl Report {
     }
 }
 
-/// Unknown tags that are named.
+/// Maximum number of unknown tags in a message.
 const SHOWN_TAGS: usize = 10;
 
-/// A tag between backquotes, as much of it as a message has room for.
+/// Returns a tag in backquotes, shortened for messages.
 fn shown(tag: &str) -> String {
     const LONGEST: usize = 40;
     let start: String = tag.chars().take(LONGEST).collect();
     if start.len() < tag.len() { format!("`{start}…`") } else { format!("`{tag}`") }
 }
 
-/// The tag of a line, and what follows it.
+/// Splits a line into its tag and the remaining fields.
 fn tag_of(line: &str) -> (&str, &str) {
     line.split_once(char::is_whitespace).unwrap_or((line, ""))
 }
 
-/// What reads lines with this tag.
+/// Returns the parser of lines with this tag.
 fn parser(tag: &str) -> Option<record::Parse> {
     g2o::parser(tag).or_else(|| toro::parser(tag))
 }
@@ -175,15 +176,16 @@ fn parser(tag: &str) -> Option<record::Parse> {
 /// Reads a g2o or TORO file.
 ///
 /// # Errors
-/// All malformed lines; vertices defined twice, used as another type or fixed without being there;
-/// edges of a vertex with itself; information that is not positive definite, unless it is repaired; a
-/// file without any vertex or edge; unknown tags, unless [`Options::lenient`] leaves them out.
+/// If a line is malformed, or if a vertex is defined twice, used with a different type or fixed without a
+/// definition. If an edge connects a vertex with itself, or if an information matrix is not positive definite
+/// and not repaired. If there is no vertex or edge, or if there are unknown tags without
+/// [`Options::lenient`]. The error lists all mistakes.
 pub fn read(path: impl AsRef<Path>, options: &Options) -> Result<PoseGraph, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path, options)
 }
 
-/// As [`read`], of a text; `path` is what errors name.
+/// Works like [`read`], for a given text; `path` is used only in errors.
 ///
 /// # Errors
 /// As [`read`].

@@ -1,8 +1,10 @@
-//! A pose graph as a robot would have built it: pose by pose, each with the factors to what was there before it.
+//! Replay of a pose graph in the order in which a robot would have built it: pose by pose, each with the
+//! factors to earlier variables.
 //!
-//! Steps are the variables `x<number>`, by number. A factor belongs to the step of its latest pose; anything else, a landmark
-//! say, comes with the first factor that reaches it from what is known. Factors that nothing known reaches wait; with the
-//! last step come those that nothing will reach, a part of the graph that hangs together with no other.
+//! Steps are the variables `x<number>`, in numeric order. A factor belongs to the step of its latest pose.
+//! Other variables, such as landmarks, are added with the first factor that connects them to a known
+//! variable. Factors without a known variable wait. The last step adds all factors that never become
+//! reachable: parts of the graph that are not connected to the rest.
 use manifactor_geometry::{Tree, spanning_tree};
 use manifactor_graph::{FactorEntry, Graph, Key, ValueError, Values, Variable};
 use std::cmp::Reverse;
@@ -14,24 +16,25 @@ pub struct Replay {
     steps: VecDeque<Vec<FactorEntry>>,
     waiting: Waiting,
     known: HashSet<Key>,
-    /// What is held, and has not been told yet.
+    /// Held variables that no step has returned yet.
     fixed: Graph,
     /// Initial values of the whole graph.
     initial: Values,
 }
 
-/// What one step brings: factors, and the first values of their new variables.
+/// The content of one step: factors, and the initial values of their new variables.
 #[derive(Debug, Clone, Default)]
 pub struct Step {
-    /// New factors; what the whole graph holds of the new variables is held.
+    /// New factors. New variables that the whole graph holds are held here too.
     pub factors: Graph,
-    /// By new variable: its initial value if it is held, else where odometry leads from the estimate of known variables, else
-    /// its initial value.
+    /// Initial values of the new variables. A held variable has its value in the file. Any other variable is
+    /// placed by odometry from the estimate of known variables, or has its value in the file if that is not
+    /// possible.
     pub values: Values,
 }
 
-/// If several factors connect the same variables, puts the one first that fits the initial values best: the others may be wrong
-/// closures.
+/// Sorts factors between the same variables: the one with the best fit to the initial values comes first, as
+/// the remaining ones may be false loop closures.
 fn best_first(factors: &mut [FactorEntry], initial: &Values) {
     let misfit = |entry: &FactorEntry| {
         let point = |key: &Key| Some(initial.variable(key.as_str())?.erased().clone_box());
@@ -49,13 +52,13 @@ fn best_first(factors: &mut [FactorEntry], initial: &Values) {
     }
 }
 
-/// The number of a pose's key.
+/// Returns the number in a pose's key.
 fn number(key: &Key) -> Option<u64> {
     key.as_str().strip_prefix('x')?.parse().ok()
 }
 
 impl Replay {
-    /// The steps of a graph with these initial values; none, where it has no poses.
+    /// Splits a graph with these initial values into steps; there are none if it has no poses.
     pub fn of(graph: &Graph, initial: &Values) -> Self {
         let poses = |entry: &FactorEntry| entry.keys.iter().filter_map(number).collect::<Vec<_>>();
         let first = graph.factors().iter().flat_map(poses).min();
@@ -67,7 +70,7 @@ impl Replay {
             let Some(latest) = poses(entry).into_iter().max().or(first) else { break };
             steps.entry(latest).or_default().push(entry.clone());
         }
-        // the odometry first: a pose starts from the one before it
+        // Odometry first, as a pose is initialized from the previous one.
         for factors in steps.values_mut() {
             factors.sort_by_key(|entry| Reverse(poses(entry).into_iter().min()));
             best_first(factors, initial);
@@ -83,7 +86,7 @@ impl Replay {
         }
     }
 
-    /// Steps that are left.
+    /// Returns the number of remaining steps.
     pub fn len(&self) -> usize {
         self.steps.len()
     }
@@ -93,10 +96,11 @@ impl Replay {
         self.steps.is_empty()
     }
 
-    /// The next step, `None` after the last. New variables start from where `estimate` has those that are known.
+    /// Returns the next step, `None` after the last. New variables are placed relative to the `estimate` of
+    /// known ones.
     ///
     /// # Errors
-    /// If a factor takes a variable for another type than its estimate has.
+    /// If a factor expects a variable of a different type than its estimate has.
     pub fn step(
         &mut self,
         estimate: impl Fn(&str) -> Option<Box<dyn Variable>>,
@@ -118,7 +122,7 @@ impl Replay {
             }
         }
         let held: Vec<&Key> = keys.iter().filter(|key| self.fixed.fixed().contains_key(*key)).collect();
-        // the first pose of all is where the file has it: other factors may say where in the world that is
+        // The first pose keeps its value in the file, as other factors may measure it in the world frame.
         let first =
             keys.iter().find(|key| number(key).is_some()).filter(|_| values.is_empty() && held.is_empty());
         for key in held.into_iter().chain(first) {
@@ -140,8 +144,9 @@ impl Replay {
         Ok(Some(step))
     }
 
-    /// Takes out the waiting factors that what is known reaches, one over the other; and the variables that are new with
-    /// them, in order. The very first are reached from nothing, and so is what is left at the end.
+    /// Removes and returns the waiting factors that are reachable from known variables, one after another,
+    /// and the new variables in order. The first factor needs no known variable, nor do the remaining ones in
+    /// the last step.
     fn reach(&mut self) -> (Vec<FactorEntry>, Vec<Key>) {
         let (mut factors, mut keys) = (vec![], vec![]);
         while let Some(entry) = self.waiting.next(self.known.is_empty() || self.steps.is_empty()) {
@@ -157,13 +162,13 @@ impl Replay {
     }
 }
 
-/// Factors that have come, but are not out: the first that something known reaches is the next.
+/// Factors that have arrived but were not returned yet. The first one with a known variable is next.
 #[derive(Debug, Clone, Default)]
 struct Waiting {
-    /// By number, in the order in which they came.
+    /// By number, in order of arrival.
     factors: BTreeMap<usize, FactorEntry>,
     reached: BTreeSet<usize>,
-    /// By variable that is not known: the factors that wait for it.
+    /// For each unknown variable, the factors that wait for it.
     by_key: HashMap<Key, Vec<usize>>,
     numbers: usize,
 }
@@ -182,13 +187,13 @@ impl Waiting {
         self.factors.insert(number, entry);
     }
 
-    /// Says that a variable is known now.
+    /// Marks a variable as known.
     fn tell(&mut self, key: &Key) {
         let factors = self.by_key.remove(key).unwrap_or_default();
         self.reached.extend(factors.into_iter().filter(|number| self.factors.contains_key(number)));
     }
 
-    /// Takes out the first factor that is reached; or else the first of all, if it need not be reached.
+    /// Removes the first factor that is reached, otherwise the first of all if `unreached` allows it.
     fn next(&mut self, unreached: bool) -> Option<FactorEntry> {
         let first = || self.factors.keys().next().copied().filter(|_| unreached);
         let number = self.reached.first().copied().or_else(first)?;
@@ -197,21 +202,21 @@ impl Waiting {
     }
 }
 
-/// How long steps took, in seconds.
+/// Durations of steps, in seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct Latencies {
-    /// All of them together.
+    /// Sum of all durations.
     pub total: f64,
-    /// Half of them took at most this.
+    /// Median.
     pub p50: f64,
-    /// 99 of 100 took at most this.
+    /// 99th percentile.
     pub p99: f64,
-    /// The longest.
+    /// Maximum.
     pub max: f64,
 }
 
 impl Latencies {
-    /// Of steps in any order; zeros, where there is none.
+    /// Computes the statistics of durations in any order; zeros if there are none.
     pub fn of(seconds: &[f64]) -> Self {
         let mut sorted = seconds.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -259,7 +264,7 @@ mod tests {
         let mut link = |a: &str, b: &str| {
             graph.add([a, b], Between { relative: Se2::identity() });
         };
-        // pose 3 is tied to what is known by pose 5 alone, and landmark m by pose 3
+        // Pose 3 is connected to known variables only through pose 5, and landmark m only through pose 3.
         [("x0", "x1"), ("x1", "x2"), ("x3", "m"), ("m", "x4"), ("x2", "x5"), ("x4", "x5")]
             .into_iter()
             .for_each(|(a, b)| link(a, b));

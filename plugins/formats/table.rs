@@ -6,40 +6,40 @@ pub use parquet::to_parquet;
 /// A table, column by column.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
-    /// Names and cells; all columns are of one length.
+    /// Names and cells; all columns have equal length.
     pub columns: Vec<(String, Column)>,
 }
 
 /// The cells of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Column {
-    /// Words.
+    /// Text cells.
     Text(Vec<String>),
-    /// Numbers, where there are any.
+    /// Numeric cells; `None` for a missing number.
     Number(Vec<Option<f64>>),
 }
 
-/// Why a table could not be written.
+/// The reason why a table could not be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TableError {
-    /// Columns of different lengths.
+    /// The columns have different lengths.
     #[error("column `{column}` has {found} cells where the first has {expected}")]
     Ragged {
-        /// The column that differs.
+        /// Name of the column that differs.
         column: String,
-        /// Cells of the first.
+        /// Number of cells in the first column.
         expected: usize,
-        /// Its own.
+        /// Number of cells in this column.
         found: usize,
     },
-    /// The writer's own words.
+    /// The writer failed.
     #[error("the table cannot be written: {0}")]
     Writer(String),
 }
 
 impl Column {
-    /// How many cells there are.
+    /// Returns the number of cells.
     pub fn len(&self) -> usize {
         match self {
             Self::Text(cells) => cells.len(),
@@ -47,12 +47,12 @@ impl Column {
         }
     }
 
-    /// Returns whether there is no cell.
+    /// Returns whether there are no cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// A cell as CSV has it; numbers read back as the same bits.
+    /// Formats a cell for CSV; numbers read back bit for bit.
     fn cell(&self, row: usize) -> String {
         match self {
             Self::Text(cells) => cells.get(row).map(|text| no_formula(text)).unwrap_or_default(),
@@ -62,7 +62,7 @@ impl Column {
 }
 
 impl Table {
-    /// How many rows there are.
+    /// Returns the number of rows.
     ///
     /// # Errors
     /// If columns differ in length.
@@ -76,8 +76,9 @@ impl Table {
         }
     }
 
-    /// As CSV with a header. What is not there is an empty cell. A text that a spreadsheet would take for a formula has an
-    /// apostrophe before it: one that begins with `=`, `+`, `-`, `@`, a tab or a line break, and is no number.
+    /// Formats the table as CSV with a header. Missing numbers are empty cells. A text that a spreadsheet
+    /// would interpret as a formula gets an apostrophe as prefix: one that begins with `=`, `+`, `-`, `@`, a
+    /// tab or a line break and is not a number.
     ///
     /// # Errors
     /// If columns differ in length.
@@ -95,7 +96,8 @@ impl Table {
     }
 }
 
-/// A text that no spreadsheet runs: what others call a class or a variant may be a formula that fetches or sends.
+/// Makes a text safe for spreadsheets: a class or variant name from outside may be a formula that fetches or
+/// sends data.
 fn no_formula(text: &str) -> String {
     let begins_one = text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n']);
     if begins_one && text.parse::<f64>().is_err() { format!("'{text}") } else { text.to_owned() }

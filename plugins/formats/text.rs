@@ -1,4 +1,4 @@
-//! Texts from files: read once, and not without end.
+//! Texts from files, read once and with a size limit.
 pub mod plausible;
 pub mod words;
 
@@ -8,22 +8,22 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-/// The most bytes that are read from a pipe or a device, which do not say how many there are: as many as a document
-/// may have. A regular file may be longer.
+/// Maximum number of bytes from a pipe or a device, whose length is unknown: the maximum size of a document.
+/// A regular file may be longer.
 const STREAM: u64 = 256 << 20;
 
-/// Standard input, where a path is asked for.
+/// The path that stands for standard input.
 pub const STDIN: &str = "-";
 
-/// Reads a file, once: it may be a pipe. `-` is standard input.
+/// Reads a file once, as it may be a pipe. `-` is standard input.
 ///
 /// # Errors
-/// A file that cannot be read or is not UTF-8; more than 256 MiB from what is no regular file.
+/// If the file cannot be read or is not UTF-8, or if a pipe or device supplies more than 256 MiB.
 pub fn read_text(path: &Path) -> Result<String, FormatError> {
     let bytes = read(path).map_err(io_error(path))?;
     tracing::debug!(file = %path.display(), bytes = bytes.len(), "read");
     String::from_utf8(bytes).map_err(|error| {
-        // what is no text is shown as far as it is
+        // The valid part of the content is shown.
         let text = String::from_utf8_lossy(error.as_bytes());
         let good = error.as_bytes().iter().take(error.utf8_error().valid_up_to());
         let mut problems = Problems::of(path, &text);
@@ -43,11 +43,11 @@ fn read(path: &Path) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     let about = file.metadata()?;
     let length = if about.is_file() { about.len() } else { 0 };
-    // the system's own files, such as those of /proc, have a length of zero
+    // System files such as in /proc report a length of zero.
     read_bounded(file, length, length.max(STREAM))
 }
 
-/// Reads `length` bytes, or to the end, if that is not beyond `limit`.
+/// Reads up to the end, with `length` bytes reserved; fails if there are more than `limit` bytes.
 fn read_bounded(reader: impl Read, length: u64, limit: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let length = usize::try_from(length).map_err(|_| ErrorKind::OutOfMemory)?;

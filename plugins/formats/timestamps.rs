@@ -1,29 +1,29 @@
-//! Lists of images as TUM RGB-D writes them: `timestamp filename`, one image a line (`rgb.txt`).
+//! Lists of images in TUM RGB-D format: `timestamp filename`, one image per line (`rgb.txt`).
 use crate::error::{FormatError, Problems};
 use crate::lines::{Fields, lines};
 use crate::text::read_text;
 use crate::tum::increasing;
 use std::path::Path;
 
-/// An image at a time.
+/// An image file with its timestamp.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StampedFile {
-    /// Seconds.
+    /// Timestamp, in seconds.
     pub timestamp: f64,
-    /// As it is written, relative to the list's folder.
+    /// File name as written, relative to the folder of the list.
     pub file: String,
 }
 
 /// Reads a list of images.
 ///
 /// # Errors
-/// All malformed lines; time that does not increase.
+/// If a line is malformed or timestamps do not increase; the error lists all such lines.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<StampedFile>, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path)
 }
 
-/// As [`read`], of a text; `path` is what errors name.
+/// Works like [`read`], for a given text; `path` is used only in errors.
 ///
 /// # Errors
 /// As [`read`].

@@ -1,8 +1,8 @@
-//! Trajectories as TUM RGB-D writes them: `timestamp tx ty tz qx qy qz qw`, one pose a line.
+//! Trajectories in TUM RGB-D format: `timestamp tx ty tz qx qy qz qw`, one pose per line.
 //!
-//! Seconds, metres and a unit quaternion; `world_from_camera`. Time has to increase, with what published
-//! files need: a line that is late by at most 0.05 s is put where it belongs, of two lines with one
-//! time stamp the first stays. Both are reported.
+//! Seconds, metres and a unit quaternion; the pose is `world_from_camera`. Timestamps must increase, with two
+//! exceptions that published files need. A line that is late by at most 0.05 s is moved to its place. Of two
+//! lines with equal timestamps, the first is used. Both cases are reported.
 use crate::error::{FormatError, Mistake, Problems};
 use crate::lines::{Fields, lines};
 use crate::text::{read_text, write_text};
@@ -10,40 +10,41 @@ use manifactor_geometry::{Se3, So3};
 use std::fmt::Write;
 use std::path::Path;
 
-/// A pose at a time.
+/// A pose with its timestamp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StampedPose {
-    /// Seconds.
+    /// Timestamp, in seconds.
     pub timestamp: f64,
-    /// `world_from_camera`.
+    /// The pose `world_from_camera`.
     pub pose: Se3,
 }
 
-/// How far behind the line before a line may be, in seconds.
+/// Maximum lateness of a line relative to the previous one, in seconds.
 pub(crate) const LATE: f64 = 0.05;
 
-/// A trajectory, and what had to be done to its file.
+/// A trajectory, and the repairs that its file needed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trajectory {
-    /// By time, strictly increasing.
+    /// Poses with strictly increasing timestamps.
     pub poses: Vec<StampedPose>,
-    /// Lines, from 1, that came late and were put where they belong.
+    /// Lines, from 1, that were late and were moved to their place.
     pub moved: Vec<usize>,
-    /// Lines, from 1, that repeat a time stamp and were left out.
+    /// Lines, from 1, that repeat a timestamp and were omitted.
     pub dropped: Vec<usize>,
 }
 
 /// Reads a trajectory.
 ///
 /// # Errors
-/// All malformed lines: fields missing, too many or not finite, a quaternion whose length differs
-/// from 1 by more than 0.001, time that runs back by more than 0.05 s; a file without a pose.
+/// If a line has missing, extra or non-finite fields, a quaternion whose length differs from 1 by more than
+/// 0.001, or a timestamp more than 0.05 s before the previous one; the error lists all such lines. If the
+/// file has no pose.
 pub fn read(path: impl AsRef<Path>) -> Result<Trajectory, FormatError> {
     let path = path.as_ref();
     parse(&read_text(path)?, path)
 }
 
-/// As [`read`], of a text; `path` is what errors name.
+/// Works like [`read`], for a given text; `path` is used only in errors.
 ///
 /// # Errors
 /// As [`read`].
@@ -88,7 +89,7 @@ fn stamped_pose(text: &str) -> Result<StampedPose, Mistake> {
     Ok(StampedPose { timestamp, pose: pose(&mut fields)? })
 }
 
-/// `x y z qx qy qz qw`
+/// Parses `x y z qx qy qz qw`.
 pub(crate) fn pose(fields: &mut Fields<'_>) -> Result<Se3, Mistake> {
     let translation = fields.numbers::<3>()?.into();
     Ok(Se3::new(So3::from_quaternion_xyzw(fields.numbers()?)?, translation))
@@ -101,13 +102,13 @@ pub(crate) fn increasing(previous: Option<f64>, found: f64) -> Result<(), Mistak
     }
 }
 
-/// The text of a trajectory; what [`parse`] makes of it is the same, bit for bit.
+/// Returns the text of a trajectory; [`parse`] reads it back bit for bit.
 pub fn format(trajectory: &[StampedPose]) -> String {
     let mut text = String::from("# timestamp tx ty tz qx qy qz qw\n");
     for StampedPose { timestamp, pose } in trajectory {
         let [x, y, z]: [f64; 3] = pose.translation.into();
         let [qx, qy, qz, qw] = pose.rotation.quaternion_xyzw();
-        // writing to a String does not fail
+        // Writing to a String cannot fail.
         let _ = writeln!(text, "{timestamp} {x} {y} {z} {qx} {qy} {qz} {qw}");
     }
     text
@@ -179,7 +180,7 @@ mod tests {
             let trajectory: Vec<_> = steps.iter().map(|(dt, xi)| {
                 timestamp += dt;
                 let pose = Se3::exp(&Vector6::from(*xi));
-                // a product may be off unit length by more than a reader takes for rounding
+                // The length of a product may deviate from 1 by more than the reader accepts as rounding.
                 let rotation = So3::from_quaternion_xyzw(pose.rotation.quaternion_xyzw()).unwrap();
                 StampedPose { timestamp, pose: Se3::new(rotation, pose.translation * 1e3 + Vector3::repeat(0.1)) }
             }).collect();

@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all: the one place that writes files.
+//! Atomic writing of files; all files are written through this module.
 pub mod journal;
 
 use std::fs::{File, Metadata, OpenOptions};
@@ -7,28 +7,28 @@ use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use tempfile::{Builder, NamedTempFile};
 
-/// What the name of a file begins with that is not yet whole.
+/// Prefix of the name of an unfinished file.
 const PREFIX: &str = ".manifactor-";
-/// How many random letters and digits follow.
+/// Number of random letters and digits in the name.
 const RANDOM: usize = 16;
-/// What it ends with.
+/// Suffix of the name.
 const SUFFIX: &str = ".unfinished";
 
-/// Writes a file whole or not at all: under another name in the same folder first, brought to the disk, and renamed
-/// then. A file that is replaced keeps its permissions; a link is replaced, and what it points to is left alone.
+/// Writes a file atomically: writes to a temporary file in the same folder, syncs it to the disk, and renames
+/// it. A replaced file keeps its permissions. A link is replaced; its target is left unchanged.
 ///
 /// # Errors
-/// If it cannot be written; what was there before is there still, and nothing else.
+/// If the file cannot be written. The previous file is then still there, and no temporary file remains.
 pub fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
     let written = if is_stream(path) { write_stream(path, content) } else { replace(path, content) };
     tracing::debug!(file = %path.display(), bytes = content.len(), whole = written.is_ok(), "written");
     written
 }
 
-/// Returns whether a file can be written: asked before hours are spent on what goes there.
+/// Checks that a file can be written, before a long computation whose result goes there.
 ///
 /// # Errors
-/// If it cannot, with what the system says.
+/// If the file cannot be written, with the error of the operating system.
 pub fn can_write(path: &Path) -> io::Result<()> {
     if path.is_dir() {
         return Err(ErrorKind::IsADirectory.into());
@@ -39,8 +39,8 @@ pub fn can_write(path: &Path) -> io::Result<()> {
     unfinished(path, None)?.as_file_mut().write_all(b"?")
 }
 
-/// Removes what a killed program left of [`write_whole`] in a folder. The caller makes sure that no other process
-/// writes into it.
+/// Removes temporary files of [`write_whole`] that a killed program left in a folder. The caller ensures that
+/// no other process is writing to the folder.
 pub fn remove_unfinished(folder: &Path) {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let is_ours = |name: &str| {
@@ -49,17 +49,17 @@ pub fn remove_unfinished(folder: &Path) {
     };
     for file in files.filter(|file| file.file_name().to_str().is_some_and(is_ours)) {
         if file.file_type().is_ok_and(|t| t.is_file()) {
-            // what cannot be removed does no harm
+            // A file that cannot be removed does no harm.
             let _ = std::fs::remove_file(file.path());
         }
     }
 }
 
-/// Opens a regular file for reading and for writing at its end, or makes it. It is never opened through a link, so
-/// that what is written stays in its folder.
+/// Opens a regular file for reading and appending, or creates it. It is never opened through a link, so that
+/// all written data stays in its folder.
 ///
 /// # Errors
-/// If it is a link or no regular file; where it cannot be opened.
+/// If the path is a link or not a regular file, or if it cannot be opened.
 pub fn open_regular(path: &Path) -> io::Result<File> {
     let refused = || io::Error::new(ErrorKind::InvalidInput, "it is a link, or not a regular file");
     let mut options = OpenOptions::new();
@@ -68,19 +68,19 @@ pub fn open_regular(path: &Path) -> io::Result<File> {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
         made => return made,
     }
-    // opening a pipe would wait for somebody at its other end
+    // Opening a pipe would block until a process opens its other end.
     if !path.symlink_metadata()?.is_file() {
         return Err(refused());
     }
     let file = options.open(path)?;
-    // a link may have taken its place since
+    // A link may have replaced the file since the check.
     if is_same(&file.metadata()?, &path.symlink_metadata()?) { Ok(file) } else { Err(refused()) }
 }
 
-/// The bytes of a regular file. A pipe, which would be waited for without end, is refused.
+/// Reads a regular file. A pipe is refused, as reading it might block forever.
 ///
 /// # Errors
-/// If it cannot be read, or is a link or no regular file.
+/// If the file cannot be read, or is a link or not a regular file.
 pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
     if !path.symlink_metadata()?.is_file() {
         return Err(io::Error::new(ErrorKind::InvalidInput, "it is a link, or not a regular file"));
@@ -99,7 +99,7 @@ fn is_same(_: &Metadata, b: &Metadata) -> bool {
     b.is_file()
 }
 
-/// A pipe, a terminal or a device, which cannot be replaced.
+/// Returns whether the path is a pipe, a terminal or a device, which cannot be replaced.
 fn is_stream(path: &Path) -> bool {
     path.metadata().is_ok_and(|at| !at.is_file() && !at.is_dir())
 }
@@ -113,11 +113,12 @@ fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
     let mut file = unfinished(path, replaced.as_ref())?;
     file.as_file_mut().write_all(content)?;
     file.as_file().sync_all()?;
-    // the file is removed with the error
+    // On an error, the temporary file is removed.
     file.persist(path).map(drop).map_err(|error| error.error)
 }
 
-/// A new file beside `path`, as a rename does not cross file systems; removed when it is dropped.
+/// Creates a temporary file next to `path`, as a rename cannot cross file systems. It is removed when
+/// dropped.
 fn unfinished(path: &Path, replaced: Option<&Metadata>) -> io::Result<NamedTempFile<File>> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = Builder::new();
@@ -125,7 +126,7 @@ fn unfinished(path: &Path, replaced: Option<&Metadata>) -> io::Result<NamedTempF
     builder.make_in(folder, |path| create(path, replaced))
 }
 
-/// Makes a file that is not there, with the permissions of the one that it will replace.
+/// Creates a file that must not exist, with the permissions of the file that it will replace.
 fn create(path: &Path, replaced: Option<&Metadata>) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
@@ -133,12 +134,13 @@ fn create(path: &Path, replaced: Option<&Metadata>) -> io::Result<File> {
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     let file = options.open(path)?;
-    // a file system without permissions is no reason to lose results; a file that only its owner can read does no harm
+    // If the file system has no permissions, keep the results; a file readable only by its owner does no
+    // harm.
     let _ = file.set_permissions(replaced.permissions());
     Ok(file)
 }
 
-/// Hexadecimal digits of a line's checksum.
+/// Number of hexadecimal digits of a checksum.
 const DIGITS: usize = 16;
 
 fn checksum(text: &[u8]) -> String {
@@ -147,19 +149,20 @@ fn checksum(text: &[u8]) -> String {
     format!("{:0DIGITS$x}", hash.finish())
 }
 
-/// How a line with a checksum begins.
+/// Beginning of a line with a checksum.
 pub const CHECKED: &str = r#"{"checksum":""#;
 
-/// A line of a log, with its end: a JSON object to which a checksum is added as the first field (FNV-1a of 64 bits, of the object
-/// without it). A log that is read again after months is otherwise believed, whatever has become of a byte.
+/// Returns a log line, with its line break: a JSON object with a checksum as its first field (64-bit FNV-1a
+/// of the object without the checksum). The checksum detects damaged bytes when a log is read again after
+/// months.
 pub fn checked_line(object: &str) -> String {
     format!("{CHECKED}{}\",{}\n", checksum(object.as_bytes()), object.get(1..).unwrap_or_default())
 }
 
-/// The object of such a line, which comes without its end.
+/// Returns the object of a line with a checksum, given without its line break.
 ///
 /// # Errors
-/// In words, if there is no checksum, or one of another text.
+/// If there is no checksum or it does not match, with the reason as text.
 pub fn read_checked_line(line: &[u8]) -> Result<Vec<u8>, &'static str> {
     let rest = line.strip_prefix(CHECKED.as_bytes()).and_then(|rest| rest.split_at_checked(DIGITS));
     let parts = rest.and_then(|(sum, rest)| Some((sum, rest.strip_prefix(br#"","#)?)));
@@ -244,7 +247,7 @@ mod tests {
                 write_whole(&file, b"after").unwrap();
                 assert_eq!((mode(&file), std::fs::read(&file).unwrap()), (wanted, b"after".to_vec()));
             }
-            // a new one has those of any new file
+            // A new file has the permissions of any new file.
             let (ours, usual) = (folder.path().join("ours"), folder.path().join("usual"));
             write_whole(&ours, b"").unwrap();
             std::fs::write(&usual, "").unwrap();
@@ -261,7 +264,7 @@ mod tests {
             write_whole(&link, b"ours").unwrap();
             assert_eq!(std::fs::read(&link).unwrap(), b"ours");
             assert_eq!(std::fs::read(&file).unwrap(), b"precious");
-            // a link to a file that is not there does not make it
+            // A link to a missing file does not create that file.
             let dangling = folder.path().join("dangling");
             symlink(folder.path().join("nothing"), &dangling).unwrap();
             assert!(open_regular(&dangling).is_err() && !folder.path().join("nothing").exists());

@@ -1,4 +1,4 @@
-//! Cameras, and points as they see them.
+//! Camera models and the projection of points into images.
 mod bal_camera;
 mod camera;
 pub(crate) mod camera_model;

@@ -1,14 +1,15 @@
-//! A certificate that a pose graph's minimum is the global one, after SE-Sync.
+//! A certificate that the minimum of a pose graph is global, after SE-Sync.
 //!
 //! Rosen, Carlone, Bandeira and Leonard, *SE-Sync: a certifiably correct algorithm for synchronization over the
 //! special Euclidean group*, IJRR 2019.
 //!
-//! What is certified is the **chordal cost** with isotropic weights,
-//! ½ Σ κ ‖R_b - R_a Z‖² + τ ‖t_b - t_a - R_a z‖², with 1/2κ and 1/τ the mean variances of the rotation's angles and
-//! of the translation's coordinates. From the estimate, its own local minimum is found first; that is where the
-//! certificate stands. Where all noise is isotropic, the graph's cost is nowhere below the chordal one (θ² is
-//! not below 4 sin²(θ/2), nor the logarithm's translation shorter than the translation), and so not below its
-//! bound either; of any other noise nothing is said.
+//! The certificate covers the **chordal cost** with isotropic weights, ½ Σ κ ‖R_b - R_a Z‖² + τ ‖t_b - t_a -
+//! R_a z‖². Here 1/2κ is the mean variance of the rotation angles and 1/τ the mean variance of the
+//! translation coordinates. The chordal cost is first minimized from the estimate, and the certificate is
+//! evaluated at that local minimum. If all noise is isotropic, the graph's cost is never below the chordal
+//! cost: θ² is not below 4 sin²(θ/2), and the translation of the logarithm is not shorter than the
+//! translation. The lower bound then holds for the graph's cost too. With any other noise, the graph's cost
+//! has no bound.
 use crate::initialise::network::{Edge, Network};
 use crate::initialise::parts::Parts;
 use crate::initialise::pose::Pose;
@@ -26,59 +27,61 @@ use std::fmt;
 mod dual;
 mod lanczos;
 
-/// What is known of the global minimum of a pose graph's chordal cost.
+/// Result of [`certify`]: a lower bound on a pose graph's chordal cost, and whether the minimum close to the
+/// estimate attains it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Certificate {
-    /// Whether the minimum that the estimate is close to is the global one: S is positive semidefinite, to
-    /// within 1e-9 of its diagonal.
+    /// Whether the minimum close to the estimate is global: S is positive semidefinite, to within 1e-9 of its
+    /// diagonal.
     pub certified: bool,
-    /// The chordal cost at its minimum closest to the estimate.
+    /// The chordal cost at its local minimum close to the estimate.
     pub chordal_cost: f64,
-    /// No values whatever have a chordal cost below this, up to rounding.
+    /// Lower bound on the chordal cost over all values, up to rounding.
     pub lower_bound: f64,
-    /// How much lower than `chordal_cost` the global minimum may be at most.
+    /// Upper bound on the difference between `chordal_cost` and the global minimum.
     pub suboptimality: f64,
-    /// Smallest eigenvalue of the dual certificate matrix S = Q - Λ, each pose scaled by the mean of its
-    /// diagonal in the data matrix; no unit. Zero at a certified minimum, as S has the estimate in its kernel.
+    /// Smallest eigenvalue of the dual certificate matrix S = Q - Λ, dimensionless: each pose is scaled by
+    /// the mean of its diagonal in the data matrix. Zero at a certified minimum, as S has the estimate in its
+    /// kernel.
     pub smallest_eigenvalue: f64,
-    /// A bound from below on the cost of the graph itself: where all noise is isotropic.
+    /// Lower bound on the cost of the graph itself, if all noise is isotropic.
     pub cost_bound: Option<f64>,
 }
 
-/// Below zero by this much counts as rounding.
+/// Largest shift of the smallest eigenvalue that counts as rounding.
 const ZERO: f64 = 1e-9;
 
-/// Why there is no certificate.
+/// The reason why a graph has no certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CertificateError {
-    /// There is no between factor of poses.
+    /// The graph has no between factor of poses.
     #[error("a certificate needs a pose graph: between factors of se2 or se3, priors, and nothing else")]
     NoPoseGraph,
-    /// A factor of another kind.
+    /// The graph has a factor of an unsupported type.
     #[error(
         "a certificate needs between factors and priors of one type of poses; factor {factor} is a `{name}`"
     )]
     OtherFactor {
-        /// The factor, from 0 in the order of the graph.
+        /// Index of the factor in the graph, from 0.
         factor: usize,
-        /// Its type.
+        /// Type of the factor.
         name: &'static str,
     },
-    /// A factor with a robust loss.
+    /// A factor has a robust loss.
     #[error("a certificate is for squared costs; factor {factor} has a robust loss")]
     RobustLoss {
-        /// The factor, from 0 in the order of the graph.
+        /// Index of the factor in the graph, from 0.
         factor: usize,
     },
-    /// A factor that does not measure all of a pose.
+    /// A factor leaves some direction of a relative pose unmeasured.
     #[error("a certificate needs relative poses; factor {factor} leaves a rotation or a translation open")]
     NotMeasured {
-        /// The factor, from 0 in the order of the graph.
+        /// Index of the factor in the graph, from 0.
         factor: usize,
     },
-    /// More is held than says where the graph is.
+    /// More variables are held than needed to fix the gauge.
     #[error(
         "a certificate needs a pose graph that is held by one pose or by priors in each connected part; more than \
          that, or directions alone, is held around `{key}`"
@@ -87,16 +90,16 @@ pub enum CertificateError {
         /// One of the variables.
         key: Key,
     },
-    /// No shift makes the certificate matrix positive definite: its numbers are too uneven for f64.
+    /// No shift makes the certificate matrix positive definite: its entries are too uneven for f64.
     #[error("the certificate matrix is too badly conditioned for f64")]
     Conditioning,
     /// The graph does not fit its values.
     #[error(transparent)]
     Graph(#[from] StartError),
-    /// The graph of chordal factors cannot be compiled.
+    /// The graph of chordal factors does not compile.
     #[error(transparent)]
     Compile(#[from] CompileError),
-    /// A weight that is no noise.
+    /// A computed weight is not a valid noise.
     #[error(transparent)]
     Noise(#[from] NoiseError),
     /// The certificate matrix does not fit into memory.
@@ -104,10 +107,10 @@ pub enum CertificateError {
     System(#[from] BlockSystemError),
 }
 
-/// Certifies the minimum that an estimate of a pose graph is close to.
+/// Certifies the minimum of a pose graph close to an estimate.
 ///
 /// # Errors
-/// If the graph is more than relative poses and priors of one type, in squared costs.
+/// If the graph has factors other than between factors and priors of one pose type, or a robust loss.
 pub fn certify(graph: &Graph, values: &Values) -> Result<Certificate, CertificateError> {
     if let Some(factor) = graph.factors().iter().position(|f| f.loss.is_some()) {
         return Err(CertificateError::RobustLoss { factor });
@@ -164,7 +167,7 @@ where
     }))
 }
 
-/// That nothing but the place of each part as a whole is held.
+/// Checks that the graph holds no more than the gauge of each connected part.
 fn check_held<P: Pose<D>, const D: usize>(
     net: &Network<P, D>,
     graph: &Graph,
@@ -180,7 +183,7 @@ fn check_held<P: Pose<D>, const D: usize>(
     let mut part_is_held = vec![false; n];
     for i in (0..n).filter(|i| net.held[*i]) {
         if std::mem::replace(&mut part_is_held[parts.root(i)], true) {
-            // of two, one at least is a pose: the outer frame is the last
+            // At least one of the two is a pose, as the outer frame is the last node.
             let first =
                 net.places.iter().enumerate().find(|(k, _)| net.held[*k] && parts.root(*k) == parts.root(i));
             let key = first.and_then(|(_, place)| values.iter().nth(*place));
@@ -192,7 +195,7 @@ fn check_held<P: Pose<D>, const D: usize>(
     Ok(())
 }
 
-/// The minimum of the chordal cost that the values of the network lead to.
+/// Minimizes the chordal cost, beginning at the poses of the network.
 fn minimum<P: Pose<D>, const D: usize>(
     net: &Network<P, D>,
     edges: &[(&Edge<D>, Weights)],
@@ -223,7 +226,7 @@ where
     let near =
         LevenbergMarquardt { stop: stop(NotNegative::literal(1e-9), 100), ..LevenbergMarquardt::default() };
     let near = solve(&graph, &values, &near, &mut Silent)?.values;
-    // the last digits: the certificate matrix is only as close to singular as the gradient is to zero
+    // Solve to full accuracy: the certificate matrix is only as close to singular as the gradient is to zero.
     let exact = solve(
         &graph,
         &near,

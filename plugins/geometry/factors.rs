@@ -1,4 +1,4 @@
-//! Measurements of poses and points: one file for each factor.
+//! Measurements of poses and points; one file per factor.
 mod bearing_range;
 mod bearing_range_3d;
 mod between;

@@ -1,4 +1,4 @@
-//! Manifolds: vectors, rotations and poses of the plane and of space, and what Lie groups have in common.
+//! Manifolds: vectors, rotations and poses in the plane and in space, and the trait of Lie groups.
 mod coordinates;
 mod lie_group;
 mod operators;

@@ -1,4 +1,4 @@
-//! Initial values from relative measurements: along spanning trees, and by chordal relaxation.
+//! Initial values from relative measurements: spanning trees and chordal relaxation.
 mod chordal;
 mod loops;
 pub(crate) mod network;
@@ -15,12 +15,12 @@ pub use start::SpanningTree;
 use crate::{BearingRange2, BearingRange3, Landmark, Point2, Point3, Se2, Se3};
 use manifactor_graph::{Factor, FactorEntry, Key, Values, Variable};
 
-/// The factor as one of type `F`, and its keys where there are `N`.
+/// Returns the factor as type `F` and its keys, if it is of this type and has `N` keys.
 pub(crate) fn as_factor<F: Factor + 'static, const N: usize>(entry: &FactorEntry) -> Option<(&F, &[Key; N])> {
     Some((entry.factor.erased().as_any().downcast_ref()?, entry.keys.as_slice().try_into().ok()?))
 }
 
-/// The point that a factor saw from a pose with a value, in the outer frame.
+/// Returns the position of a measured point in the outer frame, if the pose has a value.
 fn seen_point<'a>(entry: &'a FactorEntry, values: &Values) -> Option<(&'a Key, Box<dyn Variable>)> {
     if let Some((f, [x, p])) = as_factor::<Landmark<2>, 2>(entry) {
         return Some((p, Box::new(Point2::new(values.get::<Se2>(x).ok()?.act(&f.position)))));

@@ -1,8 +1,8 @@
 //! Rotations, poses and points, and the factors between them.
 //!
-//! Conventions: x ⊞ δ = x·Exp(δ) with the full exponential, y ⊟ x = Log(x⁻¹y). In space the tangent
-//! is rotation first, (ω, v); in the plane it is (x, y, θ). A pose takes points from its own frame to
-//! the outer one.
+//! Conventions: x ⊞ δ = x·Exp(δ) with the full exponential, y ⊟ x = Log(x⁻¹y). In space the tangent has the
+//! rotation first, (ω, v); in the plane it is (x, y, θ). A pose maps points from the local frame to the outer
+//! one.
 #[doc(hidden)]
 pub mod __private {
     pub use crate::bundle::camera_model::rectify;

@@ -1,24 +1,26 @@
-//! The rotation closest to a matrix, and the similarity closest to pairs of points: orthogonal Procrustes.
+//! Orthogonal Procrustes problems: the rotation closest to a matrix, and the similarity closest to pairs of
+//! points.
 use crate::{Se3, So3};
 use nalgebra::{Matrix3, Vector3};
 
-/// The rotation R for which tr(Rᵀ M) is largest, and the singular values of M.
+/// The rotation R that maximizes tr(Rᵀ M), and the singular values of M.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearestRotation {
-    /// R. About the first direction it is arbitrary if `singular_values[1]` is zero, and about all if the first is.
+    /// R. If `singular_values[1]` is zero, R is arbitrary about the first direction; if all are zero, R is
+    /// arbitrary.
     pub rotation: So3,
     /// In descending order; the last one is negative if M has a negative determinant. Their sum is tr(Rᵀ M).
     pub singular_values: [f64; 3],
 }
 
-/// Most sweeps over the three pairs of columns; four or five are the rule.
+/// Maximum number of sweeps over the three pairs of columns; four or five are typical.
 const SWEEPS: usize = 30;
 
 /// Finds the rotation closest to a matrix (Kabsch, 1976; Umeyama, 1991, equation 40).
 ///
-/// One-sided Jacobi rotations give small singular values to full relative accuracy (Demmel and Veselić, 1992). A
-/// decomposition by bidiagonalization resolves them only to rounding of the largest one, which turns a nearly straight
-/// trajectory by a wrong angle about its direction.
+/// One-sided Jacobi rotations compute small singular values to full relative accuracy (Demmel and Veselić,
+/// 1992). A decomposition by bidiagonalization resolves them only to the rounding error of the largest one. A
+/// nearly straight trajectory would then be rotated about its direction by a wrong angle.
 pub fn nearest_rotation(matrix: &Matrix3<f64>) -> NearestRotation {
     let (mut a, mut v) = (*matrix, Matrix3::identity());
     for _ in 0..SWEEPS {
@@ -59,40 +61,41 @@ pub fn nearest_rotation(matrix: &Matrix3<f64>) -> NearestRotation {
     }
 }
 
-/// A unit vector across `direction`, close to `wanted` if that is not along it.
+/// Returns a unit vector perpendicular to `direction`, close to `wanted` unless the two are parallel.
 fn across(direction: &Vector3<f64>, wanted: &Vector3<f64>) -> Vector3<f64> {
     let candidates = [*wanted, Vector3::x(), Vector3::y()].map(|c| c - direction * direction.dot(&c));
     candidates.into_iter().find_map(|c| c.try_normalize(0.1)).unwrap_or_else(Vector3::z)
 }
 
-/// A change of frames that may change lengths: y = scale · R x + t.
+/// A change of frames that may change the scale: y = scale · R x + t.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {
-    /// Factor of lengths.
+    /// Scale factor of lengths.
     pub scale: f64,
-    /// R
+    /// Rotation R.
     pub rotation: So3,
-    /// t
+    /// Translation t.
     pub translation: Vector3<f64>,
 }
 
 impl Similarity {
-    /// Lengths as they are, then the pose.
+    /// Creates a similarity of scale 1 from a pose.
     pub fn rigid(pose: Se3) -> Self {
         Self { scale: 1.0, rotation: pose.rotation, translation: pose.translation }
     }
-    /// A point in the other frame.
+    /// Maps a point to the target frame.
     pub fn act(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation.act(point) * self.scale + self.translation
     }
-    /// A pose in the other frame: its position is scaled, its rotation is not.
+    /// Maps a pose to the target frame. Only its position is scaled.
     pub fn act_on_pose(&self, pose: &Se3) -> Se3 {
         Se3::new(self.rotation.compose(&pose.rotation), self.act(&pose.translation))
     }
 }
 
-/// Sums over pairs of points (x, y), from which the similarity follows that brings x closest to y in the mean square (Umeyama,
-/// Least-Squares Estimation of Transformation Parameters Between Two Point Patterns, 1991).
+/// Sums over pairs of points (x, y), from which the similarity is computed that minimizes the mean squared
+/// distance (Umeyama, Least-Squares Estimation of Transformation Parameters Between Two Point Patterns,
+/// 1991).
 #[derive(Debug, Clone, Copy)]
 pub struct PointPairs {
     means: [Vector3<f64>; 2],
@@ -103,7 +106,7 @@ pub struct PointPairs {
 }
 
 impl PointPairs {
-    /// The sums over points x, y and their weights. Without a pair no similarity is determined.
+    /// Computes the sums over points x, y and their weights. Without a pair, no similarity is determined.
     pub fn new(pairs: impl Iterator<Item = (Vector3<f64>, Vector3<f64>, f64)> + Clone) -> Self {
         let zero = Vector3::zeros();
         let add = |(x, y, w): (_, _, f64), (a, b, v): (Vector3<f64>, Vector3<f64>, f64)| {
@@ -120,25 +123,26 @@ impl PointPairs {
         all
     }
 
-    /// Adds a direction that is x in the one frame and y in the other, with a share of the weight of all points.
+    /// Adds a direction that is x in the first frame and y in the second, with a share of the weight of all
+    /// points.
     pub fn add_direction(&mut self, x: &Vector3<f64>, y: &Vector3<f64>, share: f64) {
         self.products += y * x.transpose() * (share * self.spread);
     }
 
-    /// The closest rotation and translation; `None` if the second singular value is this share of the first or less. Then the points lie
-    /// on a line, and the rotation about it is arbitrary.
+    /// Returns the closest rotation and translation. `None` if the ratio of the second to the first singular
+    /// value is at most `flat`: the points are on a line, and the rotation about it is arbitrary.
     pub fn rigid(&self, flat: f64) -> Option<Similarity> {
         self.closest(flat, |_| 1.0)
     }
 
-    /// The closest rotation, translation and scale, under the same condition.
+    /// Returns the closest rotation, translation and scale, with the condition of [`rigid`](Self::rigid).
     pub fn similarity(&self, flat: f64) -> Option<Similarity> {
         self.closest(flat, |singular_values| singular_values.iter().sum::<f64>() / self.spread)
     }
 
     fn closest(&self, flat: f64, scale: impl Fn([f64; 3]) -> f64) -> Option<Similarity> {
         let NearestRotation { rotation, singular_values } = nearest_rotation(&self.products);
-        // NaN, if there is no pair, is not determined either
+        // A comparison that is false for NaN, which occurs without pairs.
         let is_determined = singular_values[1] > flat * singular_values[0];
         if !is_determined {
             return None;
@@ -176,7 +180,8 @@ mod tests {
         #[test]
         fn small_singular_values_are_accurate(u in any_so3(), k in 2..14_i32) {
             let least = 10.0_f64.powi(-k);
-            // columns of very different lengths: each entry is exact to rounding, and so is each singular value
+            // Columns of very different lengths: each entry is exact to rounding, and so is each singular
+            // value.
             let matrix = u.matrix() * Matrix3::from_diagonal(&Vector3::new(1.0, least, least * least));
             let found = nearest_rotation(&matrix);
             prop_assert!((found.singular_values[1] / least - 1.0).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Strategies for rotations, poses and points, with the places where formulas tend to break.
+//! Strategies for rotations, poses and points, including the cases that tend to break formulas.
 use crate::{BalCamera, CameraModel, Point2, Point3, Rn, Se2, Se3, So2, So3, Twist};
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::{rotation_vector, signed_angle, vector};
@@ -6,10 +6,10 @@ use nalgebra::{Vector1, Vector2, Vector3, Vector6};
 use proptest::prelude::*;
 use std::f64::consts::PI;
 
-/// How far from the origin the points and poses are, in metres.
+/// Largest coordinate of points and poses, in metres.
 const SIZE: f64 = 10.0;
 
-// what the checks of all factors draw from; singular: no turn at all, and half a turn
+// Samples for the checks of all factors. The singular cases are the identity and half a turn.
 register_points!(So2, any_so2(), [So2::identity(), So2::exp(PI)]);
 register_points!(So3, any_so3(), [So3::identity(), half_a_turn()]);
 register_points!(Se2, any_se2(), [Se2::identity(), Se2::new(So2::exp(PI), Vector2::zeros())]);
@@ -20,12 +20,12 @@ register_points!(Point3, any_point3(), [Rn::<3>(Vector3::zeros())]);
 register_points!(Twist, any_twist(), [Twist::zero()]);
 register_points!(BalCamera, any_bal_camera(), []);
 
-/// The rotation by π about an axis that is none of the coordinates'.
+/// Rotation by π about an axis that is not a coordinate axis.
 fn half_a_turn() -> So3 {
     So3::exp(&(Vector3::new(2.0, -1.0, 2.0) * (PI / 3.0)))
 }
 
-/// Points with coordinates up to 10 m; now and then the origin, or next to it.
+/// Points with coordinates up to 10 m; sometimes the origin, or close to it.
 pub fn any_point<const N: usize>() -> impl Strategy<Value = Rn<N>> + Clone {
     vector(SIZE).prop_map(Rn)
 }
@@ -50,7 +50,7 @@ pub fn any_so2() -> impl Strategy<Value = So2> + Clone {
     signed_angle().prop_map(So2::exp)
 }
 
-/// Rotations in space: none, tiny ones, any, nearly half a turn.
+/// Rotations in space: the identity, tiny ones, any, nearly half a turn.
 pub fn any_so3() -> impl Strategy<Value = So3> + Clone {
     rotation_vector().prop_map(|omega| So3::exp(&omega))
 }
@@ -73,13 +73,14 @@ pub fn any_bal_camera() -> impl Strategy<Value = BalCamera> + Clone {
     })
 }
 
-/// Points in front of a camera that looks along +z, in its frame: near and far, in the middle and to the side.
+/// Points in front of a camera that looks along +z, in the camera's frame: near and far, central and
+/// off-axis.
 pub fn in_front() -> impl Strategy<Value = Vector3<f64>> + Clone {
     let depth = prop_oneof![4 => 0.5..10.0f64, 1 => 100.0..1000.0f64];
     (vector::<2>(1.5), depth).prop_map(|(side, depth)| Vector3::new(side.x, side.y, 1.0) * depth)
 }
 
-/// The law of a camera model for a point that it sees: its pixel unprojects to the point's direction.
+/// Checks a camera model at a point that it sees: the pixel of the point unprojects to its direction.
 ///
 /// # Errors
 /// If it does not.
@@ -94,17 +95,17 @@ pub fn camera_law<M: CameraModel>(camera: &M, point: &Vector3<f64>) -> Result<()
     }
 }
 
-/// Tangent vectors of SO(2) inside of its chart.
+/// Tangent vectors of SO(2) inside its chart.
 pub fn so2_tangent() -> impl Strategy<Value = Vector1<f64>> + Clone {
     signed_angle().prop_map(Vector1::new)
 }
 
-/// Tangent vectors of SE(2) inside of its chart.
+/// Tangent vectors of SE(2) inside its chart.
 pub fn se2_tangent() -> impl Strategy<Value = Vector3<f64>> + Clone {
     (vector::<2>(SIZE), signed_angle()).prop_map(|(v, theta): (Vector2<f64>, _)| v.push(theta))
 }
 
-/// Tangent vectors of SE(3) inside of its chart.
+/// Tangent vectors of SE(3) inside its chart.
 pub fn se3_tangent() -> impl Strategy<Value = Vector6<f64>> + Clone {
     (rotation_vector(), vector::<3>(SIZE)).prop_map(|(w, v)| Vector6::new(w.x, w.y, w.z, v.x, v.y, v.z))
 }

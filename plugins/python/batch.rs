@@ -1,8 +1,8 @@
-//! Factors that Python evaluates, a whole batch in one call.
+//! Factors whose residual is a Python function, evaluated for a whole batch in one call.
 //!
-//! A batch of such factors asks its function for all residuals, or all derivatives, of a pass at once; the batch of the core
-//! that does the rest then reads them one by one. Where Python gives no derivatives, they are central differences in the
-//! tangent space, of points that are evaluated in the same call.
+//! A batch of these factors calls its function once per pass for all residuals or all derivatives. The
+//! batch of the core then reads the results factor by factor. If the function returns no derivatives, they
+//! are central differences in the tangent space, whose points are evaluated in a single call.
 mod cached;
 mod evaluate;
 mod whole;
@@ -24,11 +24,11 @@ use std::any::{Any, TypeId};
 use std::sync::Arc;
 use whole::Whole;
 
-/// A factor whose residual is a function of Python. It can be solved, and not be written into a document.
+/// A factor whose residual is a Python function. It can be solved, but not written into a document.
 #[derive(Debug, Clone)]
 struct Batched {
     like: Dynamic<Cached>,
-    /// Its row of the constants, one after the other.
+    /// Row of constants of this factor, concatenated.
     constants: Arc<[f64]>,
 }
 
@@ -54,7 +54,7 @@ impl Batched {
         &self.like.get().function
     }
 
-    /// The one point of these variables; `None` where they do not fit.
+    /// The point of these variables; `None` if their number or types do not fit.
     fn at(&self, variables: &[&dyn Variable]) -> Option<Point> {
         let types = &self.function().types;
         (types.len() == variables.len()).then_some(())?;
@@ -97,14 +97,15 @@ impl ErasedResidual for Batched {
     }
 }
 
-/// A function of Python with the types of its variables, of which factors are made.
+/// A Python function with the types of its variables, from which factors are made.
 #[pyclass(module = "manifactor._native", frozen)]
 struct BatchFunction(Dynamic<Cached>);
 
 #[pymethods]
 impl BatchFunction {
-    /// `evaluate(arrays, constants, derivatives)` gives the residuals, shape (n, rows), and None or a Jacobian for each
-    /// variable, shape (n, rows, size), by its numbers. `constants` are the lengths of these.
+    /// `evaluate(arrays, constants, derivatives)` returns the residuals, shape (n, rows), and None or one
+    /// Jacobian per variable, shape (n, rows, size), with respect to its numbers. `constants` has the
+    /// lengths of the constants.
     #[new]
     fn new(
         name: String,
@@ -131,7 +132,7 @@ impl BatchFunction {
         like.map(Self).map_err(|error| errors::argument(&name, "rows", error))
     }
 
-    /// The factor with this row of constants.
+    /// Returns the factor with this row of constants.
     fn factor<'py>(&self, py: Python<'py>, constants: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let function = &self.0.get().function;
         let width = function.constants.iter().sum();
@@ -141,14 +142,14 @@ impl BatchFunction {
     }
 }
 
-/// The factors of a function, row by row of its constants.
+/// The factors of a function, one per row of its constants.
 pub(crate) struct Rows {
     like: Dynamic<Cached>,
     constants: crate::input::Numbers,
 }
 
 impl Rows {
-    /// By what a factor of Python makes of its constants: its function, and the rows of them.
+    /// Creates the rows from the function and the constants that a Python factor provides.
     pub(crate) fn new(rows: usize, made: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (function, constants): (Py<BatchFunction>, Bound<'_, PyAny>) = made.extract()?;
         let like = function.get().0.clone();

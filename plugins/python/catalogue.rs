@@ -1,4 +1,4 @@
-//! The catalogue for Python: what can be chosen by name, and what formulas can say.
+//! The catalogue for Python: registered types, and the functions of formulas.
 use manifactor::graph::catalogue::{Entry, all};
 use manifactor::graph::manifold_name;
 use manifactor::graph::quantity::{Function, functions, variable_quantity};
@@ -34,13 +34,13 @@ fn function(function: &Function) -> Value {
     })
 }
 
-/// All that is linked, as JSON: a list of entries.
+/// Returns all linked types as JSON: a list of entries.
 #[pyfunction]
 fn catalogue() -> String {
     Value::from_iter(all().into_iter().map(entry)).to_string()
 }
 
-/// The functions of formulas, as JSON.
+/// Returns the functions of formulas as JSON.
 #[pyfunction(name = "functions")]
 fn functions_of_formulas() -> String {
     Value::from_iter(functions().into_iter().map(function)).to_string()

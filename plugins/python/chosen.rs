@@ -1,4 +1,4 @@
-//! What is chosen by name: factors, losses, solvers, starts and values of variables.
+//! Registered types as Python objects: factors, losses, solvers, starts and values of variables.
 use crate::errors::{self, Mistake};
 use crate::input::{Untagged, array, json_to_python, node, numbers, to_array, to_python, unchangeable};
 use crate::threads::detach;
@@ -14,14 +14,14 @@ use pyo3::types::PyDict;
 use serde_json::Value as Json;
 use std::sync::Arc;
 
-/// An array of numpy.
+/// A NumPy array.
 type Floats<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// Something that is chosen by name, as an object that does not change. Its classes in Python are one for each kind.
+/// An immutable object of a registered type. Python has one subclass for each kind.
 #[pyclass(module = "manifactor._native", frozen, subclass)]
 pub(crate) struct Chosen(pub What);
 
-/// By kind.
+/// The object, by kind.
 #[derive(Clone)]
 pub(crate) enum What {
     Factor(Arc<dyn Factor>),
@@ -32,7 +32,7 @@ pub(crate) enum What {
 }
 
 impl What {
-    /// The kind, as the catalogue has it, and the name in documents.
+    /// The kind, as in the catalogue, and the name in documents.
     pub(crate) fn names(&self) -> (&'static str, &'static str) {
         match self {
             Self::Factor(x) => ("factor", x.typetag_name()),
@@ -54,7 +54,7 @@ impl What {
         }
     }
 
-    /// As an object of the class that Python has for it.
+    /// Converts it to an object of its Python class.
     pub(crate) fn into_python(self, py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
         let (kind, name) = self.names();
         let class = py.import("manifactor.chosen")?.call_method1("class_of", (kind, name))?;
@@ -65,7 +65,7 @@ impl What {
 
 #[pymethods]
 impl Chosen {
-    /// By kind, name and fields; or the same as another, as an object of a class of its own.
+    /// Creates an object from kind, name and fields, or copies an object into a subclass.
     #[new]
     #[pyo3(signature = (kind, name = None, fields = None))]
     fn new(
@@ -93,24 +93,24 @@ impl Chosen {
         errors.finish(what).map(Self).map_err(|diagnostics| errors::read(name, &diagnostics))
     }
 
-    /// What it is: `"factor"`, `"loss"`, `"solver"`, `"start"` or `"variable"`.
+    /// Kind of the object: `"factor"`, `"loss"`, `"solver"`, `"start"` or `"variable"`.
     #[getter]
     fn kind(&self) -> &'static str {
         self.0.names().0
     }
 
-    /// Its name in documents.
+    /// Name of the type in documents.
     #[getter]
     fn r#type(&self) -> &'static str {
         self.0.names().1
     }
 
-    /// Its fields with its `type`, as a document has them.
+    /// Returns the fields and the `type`, as in a document.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json_to_python(py, &self.json()?)
     }
 
-    /// A field, which does not change: numbers as an array for reading, fields within it as a mapping.
+    /// A field, read-only: numbers as an array, nested fields as a mapping.
     fn __getattr__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let (py, json) = (slf.py(), slf.get().json()?);
         match json.get(name) {
@@ -128,7 +128,7 @@ impl Chosen {
     }
 
     fn __repr__(&self) -> PyResult<String> {
-        // a function of Python has no fields
+        // a Python function has no fields
         let Ok(json) = self.json() else { return Ok(format!("{}(…)", self.0.names().1)) };
         let fields = json.as_object().into_iter().flatten().filter(|(name, _)| *name != "type");
         let fields: Vec<_> = fields.map(|(name, value)| format!("{name}={value}")).collect();
@@ -150,7 +150,7 @@ impl Chosen {
         slf.clone()
     }
 
-    /// For `pickle`: its kind and its fields, to the last bit.
+    /// For `pickle`: the kind and the fields, without rounding.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&'static str, String))> {
         let read = py.import("manifactor._native")?.getattr("unpickle")?;
         Ok((read, (self.0.names().0, self.json()?.to_string())))
@@ -177,7 +177,7 @@ impl Chosen {
     }
 }
 
-/// What [`Chosen::__reduce__`] has written.
+/// Restores an object from the output of [`Chosen::__reduce__`].
 #[pyfunction]
 fn unpickle<'py>(py: Python<'py>, kind: &str, text: &str) -> PyResult<Bound<'py, PyAny>> {
     let read = match kind {
@@ -190,7 +190,7 @@ fn unpickle<'py>(py: Python<'py>, kind: &str, text: &str) -> PyResult<Bound<'py,
     read.map_err(|error| errors::argument("pickle", kind, error))?.into_python(py)
 }
 
-/// A value without the name of its type; anything else as it is.
+/// Returns a value without the name of its type; any other object is returned unchanged.
 #[pyfunction]
 fn untagged<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     match value.cast::<Chosen>().map(|chosen| &chosen.get().0) {
@@ -199,7 +199,7 @@ fn untagged<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     }
 }
 
-/// Checks that there is such a name.
+/// Returns an error if no type has this kind and name.
 pub(crate) fn known(kind: &str, name: &str) -> PyResult<()> {
     if find(kind, name).is_some() {
         return Ok(());
@@ -211,7 +211,7 @@ pub(crate) fn known(kind: &str, name: &str) -> PyResult<()> {
     Err(errors::arguments("", vec![mistake.help(format!("{meant}there are {}", names.join(", ")))]))
 }
 
-/// An argument of a kind that is chosen by name.
+/// Defines the conversion of an argument of one kind.
 macro_rules! argument {
     ($function:ident, $variant:ident, $type:ty, $noun:literal) => {
         #[doc = concat!("An argument that is ", $noun, ".")]
@@ -221,7 +221,8 @@ macro_rules! argument {
                 _ => {
                     let found = value.get_type().name()?;
                     let mut message = format!("{name}: expected {}, got {found}", $noun);
-                    // a constructor, or a function under @mf.factor, in place of what it makes
+                    // the user has passed a constructor, or a function under @mf.factor, instead of calling
+                    // it
                     if value.is_callable()
                         && let Ok(called) = value.getattr("__name__")
                     {
@@ -243,7 +244,7 @@ fn variables(value: &Bound<'_, PyAny>) -> PyResult<Vec<Arc<dyn Variable>>> {
     value.try_iter()?.map(|item| variable("variables", &item?)).collect()
 }
 
-/// The point that a tangent vector leads to.
+/// Returns the point that is reached along a tangent vector.
 #[pyfunction]
 fn retract<'py>(x: &Bound<'py, PyAny>, delta: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let point = variable("x", x)?;
@@ -252,7 +253,7 @@ fn retract<'py>(x: &Bound<'py, PyAny>, delta: &Bound<'py, PyAny>) -> PyResult<Bo
     What::Variable(moved.into()).into_python(x.py())
 }
 
-/// The tangent vector that leads to another point.
+/// Returns the tangent vector that leads to the point `to`.
 #[pyfunction]
 fn local<'py>(x: &Bound<'py, PyAny>, to: &Bound<'py, PyAny>) -> PyResult<Floats<'py>> {
     let (x_point, to_point) = (variable("x", x)?, variable("to", to)?);
@@ -263,13 +264,13 @@ fn local<'py>(x: &Bound<'py, PyAny>, to: &Bound<'py, PyAny>) -> PyResult<Floats<
     to_array(x.py(), &[delta.len()], delta)
 }
 
-/// Names of the tangent directions.
+/// Returns the names of the tangent directions.
 #[pyfunction]
 fn tangent(x: &Bound<'_, PyAny>) -> PyResult<Vec<&'static str>> {
     Ok(variable("x", x)?.erased().tangent().to_vec())
 }
 
-/// The residual of a factor and its Jacobian by each variable, not whitened.
+/// Returns the residual of a factor and its Jacobian for each variable, not whitened.
 #[pyfunction]
 fn linearize<'py>(
     of: &Bound<'py, PyAny>,
@@ -294,7 +295,7 @@ fn linearize<'py>(
     Ok((to_array(py, &[rows], linearization.residual)?, jacobians))
 }
 
-/// ρ and ρ' of a loss at squared norms of whitened residuals.
+/// Returns ρ and ρ' of a loss at squared norms of whitened residuals.
 #[pyfunction]
 fn rho<'py>(of: &Bound<'py, PyAny>, squared: &Bound<'py, PyAny>) -> PyResult<(Floats<'py>, Floats<'py>)> {
     let (py, of) = (of.py(), loss("loss", of)?);
@@ -304,7 +305,8 @@ fn rho<'py>(of: &Bound<'py, PyAny>, squared: &Bound<'py, PyAny>) -> PyResult<(Fl
     Ok((to_array(py, &squared.shape, rho)?, to_array(py, &squared.shape, weight)?))
 }
 
-/// Checks a factor at random points, as `manifactor check-factor` does: whether it holds, the report as text and as a dict.
+/// Checks a factor at random points, like `manifactor check-factor`. Returns whether its laws hold, and the
+/// report as text and as a dict.
 #[pyfunction]
 #[pyo3(signature = (of, around = None, names = None, points = 256, seed = 0))]
 fn check_factor<'py>(
@@ -316,7 +318,8 @@ fn check_factor<'py>(
 ) -> PyResult<(bool, String, Bound<'py, PyAny>)> {
     use manifactor::testing::{FactorCheck, Subject};
     let (py, of) = (of.py(), factor("factor", of)?);
-    // a function of Python is not in the catalogue: what is asked of the entry is the examples of the variables
+    // a Python function has no entry; any entry will do, because only the examples of the variables are
+    // needed
     let entry = find("factor", of.typetag_name()).or_else(|| find("factor", "expression"));
     let entry = entry.ok_or_else(|| errors::internal("no entry `expression`"))?;
     let mut subject = Subject::around_examples(entry, of).map_err(errors::solve)?;

@@ -1,4 +1,4 @@
-//! Errors as exceptions: `manifactor.errors` has their classes.
+//! Errors as Python exceptions; `manifactor.errors` has the classes.
 use manifactor::config::{Diagnostic, Diagnostics, Fault, ReadError};
 use manifactor_cli::Failure;
 use pyo3::exceptions::PyRuntimeError;
@@ -6,20 +6,20 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 use std::fmt::Display;
 
-/// One thing that is wrong, as `manifactor.errors.Mistake` takes it.
+/// One mistake, as `manifactor.errors.Mistake` takes it.
 pub(crate) struct Mistake {
-    /// An argument, `camera.fx`, or a file.
+    /// The argument, such as `camera.fx`, or the file.
     pub place: String,
     pub message: String,
     pub help: Option<String>,
-    /// Line and column, from 1, of what was read from a file.
+    /// Line and column in the file, from 1.
     pub line: Option<(usize, usize)>,
-    /// A text that it is within, with the characters that are meant.
+    /// The surrounding text, with the start and the number of the wrong characters.
     pub within: Option<(String, usize, usize)>,
 }
 
 impl Mistake {
-    /// At an argument.
+    /// Creates a mistake in an argument.
     pub(crate) fn at(place: impl Into<String>, message: impl Display) -> Self {
         let (place, message) = (place.into(), message.to_string());
         Self { place, message, help: None, line: None, within: None }
@@ -29,7 +29,8 @@ impl Mistake {
         Self { help: Some(help.into()), ..self }
     }
 
-    /// What is wrong with an argument: its sources are named after arguments, see [`crate::input::node`].
+    /// Converts a diagnostic of an argument, whose source has the argument's name (see
+    /// [`crate::input::node`]).
     fn of_argument(diagnostic: &Diagnostic) -> Self {
         let Diagnostic { place, fault, .. } = diagnostic;
         let mut mistake = Self::at(place.source.name(), fault);
@@ -58,7 +59,7 @@ impl Mistake {
     }
 }
 
-/// The exception of a class of `manifactor.errors`.
+/// Creates an exception of a class in `manifactor.errors`.
 fn exception(class: &str, what: &str, mistakes: Vec<Mistake>) -> PyErr {
     let made = Python::attach(|py| {
         let mistakes: Vec<_> = mistakes.into_iter().map(|m| m.into_python(py)).collect::<PyResult<_>>()?;
@@ -68,22 +69,22 @@ fn exception(class: &str, what: &str, mistakes: Vec<Mistake>) -> PyErr {
     made.unwrap_or_else(|error| error)
 }
 
-/// Arguments that are not as they should be: an `ArgumentError`, which is a `ValueError`.
+/// Creates an `ArgumentError`, which is a `ValueError`, for invalid arguments.
 pub(crate) fn arguments(what: &str, mistakes: Vec<Mistake>) -> PyErr {
     exception("ArgumentError", what, mistakes)
 }
 
-/// One argument that is not as it should be.
+/// Creates an `ArgumentError` for one invalid argument.
 pub(crate) fn argument(what: &str, name: &str, message: impl Display) -> PyErr {
     arguments(what, vec![Mistake::at(name, message)])
 }
 
-/// What is wrong with arguments that were read as a document is.
+/// Creates an `ArgumentError` from the diagnostics of arguments that were read like a document.
 pub(crate) fn read(what: &str, diagnostics: &Diagnostics) -> PyErr {
     arguments(what, diagnostics.iter().map(Mistake::of_argument).collect())
 }
 
-/// What is wrong with one row of arguments that are columns.
+/// Creates an `ArgumentError` for one row of arguments that are columns.
 pub(crate) fn row(what: &str, row: usize, error: &ReadError, otherwise: &str) -> PyErr {
     let (fault, place) = (error.fault(), error.place().map_or(otherwise, |place| place.source.name()));
     let mut mistake = Mistake::at(format!("{place}, row {row}"), &fault);
@@ -91,24 +92,26 @@ pub(crate) fn row(what: &str, row: usize, error: &ReadError, otherwise: &str) ->
     arguments(what, vec![mistake])
 }
 
-/// A file that is not as it should be: a `DocumentError`; one that cannot be read, an `OSError` as well.
+/// Creates a `DocumentError` for an invalid file; if the file cannot be read, it is an `OSError` too.
 pub(crate) fn document(diagnostics: &Diagnostics) -> PyErr {
     let unreadable = diagnostics.iter().all(|one| matches!(one.fault, Fault::Unreadable(_)));
     let class = if unreadable { "UnreadableError" } else { "DocumentError" };
     exception(class, "", diagnostics.iter().map(Mistake::of_file).collect())
 }
 
-/// A graph, values and a solver that do not fit each other: a `GraphError`, which is a `ValueError`.
+/// Creates a `GraphError`, which is a `ValueError`, for a graph, values and a solver that do not fit
+/// together.
 pub(crate) fn graph(error: impl Display) -> PyErr {
     exception("GraphError", &error.to_string(), vec![])
 }
 
-/// What could not be done with input that is right: a `SolveError`, which is a `RuntimeError`.
+/// Creates a `SolveError`, which is a `RuntimeError`, for a failure with valid input.
 pub(crate) fn solve(error: impl Display) -> PyErr {
     exception("SolveError", &error.to_string(), vec![])
 }
 
-/// What keeps an experiment from its files: a `SolveError`, and an `OSError` too if a file cannot be written or read.
+/// Creates a `SolveError` for a failed experiment; if a file cannot be read or written, it is an `OSError`
+/// too.
 pub(crate) fn failure(error: impl Into<Failure>) -> PyErr {
     let error = error.into();
     match &error {
@@ -118,7 +121,7 @@ pub(crate) fn failure(error: impl Into<Failure>) -> PyErr {
     }
 }
 
-/// For what cannot happen.
+/// Creates a `RuntimeError` for an internal error.
 pub(crate) fn internal(error: impl Display) -> PyErr {
     PyRuntimeError::new_err(error.to_string())
 }

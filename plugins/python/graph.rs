@@ -20,7 +20,7 @@ pub(crate) use noise::Noise;
 pub(crate) use shared::Shared;
 pub(crate) use values::Values;
 
-/// Factors between named variables, and which variables are held.
+/// Factors between named variables, and the variables that are fixed.
 #[pyclass(module = "manifactor")]
 #[derive(Default)]
 pub(crate) struct Graph(pub Shared<Inner>);
@@ -32,10 +32,11 @@ impl Graph {
         Self::default()
     }
 
-    /// Adds a factor between variables, and returns its place in the graph, from 0.
+    /// Adds a factor between variables, and returns its index in the graph, from 0.
     ///
-    /// `keys` are the names of its variables, in the order of the residual's. `noise` defaults to a standard deviation of 1 in
-    /// every row, `loss` to none, `name`, which reports use, to that of the factor's type.
+    /// `keys` are the names of its variables, in the order of the residual's arguments. `noise` defaults to
+    /// a standard deviation of 1 in every row, `loss` to none, and `name`, which reports use, to the name
+    /// of the factor's type.
     #[pyo3(signature = (keys, factor, *, noise = None, loss = None, name = None))]
     fn add(
         &mut self,
@@ -56,7 +57,7 @@ impl Graph {
         Ok(at)
     }
 
-    /// Adds many factors of one type, and returns the range of their places.
+    /// Adds many factors of one type, and returns the range of their indices.
     #[pyo3(signature = (factor, keys, fields = None, *, prefix = None, noise = None, loss = None))]
     fn add_many(
         &mut self,
@@ -73,12 +74,12 @@ impl Graph {
         let mut noises = noise::Rows::new("add_many", rows, noise)?;
         let mut factors = Factors::new(factor, rows, fields)?;
         let (first, graph) = (self.0.factors().len(), self.0.change("graph")?);
-        // all or none
+        // all factors are added or none
         let mut entries = Vec::with_capacity(rows);
         for (row, keys) in keys.chunks_exact(width.max(1)).enumerate() {
             let (keys, factor, noise) = (keys.to_vec(), factors.row(row)?, noises.row(row)?);
             let entry = FactorEntry { keys, name: None, factor, noise, loss: loss.clone() };
-            // all rows have the same number of keys and the same size of noise
+            // all rows have equal numbers of keys and noise of equal size
             if row == 0 {
                 check(&entry, first)?;
             } else {
@@ -90,7 +91,8 @@ impl Graph {
         Ok((first, first + rows))
     }
 
-    /// Holds a variable at its initial value: all of it, or the directions of its tangent space that are named.
+    /// Fixes a variable at its initial value, either entirely or only in the given directions of its
+    /// tangent space.
     #[pyo3(signature = (key, directions = None))]
     fn fix(&mut self, key: &str, directions: Option<Vec<String>>) -> PyResult<()> {
         let key = crate::input::key("fix", key)?;
@@ -99,13 +101,13 @@ impl Graph {
         Ok(())
     }
 
-    /// Lets a variable move again.
+    /// Removes the constraint of `fix` from a variable.
     fn free(&mut self, key: &str) -> PyResult<()> {
         self.0.change("graph")?.set_fixed(key, Fixed::Whole(false));
         Ok(())
     }
 
-    /// The variables that are held: `True`, or names of directions, by key.
+    /// The fixed variables by key: `True`, or the names of the fixed directions.
     #[getter]
     fn fixed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
         let dict = PyDict::new(py);
@@ -115,17 +117,18 @@ impl Graph {
                 Fixed::Directions(names) => dict.set_item(key.as_str(), names)?,
             }
         }
-        // a change would be lost: `fix` and `free` make it
+        // a change of the copy would be lost; `fix` and `free` make changes
         Ok(PyMappingProxy::new(py, dict.as_mapping()))
     }
 
-    /// Everything that is wrong between the graph and these values; empty where it can be solved.
+    /// Returns all errors of the graph with these values; empty if it can be solved.
     fn check(&self, py: Python<'_>, values: PyRef<'_, Values>) -> PyResult<Vec<String>> {
         let (graph, values) = (&*self.0, &*values.0);
         detach(py, || graph.check(values).iter().map(ToString::to_string).collect())
     }
 
-    /// A copy of the factor at a place, from 0, as it stands in documents: `keys`, `factor`, `noise`, `loss`, `name`.
+    /// A copy of the factor at an index, from 0, as in documents: `keys`, `factor`, `noise`, `loss`,
+    /// `name`.
     fn __getitem__<'py>(&self, py: Python<'py>, at: isize) -> PyResult<Bound<'py, PyAny>> {
         let count = self.0.factors().len();
         let place = if at < 0 { at.checked_add_unsigned(count) } else { Some(at) };
@@ -139,7 +142,7 @@ impl Graph {
         }
     }
 
-    /// The factor at a place, from 0, as an object.
+    /// Returns the factor at an index, from 0, as an object.
     fn factor<'py>(&self, py: Python<'py>, at: usize) -> PyResult<Bound<'py, PyAny>> {
         match self.0.factors().get(at) {
             Some(entry) => What::Factor(entry.factor.clone()).into_python(py),
@@ -147,7 +150,8 @@ impl Graph {
         }
     }
 
-    /// The graph and its values as a document, in `toml`, `json` or `yaml`; `manifactor solve` reads it.
+    /// Returns the graph and its values as a document in `toml`, `json` or `yaml`, which `manifactor solve`
+    /// reads.
     #[pyo3(signature = (values, format = "toml"))]
     fn to_document(&self, py: Python<'_>, values: PyRef<'_, Values>, format: &str) -> PyResult<String> {
         document(py, &self.0, &values.0, format)
@@ -165,7 +169,7 @@ impl Graph {
         Self(self.0.copy())
     }
 
-    /// For `pickle`: its content as bytes.
+    /// For `pickle`: the content as bytes.
     fn __getstate__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         pickled(py, &*self.0)
     }
@@ -191,7 +195,7 @@ impl Graph {
         )
     }
 
-    /// How many factors there are of each type.
+    /// Returns the number of factors of each type.
     fn types(&self) -> BTreeMap<&'static str, usize> {
         let mut types = BTreeMap::new();
         for entry in self.0.factors() {
@@ -201,10 +205,10 @@ impl Graph {
     }
 }
 
-/// A class, its arguments, and a state, as `pickle` makes an object of them.
+/// A class, its arguments, and a state, from which `pickle` creates an object.
 pub(crate) type Reduced<'py> = (Bound<'py, PyAny>, (), Bound<'py, PyBytes>);
 
-/// The content of an object as bytes, to the last bit.
+/// Returns the content of an object as bytes, without rounding.
 pub(crate) fn pickled<'py>(
     py: Python<'py>,
     content: &impl serde::Serialize,
@@ -218,7 +222,8 @@ pub(crate) fn unpickled<T: serde::de::DeserializeOwned>(what: &str, state: &[u8]
     read.map(Shared::from).map_err(|error| errors::argument(what, "state", error))
 }
 
-/// Checks all of a factor that needs no values: the number of its keys, and the size of its noise.
+/// Checks everything about a factor that needs no values: the number of its keys, and the size of its
+/// noise.
 fn check(entry: &FactorEntry, at: usize) -> PyResult<()> {
     let mut found = vec![];
     entry.resolve(at, |_| None, &mut found);
@@ -228,7 +233,7 @@ fn check(entry: &FactorEntry, at: usize) -> PyResult<()> {
     }
 }
 
-/// Checks that a factor has no variable twice.
+/// Checks that a factor names no variable twice.
 fn distinct(entry: &FactorEntry, factor: usize) -> PyResult<()> {
     let is_repeated = |(position, key): &(usize, &Key)| entry.keys.iter().take(*position).any(|k| k == *key);
     match entry.keys.iter().enumerate().find(is_repeated) {
@@ -240,7 +245,7 @@ fn distinct(entry: &FactorEntry, factor: usize) -> PyResult<()> {
     }
 }
 
-/// A table for notebooks.
+/// Returns a table for notebooks.
 pub(crate) fn html(header: &[&str], rows: impl IntoIterator<Item = [String; 2]>) -> String {
     let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
     let header: String = header.iter().map(|cell| format!("<th>{}</th>", escape(cell))).collect();
@@ -251,26 +256,27 @@ pub(crate) fn html(header: &[&str], rows: impl IntoIterator<Item = [String; 2]>)
     format!("<table><tr>{header}</tr>{}</table>", rows.into_iter().map(row).collect::<String>())
 }
 
-/// Factors row by row.
+/// Factors by row.
 enum Factors {
-    /// One for all.
+    /// One factor for all rows.
     Same(Arc<dyn Factor>),
     Read {
         name: String,
         columns: Columns,
     },
-    /// Those of a function of Python.
+    /// Factors of a Python function.
     Python(crate::batch::Rows),
 }
 
 impl Factors {
-    /// By a factor, which is the same for all, or by the name of a type and fields of which arrays are columns.
+    /// Creates the rows from a factor, which is used for all rows, or from the name of a type and fields
+    /// whose arrays are columns.
     fn new(factor: &Bound<'_, PyAny>, rows: usize, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let py = factor.py();
         let name = match factor.extract::<String>() {
             Ok(name) => name,
             Err(_) if factor.hasattr("__manifactor_fields__")? => {
-                // a factor that is written in Python knows its fields, given its constants
+                // a factor written in Python computes its fields from its constants
                 let given = fields.cloned().unwrap_or_else(|| PyDict::new(py));
                 let fields = factor.call_method1("__manifactor_fields__", (given,))?;
                 return Self::read("expression".to_owned(), rows, fields.cast()?);
@@ -318,7 +324,7 @@ fn read(name: &str, columns: &mut Columns, row: usize) -> PyResult<Arc<dyn Facto
     read.map(Arc::from).map_err(|error| errors::row(name, row, &error, "fields"))
 }
 
-/// As many keys as a text or a list names; `None` for all.
+/// Returns the keys in a text or a list; empty for `None`.
 pub(crate) fn optional_keys(what: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Key>> {
     value.map_or(Ok(vec![]), |value| keys(what, value))
 }

@@ -1,4 +1,4 @@
-//! What Python hands over: values as nodes of a document, arrays, keys.
+//! Input from Python: values as nodes of a document, arrays, keys.
 mod arrays;
 mod columns;
 mod keys;

@@ -1,8 +1,9 @@
-//! Manifactor for Python: the native half of the package `manifactor`.
+//! Manifactor for Python: the native part of the package `manifactor`.
 //!
-//! What can be chosen by name crosses the border as it stands in documents, by its type and its fields; arrays of numbers
-//! as arrays of numpy. What is typed, documented or shown is written in Python, in the folder `manifactor` beside this file.
-// strangers' input comes in here: no place of it is taken for granted
+//! Registered types cross the boundary as in documents, by type and fields; arrays of numbers cross it as
+//! NumPy arrays. Type hints, documentation and display are written in Python, in the folder `manifactor`
+//! next to this file.
+// this crate reads untrusted input, so no index may be taken for granted
 #![warn(clippy::indexing_slicing)]
 #![allow(clippy::needless_pass_by_value, reason = "arguments of functions that Python calls are owned")]
 mod batch;
@@ -20,7 +21,7 @@ mod threads;
 
 use pyo3::prelude::*;
 
-/// What the Python modules of the package are made of.
+/// The native items that the Python modules of the package use.
 #[pymodule(gil_used = true)]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -1,4 +1,4 @@
-//! What all parts log, handed to a function of Python.
+//! Forwarding of the log to a Python function.
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::fmt::{Debug, Write};
@@ -11,7 +11,7 @@ use tracing_subscriber::util::SubscriberInitExt;
 
 struct Forward(Py<PyAny>);
 
-/// The message, and the fields behind it.
+/// The message, followed by the fields.
 #[derive(Default)]
 struct Line {
     message: String,
@@ -20,7 +20,7 @@ struct Line {
 
 impl Visit for Line {
     fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
-        // a text takes all that is written into it
+        // writing to a String cannot fail
         let _ = match field.name() {
             "message" => write!(self.message, "{value:?}"),
             name => write!(self.fields, " {name}={value:?}"),
@@ -47,7 +47,7 @@ impl<S: Subscriber> Layer<S> for Forward {
     }
 }
 
-/// Hands all that is logged from a level on to `log(level, target, text)`; once for a process.
+/// Forwards log messages from `level` on to `log(level, target, text)`; works once per process.
 #[pyfunction]
 fn log_to(log: Py<PyAny>, level: u8) -> PyResult<()> {
     let filter = match level {

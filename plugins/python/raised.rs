@@ -1,16 +1,16 @@
-//! What functions of Python raise within a solve, which ends it and is raised once it has ended.
+//! Exceptions of Python functions within a solve. They end the solve and are raised after it.
 use pyo3::prelude::*;
 use std::sync::Mutex;
 
-/// What a function of Python has raised within a solve, until the solve has ended.
+/// The first exception of a Python function since the last call of [`raise`].
 static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
 
-/// Whether a function of Python has raised something since [`raise`] was called.
+/// Returns whether a Python function has raised an exception since [`raise`] was called.
 pub(crate) fn has_raised() -> bool {
     RAISED.lock().is_ok_and(|raised| raised.is_some())
 }
 
-/// Raises what a function of Python has raised.
+/// Raises the stored exception, if there is one.
 pub(crate) fn raise() -> PyResult<()> {
     match RAISED.lock().ok().and_then(|mut raised| raised.take()) {
         Some(error) => Err(error),
@@ -18,7 +18,7 @@ pub(crate) fn raise() -> PyResult<()> {
     }
 }
 
-/// Keeps what was raised until the solve has ended; the first counts.
+/// Stores an exception until the solve has ended; only the first one is kept.
 pub(crate) fn keep(error: PyErr) {
     if let Ok(mut raised) = RAISED.lock() {
         raised.get_or_insert(error);

@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-/// A document from a file, or from JSON in place of one, with overrides.
+/// Opens a document from a file, or from JSON instead, and applies overrides.
 fn open(config: &Path, json: Option<String>, set: &[String]) -> Result<Document, Diagnostics> {
     let mut document = match json {
         Some(text) => Document::parse(config.display().to_string(), text, Format::Json)?,
@@ -26,14 +26,14 @@ fn open(config: &Path, json: Option<String>, set: &[String]) -> Result<Document,
     Ok(document)
 }
 
-/// An experiment, and the text of its document.
+/// Returns an experiment and the text of its document.
 fn opened(config: &Path, json: Option<String>, set: &[String]) -> PyResult<(Experiment, String)> {
     let read = open(config, json, set)
         .and_then(|document| Ok((Experiment::read(&document)?, document.source().text().to_owned())));
     read.map_err(|error| errors::document(&error))
 }
 
-/// A run as JSON: its report, its table and its record; and its page.
+/// A run as JSON: its report, its table and its record; and its page as HTML.
 type Told = (String, String, String, String);
 
 /// Builds, solves and evaluates each variant of a run.
@@ -68,7 +68,8 @@ fn run(
     done.map_err(|error: String| errors::solve(error))
 }
 
-/// Runs the trials of an experiment that are not done yet, writes its tables, pictures and page, and returns the summary as JSON and the folder.
+/// Runs the unfinished trials of an experiment and writes its tables, pictures and page. Returns the
+/// summary as JSON, and the folder.
 #[pyfunction]
 #[pyo3(name = "experiment", signature = (config, json, set, data, out, force, retry_failed, threads, shard = None, progress = None))]
 #[expect(clippy::too_many_arguments, reason = "the arguments of the command")]
@@ -116,7 +117,7 @@ fn experiment_of(
         }
         let threads = threads.unwrap_or_else(rayon::current_num_threads);
         experiment::run(&sweep, &folders, &mut journal, threads, &interrupt, show)?;
-        // a part has no tables
+        // a shard has no tables
         if shard.is_some() {
             return Ok(None);
         }
@@ -128,11 +129,11 @@ fn experiment_of(
     Ok((summary.map_err(errors::internal)?, sweep.output))
 }
 
-/// The trials of an experiment, for a driver that has them run elsewhere.
+/// The trials of an experiment, for a driver that runs them in other processes.
 #[pyclass(module = "manifactor._native")]
 struct Sweep {
     sweep: Experiment,
-    /// Its document.
+    /// Text of the document.
     text: String,
     folders: Folders,
     journal: Option<TrialLog>,
@@ -140,7 +141,7 @@ struct Sweep {
 
 #[pymethods]
 impl Sweep {
-    /// Opens an experiment; the driver has its journal, a worker has none.
+    /// Opens an experiment; the driver owns its journal, a worker has none.
     #[new]
     #[pyo3(signature = (config, json, set, data, out, force, is_driver))]
     fn new(
@@ -167,12 +168,12 @@ impl Sweep {
         Ok(Self { journal: journal.transpose()?, sweep, text, folders })
     }
 
-    /// Opens the trials again that failed before.
+    /// Marks the failed trials as unfinished.
     fn retry_failed(&mut self) {
         self.journal.iter_mut().for_each(TrialLog::retry_failed);
     }
 
-    /// Numbers of the trials that are not done yet.
+    /// Returns the numbers of the unfinished trials.
     fn open(&self) -> Vec<usize> {
         let is_open =
             |trial: &Trial| self.journal.as_ref().is_none_or(|journal| journal.find(trial).is_none());
@@ -191,14 +192,14 @@ impl Sweep {
         serde_json::to_string(&record).map_err(errors::internal)
     }
 
-    /// Keeps a trial that is done: its line of the journal.
+    /// Saves a finished trial, given as its line of the journal.
     fn keep(&mut self, line: &str) -> PyResult<()> {
         let record =
             serde_json::from_str(line).map_err(|error| errors::argument("Sweep.keep", "line", error))?;
         self.journal.as_mut().map_or(Ok(()), |journal| journal.append(record).map_err(errors::failure))
     }
 
-    /// Writes the tables, pictures and page, and returns the summary as JSON and the folder.
+    /// Writes the tables, pictures and page. Returns the summary as JSON, and the folder.
     fn write(&self, py: Python<'_>) -> PyResult<(String, PathBuf)> {
         let journal = self.journal.as_ref().ok_or_else(|| errors::solve("a worker has no journal"))?;
         let written = detach(py, || write_experiment(&self.sweep, journal, &self.text));
@@ -208,7 +209,7 @@ impl Sweep {
     }
 }
 
-/// The command line, the name of the program first; returns the exit code.
+/// Runs a command line, which begins with the name of the program, and returns the exit code.
 #[pyfunction]
 fn main(py: Python<'_>, arguments: Vec<String>) -> PyResult<u8> {
     detach(py, || manifactor_cli::main_with(arguments))

@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
 
-/// A factor of a session.
+/// The id of a factor in a session.
 #[pyclass(module = "manifactor", frozen, eq, hash)]
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct FactorId(InnerId);
@@ -34,13 +34,15 @@ impl FactorId {
     }
 }
 
-/// An incremental smoother: variables and factors come and go, and `update` keeps the estimate up to date.
+/// An incremental smoother: variables and factors are added and removed, and `update` recomputes the
+/// estimate.
 #[pyclass(module = "manifactor")]
 pub(crate) struct Session(Inner);
 
 #[pymethods]
 impl Session {
-    /// An empty session. `settings` are those of the table `online` of a document: `relinearize_every`, `bend`, `window`, …
+    /// Creates an empty session. `settings` are the fields of the table `online` of a document:
+    /// `relinearize_every`, `bend`, `window`, …
     #[new]
     #[pyo3(signature = (**settings))]
     fn new(settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
@@ -55,32 +57,33 @@ impl Session {
         Ok(Self(Inner::new(settings)))
     }
 
-    /// Adds variables with their first values, and factors between any variables, new or not; what the graph holds is held.
-    /// Takes effect at the next update. Returns the factors' ids, in order. Where something is wrong, nothing is added.
+    /// Adds variables with their initial values, and factors between new or existing variables; variables
+    /// that the graph fixes are fixed. Takes effect at the next update. Returns the ids of the factors, in
+    /// order. After an error, nothing is added.
     fn push(&mut self, graph: PyRef<'_, Graph>, values: PyRef<'_, Values>) -> PyResult<Vec<FactorId>> {
         let ids = self.0.push(&graph.0, &values.0).map_err(errors::graph)?;
         Ok(ids.into_iter().map(FactorId).collect())
     }
 
-    /// Takes factors away, with the next update.
+    /// Removes factors at the next update.
     fn remove(&mut self, factors: Vec<Py<FactorId>>) -> PyResult<()> {
         let ids: Vec<InnerId> = factors.iter().map(|id| id.get().0).collect();
         self.0.remove(&ids).map_err(errors::graph)
     }
 
-    /// Lets variables leave: what is known by them stays as a linear prior. With the next update.
+    /// Marginalizes variables at the next update: their information stays as a linear prior.
     fn marginalize(&mut self, keys: &Bound<'_, PyAny>) -> PyResult<()> {
         let keys = self::keys("marginalize", keys)?;
         self.0.marginalize(&keys).map_err(errors::graph)
     }
 
-    /// Sets the time of what comes next, in seconds; for a window by time.
+    /// Sets the time of the next factors and variables, for a window by time. Unit: seconds.
     fn set_time(&mut self, seconds: f64) -> PyResult<()> {
         self.0.set_time(seconds).map_err(errors::graph)
     }
 
-    /// Makes the changes, and brings the estimate up to date. Returns the account of it: `redone`, `relinearized`, `parked`,
-    /// `undetermined` and so on. Where it fails, the session is as it was.
+    /// Applies the changes, and updates the estimate. Returns a report: `redone`, `relinearized`, `parked`,
+    /// `undetermined` and so on. After an error, the session is unchanged.
     fn update<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let inner = &mut self.0;
         let report = detach(py, || inner.update().map_err(|error| error.to_string()))?;
@@ -88,7 +91,7 @@ impl Session {
         to_python(py, &report.map_err(errors::solve)?)
     }
 
-    /// The estimate of a variable, as of the last update.
+    /// The estimate of a variable after the last update.
     fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
         match self.0.estimate(key) {
             Some(value) => What::Variable(value.into()).into_python(py),
@@ -104,13 +107,13 @@ impl Session {
         self.0.variables()
     }
 
-    /// All estimates, in the order in which the variables came.
+    /// All estimates, in the order of insertion.
     #[getter]
     fn values(&self, py: Python<'_>) -> PyResult<Values> {
         Ok(Values(Shared::of("session", detach(py, || self.0.estimates())?)))
     }
 
-    /// ½ Σ ρ at the estimate. It looks at every factor.
+    /// Returns ½ Σ ρ at the estimate. The time is linear in the number of factors.
     fn cost(&mut self, py: Python<'_>) -> PyResult<f64> {
         let inner = &mut self.0;
         let cost = detach(py, || inner.cost())?;
@@ -118,7 +121,8 @@ impl Session {
         Ok(cost)
     }
 
-    /// The joint covariance of a few variables, in the order of `keys` and of their tangent directions.
+    /// Returns the joint covariance of a few variables, in the order of `keys` and of their tangent
+    /// directions.
     fn covariance<'py>(
         &self,
         py: Python<'py>,
@@ -131,18 +135,18 @@ impl Session {
         to_array(py, &[joint.nrows(), joint.ncols()], joint.as_slice().to_vec())
     }
 
-    /// Factors that are rejected as outliers, with the update that rejected them and what they cost.
+    /// Returns the factors rejected as outliers, each with its cost and the update that rejected it.
     fn rejections<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         to_python(py, &self.0.rejections())
     }
 
-    /// The factors that count, as a graph with what is held.
+    /// Returns the active factors as a graph, with its fixed variables.
     fn graph(&self) -> Graph {
         Graph(self.0.graph().0.into())
     }
 
-    /// Solves all that is there as one batch, from the estimate, and returns the values and the account of the solver. The
-    /// session stays as it is.
+    /// Solves the whole graph as one batch from the estimate, and returns the values and the report of the
+    /// solver. The session does not change.
     #[pyo3(signature = (solver = None))]
     fn finish<'py>(
         &self,
@@ -158,20 +162,20 @@ impl Session {
         Ok((Values(finished.values.into()), to_python(py, &finished.outcome)?))
     }
 
-    /// The session as a text, from which `Session.load` goes on, bit for bit.
+    /// Returns the session as a text. `Session.load` restores it bit for bit.
     fn save(&self, py: Python<'_>) -> PyResult<String> {
         detach(py, || self.0.save().map_err(|error| error.to_string()))?.map_err(errors::solve)
     }
 
-    /// A session that was saved.
+    /// Restores a saved session.
     #[staticmethod]
     fn load(py: Python<'_>, text: &str) -> PyResult<Self> {
         let loaded = detach(py, || Inner::load(text).map_err(|error| error.to_string()))?;
         loaded.map(Self).map_err(|error| errors::argument("Session.load", "text", error))
     }
 
-    /// Logs the session in the viewer rerun, or to a `.rrd` file, update by update: what is returned has the `push` and the
-    /// `update` to call from there on.
+    /// Logs the session in the rerun viewer, or to a `.rrd` file, update by update. Call `push` and
+    /// `update` of the returned object instead of the session's.
     #[pyo3(signature = (path = None, *, name = "session", every = 1))]
     fn to_rerun<'py>(
         slf: &Bound<'py, Self>,

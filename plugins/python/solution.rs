@@ -1,4 +1,4 @@
-//! Solving a graph, and what a solution can be asked.
+//! Solving a graph, and the queries of a solution.
 mod account;
 
 use crate::chosen::{solver, start};
@@ -17,10 +17,10 @@ use pyo3::types::{PyDict, PyTuple};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Looks for Ctrl-C, and shows steps to a function of Python, which may end the solve.
+/// Polls Ctrl-C, and reports steps to a Python function, which may end the solve.
 pub(crate) struct Watch {
     observer: Option<Py<PyAny>>,
-    /// What a signal's handler or the function has raised.
+    /// Exception of a signal handler or of the function.
     raised: Option<PyErr>,
 }
 
@@ -29,7 +29,7 @@ impl Watch {
         Self { observer: observer.map(|observer| observer.clone().unbind()), raised: None }
     }
 
-    /// Raises what ended the solve, if something of Python's did.
+    /// Raises the exception that ended the solve, if there is one.
     pub(crate) fn finish(self) -> PyResult<()> {
         self.raised.map_or(Ok(()), Err)?;
         crate::raised::raise()
@@ -53,7 +53,7 @@ impl Observer for Watch {
             py.check_signals()?;
             let Some(observer) = &self.observer else { return Ok(true) };
             let goes_on = observer.bind(py).call1((to_python(py, record)?,))?;
-            // a function that returns nothing has nothing against it
+            // a function that returns None does not end the solve
             Ok(goes_on.is_none() || goes_on.is_truthy()?)
         });
         self.flow(looked)
@@ -65,21 +65,23 @@ impl Observer for Watch {
     }
 }
 
-/// An estimate, and how it came about.
+/// An estimate and the report of its solve.
 #[pyclass(module = "manifactor", frozen)]
 pub(crate) struct Solution {
     inner: Inner,
-    /// As it was solved: changes of the program's graph leave it alone.
+    /// The graph as it was solved; later changes of the program's graph do not affect it.
     graph: Arc<InnerGraph>,
     values: Arc<InnerValues>,
-    /// The account of the solver; that of `inner` is another one in a solution that was pickled.
+    /// Report of the solver. In an unpickled solution, the report in `inner` is different.
     account: Account,
 }
 
-/// Solves a graph from these values. Returns a solution however the solve ends: `solution.converged` tells.
+/// Solves a graph from these values. Always returns a solution; `solution.converged` is true if the solve
+/// reached a minimum.
 ///
-/// `solver` defaults to `auto`, `start` to the values as they are. `observer` is called with a dict after each step that was
-/// tried, and ends the solve where it returns `False`. Other threads of Python run meanwhile, and Ctrl-C interrupts.
+/// `solver` defaults to `auto`, and `start` to the given values. `observer` is called with a dict after
+/// each attempted step, and ends the solve by returning `False`. Other Python threads run meanwhile, and
+/// Ctrl-C interrupts the solve.
 #[pyfunction]
 #[pyo3(signature = (graph, values, solver = None, *, start = None, observer = None))]
 fn solve(
@@ -109,25 +111,25 @@ fn solve(
 
 #[pymethods]
 impl Solution {
-    /// The estimate: the best values found, however the solve ended.
+    /// The best values found, independent of the termination.
     #[getter]
     fn values(&self) -> Values {
         Values(Shared::of("solution", self.values.clone()))
     }
 
-    /// The graph that was solved, as it was then.
+    /// The graph that was solved, without later changes.
     #[getter]
     fn graph(&self) -> Graph {
         Graph(Shared::of("solution", self.graph.clone()))
     }
 
-    /// Whether the values are a minimum, to a tolerance.
+    /// True if the values are a minimum within the tolerances.
     #[getter]
     fn converged(&self) -> bool {
         self.account.converged
     }
 
-    /// How the solve ended, in words.
+    /// The termination in words.
     #[getter]
     fn termination(&self) -> String {
         self.account.termination.clone()
@@ -139,13 +141,13 @@ impl Solution {
         self.account.final_cost
     }
 
-    /// The same at the values that the solve began with.
+    /// ½ Σ ρ(‖r‖²) at the initial values.
     #[getter]
     fn initial_cost(&self) -> f64 {
         self.account.initial_cost
     }
 
-    /// Linearizations that were followed by a step.
+    /// Number of linearizations that were followed by a step.
     #[getter]
     fn iterations(&self) -> usize {
         self.account.iterations
@@ -157,27 +159,28 @@ impl Solution {
         json_to_python(py, &parsed(&self.account.times)?)
     }
 
-    /// All that the solver has to tell, as a dict: `termination`, `undetermined`, `rejected`, `history` and so on.
+    /// The full report of the solver as a dict: `termination`, `undetermined`, `rejected`, `history` and so
+    /// on.
     #[getter]
     fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json_to_python(py, &parsed(&self.account.outcome)?)
     }
 
-    /// What each factor costs at the estimate, in the order of the graph, shape (factors,).
+    /// Cost of each factor at the estimate, in the order of the graph, shape (factors,).
     #[getter]
     fn costs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let costs = self.inner.factors.iter().map(|f| f.cost).collect();
         frozen(to_array(py, &[self.inner.factors.len()], costs)?)
     }
 
-    /// How much each factor counts, by its loss, shape (factors,); 1 without a loss.
+    /// Weight of each factor from its loss, shape (factors,); 1 without a loss.
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let weights = self.inner.factors.iter().map(|f| f.weight).collect();
         frozen(to_array(py, &[self.inner.factors.len()], weights)?)
     }
 
-    /// The residual of a factor at the estimate, not whitened, shape (rows,).
+    /// Returns the residual of a factor at the estimate, not whitened, shape (rows,).
     fn residual<'py>(&self, py: Python<'py>, factor: usize) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         match self.inner.factors.get(factor) {
             Some(state) => to_array(py, &[state.residual.len()], state.residual.clone()),
@@ -185,8 +188,8 @@ impl Solution {
         }
     }
 
-    /// Marginal covariances at the estimate, by key: of the variables that are named, or of all. Rows and columns are the
-    /// tangent directions of the variable, in their order and units.
+    /// Returns marginal covariances at the estimate by key, of the given variables or of all. Rows and
+    /// columns are the tangent directions of the variable, in their order and units.
     #[pyo3(signature = (keys = None))]
     fn covariances<'py>(
         &self,
@@ -208,7 +211,8 @@ impl Solution {
         Ok(dict)
     }
 
-    /// The joint covariance of a few variables at the estimate, in the order of `keys` and of their tangent directions.
+    /// Returns the joint covariance of a few variables at the estimate, in the order of `keys` and of their
+    /// tangent directions.
     fn joint_covariance<'py>(
         &self,
         py: Python<'py>,
@@ -224,7 +228,8 @@ impl Solution {
         to_array(py, &[joint.nrows(), joint.ncols()], joint.as_slice().to_vec())
     }
 
-    /// What is worth a look: the factors that cost the most, the condition of the linear system, what nothing constrains.
+    /// Returns the factors with the largest cost, the condition of the linear system, and the unconstrained
+    /// directions.
     fn diagnosis<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let diagnosis = detach(py, || self.inner.diagnose(&self.graph).map_err(|error| error.to_string()))?;
         let json = serde_json::to_value(diagnosis.map_err(errors::solve)?).map_err(errors::internal)?;
@@ -239,7 +244,7 @@ impl Solution {
         slf.clone()
     }
 
-    /// For `pickle`: its graph, its values, its account, and the states and weights of its factors.
+    /// For `pickle`: the graph, the values, the report, and the states and weights of the factors.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (own, py) = (slf.get(), slf.py());
         let states: Vec<State> = own.inner.factors.iter().cloned().map(Into::into).collect();
@@ -261,7 +266,8 @@ impl Solution {
         let (mut graph, values) = (graph.0.snapshot(), values.0.snapshot());
         let inner = detach(py, || restored(&graph, &values, states, weights))?.map_err(errors::graph)?;
         if !inner.weights.is_empty() {
-            // the problem of `inner` knows no weights: a graph of another version has it compiled again with them
+            // the problem of `inner` lacks the weights; a graph of another version makes it compile again
+            // with them
             Arc::make_mut(&mut graph).factors_mut();
         }
         Ok(Self { inner, graph, values, account })

@@ -1,7 +1,8 @@
 //! Threads in forked processes.
 //!
-//! A fork copies one thread. The pool that the parent has computed with has no threads in the child, and a solve that
-//! waits for it never ends. A process that was forked after its parent has computed gets a pool of one for each calling thread.
+//! A fork copies only the calling thread. The parent's thread pool has no threads in the child, so a solve
+//! that waits for the pool never ends. If a process was forked after its parent has computed, each calling
+//! thread gets a pool with one thread.
 use pyo3::exceptions::PyRuntimeWarning;
 use pyo3::marker::Ungil;
 use pyo3::prelude::*;
@@ -14,20 +15,21 @@ static OWNER: AtomicU32 = AtomicU32::new(0);
 static HAS_WARNED: AtomicBool = AtomicBool::new(false);
 
 thread_local! {
-    /// True if this thread has a pool of its own. A fork copies it.
+    /// True if this thread has a separate pool. A fork copies it.
     static IS_ALONE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Computes without the interpreter's lock, on threads that this process has.
+/// Computes without the interpreter's lock, on threads of this process.
 ///
 /// # Errors
-/// A warning that the user has made an error, and a pool that cannot be built.
+/// If the user turns the warning into an error, or if the pool cannot be built.
 pub(crate) fn detach<T: Ungil>(py: Python<'_>, work: impl Ungil + FnOnce() -> T) -> PyResult<T> {
     prepare(py)?;
     Ok(py.detach(work))
 }
 
-/// Gives the calling thread a pool of one if the threads of the global pool belong to another process.
+/// Gives the calling thread a pool of one thread if the threads of the global pool belong to another
+/// process.
 fn prepare(py: Python<'_>) -> PyResult<()> {
     let own = std::process::id();
     let is_owner = match OWNER.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
@@ -38,7 +40,7 @@ fn prepare(py: Python<'_>) -> PyResult<()> {
         return Ok(());
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
-    // it ends with the thread: without it, the thread would wait for the pool of the parent
+    // the pool ends with the thread; if it were dropped, the thread would wait for the pool of the parent
     std::mem::forget(pool.map_err(crate::errors::solve)?);
     IS_ALONE.set(true);
     if HAS_WARNED.swap(true, Ordering::Relaxed) {

@@ -1,4 +1,4 @@
-//! What is known of an ellipsoid: its box in an image, its orientation, its size.
+//! Factors of ellipsoids: boxes in images, orientation, depth and size.
 mod bounding_box;
 mod centroid_depth;
 mod orientation;

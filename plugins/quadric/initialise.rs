@@ -1,5 +1,5 @@
-//! First estimates of objects from the boxes that show them. Chosen by name: `svd`, `rays`, `depth`,
-//! and `first_of` several.
+//! Initial estimates of objects from bounding boxes, selected by name: `svd`, `rays`, `depth`, and `first_of`
+//! several.
 mod depth;
 mod first_of;
 mod rays;
@@ -20,128 +20,130 @@ pub use first_of::FirstOf;
 pub use rays::Rays;
 pub use svd::Svd;
 
-/// A way to a first estimate of an object.
+/// A method for the initial estimate of an object.
 #[typetag::serialize(tag = "type")]
 pub trait Initialiser: Debug + Send + Sync {
-    /// An object that all views show, in the frame of their poses.
+    /// Estimates an object that is visible in all views, in the frame of their poses.
     ///
     /// # Errors
-    /// If the views do not say enough, or what they say is no object in front of them.
+    /// If the views do not determine the object, or if the result is not an object in front of all cameras.
     fn initialise(&self, views: &[View]) -> Result<DualQuadric, InitialiseError>;
 }
 
 manifactor_graph::kind!(dyn Initialiser, "initialiser");
 
-/// One box that shows the object, and where it was seen from.
+/// A bounding box of the object, with the pose and the calibration of the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// The pose of the camera.
+    /// Pose of the camera.
     pub world_from_camera: Se3,
-    /// The camera.
+    /// Calibration of the camera.
     pub camera: Camera,
-    /// The box, in pixels.
+    /// Bounding box, in pixels.
     pub bounding_box: BoundingBox,
-    /// Which of its sides xmin, ymin, xmax, ymax are the object's own; the others are the border's.
+    /// Which of the sides xmin, ymin, xmax, ymax belong to the object; the remaining sides are cut by the
+    /// image border.
     pub observed: [bool; 4],
-    /// How far away the object's surface is in the middle of the box, in metres along the optical axis.
+    /// Depth of the object's surface at the centre of the box, in metres along the optical axis.
     pub depth: Option<f64>,
 }
 
-/// Why an object could not be had from its views. Views count from 0.
+/// The reason why an object could not be initialized. Views count from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InitialiseError {
-    /// Not enough of them.
+    /// There are not enough views.
     #[error("{found} views, {needed} are needed")]
     TooFewViews {
-        /// How many there are.
+        /// The number of views.
         found: usize,
-        /// How many there should be.
+        /// The minimum number of views.
         needed: usize,
     },
-    /// The border cuts off too much of the boxes.
+    /// The image border cuts off too many sides of the boxes.
     #[error("{found} of the boxes' sides are inside of the image, {needed} are needed")]
     TooFewSides {
-        /// How many there are.
+        /// The number of sides.
         found: usize,
-        /// How many there should be.
+        /// The minimum number of sides.
         needed: usize,
     },
     /// No view has a depth above zero.
     #[error("no view has a depth")]
     NoDepth,
-    /// A pose or a depth that is not a number.
+    /// A pose or a depth is not finite.
     #[error("view {view} has a pose or a depth that is not finite")]
     NotFinite {
-        /// The view.
+        /// Index of the view.
         view: usize,
     },
-    /// All views look along nearly the same line.
+    /// All views have nearly parallel lines of sight.
     #[error("the largest angle between two lines of sight is {degrees:.2}°, {needed}° are needed")]
     TooLittleParallax {
-        /// The largest angle between the lines of sight of two views.
+        /// Largest angle between the lines of sight of two views, in degrees.
         degrees: f64,
-        /// How large it should be.
+        /// Minimum angle, in degrees.
         needed: f64,
     },
-    /// The equations have no solution of their own.
+    /// The equations have no unique solution.
     #[error("the views leave the object undetermined")]
     Undetermined,
-    /// The surface that fits the views best is none.
+    /// The best-fitting surface is not an ellipsoid.
     #[error(transparent)]
     NotAnEllipsoid(#[from] NotAnEllipsoid),
-    /// The object came out behind one of the cameras.
+    /// The estimated object is behind a camera.
     #[error("the object came out behind the camera of view {view}")]
     Behind {
-        /// The view.
+        /// Index of the view.
         view: usize,
     },
-    /// The object came out around one of the cameras.
+    /// The estimated object contains a camera.
     #[error("the object came out around the camera of view {view}")]
     Around {
-        /// The view.
+        /// Index of the view.
         view: usize,
     },
-    /// The object came out beside one of the cameras, across its plane.
+    /// The estimated object is beside a camera, across its plane.
     #[error("the outline of the object in view {view} is no ellipse")]
     NotAnEllipse {
-        /// The view.
+        /// Index of the view.
         view: usize,
     },
-    /// None of several ways succeeded.
+    /// All of several methods failed.
     #[error("{}", .0.iter().map(|(name, error)| format!("{name}: {error}")).collect::<Vec<_>>().join("; "))]
     All(Vec<(&'static str, InitialiseError)>),
 }
 
 impl View {
-    /// A box with all its sides, without depth.
+    /// Creates a view with all sides observed and without depth.
     pub fn new(world_from_camera: Se3, camera: Camera, bounding_box: BoundingBox) -> Self {
         Self { world_from_camera, camera, bounding_box, observed: [true; 4], depth: None }
     }
-    /// Lines of the observed sides.
+    /// Returns the lines of the observed sides.
     fn lines(&self) -> impl Iterator<Item = Vector3<f64>> + use<> {
         let lines = self.bounding_box.lines().into_iter().zip(self.observed);
         lines.filter_map(|(line, observed)| observed.then_some(line))
     }
-    /// Lines through the middle of the box, from side to side; of those axes that have both.
+    /// Returns the lines through the centre of the box, for each image axis with both sides observed.
     fn middle_lines(&self) -> impl Iterator<Item = Vector3<f64>> + use<> {
         let middle = self.bounding_box.centre();
         let vertical = (self.observed[0] && self.observed[2]).then(|| Vector3::new(1.0, 0.0, -middle.x));
         let horizontal = (self.observed[1] && self.observed[3]).then(|| Vector3::new(0.0, 1.0, -middle.y));
         vertical.into_iter().chain(horizontal)
     }
-    /// The unit normal, in the world's frame, of the plane through the camera and a line in its image.
+    /// Returns the unit normal, in the world frame, of the plane through the camera centre and a line in its
+    /// image.
     fn normal(&self, line: &Vector3<f64>) -> Vector3<f64> {
         self.world_from_camera.rotation.act(&self.camera.matrix().tr_mul(line).normalize())
     }
-    /// The direction of sight of the middle of the box, in the world's frame.
+    /// Returns the viewing direction of the box centre, in the world frame.
     fn sight(&self) -> Vector3<f64> {
         let ray = self.camera.ray(self.bounding_box.centre());
         self.world_from_camera.rotation.act(&ray.normalize())
     }
 }
 
-/// The largest angle between the lines of sight of two views, in degrees; 0 for fewer than two.
+/// Returns the largest angle between the lines of sight of two views, in degrees; 0 for fewer than two.
 pub fn parallax(views: &[View]) -> f64 {
     let sights: Vec<_> = views.iter().map(View::sight).collect();
     let pairs = sights.iter().enumerate().flat_map(|(i, a)| sights[..i].iter().map(move |b| a.dot(b)));
@@ -153,7 +155,7 @@ fn check_parallax(views: &[View], needed: f64) -> Result<(), InitialiseError> {
     if degrees >= needed { Ok(()) } else { Err(InitialiseError::TooLittleParallax { degrees, needed }) }
 }
 
-/// Enough views, all of numbers.
+/// Checks that there are enough views and that all numbers are finite.
 fn check_views(views: &[View], needed: usize) -> Result<(), InitialiseError> {
     if views.len() < needed {
         return Err(InitialiseError::TooFewViews { found: views.len(), needed });
@@ -165,7 +167,7 @@ fn check_views(views: &[View], needed: usize) -> Result<(), InitialiseError> {
     }
 }
 
-/// That every view sees all of the object in front of it.
+/// Checks that the whole object is in front of every camera.
 fn check_visible(quadric: &DualQuadric, views: &[View]) -> Result<(), InitialiseError> {
     for (view, seen_by) in views.iter().enumerate() {
         let pose = &seen_by.world_from_camera;

@@ -1,4 +1,4 @@
-//! Objects as constrained dual quadrics, and the factors that see and orient them.
+//! Objects as constrained dual quadrics, and factors that measure and orient them.
 mod factors;
 mod functions;
 pub mod initialise;

@@ -1,4 +1,4 @@
-//! Strategies for quadrics and for views of them, with the places where formulas tend to break.
+//! Strategies for quadrics and their views, including the cases that tend to break formulas.
 use crate::{AxisOrder, Camera, DualQuadric, Ellipsoid, SemiAxes};
 use manifactor_geometry::testing::{any_se3, any_so3, se3_tangent};
 use manifactor_geometry::{Se3, So3};
@@ -6,7 +6,8 @@ use manifactor_testing::register_points;
 use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
 
-// what the checks of all factors draw from; singular: along the axes, lying, and two or all of the semi-axes equal
+// Samples for the checks of all factors. The singular cases: aligned with the axes, lying, and two or all
+// semi-axes equal.
 register_points!(
     DualQuadric,
     any_quadric(),
@@ -19,12 +20,12 @@ register_points!(
     ]
 );
 
-/// At the origin, with its axes along the coordinates'.
+/// A quadric at the origin, aligned with the coordinate axes.
 fn shaped(semi_axes: [f64; 3]) -> DualQuadric {
     DualQuadric { pose: Se3::identity(), semi_axes: semi_axes.into() }
 }
 
-/// Semi-axes from 1 cm to 10 m; now and then two or all of them equal.
+/// Semi-axes from 1 cm to 10 m; sometimes two or all of them are equal.
 pub fn any_semi_axes() -> impl Strategy<Value = Vector3<f64>> + Clone {
     let lengths = proptest::array::uniform3(-4.6..2.3f64).prop_map(|s| Vector3::from(s).map(f64::exp));
     (lengths, 0..10).prop_map(|(s, kind)| match kind {
@@ -39,7 +40,7 @@ pub fn any_quadric() -> impl Strategy<Value = DualQuadric> + Clone {
     (any_se3(), any_semi_axes()).prop_map(|(pose, semi_axes)| DualQuadric { pose, semi_axes })
 }
 
-/// Quadrics whose semi-axes differ by 5 % and more, so that none changes places with another nearby.
+/// Quadrics whose semi-axes differ by more than 5 %, so that small steps do not change their order.
 pub fn unequal_quadric() -> impl Strategy<Value = DualQuadric> + Clone {
     any_quadric().prop_filter("equal semi-axes", |q| {
         let s = &q.semi_axes;
@@ -47,14 +48,14 @@ pub fn unequal_quadric() -> impl Strategy<Value = DualQuadric> + Clone {
     })
 }
 
-/// The usual semi-axes of a class, and how they are compared.
+/// Usual semi-axes of a class, and the order of the comparison.
 pub fn usual() -> impl Strategy<Value = (SemiAxes, AxisOrder)> {
     let lengths =
         prop::array::uniform3(0.01..2.0).prop_filter_map("semi-axes", |s| SemiAxes::new(s.into()).ok());
     (lengths, prop_oneof![Just(AxisOrder::Sorted), Just(AxisOrder::AsGiven)])
 }
 
-/// A bottle of half a metre whose long axis, its own z, leans by an angle in radians from the vertical.
+/// A bottle, one metre long, whose major axis, the local z, leans by an angle in radians from the vertical.
 pub fn tilted(tilt: f64) -> DualQuadric {
     let rotation = So3::exp(&Vector3::new(tilt, 0.0, 0.0));
     DualQuadric {
@@ -63,13 +64,13 @@ pub fn tilted(tilt: f64) -> DualQuadric {
     }
 }
 
-/// Tangent vectors inside of the chart.
+/// Tangent vectors inside the chart.
 pub fn quadric_tangent() -> impl Strategy<Value = SVector<f64, 9>> + Clone {
     (se3_tangent(), proptest::array::uniform3(-2.0..2.0f64))
         .prop_map(|(xi, log)| SVector::from_fn(|i, _| if i < 6 { xi[i] } else { log[i - 6] }))
 }
 
-/// Cameras of usual images, one in five with skew.
+/// Cameras of common images, one in five with skew.
 pub fn any_camera() -> impl Strategy<Value = Camera> + Clone {
     let sizes = prop_oneof![Just((640u32, 480u32)), Just((752, 480)), Just((1280, 720))];
     let skew = prop_oneof![4 => Just(0.0), 1 => -20.0..20.0];
@@ -79,8 +80,8 @@ pub fn any_camera() -> impl Strategy<Value = Camera> + Clone {
     })
 }
 
-/// An object in front of a camera: most of them at the size of things on a desk, some that nearly touch
-/// the camera's plane, some flat, some tiny.
+/// An object in front of a camera: most are desk-sized, some nearly touch the camera's plane, some are flat,
+/// some tiny.
 pub fn any_view() -> impl Strategy<Value = (Camera, Se3, DualQuadric)> + Clone {
     let at = (-0.7..0.7, -0.6..0.6, 0.3..20.0)
         .prop_map(|(x, y, z): (f64, f64, f64)| Vector3::new(x * z, y * z, z));
@@ -89,7 +90,7 @@ pub fn any_view() -> impl Strategy<Value = (Camera, Se3, DualQuadric)> + Clone {
         1 => Vector3::new(s[0], s[1], 1e-3),
         _ => Vector3::from(s),
     });
-    // the largest possible depth of the object, as a share of its distance
+    // Largest possible depth of the object, as a share of its distance.
     let share = prop_oneof![6 => 0.01..0.6, 1 => Just(0.999), 1 => Just(1e-4)];
     (any_camera(), any_se3(), any_so3(), at, shape, share).prop_map(
         |(camera, pose, rotation, at, shape, share)| {

@@ -1,4 +1,4 @@
-//! Where objects are with respect to planes, points and each other.
+//! Arrangement of objects relative to planes, points and each other.
 mod beside;
 mod collinear;
 mod on_object;

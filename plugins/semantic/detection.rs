@@ -1,4 +1,4 @@
-//! Other residuals of a detected box than its sides.
+//! Further residuals of detections in an image.
 mod conic_distance;
 mod tangent_planes;
 

@@ -1,4 +1,4 @@
-//! Directions, and what they have to do with gravity and with each other.
+//! Directions, and their relation to gravity and to each other.
 mod accelerometer;
 pub(crate) mod axis;
 mod parallel;

@@ -1,10 +1,10 @@
-//! What formulas know of planes.
+//! Functions of planes for formulas.
 use crate::{Plane, PlaneOf};
 use manifactor_graph::quantity::{Quantity, Shape};
 use manifactor_graph::{Scalar, register_functions, register_quantity};
 use nalgebra::Vector3;
 
-/// The normal, then the offset.
+/// Storage order: the normal, then the offset.
 impl Quantity for Plane {
     const SHAPE: Shape = Shape { name: "plane", size: 4 };
     type Of<T: Scalar> = PlaneOf<T>;
@@ -19,12 +19,12 @@ impl Quantity for Plane {
 register_quantity!(Plane);
 
 register_functions! {
-    /// The normal of a plane, a unit vector.
+    /// The unit normal of a plane.
     fn normal(plane: Plane) -> Vector3<f64> { plane.normal }
 
-    /// How far a plane is from the origin along its normal.
+    /// The distance of a plane from the origin along its normal.
     fn offset(plane: Plane) -> f64 { plane.offset }
 
-    /// How far a point is above a plane, along its normal.
+    /// The height of a point above a plane, along its normal.
     fn height(plane: Plane, p: Vector3<f64>) -> f64 { plane.height(&p) }
 }

@@ -1,7 +1,7 @@
-//! What is known of objects, as factors: what they rest on, how they stand to one another, what they may be.
+//! Semantic factors of objects: support, arrangement, orientation and mixtures.
 //!
-//! Beyond the orientations and sizes of `manifactor-quadric`, and with planes and directions as variables of their own. A
-//! factor is a file.
+//! They add to the orientation and size factors of `manifactor-quadric`, with planes and directions as
+//! additional variables. One file per factor.
 mod arrangement;
 mod detection;
 mod directions;

@@ -1,4 +1,4 @@
-//! An object that may be one thing or another: the best of several factors.
+//! Mixtures: the best of several factors, for objects or data associations that are ambiguous.
 use manifactor_graph::catalogue::{self, Kind, Signature};
 use manifactor_graph::checked::Positive;
 use manifactor_graph::noise::NoiseError;
@@ -12,18 +12,21 @@ use serde::{Deserialize, Serialize};
 use std::any::{Any, TypeId};
 use std::sync::Arc;
 
-/// The factor that fits best, of several: ½|r|² = minₖ ½|Wₖ rₖ|² + ln(w_max / wₖ)   (Olson and Agarwal 2013).
+/// The best of several factors: ½|r|² = minₖ ½|Wₖ rₖ|² + ln(w_max / wₖ)   (Olson and Agarwal 2013).
 ///
-/// A detection that may be a chair or a box brings the factors of both, weighted by the detector's scores; the estimate
-/// decides, and decides again at each step. A component without a factor means none of them, at a price: an outlier. wₖ is the factor before
-/// exp(-½|Wₖ rₖ|²), so components of different dimensions are compared by what they cost, not by how narrow they are. Rows: √(2 ln(w_max/wₖ)),
-/// then the whitened rows of the component; zeros, where it has fewer than another.
+/// A detection that may be a chair or a box adds the factors of both, weighted by the detector's scores. The
+/// solver selects the best component again at each step. A component without a factor is the null hypothesis,
+/// an outlier, at a fixed cost. wₖ is the weight in front of exp(-½|Wₖ rₖ|²), so components of different
+/// dimensions are compared by their cost, not by their sigmas. Rows: √(2 ln(w_max/wₖ)), then the whitened
+/// rows of the component, padded with zeros to the longest component.
 ///
-/// Components may be over different variables: `over` says which of the mixture's, as a box may show the one object or the other.
+/// Components may use different variables: `over` lists the variables of the mixture that a component uses.
+/// An example is a box that may show either of two objects.
 ///
-/// The cost is continuous; where the best component changes, the rows jump. A component that is not defined takes no
-/// part; where none is, the mixture is not defined. It has noise of its own in each component: leave out `noise` beside it.
-/// Evaluating allocates a little for each component: it is for priors on objects, and for some boxes, not for each measurement.
+/// The cost is continuous; the rows jump when a different component becomes the best. A component that is not
+/// defined is skipped; if none is defined, the mixture is not defined. Each component has a noise model, so
+/// omit `noise` next to the mixture. Each evaluation allocates some memory per component. Use mixtures for
+/// priors on objects and for ambiguous boxes, not for every measurement.
 ///
 /// ```toml
 /// [[factors]]
@@ -38,7 +41,7 @@ use std::sync::Arc;
 /// ]
 /// ```
 ///
-/// A box from x0 that shows q0, or q1 half as likely:
+/// A box from x0 that shows either q0 or, half as likely, q1:
 ///
 /// ```toml
 /// [[factors]]
@@ -63,83 +66,86 @@ pub struct MaxMixture {
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "MaxMixture")]
 struct Document {
-    /// What it may be: two or more.
+    /// Alternatives: two or more.
     components: Vec<Component>,
 }
 
-/// One of the things that it may be.
+/// One alternative of a mixture.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Component {
-    /// How likely it is, relative to the others.
+    /// Likelihood relative to the remaining components.
     pub weight: Positive,
-    /// The factor that holds then. Default: none.
+    /// Factor of this alternative. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub factor: Option<Arc<dyn Factor>>,
-    /// Which of the mixture's variables the factor is over, in its order: places among `keys`, from 0. Default: all of them.
+    /// Variables that the factor uses, as indices into `keys` from 0, in the order of the factor. Default:
+    /// all of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub over: Option<Vec<usize>>,
-    /// What the factor's residual is measured in.
+    /// Noise model of the factor's residual.
     #[serde(default, skip_serializing_if = "Noise::is_default")]
     pub noise: Noise,
 }
 
-/// Why components make no mixture.
+/// The reason why components do not form a mixture.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MixtureError {
-    /// Nothing to choose from.
+    /// There are fewer than two components.
     #[error("expected two components or more, got {0}; one alone is a factor")]
     TooFew(usize),
-    /// None of them says anything.
+    /// No component has a factor.
     #[error("none of the components has a factor")]
     NoFactor,
-    /// Components that do not agree what a variable is.
+    /// Two components use one variable with different types.
     #[error(
         "component {component} has a {found} at place {place}, where another one has a {expected}: `over` says which variables a component is over"
     )]
     Variables {
-        /// Which one, from 0.
+        /// Index of the component, from 0.
         component: usize,
-        /// Of the mixture's variables, from 0.
+        /// Index among the mixture's variables, from 0.
         place: usize,
-        /// What it has there.
+        /// Type in this component.
         found: &'static str,
-        /// What another one has.
+        /// Type in another component.
         expected: &'static str,
     },
-    /// A component whose factor is not over as many variables as it says, or over one of them twice.
+    /// The length of `over` differs from the number of the factor's variables, or an index occurs twice.
     #[error(
         "component {component}: its factor is over {found}; expected as many different places in `over`, got {over:?}"
     )]
     Over {
-        /// Which one, from 0.
+        /// Index of the component, from 0.
         component: usize,
-        /// Its variables.
+        /// Types of the factor's variables.
         found: String,
-        /// What it says.
+        /// The given indices.
         over: Vec<usize>,
     },
-    /// A variable that no component is over.
+    /// No component uses a variable.
     #[error("no component is over variable {place}, but there is one at a later place")]
     Unused {
-        /// From 0.
+        /// Index of the variable, from 0.
         place: usize,
     },
-    /// Noise of another size than its factor.
+    /// The noise model does not match the rows of the factor.
     #[error("component {component}: {error}")]
     Noise {
-        /// Which one, from 0.
+        /// Index of the component, from 0.
         component: usize,
-        /// What is wrong.
+        /// The error of the noise model.
         error: NoiseError,
     },
-    /// Too many rows.
+    /// The mixture has too many rows.
     #[error("{0}; a mixture has one row more than its longest component")]
     Rows(#[from] WrongRows),
 }
 
 impl MaxMixture {
+    /// Creates a mixture from its components.
+    ///
     /// # Errors
     /// If the components do not fit together.
     pub fn new(components: Vec<Component>) -> Result<Self, MixtureError> {
@@ -163,7 +169,8 @@ impl From<MaxMixture> for Document {
 
 #[typetag::serialize(name = "max_mixture")]
 impl Factor for MaxMixture {
-    // inlined, the loops over its factors would be compiled again in each crate that makes one
+    // Not inlined, as the loops over the factors would be compiled again in each crate that creates a
+    // mixture.
     #[inline(never)]
     fn erased(&self) -> &dyn ErasedResidual {
         &self.mixture
@@ -182,7 +189,7 @@ impl Factor for MaxMixture {
 }
 register!(dyn Factor, "max_mixture", MaxMixture);
 
-/// What runs.
+/// The compiled mixture.
 #[derive(Debug, Clone)]
 struct Mixture {
     parts: Arc<[Part]>,
@@ -194,12 +201,12 @@ struct Mixture {
 
 #[derive(Debug)]
 struct Part {
-    /// √(2 ln(w_max / w)).
+    /// First row of the residual if this component is selected: √(2 ln(w_max / w)).
     price: f64,
     factor: Option<Weighted>,
 }
 
-/// A component's factor, its whitening, and which of the mixture's variables it is over.
+/// Factor of a component, its whitening matrix, and the indices of the variables that it uses.
 #[derive(Debug)]
 struct Weighted {
     factor: Arc<dyn Factor>,
@@ -252,7 +259,7 @@ impl Mixture {
             Some(((entry.signature)().tangent.len(), as_variable(*id)?))
         };
         let known: Option<Vec<_>> = types.iter().map(dimension).collect();
-        // what is registered as a factor is over registered manifolds
+        // A registered factor uses only registered manifolds.
         let (dimensions, casts) = known.unwrap_or_default().into_iter().unzip();
         let rows = parts.iter().filter_map(|part| part.factor.as_ref()).map(|of| of.whitening.nrows());
         let rows = 1 + rows.max().unwrap_or(0);
@@ -263,7 +270,8 @@ impl Mixture {
         variables.iter().zip(&self.casts).filter_map(|(x, to)| (to.cast)(*x)).collect()
     }
 
-    /// The component that costs the least, with its whitened residual; `None` where none is defined.
+    /// Returns the component with the lowest cost and its whitened residual; `None` if no component is
+    /// defined.
     fn best(&self, x: &[&dyn Variable]) -> Option<(&Part, DVector<f64>)> {
         let costs = self.parts.iter().filter_map(|part| {
             let residual = match &part.factor {
@@ -334,7 +342,7 @@ impl DynamicResidual for Mixture {
     }
 }
 
-/// Which of a mixture's variables a component's factor is over.
+/// Returns the indices of the mixture's variables that a component's factor uses.
 fn places(
     component: usize,
     over: Option<&[usize]>,
@@ -351,7 +359,7 @@ fn places(
     Ok(over)
 }
 
-/// Variables that a mixture may have.
+/// Maximum number of variables of a mixture.
 const PLACES: usize = 64;
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! Strategies for directions and planes, with the places where formulas tend to break.
+//! Strategies for directions and planes, including the cases that tend to break formulas.
 use crate::{Plane, S2};
 use manifactor_graph::Direction;
 use manifactor_testing::register_points;
 use manifactor_testing::strategies::direction;
 use proptest::prelude::*;
 
-/// Directions anywhere.
+/// Arbitrary directions.
 pub fn any_direction() -> impl Strategy<Value = Direction> + Clone {
     direction().prop_map(|v| Direction::new(v.into_inner()).unwrap_or_default())
 }

@@ -1,4 +1,4 @@
-//! A sheet of lines, shapes and words, before it is a file: what SVG and PNG are made of.
+//! A sheet of lines, shapes and text, which is written as SVG or PNG.
 mod clip;
 mod font;
 mod ink;
@@ -10,7 +10,7 @@ pub use ink::Theme;
 pub(crate) use ink::{Ink, style_sheet};
 pub(crate) use svg::Colors;
 
-/// A sheet of this size, in pixels, x to the right and y downward.
+/// A drawing surface with x to the right and y downward. Unit: pixels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Sheet {
     pub(crate) width: f64,
@@ -18,7 +18,7 @@ pub(crate) struct Sheet {
     pub(crate) items: Vec<Item>,
 }
 
-/// What is drawn, in order.
+/// One element of a sheet; later ones cover earlier ones.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Item {
     Path { points: Vec<[f64; 2]>, closed: bool, stroke: Option<Stroke>, fill: Option<(Ink, f64)> },
@@ -26,7 +26,7 @@ pub(crate) enum Item {
     Text(Text),
 }
 
-/// How a line is drawn.
+/// The style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stroke {
     pub(crate) ink: Ink,
@@ -34,21 +34,21 @@ pub(crate) struct Stroke {
     pub(crate) dashed: bool,
 }
 
-/// Words in one line.
+/// One line of text.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Text {
     pub(crate) text: String,
-    /// Where its baseline begins, has its middle, or ends.
+    /// Position of the start, middle or end of the baseline, as `anchor` selects. Unit: pixels.
     pub(crate) at: [f64; 2],
     pub(crate) anchor: Anchor,
     pub(crate) size: f64,
     pub(crate) ink: Ink,
     pub(crate) bold: bool,
-    /// Whether it reads from below to above.
+    /// True for text that reads from bottom to top.
     pub(crate) upward: bool,
 }
 
-/// Which point of a text is given.
+/// The point of a text that its position refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,
@@ -56,7 +56,7 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// Pixels of a dash and of the gap after it.
+/// Lengths of a dash and of the gap after it. Unit: pixels.
 pub(crate) const DASHES: [f64; 2] = [6.0, 4.0];
 
 impl Stroke {
@@ -113,7 +113,7 @@ impl Sheet {
         self.items.push(Item::Dot { at, radius, ink });
     }
 
-    /// Puts another sheet onto this one, its corner at `at`.
+    /// Adds another sheet to this one, with its corner at `at`.
     pub(crate) fn place(&mut self, other: Self, [x, y]: [f64; 2]) {
         let moved = |p: [f64; 2]| [p[0] + x, p[1] + y];
         self.items.extend(other.items.into_iter().map(|item| match item {

@@ -1,4 +1,4 @@
-//! Pictures: what is drawn, and how.
+//! The pictures and their parts.
 mod axes;
 mod chart;
 mod distribution;

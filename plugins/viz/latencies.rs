@@ -1,9 +1,9 @@
-//! How long each update of a session took.
+//! The duration of each update of a session.
 use crate::canvas::Ink;
 use crate::drawing::{Chart, Curve, Picture, figure};
 
-/// The latencies of updates in their order, in milliseconds on an axis of powers, with the lines that half of them and 99 %
-/// of them stay below. `None` where there are none.
+/// Draws the latencies of updates in order, in milliseconds on a logarithmic axis, with lines at the median
+/// and the 99th percentile. `None` if there are no updates.
 pub fn latencies(title: &str, seconds: &[f64], width: f64) -> Option<Picture> {
     let ms: Vec<f64> = seconds.iter().map(|s| s * 1e3).collect();
     let mut sorted = ms.clone();

@@ -1,7 +1,7 @@
-//! Pictures and pages of a run: trajectories and objects from above and from the side, images with their boxes, charts, as
-//! SVG and PNG; and one page with all of it and the map in 3D.
+//! Pictures and pages of a run. Pictures show trajectories and objects from above and from the side, images
+//! with their boxes, and charts, as SVG and PNG. The page shows all of them, and the map in 3D.
 //!
-//! All of it is drawn from the [record](manifactor_slam::record) of a run, so that it can be drawn again.
+//! Everything is drawn from the [record](manifactor_slam::record) of a run, so it can be drawn again.
 mod canvas;
 mod drawing;
 mod latencies;

@@ -1,4 +1,4 @@
-//! Reports to be opened in a browser.
+//! Reports for a browser.
 mod experiment_page;
 mod live;
 mod live_page;

@@ -1,4 +1,5 @@
-//! The map as PLY, for mesh viewers: ellipsoids as triangles, trajectories as edges, each vertex with its colour.
+//! The map as PLY for mesh viewers: ellipsoids as triangles, trajectories as edges, each vertex with a
+//! colour.
 use crate::canvas::{Ink, Theme};
 use crate::drawing::{Palette, Scene, stretches};
 use manifactor_slam::record::{RunRecord, VariantRecord};
@@ -6,12 +7,13 @@ use nalgebra::Vector3;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-/// Rings of an ellipsoid from pole to pole, and how many of them where there are more objects than that. Sectors are twice as
-/// many.
+/// Number of rings of an ellipsoid from pole to pole, normally and with more than `MANY` objects. There are
+/// twice as many sectors.
 const RINGS: [usize; 2] = [12, 5];
 const MANY: usize = 500;
 
-/// The estimated objects and all trajectories of a variant, in metres, in the frame of its record.
+/// Returns the estimated objects and all trajectories of a variant, in the frame of its record. Unit:
+/// metres.
 pub fn ply(run: &RunRecord, variant: &VariantRecord) -> String {
     let palette = Palette::of(run);
     let scene = Scene::of("", variant);
@@ -66,7 +68,7 @@ struct Lines {
 
 impl Lines {
     fn line(&mut self, line: std::fmt::Arguments<'_>) {
-        // writing to a String does not fail
+        // writing to a String cannot fail
         let _ = writeln!(self.text, "{line}");
         self.count += 1;
     }

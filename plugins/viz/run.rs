@@ -1,4 +1,4 @@
-//! The pictures of a run, of its record.
+//! The pictures of a run, from its record.
 mod error;
 mod pose;
 mod residual;
@@ -9,8 +9,8 @@ use manifactor_slam::record::{RunRecord, VariantRecord};
 
 pub(crate) use residual::{RESIDUALS, row as residual_row};
 
-/// All pictures of a variant, at this width in pixels: the map from above and from the side, errors, trajectories, residuals,
-/// cost, and some images.
+/// Draws all pictures of a variant: the map from above and from the side, errors, trajectories, residuals,
+/// cost, and some images. Unit of `width`: pixels.
 pub fn run_pictures(run: &RunRecord, variant: &VariantRecord, width: f64) -> Vec<Picture> {
     let palette = Palette::of(run);
     let mut pictures = maps_and_charts(format!("{}: {}", run.title, variant.name), variant, &palette, width);
@@ -18,7 +18,7 @@ pub fn run_pictures(run: &RunRecord, variant: &VariantRecord, width: f64) -> Vec
     pictures
 }
 
-/// The maps, under this title, and the charts of a variant.
+/// Draws the maps with this title, and the charts of a variant.
 pub(crate) fn maps_and_charts(
     title: String,
     variant: &VariantRecord,
@@ -38,7 +38,7 @@ pub(crate) fn maps_and_charts(
     maps.into_iter().chain(charts).flatten().collect()
 }
 
-/// Some images of a variant, with what the estimate puts there.
+/// Draws some images of a variant, with the predictions of the estimate.
 pub(crate) fn images(variant: &VariantRecord, palette: &Palette, width: f64) -> Vec<Picture> {
     let frames = frames_seen(variant, variant.images).into_iter();
     frames
@@ -46,7 +46,7 @@ pub(crate) fn images(variant: &VariantRecord, palette: &Palette, width: f64) -> 
         .collect()
 }
 
-/// The cost by iteration, a curve for each variant.
+/// Draws the cost by iteration, with a curve for each variant.
 pub(crate) fn cost(variants: &[VariantRecord], width: f64) -> Option<Picture> {
     let curve = |(i, variant): (usize, &VariantRecord)| {
         let points = variant.cost.iter().enumerate().map(|(step, cost)| (step as f64, *cost)).collect();
@@ -61,7 +61,7 @@ pub(crate) fn cost(variants: &[VariantRecord], width: f64) -> Option<Picture> {
     Some(Picture::new("cost", text, sheet))
 }
 
-/// Seconds since the first frame.
+/// Returns the time since the first frame. Unit: seconds.
 fn clock(variant: &VariantRecord) -> impl Fn(f64) -> f64 {
     let start = variant.frames.first().map_or(0.0, |frame| frame.timestamp);
     move |timestamp| timestamp - start

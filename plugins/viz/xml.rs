@@ -1,7 +1,7 @@
-//! Texts in SVG and HTML.
+//! Text in SVG and HTML.
 
-/// A text as XML and HTML take it: markup as entities; characters that no document may hold, and control characters but
-/// for line breaks and tabs, as U+FFFD.
+/// Escapes a text for XML and HTML. Markup becomes entities. Control characters except for line breaks and
+/// tabs, and characters that are not allowed in documents, become U+FFFD.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in visible(text) {
@@ -16,7 +16,7 @@ pub fn escape(text: &str) -> String {
     out
 }
 
-/// The characters of a text, with U+FFFD in place of those that escaping does not make fit for XML (1.0, section 2.2).
+/// Replaces the characters of a text that are not valid in XML (1.0, section 2.2) by U+FFFD.
 pub(crate) fn visible(text: &str) -> impl Iterator<Item = char> {
     let unfit = |c: char| matches!(c, '\u{fffe}' | '\u{ffff}') || (c.is_control() && c != '\n' && c != '\t');
     text.chars().map(move |c| if unfit(c) { char::REPLACEMENT_CHARACTER } else { c })

@@ -1,6 +1,7 @@
-//! What people and machines get wrong in files, and what the binary says to it.
+//! Mistakes in files, by people and machines, and the answers of the binary.
 //!
-//! Each case is a file; its snapshot is the exit code and the message, to be read as a user would. All of them run under a
+//! Each case is a file. Its snapshot is the exit code and the message, for review from a user's point of
+//! view. All cases run with a limit of memory and time, and none may panic.
 //! limit of memory and of time, and none may panic.
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
 mod bundles;

@@ -10,7 +10,7 @@ folder = "."
 camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 }
 "#;
 
-/// What is said of detections, beside odometry that is fine.
+/// Runs the cases of detections, with valid odometry.
 fn account(cases: Vec<Case>) -> String {
     let mut account = String::new();
     for (name, bytes) in cases {

@@ -1,25 +1,25 @@
-//! Runs the binary on a file, and shows what became of it.
+//! Runs the binary on a file, and shows the result.
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// After this a case counts as hung: a watchdog, hundreds of times as long as the slowest takes on a machine that is busy.
+/// Time limit of a case: hundreds of times the duration of the slowest one on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(600);
-/// KiB of address space that a case may have.
+/// Limit of the address space of a case. Unit: KiB.
 const MEMORY: u32 = 4 << 20;
-/// Bytes of an input that are shown.
+/// Largest part of an input that is shown. Unit: bytes.
 const SHOWN: usize = 300;
 
-/// A name, and what is in the file.
+/// A name, and the content of the file.
 pub(crate) type Case = (&'static str, Vec<u8>);
 
-/// A case of text.
+/// Creates a case from text.
 pub(crate) fn text(name: &'static str, text: impl Into<String>) -> Case {
     (name, text.into().into_bytes())
 }
 
-/// Runs `command` on each case, with `FILE` for the file, and gives an account of all.
+/// Runs `command` on each case, with `FILE` for the file, and returns a report of all.
 pub(crate) fn account(file: &str, command: &str, cases: Vec<Case>) -> String {
     let mut account = String::new();
     for (name, bytes) in cases {
@@ -31,7 +31,7 @@ pub(crate) fn account(file: &str, command: &str, cases: Vec<Case>) -> String {
     account
 }
 
-/// Writes a case into the folder that `MANIFACTOR_KEEP` names, if it does, for others to be tried on.
+/// Writes a case into the folder `MANIFACTOR_KEEP`, if it is set, for tests of other programs.
 fn keep(name: &str, file: &str, bytes: &[u8]) {
     let Some(folder) = std::env::var_os("MANIFACTOR_KEEP") else { return };
     let extension = Path::new(file).extension().unwrap().to_str().unwrap();
@@ -39,7 +39,7 @@ fn keep(name: &str, file: &str, bytes: &[u8]) {
     std::fs::write(Path::new(&folder).join(name), bytes).unwrap();
 }
 
-/// Runs `command` in a folder; its exit code, and what it says.
+/// Runs `command` in a folder, and returns its exit code and its messages.
 pub(crate) fn ended(folder: &Path, command: &str, file: &str) -> String {
     let arguments = command.split_whitespace().map(|word| if word == "FILE" { file } else { word });
     let mut child = Command::new("sh")
@@ -70,14 +70,15 @@ pub(crate) fn ended(folder: &Path, command: &str, file: &str) -> String {
     let said = String::from_utf8(std::fs::read(folder.join(".stderr")).unwrap()).unwrap();
     let code = status.code().unwrap_or_else(|| panic!("{status}: {said}"));
     assert!(!said.contains("panicked"), "{said}");
-    // temporary folders have another name each time
+    // temporary folders have a different name each time
     let said = said.replace(&folder.display().to_string(), "FOLDER");
-    // how a solve ended is a result, and so on standard output, above what differs each time
+    // the termination of a solve is a result and thus on standard output, above the parts that differ each
+    // time
     let results = String::from_utf8(std::fs::read(folder.join(".stdout")).unwrap()).unwrap();
     let ending =
         results.lines().skip_while(|line| !line.starts_with("start")).skip(1).take(1).collect::<String>();
     let ending = if code == 1 { ending } else { String::new() };
-    // which direction is open is rounding's choice, where several are
+    // with several undetermined directions, rounding selects the reported one
     let warnings = results.lines().filter(|line| line.starts_with("warning"));
     let warnings =
         warnings.map(|line| line.find("constrains").map_or(line, |at| &line[..at + "constrains".len()]));

@@ -5,12 +5,12 @@ const EDGE: &str = "EDGE_SE2 0 1 1 0 0 100 0 0 100 0 100\n";
 const SPACE: &str = "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n";
 const IDENTITY: &str = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1";
 
-/// Two poses in the plane, and these lines.
+/// Two planar poses, followed by these lines.
 fn plane(name: &'static str, lines: &str) -> Case {
     text(name, format!("{TWO}{lines}\n"))
 }
 
-/// Two poses in space, and an edge with this relative pose and information.
+/// Two 3D poses, and an edge with this relative pose and information.
 fn space(name: &'static str, relative: &str, information: &str) -> Case {
     text(name, format!("{SPACE}EDGE_SE3:QUAT 0 1 {relative} {information}\n"))
 }

@@ -3,7 +3,7 @@ use std::fmt::Write as _;
 
 const TRUTH: &str = "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 2 0 1 0 0 0 1\n3 3 1 0 0 0 0 1\n";
 
-/// What is said of an estimate, beside a truth that is fine.
+/// Runs the cases of an estimate, with a valid truth.
 fn account(cases: Vec<Case>) -> String {
     let mut account = String::new();
     for (name, bytes) in cases {

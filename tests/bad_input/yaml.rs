@@ -16,7 +16,7 @@ fn change(name: &'static str, from: &str, to: &str) -> Case {
     text(name, GRAPH.replacen(from, to, 1))
 }
 
-/// Ten names, each nine times the one before: a billion of the first.
+/// Ten names, each nine times the previous one: a billion copies of the first.
 fn laughs() -> String {
     let line = |i: usize| format!("a{i}: &a{i} [{}]\n", vec![format!("*a{}", i - 1); 9].join(", "));
     "a0: &a0 [lol]\n".to_owned() + &(1..10).map(line).collect::<String>()

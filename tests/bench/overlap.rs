@@ -1,4 +1,5 @@
-//! Data association by overlap: each box goes to the object that it overlaps with most, as other systems do it.
+//! Data association by overlap: each box is assigned to the object that it overlaps most, as in other
+//! systems.
 use manifactor::geometry::Se3;
 use manifactor::graph::checked::Share;
 use manifactor::quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric};
@@ -12,9 +13,11 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Association by overlap with the last box of an object or with its outline in the map, for any class (as in quadricslam).
+/// Association by overlap with the last box of an object or with its outline in the map, for any class (as
+/// in quadricslam).
 ///
-/// The assignment has the largest sum of overlaps. A box that overlaps too little with all objects begins a new one.
+/// The assignment maximizes the sum of overlaps. A box that overlaps too little with all objects begins a
+/// new one.
 ///
 /// ```toml
 /// association = { type = "iou", least = 0.2 }
@@ -81,7 +84,7 @@ impl Association for Projection {
 }
 register!(dyn Association, "projection", Projection);
 
-/// The associator of both.
+/// The associator of [`Iou`] and [`Projection`].
 #[derive(Debug)]
 struct Overlap {
     rule: Projection,
@@ -95,7 +98,7 @@ struct Overlap {
 /// The last detection of an object.
 #[derive(Debug)]
 struct Last {
-    /// Frame and box; `None` for an object of the prior map that no frame has shown yet.
+    /// Frame and box; `None` for an object of the prior map that is not detected yet.
     seen: Option<(usize, BoundingBox)>,
     class: Option<String>,
 }
@@ -169,7 +172,7 @@ impl Associator for Overlap {
                 self.next = self.next.max(id.0.saturating_add(1));
             }
         }
-        // without a place in the map and a recent box, no later box can match
+        // without an estimate in the map or a recent box, an object cannot match any later box
         let since = image.frame.saturating_sub(self.rule.frames);
         let is_recent = |last: &Last| last.seen.is_some_and(|(frame, _)| frame >= since);
         self.objects.retain(|id, last| is_recent(last) || map.object(*id).is_some());

@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What the binary printed, and how it ended.
+/// Output and exit code of the binary.
 struct Ran {
     code: i32,
     stdout: String,
@@ -53,7 +53,7 @@ impl Ran {
     }
     #[track_caller]
     fn complains(&self, text: &str) {
-        // lines are broken to the width of the terminal
+        // lines are wrapped at the width of the terminal
         let words = |s: &str| s.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
         assert!(words(&self.stderr).contains(text), "no `{text}` in:\n{}", self.stderr);
     }
@@ -63,7 +63,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// A folder with these files.
+/// Creates a folder with these files.
 fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in files {

@@ -1,4 +1,4 @@
-//! Each command: what it takes, and what it does.
+//! Each command: its arguments and its results.
 mod check;
 mod documents;
 mod evaluate;

@@ -1,4 +1,4 @@
-//! How the program ends: exit codes, signals, disks and folders that do not serve; and what is left then.
+//! The end of the program: exit codes, signals, unusable disks and folders, and the remaining files.
 mod disk;
 mod exit_codes;
 pub(crate) mod interrupt;

@@ -1,4 +1,4 @@
-//! What is printed: examples of the book, messages, logs, on any terminal.
+//! Printed text: examples of the book, messages, logs, on any terminal.
 mod book;
 mod log;
 mod mistakes;

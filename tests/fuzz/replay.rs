@@ -1,6 +1,6 @@
-//! The fuzz targets, on their corpora and on quick random changes of these.
+//! The fuzz targets, on their corpora and on quick random changes of them.
 //!
-//! Fuzzers that look for new paths need a nightly compiler (`README.md`).
+//! Fuzzers that search for new paths need a nightly compiler (`README.md`).
 #![allow(unreachable_pub)]
 mod targets;
 
@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::path::Path;
 use targets::TARGETS;
 
-/// Words that may come in anywhere.
+/// Words that may be inserted anywhere.
 const WORDS: [&[u8]; 16] = [
     b"nan",
     b"inf",
@@ -49,7 +49,8 @@ const NUMBERS: [&str; 16] = [
     "18446744073709551615",
 ];
 
-/// `MANIFACTOR_FUZZ` is the number of changed inputs for each target, `MANIFACTOR_FUZZ_TARGET` the name of a single one.
+/// Runs all targets. `MANIFACTOR_FUZZ` is the number of changed inputs for each target,
+/// `MANIFACTOR_FUZZ_TARGET` the name of a single target.
 #[test]
 fn no_target_panics() {
     let asked = std::env::var("MANIFACTOR_FUZZ").map(|n| n.parse().unwrap()).ok();
@@ -72,7 +73,7 @@ fn no_target_panics() {
     }
 }
 
-/// Runs a target, and has the input in the message if that panics.
+/// Runs a target; if it panics, the message has the input.
 fn run(name: &str, target: fn(&[u8]), input: &[u8]) {
     let ran = std::panic::catch_unwind(|| target(input));
     assert!(ran.is_ok(), "{name} panics at:\n{}", String::from_utf8_lossy(input));
@@ -103,7 +104,7 @@ fn changed(input: &[u8], other: &[u8], rng: &mut StdRng) -> Vec<u8> {
     bytes
 }
 
-/// The first number from here on; an empty place at the end if there is none.
+/// Returns the range of the next number, or an empty range at the end if there is none.
 fn number(bytes: &[u8], from: usize) -> Range<usize> {
     let is_part = |b: &u8| b.is_ascii_digit() || b"+-.eE".contains(b);
     let start = bytes[from..].iter().position(u8::is_ascii_digit).map_or(bytes.len(), |place| from + place);

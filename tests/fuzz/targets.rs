@@ -1,5 +1,5 @@
-//! Functions that take bytes of strangers: none may panic, hang, or leave a value that is not finite.
-// the root of a package of its own for cargo-fuzz, and a module of the tests
+//! Functions that read untrusted bytes: none may panic, hang, or leave a value that is not finite.
+// the root of a separate package for cargo-fuzz, and a module of the tests
 #[path = "targets/experiments.rs"]
 mod experiments;
 #[path = "targets/files.rs"]
@@ -40,7 +40,8 @@ use std::num::NonZero;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 
-/// A target: its name, its function, and the number of changed inputs in a test run, fewer for those that take longer.
+/// A target: its name, its function, and the number of changed inputs in a test run, smaller for slow
+/// targets.
 pub type Target = (&'static str, fn(&[u8]), usize);
 
 /// All targets.
@@ -67,10 +68,10 @@ pub const TARGETS: [Target; 20] = [
     ("history", history, 300),
 ];
 
-/// Graphs of more are read, but not solved: fuzzers are there for many small inputs.
+/// Largest graph that is solved; larger ones are only read. Fuzzers are for many small inputs.
 const SOLVED: usize = 64;
 
-/// g2o and TORO files, by each policy of repair.
+/// Reads g2o and TORO files with each policy of repair.
 pub fn pose_graph(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     for repair in [Repair::Error, Repair::Reject, Repair::Clamp] {
@@ -81,14 +82,14 @@ pub fn pose_graph(data: &[u8]) {
     }
 }
 
-/// Bundle adjustments in BAL's form.
+/// Reads bundle adjustments in BAL's format.
 pub fn bundle(data: &[u8]) {
     if let Ok(read) = bal::parse(&String::from_utf8_lossy(data), "scene.bal", true) {
         three_steps(&read.graph, &read.values, &Auto::default());
     }
 }
 
-/// Reads TUM's trajectories, and lists of times and accelerations. Trajectories are written and read back.
+/// Reads TUM trajectories, and lists of times and accelerations. Trajectories are written and read back.
 pub fn trajectory(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     let _ = (accelerometer::parse(&text, "accelerometer.txt"), timestamps::parse(&text, "rgb.txt"));
@@ -98,29 +99,29 @@ pub fn trajectory(data: &[u8]) {
     }
 }
 
-/// Boxes of a detector.
+/// Reads boxes of a detector.
 pub fn detections(data: &[u8]) {
     if let Ok(read) = detections::parse(&String::from_utf8_lossy(data), "boxes.csv") {
         assert!(read.iter().all(|d| d.xmin < d.xmax && d.ymin < d.ymax));
     }
 }
 
-/// Documents in TOML.
+/// Reads documents in TOML.
 pub fn toml(data: &[u8]) {
     document(data, Format::Toml);
 }
 
-/// Documents in JSON.
+/// Reads documents in JSON.
 pub fn json(data: &[u8]) {
     document(data, Format::Json);
 }
 
-/// Documents in YAML.
+/// Reads documents in YAML.
 pub fn yaml(data: &[u8]) {
     document(data, Format::Yaml);
 }
 
-/// Formulas over two poses and an ellipsoid.
+/// Reads formulas over two poses and an ellipsoid.
 pub fn expression(data: &[u8]) {
     let formula = serde_json::Value::from(String::from_utf8_lossy(data));
     let pose = r#"{ "type": "se3", "rotation": [0, 0, 0.6, 0.8], "translation": [1, 2, 3] }"#;
@@ -134,7 +135,7 @@ pub fn expression(data: &[u8]) {
     document(graph.as_bytes(), Format::Json);
 }
 
-/// Runs, of a small simulation in place of their own source: from the document to the report.
+/// Reads runs, with a small simulation instead of their source: from the document to the report.
 pub fn run(data: &[u8]) {
     static SEQUENCE: LazyLock<Arc<Sequence>> = LazyLock::new(|| {
         let mut simulation = Simulated::default();
@@ -160,10 +161,10 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// As a graph, with the solver and the start that it may name, and as a run.
+/// Reads a document as a graph, with its solver and its start, and as a run.
 fn document(data: &[u8], format: Format) {
     let Ok(document) = Document::parse("document", String::from_utf8_lossy(data), format) else { return };
-    // nothing is loaded: sources may be as large as they like
+    // nothing is loaded, so sources may have any size
     let _ = RunDocument::read(&document);
     let errors = Errors::new();
     let read = document.section(&errors).map(|mut section| {
@@ -195,7 +196,7 @@ fn third() -> impl Observer {
     }
 }
 
-/// A few steps, where graph and values fit each other.
+/// Makes a few steps if graph and values fit together.
 fn three_steps(graph: &Graph, values: &Values, solver: &dyn Optimizer) {
     if values.len() > SOLVED || graph.factors().len() > SOLVED {
         return;

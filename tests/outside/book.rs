@@ -1,4 +1,4 @@
-//! The blocks of TOML in the book, as a reader would paste them.
+//! The TOML blocks of the book, as a reader would copy them.
 use manifactor::config::{Document, Format, Node, Reader, Value};
 use manifactor::graph::catalogue::{self, Entry};
 use std::collections::HashMap;
@@ -14,7 +14,7 @@ fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The TOML blocks of a page, with the line that each begins at.
+/// Returns the TOML blocks of a page, each with its first line number.
 fn blocks(page: &str) -> Vec<(usize, String)> {
     let (mut blocks, mut open) = (vec![], None);
     for (i, line) in page.lines().enumerate() {
@@ -28,7 +28,7 @@ fn blocks(page: &str) -> Vec<(usize, String)> {
     blocks
 }
 
-/// Reads all tables that name a registered type; returns the names that nothing has.
+/// Reads all tables that name a registered type, and returns the unknown names.
 fn read_all(node: &Node, place: &str) -> Vec<String> {
     let mut unknown = vec![];
     match &node.value {
@@ -62,7 +62,7 @@ fn every_block_of_toml_is_read() {
     let (mut found, mut count) = (vec![], 0);
     pages(&docs, &mut found);
     for page in found {
-        // its blocks are wrong on purpose, and have a test of their own
+        // its blocks are wrong on purpose, and have a separate test
         if page.ends_with("mistakes.md") {
             continue;
         }
@@ -95,7 +95,7 @@ fn the_summary_has_every_page_and_no_other() {
     }
 }
 
-/// The anchors of a page's headings, as mdBook and GitHub make them.
+/// Returns the anchors of a page's headings, as in mdBook and GitHub.
 fn anchors(page: &str) -> Vec<String> {
     let mut met: HashMap<String, usize> = HashMap::new();
     let anchor = |heading: &str| {
@@ -131,7 +131,8 @@ fn every_link_within_the_book_leads_somewhere() {
     assert!(count > 100, "{count} links");
 }
 
-/// The ratios of our time to the best peer's, of the pose graphs in the first table of `docs/benchmarks.md`.
+/// Returns the ratios of our time to the best peer's, for the pose graphs in the first table of
+/// `docs/benchmarks.md`.
 fn pose_graph_ratios(page: &str) -> Vec<f64> {
     let table =
         page.split("## How fast is the default solver?").nth(1).unwrap().split("\n## ").next().unwrap();
@@ -165,7 +166,8 @@ fn the_front_page_lists_every_page() {
     }
 }
 
-/// The peers' factors in the book, by the interpreter that `python3` is; said aloud, where it lacks a peer.
+/// Runs the peers' factors in the book with `python3`. A missing peer is reported, and its blocks are
+/// skipped.
 #[test]
 fn blocks_of_python_run_where_their_packages_are() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/coming-from.md");

@@ -1,4 +1,4 @@
-//! A factor: `examples/01_new_factor/rests_on.rs`, as the author's guide has it.
+//! A factor: `examples/01_new_factor/rests_on.rs`, as in the author's guide.
 use crate::rests_on::RestsOn;
 use crate::solve_document;
 use manifactor::config::{Document, Format};

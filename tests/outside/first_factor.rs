@@ -1,4 +1,4 @@
-//! `docs/first-factor.md`: its factor is the one here, and what it says is printed is printed.
+//! `docs/first-factor.md`: its factor is the one here, and its output is the real output.
 #[allow(unreachable_pub, reason = "as the page has it")]
 mod in_the_middle;
 
@@ -13,7 +13,7 @@ fn the_page_has_this_factor_and_what_is_found_of_it() {
     assert!(page.contains(include_str!("first_factor/in_the_middle.rs").trim()), "the factor is another");
     let subject = Subject::example(find("factor", "in_the_middle").unwrap()).unwrap();
     let found = FactorCheck::default().run(&subject).to_string();
-    // the last digits of the worst entry are rounding, and may be others elsewhere
+    // the last digits of the worst entry depend on rounding
     for line in found.lines().map(|line| line.split(", is ").next().unwrap_or_default()) {
         assert!(page.contains(line), "found is:\n{found}");
     }

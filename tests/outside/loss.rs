@@ -1,14 +1,14 @@
-//! A robust loss: squares up to a bound, and nothing beyond it.
+//! A robust loss: quadratic up to a bound, and constant beyond it.
 use crate::solve_document;
 use manifactor::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Truncated squares: ρ = min(s, k²).
+/// Truncated least squares: ρ = min(s, k²).
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Truncated {
-    /// k, in σ's.
+    /// The bound k, in standard deviations.
     scale: Positive,
 }
 
@@ -33,11 +33,11 @@ fn a_graph_names_it_and_the_outlier_does_not_pull() {
     let solution = solve_document(&text);
     let p: &manifactor::geometry::Point1 = solution.values.get("p").unwrap();
     assert!((p.0.x - 1.0).abs() < 1e-9, "{p:?}");
-    // two measurements one σ off, and the bound of the third
+    // two residuals of one σ, and the bound of the third
     assert!((solution.outcome.final_cost - 0.5 * (1.0 + 1.0 + 9.0)).abs() < 1e-9);
 }
 
-/// `Truncated` has no `tempered` of its own.
+/// `Truncated` does not implement `tempered`.
 #[test]
 fn it_is_tempered_all_the_same() {
     let loss = Truncated { scale: Positive::new(3.0).unwrap() };

@@ -1,4 +1,5 @@
-//! Types that are written outside the workspace's crates, through the facade alone: one file per extension point.
+//! Types that are defined outside the workspace's crates, using only the facade: one file per extension
+//! point.
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 #[path = "../../examples/01_new_factor/rests_on.rs"]
 mod rests_on;

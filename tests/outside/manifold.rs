@@ -1,4 +1,4 @@
-//! A type of variable: a positive number, by its logarithm. And a factor on it.
+//! A type of variable, a positive number with a logarithmic tangent space, and a factor on it.
 use crate::solve_document;
 use manifactor::graph::catalogue;
 use manifactor::prelude::*;
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Scale {
-    /// The number itself.
+    /// The number.
     factor: Positive,
 }
 
@@ -43,14 +43,14 @@ impl Manifold for Scale {
 }
 register_manifold!("test_scale", Scale);
 
-// what it is in formulas, and a function of them
+// its type in formulas, and a function of it
 register_quantity!(Scale as f64);
 register_functions! {
-    /// Twice a number.
+    /// Doubles a number.
     fn test_doubled(x: f64) -> f64 { x * 2.0 }
 }
 
-/// Two lengths, one measured in the units of the other: r = x·a - b.
+/// Two lengths, one measured in a scaled unit: r = x·a - b.
 ///
 /// ```toml
 /// factor = { type = "test_ratio", a = 2.0, b = 3.0 }
@@ -58,9 +58,9 @@ register_functions! {
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Ratio {
-    /// In one unit.
+    /// The length in the scaled unit.
     a: f64,
-    /// In the other.
+    /// The length in the unit of reference.
     b: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A measurement: the distance of an object from the camera, as a laser range finder has it.
+//! A measurement: the distance between an object and the camera, as from a laser range finder.
 use manifactor::config::{Document, Format};
 use manifactor::geometry::Se3;
 use manifactor::graph::checked::Positive;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::sync::Arc;
 
-/// The centre of an object is at this distance from the camera: r = |c - t| - distance.
+/// Distance of an object's centre from the camera: r = |c - t| - distance.
 ///
 /// ```toml
 /// [[factors]]
@@ -23,7 +23,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Distance {
-    /// In metres.
+    /// Measured distance. Unit: metres.
     distance: Positive,
 }
 
@@ -56,7 +56,8 @@ impl Measurement for Distance {
 }
 register_measurement!("test_distance", Distance);
 
-/// Lines of a camera that goes to the right and sees one ball of 0.2 m, 2 m ahead; with its distance, or with a field of another name.
+/// Lines of JSON for a camera that moves to the right and sees one ball of 0.2 m, 2 m ahead. `field` is the
+/// name of the distance, possibly a wrong one.
 fn lines(field: &str) -> String {
     let mut text = String::new();
     for i in 0..20 {

@@ -1,4 +1,4 @@
-//! A motion model: frames that nothing ties but a walk at random.
+//! A motion model: frames that are connected only by a random walk.
 use manifactor::config::{Document, Format};
 use manifactor::geometry::{Between, Se3};
 use manifactor::graph::FactorEntry;
@@ -10,11 +10,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A camera that stays where it is, more or less.
+/// A camera that moves randomly around its position.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct RandomWalk {
-    /// Standard deviation in one second, in rad and m.
+    /// Standard deviation after one second. Unit: rad and m.
     sigma: f64,
 }
 
@@ -33,7 +33,7 @@ impl MotionModel for RandomWalk {
 }
 register!(dyn MotionModel, "test_random_walk", RandomWalk);
 
-/// The distance from the first pose to the last, in metres, as it is estimated.
+/// Returns the estimated distance from the first pose to the last. Unit: metres.
 fn run(sigma: f64) -> Result<f64, String> {
     let text = format!(
         "source = {{ type = 'simulated', trajectory = {{ frames = 40 }}, detector = {{ depth_error = 0.01 }}, odometry = {{ translation = 0.0, rotation = 0.0 }} }}

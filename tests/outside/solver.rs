@@ -1,14 +1,15 @@
-//! A solver of one's own: Levenberg-Marquardt, on the seam that the built-in ones use.
+//! A custom solver: Levenberg-Marquardt, on the interface of the built-in ones.
 use crate::solve_document;
 use manifactor::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Steps damped along the diagonal of H: ten times less after a good one, ten times more after a bad one.
+/// Steps damped along the diagonal of H: the damping is divided by ten after a good step, and multiplied by
+/// ten after a bad one.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Marquardt {
-    /// Damping of the first step, as a share of the diagonal.
+    /// Damping of the first step, as a fraction of the diagonal.
     lambda: f64,
 }
 
@@ -41,7 +42,7 @@ impl Optimizer for Marquardt {
 }
 register!(dyn Optimizer, "test_marquardt", Marquardt);
 
-/// A range to each of two beacons, and where it begins: nonlinear, so that full steps overshoot.
+/// A range to each of two beacons, with an initial value. It is nonlinear, so full steps overshoot.
 const GRAPH: &str = r#"
 variables = [
     { key = "x", value = { type = "point2", position = [0.2, 0.1] } },

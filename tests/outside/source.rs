@@ -1,4 +1,4 @@
-//! A data source: a camera that stands still and sees nothing.
+//! A data source: a static camera without detections.
 use manifactor::config::{Document, Format};
 use manifactor::geometry::Se3;
 use manifactor::prelude::*;
@@ -10,11 +10,11 @@ use manifactor::slam::source::{Folders, Source, SourceError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// So many frames of nothing.
+/// Empty frames.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Nothing {
-    /// How many.
+    /// Number of frames.
     frames: usize,
 }
 

@@ -1,10 +1,10 @@
-"""What becomes of bad pose graphs, here and in peers that have a reader of their own.
+"""Behaviour on bad pose graphs, of our binary and of peers with a reader.
 
     MANIFACTOR_KEEP=FOLDER cargo test --test bad_input g2o     # writes the cases
     python3 tests/peers/bad_input.py BINARY FOLDER             # prints a table
 
-Each case runs in a process of its own, for at most 20 seconds. Peers get what their examples do: their reader, a prior on (or a
-hold of) the first pose, Levenberg-Marquardt.
+Each case runs in a separate process, for at most 20 seconds. Peers are used as in their examples: their
+reader, a fixed first pose or a prior on it, Levenberg-Marquardt.
 """
 
 import json
@@ -55,7 +55,7 @@ def g2o_solve(path):
 
 
 def ended(command):
-    """How a process ended, in a word or two, and what it said."""
+    """Returns the end of a process in a word or two, and its messages."""
     try:
         ran = subprocess.run(command, capture_output=True, timeout=PATIENCE, text=True, errors="replace")
     except subprocess.TimeoutExpired:

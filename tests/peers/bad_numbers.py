@@ -1,10 +1,10 @@
-"""What becomes of bad numbers that come by the interface of a program, not by a file: ours, GTSAM and Ceres.
+"""Behaviour on bad numbers from the programming interface, not from a file: ours, GTSAM and Ceres.
 
     g++ -O1 -I/usr/include/eigen3 tests/peers/adapters/ceres/bad_numbers.cpp -lceres -lglog -o CERES
     python3 tests/peers/bad_numbers.py BINARY CERES     # prints a table; needs the package gtsam
 
-Each case is two poses and what is measured between them, and runs in a process of its own. Ours gets a literal graph, which goes
-through the same constructors as a program's own graph does.
+Each case is two poses and a measurement between them, and runs in a separate process. Ours gets a literal
+graph, which uses the same constructors as a graph from a program.
 """
 
 import json
@@ -57,7 +57,7 @@ def ours(binary, case):
         return f"{{ rotation = {toml(numbers[3:])}, translation = {toml(numbers[:3])} }}"
 
     value = pose(case["start"]).replace("{", '{ type = "se3",', 1)
-    # rotation before translation, as it is written here
+    # rotation before translation, the order of the document below
     order = [3, 4, 5, 0, 1, 2]
     information = [[case["information"][r][c] for c in order] for r in order]
     loss = f'loss = {{ type = "cauchy", scale = {toml(case["scale"])} }}' if case["scale"] else ""

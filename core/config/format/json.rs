@@ -1,4 +1,4 @@
-//! Strict JSON as a tree with places.
+//! Parser for strict JSON, with positions.
 use crate::format::too_deep;
 use indexmap::map::Entry;
 use jsonc_parser::ast::{Object, Value as Ast};
@@ -39,7 +39,8 @@ pub(crate) fn parse(source: &SourceText) -> Result<Node, Diagnostics> {
     Diagnostics::from_list(reader.errors).map_or(Ok(node), Err)
 }
 
-/// The parser lets a few things through that JSON does not, such as line breaks within strings.
+/// Rejects texts that the parser accepts although they are not valid JSON, such as line breaks within
+/// strings.
 fn refuse_what_else_is_not_json(source: &SourceText) -> Result<(), Diagnostics> {
     let Err(error) = serde_json::from_str::<serde::de::IgnoredAny>(source.text()) else { return Ok(()) };
     let lines = source.text().split_inclusive('\n').take(error.line().saturating_sub(1));
@@ -98,7 +99,8 @@ impl Reader<'_> {
     }
 }
 
-/// Whole numbers that fit are integers; all other numbers, and negative zero, are read as the nearest `f64`.
+/// Parses a number. Integers that fit into 64 bits stay integers; all other numbers and negative zero become
+/// the nearest `f64`.
 fn number_of(text: &str) -> Value {
     match text.parse::<i64>() {
         Ok(value) if value != 0 || !text.starts_with('-') => Value::Integer(value),

@@ -1,4 +1,4 @@
-//! TOML as a tree with places. All its syntax errors are reported, not only the first.
+//! Parser for TOML, with positions. It reports several syntax errors at once.
 use crate::format::too_deep;
 use ::toml::Spanned;
 use ::toml::de::{DeInteger, DeTable, DeValue};
@@ -8,7 +8,7 @@ use manifactor_document::{Field, MAX_DEPTH, Node, Table, Value};
 use manifactor_document::{Place, SourceText};
 use std::ops::Range;
 
-/// One bracket that is missing makes a dozen errors: no more than these are told.
+/// Largest number of reported syntax errors, because one missing bracket causes a dozen.
 const MAX_ERRORS: usize = 5;
 
 /// Parses a document.
@@ -60,7 +60,7 @@ impl Reader<'_> {
         let value = match value.get_ref() {
             DeValue::String(text) => Value::String(text.clone().into_owned()),
             DeValue::Integer(integer) => self.integer(integer, &place),
-            // the literal, so that the nearest f64 is found by the standard library
+            // parse the literal, so that the standard library finds the nearest f64
             DeValue::Float(float) => Value::Float(float.as_str().parse().unwrap_or(f64::NAN)),
             DeValue::Boolean(value) => Value::Bool(*value),
             DeValue::Datetime(value) => Value::String(value.to_string()),
@@ -103,8 +103,8 @@ fn bare(key: &str) -> &str {
     key.trim_matches(['"', '\''])
 }
 
-/// Where the key that is written again at `second` was written first: the last key of its name before it, in a table
-/// that could still go on.
+/// Returns the first position of a key that is repeated at `second`: the last key of this name before it, in
+/// a table that can still continue there.
 fn first_of_two(source: &SourceText, table: &DeTable<'_>, second: &Range<usize>) -> Option<Place> {
     let name = bare(source.text().get(second.clone())?);
     let mut found: Option<Range<usize>> = None;
@@ -141,7 +141,7 @@ fn tables<'a, 'i>(value: &'a Spanned<DeValue<'i>>) -> Vec<(Range<usize>, &'a DeT
     }
 }
 
-/// Moves the places of a value that was parsed out of the middle of a text.
+/// Moves the positions of a value that was parsed from the middle of a text.
 fn shift(node: &mut Node, source: &SourceText, by: usize) {
     let moved = |place: &Place| source.place(place.span().start + by..place.span().end + by);
     node.place = moved(&node.place);

@@ -1,7 +1,7 @@
-//! YAML 1.2 (core schema) as a tree with places, built from events without recursion.
+//! Parser for YAML 1.2 (core schema), with positions. It handles parser events without recursion.
 //!
-//! Anchors and aliases are copied, up to a limit. Tags other than those of the core schema, several documents in one
-//! file and keys that are not scalars are refused.
+//! Aliases are expanded up to a limit. Tags outside of the core schema, several documents in one file, and
+//! keys that are not scalars are rejected.
 use crate::format::too_deep;
 use indexmap::map::Entry;
 use manifactor_document::Fault;
@@ -12,7 +12,7 @@ use saphyr_parser::{Event, Parser, ScalarStyle, Span, Tag};
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// How many values all anchors and aliases of a document together may stand for.
+/// Largest number of values in all anchors and aliases of a document.
 const MAX_ALIASED: usize = 1_000_000;
 
 /// Parses a document.
@@ -55,7 +55,7 @@ enum Kind {
 
 struct Builder<'a> {
     source: &'a SourceText,
-    /// Byte offset of each character; empty where the text is ASCII and they are the same.
+    /// Byte offset of each character; empty for ASCII texts, which have equal offsets.
     bytes: Vec<usize>,
     open: Vec<Open>,
     anchors: HashMap<usize, (Node, usize)>,
@@ -136,7 +136,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Puts a finished node where it belongs: into its array, as the key or the value of its table, or at the root.
+    /// Inserts a finished node: into its array, as the key or the value of its table, or as the root.
     fn close(&mut self, node: Node, anchor: usize) -> Result<(), Diagnostics> {
         if anchor > 0 {
             let size = count(&node);
@@ -167,7 +167,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Every copy that an anchor or an alias makes counts.
+    /// Counts the copied values of an anchor or an alias. Exceeding the limit is an error.
     fn charge(&mut self, size: usize, place: &Place) -> Result<(), Diagnostics> {
         self.aliased = self.aliased.saturating_add(size);
         if self.aliased > MAX_ALIASED {
@@ -222,13 +222,13 @@ fn key_of(node: Node, errors: &mut Vec<Diagnostic>) -> (String, Place) {
             errors.push(syntax(node.place.clone(), "a key has to be a scalar"));
             String::new()
         }
-        // 1: and true: are keys as they are written
+        // keys such as `1` and `true` keep their spelling
         _ => node.place.text().to_owned(),
     };
     (name, node.place)
 }
 
-/// A plain scalar by the core schema (YAML 1.2.2, §10.3.2).
+/// Resolves a plain scalar by the core schema (YAML 1.2.2, §10.3.2).
 fn resolve(text: &str) -> Value {
     match text {
         "" | "~" | "null" | "Null" | "NULL" => return Value::Null,
@@ -252,7 +252,7 @@ fn float(text: &str) -> Option<f64> {
         ".inf" | ".Inf" | ".INF" | "+.inf" | "+.Inf" | "+.INF" => Some(f64::INFINITY),
         "-.inf" | "-.Inf" | "-.INF" => Some(f64::NEG_INFINITY),
         ".nan" | ".NaN" | ".NAN" => Some(f64::NAN),
-        // Rust reads `inf` and `nan` as well, which are texts here
+        // Rust also parses `inf` and `nan`, which are strings in YAML
         _ if text.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b)) => text.parse().ok(),
         _ => None,
     }

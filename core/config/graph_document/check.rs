@@ -1,14 +1,14 @@
-//! What is wrong between the factors and the variables of a document, at its place.
+//! Errors between the factors and the variables of a document, with positions.
 use super::read::Read;
 use manifactor_document::{Diagnostic, Errors, Fault, Node, Place, Value, nearest, quoted_list};
 use manifactor_graph::{GraphError, Key};
 
-/// Up to this many variables are listed for a key that is none of them.
+/// Largest number of variables that are listed for an unknown key.
 const LISTED: usize = 12;
-/// Unknown keys for which the nearest known key is searched: each search goes through all variables.
+/// Number of unknown keys for which the nearest known key is searched. Each search visits all variables.
 const SEARCHED: usize = 100;
 
-/// Reports everything that the graph finds wrong between itself and its values.
+/// Reports all errors of the graph and its values.
 pub(super) fn check(read: &Read<'_>, root: &Place, errors: &Errors) {
     let mut unknown = 0;
     for key in read.factors.iter().chain(&read.unread).flat_map(|factor| factor.items("keys")) {
@@ -36,7 +36,7 @@ fn missing(read: &Read<'_>, key: &str, search: bool) -> Fault {
     Fault::UnknownName { what: "variable".into(), name: key.to_owned(), known }
 }
 
-/// Which variables a factor could have taken.
+/// Lists the variables of the type that a factor expects.
 fn of_type(read: &Read<'_>, expected: &str) -> String {
     let fit = read.values.iter().filter(|(_, value)| value.typetag_name() == expected);
     let keys: Vec<String> = fit.take(LISTED + 1).map(|(key, _)| key.to_string()).collect();
@@ -47,7 +47,7 @@ fn of_type(read: &Read<'_>, expected: &str) -> String {
     }
 }
 
-/// The error as a diagnostic; none, where it has been reported already.
+/// Converts an error to a diagnostic. Returns `None` if it was already reported.
 fn place(read: &Read<'_>, error: &GraphError, root: &Place) -> Option<Diagnostic> {
     let at = |node: Option<&Node>| node.map_or(root, |node| &node.place).clone();
     let factor = |factor: &usize| read.factors.get(*factor);

@@ -1,4 +1,4 @@
-//! A literal graph, read.
+//! Reading of graph documents.
 use super::check::check;
 use crate::document::Document;
 use indexmap::IndexMap;
@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;
 
-/// Reads a document that is a graph: every variable and every factor by key.
+/// Reads a graph document, which lists all variables and factors by key.
 ///
 /// ```toml
 /// [[variables]]
@@ -28,11 +28,11 @@ use std::sync::Arc;
 /// loss = { type = "huber", scale = 1.345 }       # none, where it is left out
 /// ```
 ///
-/// What [`write_graph`](crate::write_graph) writes, this reads back to the last bit.
+/// Reading the text of [`write_graph`](crate::write_graph) restores all values bit for bit.
 ///
 /// # Errors
-/// Everything that is wrong with it, at once: unknown types and fields, wrong types of fields, variables given twice,
-/// and factors that do not fit their variables or their noise.
+/// All errors at once: unknown types and fields, wrong types of fields, variables that are given twice, and
+/// factors that do not fit their variables or their noise.
 pub fn read_graph(document: &Document) -> Result<(Graph, Values), Diagnostics> {
     let errors = Errors::new();
     let graph = document.section(&errors).map(|mut section| {
@@ -43,7 +43,7 @@ pub fn read_graph(document: &Document) -> Result<(Graph, Values), Diagnostics> {
     errors.finish(graph)
 }
 
-/// Takes `variables` and `factors` out of a table. What is wrong is reported and left out.
+/// Takes `variables` and `factors` from a table. Entries with errors are reported and left out.
 pub fn read_graph_section(section: &mut Section<'_>) -> (Graph, Values) {
     let errors = section.errors();
     let mut read = Read::default();
@@ -57,49 +57,49 @@ pub fn read_graph_section(section: &mut Section<'_>) -> (Graph, Values) {
     (read.graph, read.values)
 }
 
-/// A variable, as it is written.
+/// A variable in a document.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct VariableDocument {
-    /// Its name, by which factors have it.
+    /// Key of the variable, which factors refer to.
     key: Key,
-    /// Where the solve begins.
+    /// Initial value.
     value: Box<dyn Variable>,
-    /// How much of it is held at its value.
+    /// Directions that are held at the initial value, or `true` for all of them.
     #[serde(default)]
     fixed: Fixed,
 }
 
-/// A factor, as it is written.
+/// A factor in a document.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FactorDocument {
-    /// The variables that it connects.
+    /// Keys of the variables that it connects.
     #[schemars(length(min = 1))]
     keys: Vec<Key>,
-    /// What reports call it. Default: the name of its type.
+    /// Name in reports. Default: the name of its type.
     #[serde(default)]
     name: Option<Arc<str>>,
-    /// What it says of them.
+    /// Type and parameters of the factor.
     factor: Box<dyn Factor>,
-    /// Of its residual.
+    /// Noise model of its residual.
     #[serde(default)]
     noise: Noise,
-    /// How much of a large residual counts. Default: all of it.
+    /// Robust loss, which limits large residuals. Default: none.
     #[serde(default)]
     loss: Option<Box<dyn Loss>>,
 }
 
-/// What was read, and where.
+/// A graph with the nodes that it was read from.
 #[derive(Default)]
 pub(super) struct Read<'a> {
     pub graph: Graph,
     pub values: Values,
-    /// Every variable that was declared, readable or not, as it is written.
+    /// Nodes of all declared variables, also of variables with errors.
     pub variables: IndexMap<Key, &'a Node>,
-    /// Every factor that is in the graph, as it is written.
+    /// Nodes of all factors in the graph.
     pub factors: Vec<&'a Node>,
-    /// Those that could not be read.
+    /// Nodes of factors with errors.
     pub unread: Vec<&'a Node>,
 }
 
@@ -108,7 +108,7 @@ impl<'a> Read<'a> {
         let read = node.read_what_is_right::<VariableDocument>(&[], errors);
         let key = match (&read, node.field("key")) {
             (Some(variable), _) => variable.key.clone(),
-            // one that could not be read is declared all the same
+            // a variable with errors still counts as declared
             (None, Some(Node { value: Value::String(key), .. })) => Key::from(key.as_str()),
             (None, _) => return,
         };

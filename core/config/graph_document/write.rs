@@ -1,4 +1,4 @@
-//! A literal graph, written: one line for each value, factor, noise and loss.
+//! Writing of graph documents, with one line for each value, factor, noise and loss.
 use crate::format::Format;
 use crate::write::{WriteError, tree};
 use ::toml::Value;
@@ -19,10 +19,10 @@ struct LiteralVariable<'a> {
     fixed: Option<&'a Fixed>,
 }
 
-/// Writes a graph and its values as a document that [`read_graph`](crate::read_graph) reads back to the last bit.
+/// Writes a graph and its values as a document. [`read_graph`](crate::read_graph) restores it bit for bit.
 ///
 /// # Errors
-/// A variable that is held fixed and has no value, and values that are not finite.
+/// If a held variable has no value, or a value is not finite.
 pub fn write_graph(graph: &Graph, values: &Values, format: Format) -> Result<String, WriteError> {
     if let Some(key) = graph.fixed().keys().find(|key| !values.contains(key.as_str())) {
         return Err(WriteError::FixedWithoutValue { key: key.clone() });
@@ -39,13 +39,13 @@ pub fn write_graph(graph: &Graph, values: &Values, format: Format) -> Result<Str
     }
 }
 
-/// `[[variables]]` and `[[factors]]` with one line for each of their fields.
+/// Formats `[[variables]]` and `[[factors]]`, with one line for each field.
 fn toml(literal: &Value) -> String {
     let mut text = String::new();
     for name in ["variables", "factors"] {
         let items = literal.get(name).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
         if items.is_empty() {
-            // an array that is empty has no header of its own, and stands before the headers of others
+            // an empty array has no header and has to be written before all headers
             text.insert_str(0, &format!("{name} = []\n"));
         }
         for item in items.iter().filter_map(Value::as_table) {
@@ -59,7 +59,7 @@ fn toml(literal: &Value) -> String {
     text
 }
 
-/// One line for each variable and each factor.
+/// Formats one line for each variable and each factor.
 fn json(literal: &Value) -> Result<String, WriteError> {
     let fail =
         |e: serde_json::Error| WriteError::Inexpressible { format: Format::Json, message: e.to_string() };

@@ -1,4 +1,4 @@
-//! Documents, from text to graphs.
+//! Tests of documents, from texts to graphs.
 #![allow(
     missing_docs,
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! The same document in three formats, and what is said of those that are none.
+//! One document in three formats, and the errors of invalid texts.
 
 use manifactor_config::{Document, Format, MAX_DEPTH, Node, Value};
 
@@ -16,7 +16,7 @@ fn errors(format: Format, text: &str) -> String {
     }
 }
 
-/// Every value with the text at its place.
+/// Collects every value with the text at its position.
 fn places(node: &Node, found: &mut Vec<String>) {
     match &node.value {
         Value::Array(items) => items.iter().for_each(|item| places(item, found)),

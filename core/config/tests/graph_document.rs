@@ -1,4 +1,4 @@
-//! Literal graphs: what they say, that they round trip, and what is said of wrong ones.
+//! Graph documents: their content, round trips, and the errors of wrong ones.
 
 use crate::plugin::{Balance, Height, Offset, Plane, Real, Unit};
 use manifactor_config::{Document, Format, read_graph, write_graph};
@@ -42,7 +42,7 @@ fn said(format: Format, text: &str) -> String {
     read(format, text).expect_err("an error")
 }
 
-/// The good document with a part replaced.
+/// Returns the good document with a part replaced.
 fn wrong(part: &str, by: &str) -> String {
     assert!(GOOD.contains(part), "{part}");
     said(Format::Toml, &GOOD.replace(part, by))
@@ -156,7 +156,7 @@ factor = { type = "offset", measured = [0.5, 1] }
     similar(&said(Format::Toml, text), &expected);
 }
 
-/// Line by line, so that a failure shows the line.
+/// Compares line by line, so that a failure shows the line.
 fn similar(said: &str, expected: &str) {
     for (said, expected) in said.lines().zip(expected.lines()) {
         assert_eq!(said, expected);
@@ -330,7 +330,7 @@ proptest! {
             prop_assert_eq!(format!("{values:?}"), format!("{values_again:?}"));
             prop_assert_eq!(format!("{:?}", graph.factors()), format!("{:?}", graph_again.factors()));
             prop_assert_eq!(graph.fixed(), graph_again.fixed());
-            // Debug prints a float so that it reads back as the same bits; writing again proves it for the noise, too
+            // Debug prints a float with all of its bits; writing again also proves this for the noise
             prop_assert_eq!(write_graph(&graph_again, &values_again, format).unwrap(), text);
         }
     }

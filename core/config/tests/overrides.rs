@@ -1,4 +1,4 @@
-//! `--set` and variants.
+//! Overrides by `--set`, and variants.
 
 use manifactor_config::{Document, Errors, Format, to_toml};
 use serde_json::json;

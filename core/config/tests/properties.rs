@@ -1,4 +1,4 @@
-//! No text makes the parsers panic, and what is written reads back to the last bit.
+//! No text makes the parsers panic, and written documents read back bit for bit.
 
 use manifactor_config::{Document, Errors, Format, Node, Value};
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ fn any_format() -> impl Strategy<Value = Format> {
     prop::sample::select(Format::ALL.to_vec())
 }
 
-/// Texts that look like documents, which get further into a parser than random ones.
+/// Texts that resemble documents, so that a parser gets further into them than into random texts.
 fn any_text() -> impl Strategy<Value = String> {
     let words = [
         "a",
@@ -79,7 +79,7 @@ fn any_key() -> impl Strategy<Value = String> {
     ]
 }
 
-/// What all three formats can say.
+/// Values that are possible in all three formats.
 fn any_json() -> impl Strategy<Value = Json> {
     let finite = any::<f64>().prop_filter("finite", |x| x.is_finite());
     let text = prop_oneof![
@@ -106,7 +106,7 @@ fn any_json() -> impl Strategy<Value = Json> {
     prop::collection::vec((any_key(), value), 0..6).prop_map(|fields| fields.into_iter().collect())
 }
 
-/// Equal to the last bit, whatever the order of fields.
+/// Compares bit for bit, independent of the order of fields.
 fn same(a: &Json, b: &Json) -> bool {
     match (a, b) {
         (Json::Array(a), Json::Array(b)) => a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b)),
@@ -120,7 +120,7 @@ fn same(a: &Json, b: &Json) -> bool {
     }
 }
 
-/// Every place lies within the text, and scalars within the tables that hold them.
+/// Checks that every position lies within the text, and scalars within their tables.
 fn check_places(node: &Node, text: &str) {
     assert!(text.get(node.place.span()).is_some());
     match &node.value {

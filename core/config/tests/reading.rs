@@ -1,4 +1,4 @@
-//! What is said of documents that are well formed and wrong, in full.
+//! Complete error messages of documents with valid syntax and wrong content.
 
 use manifactor_config::{Document, Errors, Fault, Format, Section};
 use manifactor_graph::register;

@@ -1,4 +1,4 @@
-//! The schema of literal graphs.
+//! The schema of graph documents.
 #![allow(dead_code, reason = "types that are here for their schemas alone")]
 
 use manifactor_config::{Definitions, graph_schema};

@@ -1,4 +1,4 @@
-//! Sizes known at compile time, and everything whose type follows from them.
+//! Compile-time sizes, and the vector, matrix and jet types of each size.
 use crate::algebra::{Jet, Scalar};
 use nalgebra::{Const, SMatrix, SVector};
 use num_dual::DualSVec64;
@@ -6,11 +6,11 @@ use std::fmt::Debug;
 
 /// A dense array of compile-time size, column-major.
 pub trait Block: Copy + Debug + Send + Sync + 'static {
-    /// All entries zero.
+    /// Returns the array with all entries zero.
     fn zeros() -> Self;
-    /// The entries, column after column.
+    /// Returns the entries, column after column.
     fn as_slice(&self) -> &[f64];
-    /// The entries, to be written.
+    /// Returns the entries for writing, column after column.
     fn as_mut_slice(&mut self) -> &mut [f64];
 }
 
@@ -35,7 +35,7 @@ impl<const R: usize, const C: usize> Block for SMatrix<f64, R, C> {
     note = "write nalgebra's type for it: `type Dim = U1;`, `U2`, `U3`, …"
 )]
 pub trait Dimension: Debug + Send + Sync + 'static {
-    /// The number itself.
+    /// The number.
     const N: usize;
     /// A dual number with `N` directions.
     type Jet: Jet;
@@ -43,9 +43,9 @@ pub trait Dimension: Debug + Send + Sync + 'static {
     type Vector<T: Scalar>: AsRef<[T]> + Copy + Debug + Send + Sync;
     /// An `N` × `C` matrix: nalgebra's `SMatrix<f64, N, C>`, found through [`Dimension::Rows`].
     type Matrix<C: Dimension>: Block;
-    /// `SMatrix<f64, R, N>`; the second half of a double dispatch, of no other use.
+    /// `SMatrix<f64, R, N>`: the second step of the double dispatch in [`Dimension::Matrix`].
     type Rows<const R: usize>: Block;
-    /// The vector of `f(0), f(1), …`.
+    /// Returns the vector of `f(0), f(1), …`.
     fn vector<T: Scalar>(f: impl FnMut(usize) -> T) -> Self::Vector<T>;
 }
 

@@ -1,4 +1,4 @@
-//! A unit vector in 3D that is checked when it is read.
+//! A 3D unit vector that is checked at parse time.
 use crate::algebra::{Lift, Scalar};
 use nalgebra::{UnitVector3, Vector3};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -6,31 +6,31 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Deref;
 
-/// A direction in 3D: a unit vector. Read from any three finite numbers but zero, and normalised.
+/// A direction in 3D: a unit vector. Any three finite numbers except zero are accepted, and normalised.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "[f64; 3]", into = "[f64; 3]")]
 pub struct Direction(UnitVector3<f64>);
 
-/// A vector that points nowhere.
+/// The error for a vector without a direction: zero or not finite.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected a direction, three finite numbers not all zero; got {0:?}")]
 pub struct NoDirection(pub [f64; 3]);
 
 impl Direction {
-    /// The z axis: up, where nothing else is said.
+    /// The z axis, the default for up.
     pub const Z: Direction = Direction(UnitVector3::new_unchecked(Vector3::new(0.0, 0.0, 1.0)));
 
-    /// The direction of `v`.
+    /// Returns the direction of `v`.
     ///
     /// # Errors
     /// If `v` is zero or not finite.
     pub fn new(v: Vector3<f64>) -> Result<Self, NoDirection> {
-        // scale first: the squares of tiny and of huge entries leave the range of f64
+        // scale first: the squares of tiny or huge entries would leave the range of f64
         let scale = v.amax();
         if !(scale > 0.0 && v.iter().all(|x| x.is_finite())) {
             return Err(NoDirection(v.into()));
         }
-        // a vector that is normal already stays as it is, bit for bit: documents round trip
+        // a vector that is normalised already stays unchanged to the last bit, so that documents round trip
         if (v.norm() - 1.0).abs() < 4.0 * f64::EPSILON {
             return Ok(Self(UnitVector3::new_unchecked(v)));
         }
@@ -84,8 +84,9 @@ impl JsonSchema for Direction {
     }
 }
 
-/// The world's up, as a factor's document says it, or open: then it is z, until something that knows better fills it in, as
-/// a run does with its gravity. Name the field at the registration: `register_factor!("name", Type, up);`.
+/// The up direction of the world, as given in the document of a factor, or unset. An unset direction is z
+/// until a caller fills in a better one, as a run does from gravity. Name the field at the registration:
+/// `register_factor!("name", Type, up);`.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(from = "Direction", into = "Direction")]
 pub struct Up {
@@ -94,7 +95,7 @@ pub struct Up {
 }
 
 impl Up {
-    /// Takes this direction, where none is given; whether it was open.
+    /// Sets the direction if none was given. Returns whether it was unset.
     pub fn fill(&mut self, up: Direction) -> bool {
         let is_open = !self.is_given;
         if is_open {
@@ -123,7 +124,7 @@ impl Deref for Up {
     }
 }
 
-/// Whether they point the same way, given or open.
+/// Compares the directions only: a given z equals an unset up.
 impl PartialEq for Up {
     fn eq(&self, other: &Self) -> bool {
         self.direction == other.direction

@@ -1,12 +1,12 @@
-//! What residuals compute with: `f64`, or a dual number that carries a derivative.
+//! Scalars of residuals: `f64`, or a dual number that carries a derivative.
 use crate::algebra::Dimension;
 use nalgebra::{RealField, SMatrix, SVector};
 use num_dual::{Derivative, DualNum, DualSVec64};
 
-/// A real number to differentiate through.
+/// A real number that residuals can be differentiated through.
 ///
-/// `x * 2.0` works, `2.0 * x` does not; lift constants with [`Lift::lift`] or `T::from(c)`.
-/// Comparisons, `max` and `clamp` see the real part only.
+/// `x * 2.0` works, `2.0 * x` does not; lift constants with [`Lift::lift`] or `T::from(c)`. Comparisons,
+/// `max` and `clamp` use the real part only.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a scalar that residuals can be differentiated through",
     note = "write residuals over `T: Scalar`; lift constants with `T::from(c)` or `.lift()`"
@@ -14,17 +14,17 @@ use num_dual::{Derivative, DualNum, DualSVec64};
 pub trait Scalar: RealField + Copy + DualNum<Primitive = f64> {}
 impl<T: RealField + Copy + DualNum<Primitive = f64>> Scalar for T {}
 
-/// |x|. Where x is zero, the derivative is that of x > 0.
+/// Returns |x|. At x = 0 the derivative is 1, as for x > 0.
 #[inline(always)]
 pub fn abs<T: Scalar>(x: T) -> T {
     if x < T::zero() { -x } else { x }
 }
 
-/// A dual number whose derivative part can be written and read.
+/// A dual number with a derivative part that can be written and read.
 pub trait Jet: Scalar {
-    /// A value with its gradient; `gradient` has as many entries as the jet has directions.
+    /// Makes a value with its gradient; `gradient` has one entry for each direction of the jet.
     fn with_gradient(value: f64, gradient: &[f64]) -> Self;
-    /// The gradient; `None` stands for zero, as num-dual drops the part of constants.
+    /// Returns the gradient; `None` stands for zero, since num-dual drops the derivative part of constants.
     fn gradient(&self) -> Option<&[f64]>;
 }
 
@@ -42,15 +42,15 @@ impl<const N: usize> Jet for DualSVec64<N> {
 /// The jet with one direction for each tangent direction of `D`.
 pub type JetOf<D> = <D as Dimension>::Jet;
 
-/// Constants, lifted to another scalar.
+/// Constants that can be lifted to a scalar type.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be lifted to the scalar of a residual",
     note = "numbers, nalgebra's vectors and matrices, `Direction` and the manifolds can; for another type write `impl Lift for {Self}`"
 )]
 pub trait Lift {
-    /// The same thing over `T`.
+    /// The lifted type over `T`.
     type Of<T: Scalar>;
-    /// The same value, with no derivative.
+    /// Returns the value over `T`, with derivative zero.
     fn lift<T: Scalar>(&self) -> Self::Of<T>;
 }
 

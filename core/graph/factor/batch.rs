@@ -1,4 +1,4 @@
-//! Factors of one concrete type, side by side.
+//! Batches: factors of one concrete type, stored contiguously.
 mod batches;
 mod change;
 mod pass;
@@ -17,19 +17,19 @@ use std::time::Instant;
 
 pub use batches::Batches;
 
-/// A factor on its way into a batch.
+/// A factor to be added to a batch.
 pub struct Member<'a> {
-    /// Its place in the graph.
+    /// Index in the graph.
     pub entry: usize,
     /// The residual.
     pub factor: &'a dyn Any,
-    /// Its variables' places in their columns.
+    /// Index of each variable in its column.
     pub index: &'a [u32],
-    /// Where its variables begin in the linear system; [`FIXED`] for those that are held.
+    /// Start of each variable in the linear system; [`FIXED`] for fixed variables.
     pub starts: &'a [u32],
-    /// By variable, a bit for each tangent direction that is held.
+    /// For each variable, one bit per tangent direction: set if the direction is fixed.
     pub held: &'a [u32],
-    /// Where its blocks of H go.
+    /// Slots of its blocks in H.
     pub slots: &'a [Slot],
     /// Its noise.
     pub whitener: &'a Whitener,
@@ -37,21 +37,21 @@ pub struct Member<'a> {
     pub loss: Option<&'a dyn Loss>,
 }
 
-/// What came out of a pass over factors.
+/// Result of a pass over factors.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Evaluation {
     /// ½ Σ ρ(‖r‖²) over the active factors.
     pub cost: f64,
-    /// Factors that were not defined at the last linearization, and take no part.
+    /// Number of factors that were undefined at the last linearization, and so are excluded.
     pub inactive: usize,
-    /// Active factors that are not defined here.
+    /// Number of active factors that are undefined at these values.
     pub left: usize,
-    /// Place in the graph of a factor whose cost is not finite.
+    /// Index in the graph of a factor whose cost is not finite.
     pub not_finite: Option<usize>,
 }
 
 impl Evaluation {
-    /// Both together; `self` comes first.
+    /// Returns the sum of both evaluations. `not_finite` comes from `self` if both have one.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
@@ -63,93 +63,97 @@ impl Evaluation {
     }
 }
 
-/// One factor, for people to look at.
+/// State of one factor, for reports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FactorState {
-    /// Its place in the graph.
+    /// Index in the graph.
     pub entry: usize,
     /// Whether it is defined at these values.
     pub defined: bool,
-    /// The residual, not whitened.
+    /// The unwhitened residual.
     pub residual: Vec<f64>,
     /// The residual in standard deviations.
     pub whitened: Vec<f64>,
-    /// The weight that the loss gives it, 1 without a loss.
+    /// Weight given by the loss; 1 without a loss.
     pub weight: f64,
-    /// ½ρ(‖whitened‖²); zero where it is not defined.
+    /// ½ρ(‖whitened‖²); zero if the factor is undefined.
     pub cost: f64,
 }
 
-/// One factor's whitened Jacobian, each row scaled by the root of the robust weight.
+/// The whitened Jacobian of one factor, each row scaled by the square root of the robust weight.
 #[derive(Debug)]
 pub struct FactorRows<'a> {
-    /// Its place in the graph.
+    /// Index in the graph.
     pub entry: usize,
     /// Whitened and weighted residual.
     pub residual: &'a [f64],
-    /// By free variable: where it begins in the linear system, and its block, column-major.
+    /// One entry per free variable: its start in the linear system, and its block, column-major.
     pub blocks: Vec<(usize, Vec<f64>)>,
 }
 
-/// All factors of one concrete type, one kind of noise and one type of loss.
+/// All factors with the same residual type, kind of noise and type of loss.
 pub trait Batch: Send + Sync {
-    /// Number of factors.
+    /// Returns the number of factors.
     fn len(&self) -> usize;
-    /// Returns whether there is no factor.
+    /// Returns whether the batch is empty.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Returns whether a factor of the same type belongs here, by its noise and loss.
+    /// Returns whether noise and loss of a factor fit this batch. The factor must have the batch's residual
+    /// type.
     fn fits(&self, noise: &Whitener, loss: Option<&dyn Loss>) -> bool;
-    /// Returns whether a factor of the same type belongs here, by its parameters. Any does, as a rule; not where a batch is evaluated
-    /// in one call, of which those have to be the same.
+    /// Returns whether the parameters of a factor fit this batch. True by default; a batch that is
+    /// evaluated in one call requires equal parameters.
     fn takes(&self, _factor: &dyn Any) -> bool {
         true
     }
     /// Reserves room for `factors` more factors, with `variables` variables in total.
     fn reserve(&mut self, factors: usize, variables: usize);
-    /// Adds a factor of this batch's type; others are left out.
+    /// Adds a factor of this batch's type. A factor of a different type is ignored.
     fn push(&mut self, member: &Member<'_>);
-    /// The residual of a factor, by its place in the batch; `None` where its type leaves the number of rows open.
+    /// Returns the residual of factor `index` of the batch; `None` if its type leaves the number of rows
+    /// open.
     fn residual_mut(&mut self, index: usize) -> Option<&mut dyn Any>;
-    /// Sets the noise of a factor, by its place in the batch; whether it is of the batch's kind.
+    /// Sets the noise of factor `index` of the batch. Returns `false` if the noise is of a different kind.
     fn set_noise(&mut self, index: usize, noise: &Whitener) -> bool;
-    /// Decides which factors are active, and adds their parts of H and g.
+    /// Decides which factors are active, and adds their contributions to H and g.
     fn linearize(&mut self, columns: &Columns, to: &mut NormalEquations<'_>) -> Evaluation;
-    /// The cost of the factors that were active at the last linearization.
+    /// Evaluates the cost of the factors that were active at the last linearization.
     fn cost(&self, columns: &Columns) -> Evaluation;
-    /// Visits the factors that were not defined at the last linearization, by their place in the graph.
+    /// Visits the factors that were undefined at the last linearization, by index in the graph.
     fn inactive(&self, visit: &mut dyn FnMut(usize));
-    /// ½ρ of each factor, to its place in the graph, whatever its weight; zero where it is not defined.
+    /// Writes ½ρ of each factor to `to`, by index in the graph, without the factor's weight; zero if it is
+    /// undefined.
     fn costs(&self, columns: &Columns, to: &mut [f64]);
-    /// Makes each factor count as often as the entry at its place in the graph says, on top of its loss.
+    /// Sets the weight of each factor, by index in the graph. It multiplies the weight of the loss.
     fn set_weights(&mut self, weights: &[f64]);
-    /// Each factor as it stands, in order of the batch.
+    /// Returns the state of each factor, in the order of the batch.
     fn inspect(&self, columns: &Columns) -> Vec<FactorState>;
-    /// Each defined factor's rows of the Jacobian.
+    /// Visits the Jacobian rows of each defined factor.
     fn rows(&self, columns: &Columns, visit: &mut dyn FnMut(FactorRows<'_>));
 
-    /// Takes a factor out, by its place in the batch. The last factor takes that place; returns the last factor's place in
-    /// the graph, or `None` where the last was the one that went. O(1) where all factors have as many variables.
+    /// Removes factor `index` of the batch; the last factor takes its place. Returns the graph index of the
+    /// moved factor, or `None` if the removed factor was the last. O(1) if all factors have the same number
+    /// of variables.
     fn remove(&mut self, index: usize) -> Option<usize>;
-    /// As [`linearize`](Self::linearize), of the factors at these places in the batch, ascending.
+    /// Like [`linearize`](Self::linearize), for the factors at these indices in the batch, ascending.
     fn linearize_at(
         &mut self,
         indices: &[u32],
         columns: &Columns,
         to: &mut NormalEquations<'_>,
     ) -> Evaluation;
-    /// As [`cost`](Self::cost), of the factors at these places in the batch, ascending.
+    /// Like [`cost`](Self::cost), for the factors at these indices in the batch, ascending.
     fn cost_at(&self, indices: &[u32], columns: &Columns) -> Evaluation;
-    /// Appends the robust weights of the factors at these places in the batch, ascending: 1 without a loss, 0 for a factor that is
-    /// not defined.
+    /// Appends the robust weights of the factors at these indices in the batch, ascending: 1 without a
+    /// loss, 0 if the factor is undefined.
     fn robust_weights_at(&self, indices: &[u32], columns: &Columns, to: &mut Vec<f64>);
-    /// Makes one factor count as often as its weight says, by its place in the batch.
+    /// Sets the weight of factor `index` of the batch.
     fn set_weight(&mut self, index: usize, weight: f64);
-    /// Sets what is held of a factor's variables, by its place in the batch: see [`Member::starts`] and
+    /// Sets the fixed variables and directions of factor `index` of the batch: see [`Member::starts`] and
     /// [`Member::held`].
     fn hold(&mut self, index: usize, starts: &[u32], held: &[u32]);
-    /// Returns whether a factor was defined at its last linearization.
+    /// Returns whether factor `index` was defined at its last linearization.
     fn is_active(&self, index: usize) -> bool;
 }
 
@@ -157,30 +161,30 @@ pub trait Batch: Send + Sync {
 pub(crate) struct BatchOf<F: Kernel> {
     factors: Vec<F>,
     entries: Vec<u32>,
-    /// Factor i's variables are `ends[i-1]..ends[i]` of `index`, `starts`, `free` and `held`.
+    /// The variables of factor i are `ends[i-1]..ends[i]` of `index`, `starts`, `free` and `held`.
     ends: Vec<u32>,
     index: Vec<u32>,
     starts: Vec<u32>,
     free: Vec<bool>,
-    /// Empty where no direction of any variable is held.
+    /// Empty if no direction of any variable is fixed.
     held: Vec<u32>,
     slot_ends: Vec<u32>,
     slots: Vec<Slot>,
     whiteners: Whiteners<F::Dim>,
     losses: Option<Box<dyn LossColumn>>,
-    /// What each factor's cost is multiplied by; empty if no weights were set.
+    /// Weight of each factor, which multiplies its cost; empty if no weights were set.
     weights: Vec<f64>,
     active: Vec<bool>,
-    /// One for each chunk of a window, and of the next, for threads; empty until they are used.
+    /// One entry per chunk of the current window and of the next one, for threads. Empty until first used.
     work: [Vec<Work<F>>; 2],
-    /// Seconds that the last linearization by one thread took.
+    /// Duration of the last single-threaded linearization, in seconds.
     alone: f64,
-    /// What registers there are: loops over entries of blocks are compiled for each width.
+    /// SIMD level of the CPU: loops over block entries are compiled for each register width.
     arch: Arch,
 }
 
 impl<F: Kernel> BatchOf<F> {
-    /// An empty batch, for factors with such a noise and loss.
+    /// Makes an empty batch for factors with this noise and loss.
     pub(crate) fn new(noise: &Whitener, loss: Option<&dyn Loss>) -> Self {
         Self {
             factors: vec![],
@@ -227,7 +231,7 @@ impl<F: Kernel> Batch for BatchOf<F> {
         self.starts.reserve_exact(variables);
         self.free.reserve_exact(variables);
         self.slot_ends.reserve_exact(factors);
-        // as many as there are, where all have as many variables
+        // exact if all factors have the same number of variables
         let each = variables / factors.max(1);
         self.slots.reserve_exact(factors * each * (each + 1) / 2);
         self.whiteners.reserve(factors);

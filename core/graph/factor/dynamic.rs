@@ -1,4 +1,4 @@
-//! Residuals whose rows, and whose variables' types, are known when they are read rather than compiled.
+//! Residuals whose number of rows and variable types are known only at run time.
 use crate::algebra::{Dimension, Vector};
 use crate::factor::batch::{Batch, BatchOf};
 use crate::factor::kernel::Kernel;
@@ -15,29 +15,31 @@ use smallvec::SmallVec;
 use std::any::{Any, TypeId};
 use std::fmt::Debug;
 
-/// The most rows that a [`DynamicResidual`] may have. Its loops are compiled for each number of rows up to nine, and for some
-/// above: between those, rows of zeros are put behind its own.
+/// Largest number of rows of a [`DynamicResidual`]. Its loops are compiled for each number of rows up to
+/// nine, and for some above. Sizes in between are padded with rows of zeros.
 pub const MAX_ROWS: usize = 48;
 
-/// A residual that says at run time how many rows it has and what types its variables are of.
+/// A residual that gives its number of rows and the types of its variables at run time.
 ///
-/// Where the types are known, [`Residual`](crate::Residual) is the trait to implement: it is checked by the compiler,
-/// and faster. A factor type holds a [`Dynamic`] of its residual and returns it from
+/// If the types are known at compile time, implement [`Residual`](crate::Residual): the compiler checks it,
+/// and it is faster. A factor type holds a [`Dynamic`] of its residual and returns it from
 /// [`Factor::erased`](crate::Factor::erased).
 pub trait DynamicResidual: Debug + Clone + Send + Sync + 'static {
-    /// Number of rows, 1 to [`MAX_ROWS`].
+    /// Returns the number of rows, 1 to [`MAX_ROWS`].
     fn rows(&self) -> usize;
-    /// Types of its variables, in order.
+    /// Returns the types of its variables, in order.
     fn variables(&self) -> &[TypeId];
-    /// Dimensions of its variables' tangent spaces, in order.
+    /// Returns the tangent dimensions of its variables, in order.
     fn dimensions(&self) -> &[usize];
-    /// Returns whether it means anything at this point; see [`Residual::is_defined`](crate::Residual::is_defined).
+    /// Returns whether the residual is defined at this point; see
+    /// [`Residual::is_defined`](crate::Residual::is_defined).
     fn is_defined(&self, _variables: &[&dyn Any]) -> bool {
         true
     }
-    /// Writes the residual, not whitened. Variables have the types that [`DynamicResidual::variables`] names.
+    /// Writes the unwhitened residual. Variables have the types given by [`DynamicResidual::variables`].
     fn residual(&self, variables: &[&dyn Any], residual: &mut [f64]);
-    /// Writes the residual, and the blocks of those variables that are `free`, which hold garbage on entry.
+    /// Writes the residual and the blocks of the variables that are `free`. The blocks hold garbage on
+    /// entry.
     fn linearize(
         &self,
         variables: &[&dyn Any],
@@ -47,7 +49,7 @@ pub trait DynamicResidual: Debug + Clone + Send + Sync + 'static {
     );
 }
 
-/// One factor's Jacobian blocks, of sizes that are known at run time. Nothing is allocated for up to 64 entries.
+/// Jacobian blocks of one factor, with run-time sizes. Up to 64 entries need no allocation.
 #[derive(Debug, Clone, Default)]
 pub struct DynamicBlocks {
     values: SmallVec<[f64; 64]>,
@@ -64,11 +66,11 @@ impl DynamicBlocks {
         }));
         self.values.resize(end, 0.0);
     }
-    /// Puts zeros behind the rows of each column.
+    /// Appends zeros below the rows of each column.
     fn pad(&mut self, rows: usize, to: usize) {
         let columns = self.values.len() / rows;
         self.values.resize(columns * to, 0.0);
-        // from the last column on, so that none is overwritten before it has moved
+        // from the last column on, so that no column is overwritten before it has moved
         for column in (0..columns).rev() {
             self.values.copy_within(column * rows..(column + 1) * rows, column * to);
             self.values[column * to + rows..(column + 1) * to].fill(0.0);
@@ -82,18 +84,18 @@ impl DynamicBlocks {
     fn block(&self, variable: usize) -> &[f64] {
         &self.values[self.range(variable)]
     }
-    /// The block of a variable: rows × tangent dimension, column-major.
+    /// Returns the block of a variable: rows × tangent dimension, column-major.
     pub fn block_mut(&mut self, variable: usize) -> &mut [f64] {
         let range = self.range(variable);
         &mut self.values[range]
     }
 }
 
-/// A [`DynamicResidual`], as a factor returns it from [`Factor::erased`](crate::Factor::erased).
+/// A [`DynamicResidual`], in the form that [`Factor::erased`](crate::Factor::erased) returns.
 #[derive(Debug, Clone)]
 pub struct Dynamic<F>(F);
 
-/// A number of rows that no [`DynamicResidual`] can have.
+/// The error for a number of rows outside 1 to [`MAX_ROWS`].
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "expected a residual of 1 to {MAX_ROWS} rows, got {0}; a longer one can be split over several factors"
@@ -101,19 +103,21 @@ pub struct Dynamic<F>(F);
 pub struct WrongRows(pub usize);
 
 impl<F: DynamicResidual> Dynamic<F> {
+    /// Wraps a residual.
+    ///
     /// # Errors
     /// If it has no rows, or more than [`MAX_ROWS`].
     pub fn new(residual: F) -> Result<Self, WrongRows> {
         let rows = residual.rows();
         if (1..=MAX_ROWS).contains(&rows) { Ok(Self(residual)) } else { Err(WrongRows(rows)) }
     }
-    /// The residual.
+    /// Returns the residual.
     pub fn get(&self) -> &F {
         &self.0
     }
 }
 
-/// Calls with the number of rows as a type, or with the next that there is.
+/// Calls `$call` with the number of rows as a constant, rounded up to the next compiled size.
 macro_rules! with_rows {
     ($rows:expr, $n:ident => $call:expr) => {
         with_rows!(@arms $rows, $n => $call, 2=2 3=3 4=4 5=5 6=6 7=7 8=8 9=9 10=12 13=16 17=24 25=48)
@@ -163,7 +167,7 @@ impl<F: DynamicResidual> ErasedResidual for Dynamic<F> {
 }
 
 impl<F: DynamicResidual> Dynamic<F> {
-    /// The variables' concrete values; `None` where number or types do not fit.
+    /// Returns the concrete values of the variables; `None` if their number or types do not fit.
     fn fit<'a>(&self, variables: &[&'a dyn Variable]) -> Option<Vec<&'a dyn Any>> {
         let types = self.0.variables();
         (types.len() == variables.len()).then_some(())?;
@@ -174,7 +178,7 @@ impl<F: DynamicResidual> Dynamic<F> {
     }
 }
 
-/// A [`DynamicResidual`] of up to `N` rows, in a batch. Rows behind its own are zeros.
+/// A [`DynamicResidual`] of up to `N` rows in a batch. Rows beyond its own are zero.
 #[derive(Clone)]
 struct Rows<F, const N: usize>(F);
 

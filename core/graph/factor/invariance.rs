@@ -1,4 +1,4 @@
-//! What leaves a factor's residual unchanged, as its author states it.
+//! Invariances of factors: motions that do not change the residual, as stated by the author.
 use crate::registry::catalogue;
 use crate::residual::Variables;
 use crate::residual::{Refs, Residual};
@@ -6,25 +6,26 @@ use crate::variable::Manifold;
 use crate::variable::Variable;
 use std::any::{Any, TypeId};
 
-/// A motion of a factor's variables that does not change its residual. Made by
-/// [`register_invariance!`](crate::register_invariance), shown by the catalogue, checked with the factor's Jacobian.
+/// A motion of a factor's variables that does not change its residual. Created by
+/// [`register_invariance!`](crate::register_invariance), listed in the catalogue, checked together with the
+/// factor's Jacobian.
 pub struct Invariance {
     /// The type of the factor.
     pub factor: fn() -> TypeId,
-    /// What the motion is, such as `turning about up`.
+    /// Description of the motion, such as `turning about up`.
     pub motion: &'static str,
-    /// The variables after the motion; `None` where they are not of the factor's types.
+    /// The variables after the motion; `None` if they do not have the factor's types.
     pub moved: Motion,
 }
 inventory::collect!(Invariance);
 
-/// A factor, its variables, and a source of random numbers → the variables elsewhere.
+/// Maps a factor, its variables and a source of random numbers to the moved variables.
 pub type Motion = fn(&dyn Any, &[&dyn Variable], Random<'_>) -> Option<Vec<Box<dyn Variable>>>;
 
 /// Draws a number from -size to size.
 pub type Random<'a> = &'a mut dyn FnMut(f64) -> f64;
 
-/// What is stated of a type of factors, in the order of the alphabet.
+/// Returns the invariances that are registered for a factor type, sorted by name.
 pub fn invariances(factor: TypeId) -> Vec<&'static Invariance> {
     let mut all: Vec<_> =
         inventory::iter::<Invariance>.into_iter().filter(|i| (i.factor)() == factor).collect();
@@ -33,14 +34,14 @@ pub fn invariances(factor: TypeId) -> Vec<&'static Invariance> {
     all
 }
 
-/// The same for an entry of the catalogue.
+/// Returns the invariances of a factor in the catalogue.
 pub fn invariances_of(entry: &catalogue::Entry) -> Vec<&'static Invariance> {
     invariances((entry.type_id)())
 }
 
-/// Points of a factor's variables: a tuple of one for each, or a list.
+/// Moved variables of a factor: a tuple with one element for each, or a list.
 pub trait Moved {
-    /// As trait objects.
+    /// Returns the variables as trait objects.
     fn boxed(self) -> Vec<Box<dyn Variable>>;
 }
 
@@ -77,8 +78,8 @@ pub fn apply<R: Residual, P: Moved>(
     Some(motion(factor.downcast_ref()?, variables, random).boxed())
 }
 
-/// States what leaves a factor's residual unchanged. The closure gets the factor, references to its variables and a
-/// source of random numbers, and returns the variables after the motion, as a tuple:
+/// Registers a motion that does not change a factor's residual. The closure gets the factor, references to
+/// its variables and a source of random numbers, and returns the moved variables as a tuple:
 ///
 /// `register_invariance!(Upright, "turning about up", |factor, (quadric,), random| (turned(quadric, random(PI)),));`
 #[macro_export]

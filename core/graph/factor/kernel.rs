@@ -1,4 +1,4 @@
-//! What a batch runs: a residual, with the way to its variables and to its places in the normal equations.
+//! The interface of a batch to its residual: access to variables, and to slots in the normal equations.
 use crate::algebra::{Dimension, Vector};
 use crate::residual::Residual;
 use crate::residual::Variables;
@@ -6,38 +6,39 @@ use crate::residual::normal_equations::{NormalEquations, Places};
 use crate::variable::column::Columns;
 use std::any::Any;
 
-/// Implemented for every [`Residual`], and for [`DynamicResidual`](crate::DynamicResidual)s by their number of rows.
+/// Implemented for every [`Residual`], and for [`DynamicResidual`](crate::DynamicResidual)s by number of
+/// rows.
 pub(crate) trait Kernel: Clone + Send + Sync + 'static {
     /// Number of rows.
     type Dim: Dimension;
-    /// The columns that its variables are in.
+    /// The columns of its variables.
     type Columns<'a>: Copy + Send + Sync;
-    /// One factor's variables, by reference.
+    /// The variables of one factor, by reference.
     type Refs<'a>: Clone;
-    /// One factor's Jacobian blocks.
+    /// The Jacobian blocks of one factor.
     type Blocks: Clone + Send + Sync;
 
-    /// A copy of a factor of this type; `None` for another.
+    /// Returns a copy of a factor of this type; `None` for any other type.
     fn of(factor: &dyn Any) -> Option<Self>;
-    /// The residual itself; `None` where its value may change the number of rows.
+    /// Returns the residual; `None` if a new value may change the number of rows.
     fn residual_mut(&mut self) -> Option<&mut dyn Any> {
         None
     }
     fn columns(columns: &Columns) -> Self::Columns<'_>;
-    /// Number of rows of the residual itself: those behind are zeros.
+    /// Returns the number of rows of the residual. Rows beyond them are zero.
     fn rows(&self) -> usize {
         Self::Dim::N
     }
-    /// The variables, by their places in their columns.
+    /// Returns the variables at these indices of their columns.
     fn load<'a>(&self, columns: Self::Columns<'a>, index: &[u32]) -> Self::Refs<'a>;
     fn is_defined(&self, x: Self::Refs<'_>) -> bool;
     fn value(&self, x: &Self::Refs<'_>) -> Vector<Self::Dim>;
-    /// Blocks to be written by [`Kernel::linearize`].
+    /// Returns blocks for [`Kernel::linearize`] to write.
     fn blocks() -> Self::Blocks;
     fn linearize(&self, x: Self::Refs<'_>, free: &[bool], blocks: &mut Self::Blocks) -> Vector<Self::Dim>;
     /// Visits each block.
     fn each(blocks: &mut Self::Blocks, visit: impl FnMut(usize, &mut [f64]));
-    /// Adds w JᵀJ and w Jᵀr.
+    /// Adds w JᵀJ to H and w Jᵀr to g.
     fn scatter(blocks: &Self::Blocks, r: &[f64], w: f64, places: Places<'_>, to: &mut NormalEquations<'_>);
 }
 

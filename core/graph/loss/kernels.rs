@@ -1,12 +1,12 @@
-//! The losses themselves. `scale` is in units of the whitened residual, so σ's: dimensionless.
+//! The built-in losses. `scale` is in σ's, the units of the whitened residual, so it is dimensionless.
 use super::RobustLoss;
 use crate::register_loss;
 use crate::registry::checked::Positive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Declares a loss with one scale: its docs, its default, its ρ, and the scale k of ρ(τs)/τ by (k, τ): k/√τ where k is
-/// in σ's.
+/// Declares a loss with one scale: docs, default, ρ, and the scale of ρ(τs)/τ as a function of (k, τ). The
+/// latter is k/√τ by default, for scales in σ's.
 macro_rules! loss {
     ($(#[$doc:meta])* $type:ident, $name:literal, $scale:literal, |$s:ident, $k:ident| $rho:expr) => {
         loss! { $(#[$doc])* $type, $name, $scale, |$s, $k| $rho, |k, tau| k / tau.sqrt() }
@@ -41,7 +41,7 @@ macro_rules! loss {
             }
             fn tempered(&self, tau: Positive) -> Option<Self> {
                 let scale: fn(f64, f64) -> f64 = $tempered;
-                // a scale too small for a number is left to the wrapper
+                // a scale that underflows is left to the wrapper
                 Self::new(scale(self.scale.get(), tau.get())).ok()
             }
         }
@@ -49,7 +49,7 @@ macro_rules! loss {
     };
 }
 
-/// No robustness: ρ = s. The same as no loss at all.
+/// No robustness: ρ = s. Equivalent to no loss.
 ///
 /// ```toml
 /// loss = { type = "l2" }
@@ -68,14 +68,14 @@ impl RobustLoss for L2 {
 }
 register_loss!("l2", L2);
 
-/// Below √s = k times this, [`L1`] is a parabola.
+/// Below √s = k times this share, [`L1`] is a parabola.
 const SMALL: f64 = 1e-6;
 
 loss! {
     /// The norm instead of its square: ρ = 2k√s.
     ///
-    /// The scale is the slope: half the cost of one more σ. The weight k/√s has no bound; below √s = 1e-6 k the loss
-    /// continues as a parabola of the same slope.
+    /// The scale is the slope: half the cost of one more σ. The weight k/√s has no bound; below √s = 1e-6 k
+    /// the loss continues as a parabola with the slope at that point.
     ///
     /// ```toml
     /// loss = { type = "l1" }
@@ -112,7 +112,7 @@ loss! {
 }
 
 loss! {
-    /// Ignores what lies beyond the scale: ρ = k²/3 (1 - (1 - s/k²)³) up to √s = k, k²/3 beyond.
+    /// Ignores residuals beyond the scale: ρ = k²/3 (1 - (1 - s/k²)³) up to √s = k, k²/3 beyond.
     ///
     /// ```toml
     /// loss = { type = "tukey", scale = 4.685 }
@@ -120,7 +120,7 @@ loss! {
     Tukey, "tukey", 4.685, |s, k| {
         let k2 = k * k;
         let x = s / k2;
-        // s (1 - x + x²/3) is the same, and keeps its digits where x is small
+        // s (1 - x + x²/3) is equal to the formula above, and stays accurate for small x
         if x < 1.0 { (s * (1.0 - x + x * x / 3.0), (1.0 - x) * (1.0 - x)) } else { (k2 / 3.0, 0.0) }
     }
 }
@@ -158,7 +158,7 @@ loss! {
     /// ```
     Fair, "fair", 1.4, |s, k| {
         let u = s.sqrt() / k;
-        // the difference loses its digits where u is small: ρ = s (1 - 2u/3 + u²/2 - …) there
+        // for small u the difference loses its digits, so the series ρ = s (1 - 2u/3 + u²/2 - …) is used
         let rho = if u < 1e-4 { s * (1.0 - u * (2.0 / 3.0) + u * u * 0.5) } else { 2.0 * k * k * (u - u.ln_1p()) };
         (rho, 1.0 / (1.0 + u))
     }
@@ -167,9 +167,9 @@ loss! {
 loss! {
     /// Dynamic covariance scaling: squares up to s = k, weight (2k/(k + s))² beyond.
     ///
-    /// Unlike the others its scale Φ = k is in units of s itself, squares of σ's (Agarwal et al., ICRA 2013, eq. 15). The cost
-    /// is the integral of the weight, ρ = k (3s - k)/(k + s) beyond k, and saturates at 3k: the paper gives
-    /// a weight only.
+    /// Unlike in the other losses, the scale Φ = k is in units of s, i.e. squared σ's (Agarwal et al., ICRA
+    /// 2013, eq. 15). The paper gives only a weight. The cost is its integral: ρ = k (3s - k)/(k + s)
+    /// beyond k, which saturates at 3k.
     ///
     /// ```toml
     /// loss = { type = "dcs", scale = 1.0 }

@@ -5,12 +5,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Another loss at another temperature: ρ(τs)/τ.
+/// A loss at a different temperature: ρ(τs)/τ.
 ///
-/// Where τ residuals of a kind say as much as one alone, their noise is made √τ times as large. This loss still counts
-/// in the σ of one: a residual is an outlier among the residuals, not among means of τ of them. Small residuals cost what
-/// they cost without it. A built-in loss is that loss with another scale, and cheaper so: `scale` / √τ, for `dcs`
-/// `scale` / τ.
+/// If τ residuals of a kind carry the information of one, their σ is multiplied by √τ. This loss still
+/// counts in the σ of a single residual: an outlier is one among single residuals, not among means of τ of
+/// them. Small residuals cost as much as without the loss. The built-in losses need no wrapper, which is
+/// cheaper: use `scale` / √τ, or `scale` / τ for `dcs`.
 ///
 /// ```toml
 /// loss = { type = "tempered", tau = 4.0, loss = { type = "huber", scale = 1.345 } }
@@ -18,9 +18,9 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tempered {
-    /// τ: how many residuals say as much as one alone.
+    /// τ: the number of residuals that carry the information of one.
     pub tau: Positive,
-    /// ρ.
+    /// The loss ρ.
     pub loss: Arc<dyn Loss>,
 }
 
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
     use crate::loss::{Cauchy, Dcs, L1};
 
-    /// Without a method of its own, as a loss of another plugin may be.
+    /// A loss without a `tempered` method, as a plugin may have.
     #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
     struct Outside {}
     impl RobustLoss for Outside {

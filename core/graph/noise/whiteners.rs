@@ -3,7 +3,7 @@ use super::Whitener;
 use crate::algebra::{Block, Dimension, Matrix, Vector};
 use nalgebra::U1;
 
-/// The W's of a batch, all of one kind.
+/// The W matrices of a batch, all of one kind.
 #[derive(Debug, Clone)]
 pub(crate) enum Whiteners<D: Dimension> {
     Unit,
@@ -41,7 +41,7 @@ impl<D: Dimension> Whiteners<D> {
     pub(crate) fn push(&mut self, one: &Whitener) {
         match (self, one) {
             (Self::Isotropic(all), Whitener::Isotropic(w)) => all.push(*w),
-            // rows behind those of the noise are not observed
+            // rows beyond the size of the noise are not observed
             (Self::Diagonal(all), Whitener::Diagonal(w)) => {
                 all.push(D::vector(|i| w.get(i).copied().unwrap_or(0.0)));
             }
@@ -56,7 +56,7 @@ impl<D: Dimension> Whiteners<D> {
             _ => {}
         }
     }
-    /// Puts another in place of the `i`-th; whether it is of this kind.
+    /// Replaces W of factor `i`. Returns `false` if the new one is of a different kind.
     pub(crate) fn set(&mut self, i: usize, one: &Whitener) -> bool {
         let mut single = Self::like(one);
         single.push(one);
@@ -69,7 +69,7 @@ impl<D: Dimension> Whiteners<D> {
         }
         true
     }
-    /// Puts the last in place of the `i`-th.
+    /// Moves the last W to position `i`.
     pub(crate) fn swap_remove(&mut self, i: usize) {
         match self {
             Self::Unit => {}
@@ -78,7 +78,8 @@ impl<D: Dimension> Whiteners<D> {
             Self::Full(all) => drop(all.swap_remove(i)),
         }
     }
-    /// x ← W x for each column of `x`, in place; whatever stands in rows not observed, zero comes out.
+    /// x ← W x for each column of `x`, in place. Rows that are not observed become zero, whatever they
+    /// contain.
     #[inline(always)]
     pub(crate) fn whiten(&self, i: usize, x: &mut [f64]) {
         match self {
@@ -95,12 +96,13 @@ impl<D: Dimension> Whiteners<D> {
             Self::Full(w) => {
                 let w = w[i].as_slice();
                 for column in x.chunks_exact_mut(D::N) {
-                    // whole columns of W, though half of them is zero: entries side by side go through one register
+                    // whole columns of W, though half of W is zero: adjacent entries share a register
                     let mut sum = <Matrix<D, U1> as Block>::zeros();
                     let sum = sum.as_mut_slice();
                     for (k, x) in column.iter().enumerate() {
                         let w = &w[k * D::N..(k + 1) * D::N];
-                        // a row that is not observed has a column of zeros, and may hold anything
+                        // a row that is not observed has a zero column in W, and may contain any value,
+                        // even NaN
                         if w[k] != 0.0 {
                             for r in 0..D::N {
                                 sum[r] += w[r] * x;

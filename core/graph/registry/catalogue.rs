@@ -1,9 +1,9 @@
-//! Everything that can be named in a config, collected from the crates that are linked.
+//! The catalogue of all types that a config can name, collected from the linked crates.
 //!
-//! A trait whose implementations are chosen by name is a [`Kind`]; [`register!`](crate::register)
-//! enters an implementation. The catalogue takes a type's summary, explanation and example from its
-//! doc comment, which travels in its JSON Schema: the first paragraph is the summary, the first
-//! `toml` block the example.
+//! A trait whose implementations are chosen by name is a [`Kind`]; [`register!`](crate::register) adds an
+//! implementation. The catalogue takes summary, explanation and example of a type from its doc comment,
+//! which is part of its JSON Schema. The first paragraph is the summary, the first `toml` block the
+//! example.
 use manifactor_document::{Fault, Node, ReadError, Reader};
 use schemars::Schema;
 use serde_json::Value;
@@ -11,18 +11,18 @@ use std::any::{Any, TypeId};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-/// The field of a document that names a type.
+/// The document field that names a type.
 pub(crate) const TAG: &str = "type";
 
 /// A trait object whose implementations are chosen by name. [`kind!`](crate::kind) makes a trait one.
 pub trait Kind: 'static {
-    /// What it is called: `factor`, `loss`, `solver`, …
+    /// Its name: `factor`, `loss`, `solver`, …
     const NAME: &'static str;
 }
 
 /// One registered type.
 pub struct Entry {
-    /// The [`Kind`] that it is of.
+    /// The [`Kind`] of this type.
     pub kind: &'static str,
     /// Its name in documents.
     pub name: &'static str,
@@ -32,33 +32,33 @@ pub struct Entry {
     pub schema: fn() -> Schema,
     /// The concrete type.
     pub type_id: fn() -> TypeId,
-    /// What a factor or a manifold has beyond a name.
+    /// Signature of a factor or a manifold; empty for further kinds.
     pub signature: fn() -> Signature,
     #[doc(hidden)]
     pub read_boxed: fn(Reader<'_>) -> Result<Box<dyn Any>, ReadError>,
 }
 inventory::collect!(Entry);
 
-/// What a factor connects, or what a manifold's tangent is called.
+/// The variables and rows of a factor, or the tangent directions of a manifold.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Signature {
     /// Rows of a factor's residual.
     pub rows: Option<usize>,
-    /// Names of these rows; none, where the author gave none.
+    /// Names of these rows; empty if the author gave none.
     pub row_names: &'static [&'static str],
     /// Types of a factor's variables, in order.
     pub variables: Vec<TypeId>,
-    /// A factor of any number of variables, all of the one type in `variables`.
+    /// Whether the factor takes any number of variables, all of the single type in `variables`.
     pub many: bool,
     /// Names of a manifold's tangent directions.
     pub tangent: &'static [&'static str],
 }
 
 impl Entry {
-    /// Reads the fields of this type into a trait object of kind `K`. The field `type` is passed over.
+    /// Reads the fields of this type into a trait object of kind `K`. The field `type` is skipped.
     ///
     /// # Errors
-    /// Whatever serde finds, at its place.
+    /// Any error of serde, with its position.
     pub fn read<K: Kind + ?Sized>(&self, fields: &Node) -> Result<Box<K>, ReadError> {
         let any = (self.read_boxed)(Reader::without(fields, TAG)).map_err(|error| error.at(fields))?;
         any.downcast::<Box<K>>().map(|boxed| *boxed).map_err(|_| {
@@ -67,21 +67,21 @@ impl Entry {
         })
     }
 
-    /// The type's doc comment.
+    /// Returns the doc comment of the type.
     pub fn docs(&self) -> String {
         let schema = (self.schema)();
         let text = |key| schema.get(key).and_then(Value::as_str).map(str::to_owned);
         text("description").unwrap_or_default()
     }
 
-    /// First paragraph of the docs, on one line.
+    /// Returns the first paragraph of the docs, on one line.
     pub fn summary(&self) -> String {
         let docs = self.docs();
         let paragraph = docs.split("\n\n").next().unwrap_or_default();
         paragraph.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// The first `toml` block of the docs.
+    /// Returns the first `toml` block of the docs.
     pub fn example(&self) -> Option<String> {
         let docs = self.docs();
         let (_, rest) = docs.split_once("```toml\n")?;
@@ -90,38 +90,38 @@ impl Entry {
     }
 }
 
-/// Every entry that is linked, by kind and name.
+/// Returns every linked entry, sorted by kind and name.
 pub fn all() -> Vec<&'static Entry> {
     let mut all: Vec<_> = inventory::iter::<Entry>.into_iter().collect();
-    // inventory's order differs between builds
+    // the order of inventory differs between builds
     all.sort_by_key(|e| (e.kind, e.name));
     all
 }
 
-/// The entries of one kind, by name.
+/// Returns the entries of one kind, sorted by name.
 pub fn entries(kind: &str) -> Vec<&'static Entry> {
     all().into_iter().filter(|e| e.kind == kind).collect()
 }
 
-/// Two entries of one kind and one name: a document could mean either.
+/// The error for two entries with equal kind and name, which documents cannot distinguish.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "two types are registered as the {kind} `{name}`, in `{}` and in `{}`: give one of them another name in its \
      `register_…!` line", modules[0], modules[1]
 )]
 pub struct NameTaken {
-    /// What both are.
+    /// Kind of both entries.
     pub kind: &'static str,
-    /// What both are called.
+    /// Name of both entries.
     pub name: &'static str,
-    /// Where they are registered.
+    /// Modules that register them.
     pub modules: [&'static str; 2],
 }
 
-/// Checks that every registered type has a name of its own among its kind.
+/// Checks that every registered type has a unique name within its kind.
 ///
 /// # Errors
-/// The first two that share one.
+/// The first two entries with equal names.
 pub fn check_names(sorted: &[&Entry]) -> Result<(), NameTaken> {
     let same = sorted.windows(2).find(|pair| (pair[0].kind, pair[0].name) == (pair[1].kind, pair[1].name));
     match same {
@@ -135,22 +135,23 @@ pub fn check_names(sorted: &[&Entry]) -> Result<(), NameTaken> {
 
 pub use crate::registry::registered::read;
 
-/// The schema of a trait object: a reference to the definition that a document's schema has of all that are linked.
+/// Returns the schema of a trait object: a reference to the definition with all linked types.
 #[doc(hidden)]
 pub fn reference(kind: &str) -> Schema {
     schemars::json_schema!({ "$ref": format!("#/$defs/{kind}") })
 }
 
-/// The entry of this kind and name.
+/// Returns the entry with this kind and name.
 pub fn find(kind: &str, name: &str) -> Option<&'static Entry> {
     static INDEX: OnceLock<HashMap<(&str, &str), &Entry>> = OnceLock::new();
-    // the first of two of one name, as `check_names` tells them
+    // the first of two entries with equal names wins, as in `check_names`
     let index = INDEX.get_or_init(|| all().into_iter().rev().map(|e| ((e.kind, e.name), e)).collect());
     index.get(&(kind, name)).copied()
 }
 
-/// Makes a trait a [`Kind`](crate::registry::catalogue::Kind) of this name: `kind!(dyn Optimizer, "solver");`. Boxes of it are read
-/// from documents by their `type`; `#[typetag::serialize(tag = "type")]` on the trait writes them.
+/// Makes a trait a [`Kind`](crate::registry::catalogue::Kind) with this name:
+/// `kind!(dyn Optimizer, "solver");`. Documents select the type of a box by `type`;
+/// `#[typetag::serialize(tag = "type")]` on the trait writes it.
 #[macro_export]
 macro_rules! kind {
     ($kind:ty, $name:literal) => {
@@ -184,7 +185,8 @@ macro_rules! kind {
     };
 }
 
-/// Enters `$type` into the catalogue as a `$kind`, for traits that have `#[typetag::serialize(name = …)]` on the impl.
+/// Adds `$type` to the catalogue as a `$kind`, for traits with `#[typetag::serialize(name = …)]` on the
+/// impl.
 ///
 /// `register!(dyn Optimizer, "gauss_newton", GaussNewton);`
 #[macro_export]
@@ -211,8 +213,9 @@ macro_rules! register {
     };
 }
 
-/// Registers a [`Residual`](crate::Residual) as a factor: `register_factor!("between_se3", Between<Se3>);`. One that takes
-/// the world's up names its field of type [`Up`](crate::Up): `register_factor!("upright", Upright, up);`
+/// Registers a [`Residual`](crate::Residual) as a factor: `register_factor!("between_se3", Between<Se3>);`.
+/// A factor that depends on the up direction of the world names its field of type [`Up`](crate::Up):
+/// `register_factor!("upright", Upright, up);`
 #[macro_export]
 macro_rules! register_factor {
     ($name:literal, $type:ty $(, $up:ident)?) => {

@@ -1,4 +1,4 @@
-//! Numbers with a domain: a value outside of it cannot be made, neither in code nor by a document.
+//! Numbers with a domain. A value outside of it cannot be created, neither in code nor by a document.
 use schemars::JsonSchema;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -14,8 +14,8 @@ pub struct OutOfDomain {
     pub got: f64,
 }
 
-/// Defines types of numbers with a domain: a documentation, a name, the domain in words and as an expression, and its JSON schema.
-/// Settings have them as fields, so that code and documents are checked alike:
+/// Defines types of numbers with a domain: docs, a name, the domain in words and as an expression, and its
+/// JSON schema. Settings use them as field types, so that code and documents get equal checks:
 ///
 /// ```
 /// # use manifactor_graph::number;
@@ -39,10 +39,10 @@ macro_rules! number {
 
         #[allow(dead_code, reason = "not every number is used in every way")]
         impl $name {
-            /// A number that is only known when the program runs.
+            /// Checks a number at run time.
             ///
             /// # Errors
-            /// A number outside the domain, or one that is not finite.
+            /// If the number is outside the domain or not finite.
             pub const fn new($x: f64) -> Result<Self, $crate::checked::OutOfDomain> {
                 if $is_within {
                     Ok(Self($x))
@@ -50,13 +50,14 @@ macro_rules! number {
                     Err($crate::checked::OutOfDomain { expected: $expected, got: $x })
                 }
             }
-            /// A number that is written in code. In a constant, one outside the domain does not compile; elsewhere it panics.
+            /// Makes a number from a literal. Outside the domain, a constant fails to compile, and a call
+            /// at run time panics.
             #[track_caller]
             pub const fn literal($x: f64) -> Self {
                 assert!($is_within, concat!("expected ", $expected));
                 Self($x)
             }
-            /// The number.
+            /// Returns the number.
             pub const fn get(self) -> f64 {
                 self.0
             }
@@ -124,7 +125,8 @@ number! {
 pub struct Count<const LEAST: usize, const MOST: usize>(usize);
 
 impl<const LEAST: usize, const MOST: usize> Count<LEAST, MOST> {
-    /// A number that is written in code. In a constant, one outside the domain does not compile; elsewhere it panics.
+    /// Makes a number from a literal. Outside the domain, a constant fails to compile, and a call at run
+    /// time panics.
     #[track_caller]
     pub const fn literal(n: usize) -> Self {
         assert!(LEAST <= n && n <= MOST);

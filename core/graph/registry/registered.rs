@@ -1,11 +1,11 @@
-//! Trait objects that a document chooses by name: `solver = { type = "gauss_newton", max_iterations = 20 }`.
+//! Parsing of trait objects by name: `solver = { type = "gauss_newton", max_iterations = 20 }`.
 use crate::registry::catalogue::{Entry, Kind, TAG, all, entries, find};
 use manifactor_document::{Fault, Field, Node, Place, ReadError, Value, advice, nearest};
 
 /// Reads a table as the registered type of kind `K` that its `type` names.
 ///
 /// # Errors
-/// No `type`, one that is not registered, and whatever is wrong with the fields; each at its place.
+/// If `type` is missing or not registered, or a field is wrong; each with its position.
 pub fn read<K: Kind + ?Sized>(node: &Node) -> Result<Box<K>, ReadError> {
     let tag = match &node.value {
         Value::Table(table) => table.get(TAG),
@@ -20,7 +20,7 @@ pub fn read<K: Kind + ?Sized>(node: &Node) -> Result<Box<K>, ReadError> {
     entry.map_err(|(place, problem)| ReadError::new(place, problem))?.read(node)
 }
 
-/// The entry that a tag names.
+/// Returns the entry that a tag names.
 fn entry_of(tag: &Node, kind: &str) -> Result<&'static Entry, Fault> {
     let a = article(kind);
     Err(match &tag.value {
@@ -39,7 +39,7 @@ fn entry_of(tag: &Node, kind: &str) -> Result<&'static Entry, Fault> {
     })
 }
 
-/// A name that nothing has: misspelt, or of a plugin that is not there.
+/// Describes an unknown name: misspelt, or from a plugin that is not linked.
 fn unknown(kind: &str, name: &str) -> Fault {
     let known = known(kind);
     if nearest(name, known.iter().map(String::as_str)).is_some() {
@@ -51,7 +51,7 @@ fn unknown(kind: &str, name: &str) -> Fault {
     Fault::with_help(format!("unknown {kind} `{name}`"), help)
 }
 
-/// What is wrong where there is no `type`.
+/// Describes a missing `type`.
 fn untagged(node: &Node, kind: &str) -> (Place, Fault) {
     let a = article(kind);
     let (place, problem) = match &node.value {

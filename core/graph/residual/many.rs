@@ -12,15 +12,15 @@ use smallvec::SmallVec;
 use std::any::TypeId;
 use std::marker::PhantomData;
 
-/// How many variables a factor has before its blocks are allocated.
+/// Number of variables up to which a factor needs no allocation for its blocks.
 const INLINE: usize = 8;
 
-/// A list that needs no allocation up to eight entries.
+/// A list without allocation up to eight entries.
 pub type List<T> = SmallVec<[T; INLINE]>;
 
-/// Any number of variables of type `M`: a factor has as many as it has keys.
+/// Any number of variables of type `M`: one for each key of the factor.
 ///
-/// `residual` gets a [`List`] of them. Up to eight, nothing is allocated.
+/// `residual` gets a [`List`] of them. Up to eight need no allocation.
 #[derive(Debug, Clone, Copy)]
 pub struct Many<M>(PhantomData<M>);
 

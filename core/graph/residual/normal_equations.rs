@@ -1,10 +1,10 @@
-//! Where factors add to H = JᵀJ and g = Jᵀr.
+//! Storage of the normal equations H = JᵀJ and g = Jᵀr.
 use crate::algebra::{Block, Dimension, Matrix};
 use crate::variable::column::FIXED;
 use nalgebra::U1;
 
-/// Where one block of H goes, in the packed columns of its lower triangle. Those get shorter by one each, so the columns of
-/// a block are not equally far apart:
+/// Position of one block of H in the packed columns of its lower triangle. Each column is one entry shorter
+/// than the previous one, so the distance between columns of a block decreases:
 ///
 /// ```text
 /// H    h00                 packed by columns:  h00 h10 h20 h30 | h11 h21 h31 | h22 h32 | h33
@@ -16,20 +16,21 @@ use nalgebra::U1;
 pub struct Slot {
     /// Index of entry (0, 0).
     pub at: usize,
-    /// Distance from the first column to the second; to each further one it is less by one.
+    /// Distance from the first column to the second. It decreases by one with each further column.
     pub stride: u32,
-    /// The factor's earlier variable comes later in the ordering: the transposed block is stored.
+    /// Whether the transposed block is stored, because the factor's earlier variable comes later in the
+    /// ordering.
     pub swapped: bool,
 }
 
 impl Slot {
-    /// Where entry (row, column) of the block is. In a block on the diagonal, the row is no less than the column.
+    /// Returns the index of entry (row, column) of the block. In a diagonal block, row ≥ column.
     #[inline(always)]
     pub fn index(self, row: usize, column: usize) -> usize {
         self.at + column * self.stride as usize - column * column.saturating_sub(1) / 2 + row
     }
 
-    /// The same block, its rows as columns.
+    /// Returns the slot of the transposed block.
     #[must_use]
     pub fn transposed(self) -> Self {
         Self { swapped: !self.swapped, ..self }
@@ -45,16 +46,16 @@ pub struct NormalEquations<'a> {
     pub g: &'a mut [f64],
 }
 
-/// One factor's places: where its variables begin in g, and where its blocks are in H.
+/// Positions of one factor: starts of its variables in g, and slots of its blocks in H.
 #[derive(Debug, Clone, Copy)]
 pub struct Places<'a> {
-    /// By variable; [`FIXED`] for one that is held.
+    /// Start of each variable; [`FIXED`] for fixed variables.
     pub starts: &'a [u32],
-    /// By pair (a, b ≤ a), at a(a+1)/2 + b.
+    /// Slot of each pair (a, b ≤ a), at index a(a+1)/2 + b.
     pub slots: &'a [Slot],
 }
 
-/// h ← h + s for a few entries, by twos: masked stores, which a plain loop would be compiled to, are slow.
+/// h ← h + s for a few entries, in pairs: a plain loop would compile to masked stores, which are slow.
 #[inline(always)]
 fn add_short(h: &mut [f64], s: &[f64]) {
     let ((h, last), (s, of_last)) = (h.as_chunks_mut::<2>(), s.as_chunks::<2>());
@@ -101,7 +102,7 @@ impl NormalEquations<'_> {
         }
     }
 
-    /// H ← H + w JₐᵀJ_b for b < a, whichever triangle it falls into.
+    /// H ← H + w JₐᵀJ_b for b < a, in either triangle.
     #[inline(always)]
     pub(crate) fn add_pair<R: Dimension, A: Dimension, B: Dimension>(
         &mut self,
@@ -132,7 +133,7 @@ impl NormalEquations<'_> {
         lower: bool,
     ) {
         let (ja, jb) = (ja.as_slice(), jb.as_slice());
-        // the transpose first: the inner loops then run over contiguous entries
+        // transpose first, so that the inner loops run over contiguous entries
         let mut at = <Matrix<A, R> as Block>::zeros();
         let at = at.as_mut_slice();
         for k in 0..R::N {
@@ -159,7 +160,7 @@ impl NormalEquations<'_> {
         }
     }
 
-    /// g ← g + w Jₐᵀr and H ← H + w JₐᵀJ_b for all b ≤ a, for blocks of widths that are known at run time.
+    /// g ← g + w Jₐᵀr and H ← H + w JₐᵀJ_b for all b ≤ a, for blocks with run-time widths.
     pub(crate) fn add_dynamic<'b, const R: usize>(
         &mut self,
         places: Places<'_>,

@@ -1,4 +1,4 @@
-//! Tuples of manifolds as the variables of a residual, and automatic differentiation over them.
+//! Tuples of manifolds as variables of a residual, and automatic differentiation over them.
 use crate::algebra::{Block, Dimension, Matrix, Vector};
 use crate::algebra::{Jet, JetOf, Scalar};
 use crate::residual::Residual;
@@ -8,7 +8,7 @@ use crate::variable::Variable;
 use crate::variable::column::Columns;
 use std::any::TypeId;
 
-/// What a residual depends on: `(A,)`, `(A, B)`, … up to six manifolds, or [`Many<A>`](crate::Many).
+/// Variables of a residual: `(A,)`, `(A, B)`, … up to six manifolds, or [`Many<A>`](crate::Many).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be the variables of a residual",
     note = "write a tuple of one to six manifolds, such as `(Se3, DualQuadric)` or `(Se3,)` with its comma, or `Many<Se3>`"
@@ -18,26 +18,27 @@ pub trait Variables: 'static {
     type Lifted<T: Scalar>;
     /// The variables, by reference.
     type Refs<'a>: Clone;
-    /// The columns that they are in.
+    /// The columns of the variables.
     type Columns<'a>: Copy + Send + Sync;
     /// A block of `R::N` rows for each variable.
     type Jacobians<R: Dimension>: Clone + Send + Sync;
 
-    /// Their types, and whether the one type stands for any number of variables.
+    /// Returns their types, and whether the single type stands for any number of variables.
     fn types() -> (Vec<TypeId>, bool);
-    /// The columns of the variables; one downcast each, once for a batch.
+    /// Returns the columns of the variables: one downcast each, once per batch.
     fn columns(columns: &Columns) -> Self::Columns<'_>;
-    /// One factor's variables, by their places in the columns.
+    /// Returns the variables at these indices of their columns.
     fn load<'a>(columns: Self::Columns<'a>, index: &[u32]) -> Self::Refs<'a>;
-    /// Variables of any type as these; `None` where number or types do not fit.
+    /// Casts type-erased variables to these types; `None` if their number or types do not fit.
     fn downcast<'a>(variables: &[&'a dyn Variable]) -> Option<Self::Refs<'a>>;
-    /// The variables over `T`, as constants.
+    /// Returns the variables over `T`, as constants.
     fn lift<T: Scalar>(x: &Self::Refs<'_>) -> Self::Lifted<T>;
-    /// Blocks for `count` variables.
+    /// Returns blocks for `count` variables.
     fn blocks<R: Dimension>(count: usize) -> Self::Jacobians<R>;
-    /// Makes the blocks fit `count` variables.
+    /// Resizes the blocks for `count` variables.
     fn resize<R: Dimension>(_blocks: &mut Self::Jacobians<R>, _count: usize) {}
-    /// The residual and the blocks of the free variables, by forward duals: one pass a variable.
+    /// Evaluates the residual and the blocks of the free variables by forward dual numbers, one pass per
+    /// variable.
     fn autodiff<F: Residual<Variables = Self>>(
         residual: &F,
         x: Self::Refs<'_>,
@@ -61,7 +62,7 @@ pub trait Variables: 'static {
 pub(crate) fn store<D: Dimension, R: Dimension>(r: &[JetOf<D>], block: &mut Matrix<R, D>) {
     let block = block.as_mut_slice();
     for (i, row) in r.iter().enumerate() {
-        // num-dual drops zero derivatives: zeros have to overwrite what the last factor left here
+        // num-dual drops zero derivatives: zeros have to overwrite the entries of the previous factor
         let gradient = row.gradient();
         for c in 0..D::N {
             block[i + c * R::N] = gradient.map_or(0.0, |g| g[c]);
@@ -126,7 +127,7 @@ macro_rules! tuple {
             }
         }
     };
-    // one pass for each free variable: that one seeded, the others lifted as constants
+    // one pass for each free variable: this variable is seeded, all the rest are constants
     (@passes $f:ident $x:ident $free:ident $blocks:ident [$($v:ident $i:tt),+] $all:tt) => {
         $(if $free[$i] {
             let r = $f.residual(tuple!(@seeded $x $v $i $all));
@@ -141,7 +142,7 @@ macro_rules! tuple {
     (@argument $x:ident $v:ident 4 4) => { $x.4.seed() };
     (@argument $x:ident $v:ident 5 5) => { $x.5.seed() };
     (@argument $x:ident $v:ident $s:tt $i:tt) => { $x.$i.lift::<JetOf<$v::Dim>>() };
-    // the lower triangle of pairs
+    // lower triangle of the pairs
     (@rows $r:ident $j:ident $res:ident $w:ident $places:ident $to:ident [$($v:ident $i:tt),+] $all:tt) => {
         $(
             $to.add_gradient::<$r, $v::Dim>($places, $i, &$j.$i, $res, $w);

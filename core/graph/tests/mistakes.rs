@@ -1,8 +1,8 @@
-//! What the compiler says to an author's mistakes: each message names the mistake and what to write.
+//! Compiler messages for mistakes of factor authors: each names the mistake and its fix.
 #![allow(missing_docs)]
 
 #[test]
 fn mistakes_of_authors_are_named_with_what_to_write() {
-    // the messages are those of one compiler: `TRYBUILD=overwrite` writes them anew for another
+    // messages differ between compiler versions: `TRYBUILD=overwrite` rewrites them for a new one
     trybuild::TestCases::new().compile_fail("tests/mistakes/*.rs");
 }

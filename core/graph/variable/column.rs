@@ -1,47 +1,47 @@
-//! Variables of one type, side by side.
+//! Variables of one type, stored contiguously.
 use crate::algebra::Dimension;
 use crate::variable::Manifold;
 use crate::variable::Variable;
 use std::any::{Any, TypeId};
 
-/// Start of a variable that is held fixed: it has no place in the linear system.
+/// Start of a fixed variable, which is not part of the linear system.
 pub const FIXED: u32 = u32::MAX;
 
-/// A plain vector as a trait object; a type of our own, so that impls do not meet those for `Vec`.
+/// A vector as a trait object. A new type, so that its impls do not conflict with impls for `Vec`.
 #[derive(Debug, Clone)]
 pub(crate) struct Plain<T>(pub(crate) Vec<T>);
 
 /// All variables of one type, contiguous.
 pub trait Column: Send + Sync {
-    /// For a downcast to the typed column.
+    /// Returns the column for a downcast to the typed column.
     fn as_any(&self) -> &dyn Any;
-    /// Number of variables.
+    /// Returns the number of variables.
     fn len(&self) -> usize;
-    /// Returns whether there is no variable.
+    /// Returns whether the column is empty.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Appends a variable of this column's type; others are left out.
+    /// Appends a variable of this column's type. A variable of a different type is ignored.
     fn push(&mut self, value: &dyn Variable);
-    /// Overwrites a variable by one of this column's type.
+    /// Overwrites a variable with a value of this column's type.
     fn set(&mut self, index: usize, value: &dyn Variable);
-    /// A variable, for a downcast to its type.
+    /// Returns a variable for a downcast to its type.
     fn value(&self, index: usize) -> Option<&dyn Any>;
-    /// A copy of a variable.
+    /// Returns a copy of a variable.
     fn get(&self, index: usize) -> Option<Box<dyn Variable>>;
-    /// `self ← from ⊞ step`, where variable i's part of the step begins at `starts[i]`.
+    /// `self ← from ⊞ step`; the step of variable i begins at `starts[i]`.
     fn retract_from(&mut self, from: &dyn Column, starts: &[u32], step: &[f64]);
-    /// `self[index] ← from[index] ⊞ step`, of one variable.
+    /// `self[index] ← from[index] ⊞ step`, for one variable.
     fn retract_at(&mut self, from: &dyn Column, index: usize, step: &[f64]);
-    /// `self[index] ← from[index]`, of one variable.
+    /// `self[index] ← from[index]`, for one variable.
     fn copy_at(&mut self, from: &dyn Column, index: usize);
     /// Keeps the first `len` variables.
     fn truncate(&mut self, len: usize);
-    /// The first variable with a coordinate that is not finite.
+    /// Returns the first variable with a coordinate that is not finite.
     fn first_not_finite(&self) -> Option<usize>;
-    /// `self ← from`, a column of the same type, in the memory that is there.
+    /// `self ← from`, for columns of equal type, without allocation if the memory suffices.
     fn copy_from(&mut self, from: &dyn Column);
-    /// The same column again.
+    /// Returns a copy of the column.
     fn clone_box(&self) -> Box<dyn Column>;
 }
 
@@ -109,24 +109,24 @@ impl<M: Manifold + Variable> Column for Plain<M> {
 pub struct Columns(Vec<(TypeId, Box<dyn Column>)>);
 
 impl Columns {
-    /// Adds a column, and returns its place.
+    /// Adds a column, and returns its index.
     pub fn add(&mut self, id: TypeId, column: Box<dyn Column>) -> usize {
         self.0.push((id, column));
         self.0.len() - 1
     }
-    /// The place of the column of a type.
+    /// Returns the index of the column of a type.
     pub fn position(&self, id: TypeId) -> Option<usize> {
         self.0.iter().position(|(i, _)| *i == id)
     }
-    /// The column at a place that [`Columns::add`] returned.
+    /// Returns the column at an index from [`Columns::add`].
     pub fn column(&self, place: usize) -> &dyn Column {
         &*self.0[place].1
     }
-    /// The column at a place, to be changed.
+    /// Returns the column at an index, for modification.
     pub fn column_mut(&mut self, place: usize) -> &mut dyn Column {
         &mut *self.0[place].1
     }
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -134,11 +134,11 @@ impl Columns {
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
-    /// A variable of any type, for a downcast to it.
+    /// Returns a variable of any type, for a downcast to it.
     pub fn value(&self, id: TypeId, index: usize) -> Option<&dyn Any> {
         self.0.iter().find(|(i, _)| *i == id)?.1.value(index)
     }
-    /// The variables of type `M`; empty where there are none.
+    /// Returns the variables of type `M`; empty if there are none.
     pub fn typed<M: Manifold>(&self) -> &[M] {
         let column = self.0.iter().find(|(id, _)| *id == TypeId::of::<M>());
         column.and_then(|(_, c)| c.as_any().downcast_ref::<Plain<M>>()).map_or(&[], |c| &c.0)

@@ -11,11 +11,11 @@ use std::sync::Arc;
 pub struct Key(#[schemars(with = "String")] Arc<str>);
 
 impl Key {
-    /// `Key::indexed("x", 12)` is `x12`.
+    /// Makes a key from a prefix and an index: `Key::indexed("x", 12)` is `x12`.
     pub fn indexed(prefix: &str, index: impl fmt::Display) -> Self {
         format!("{prefix}{index}").into()
     }
-    /// The text itself.
+    /// Returns the text of the key.
     pub fn as_str(&self) -> &str {
         &self.0
     }

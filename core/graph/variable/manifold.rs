@@ -1,11 +1,11 @@
-//! Smooth manifolds: the types that variables of a graph have.
+//! Smooth manifolds: the types of a graph's variables.
 use crate::algebra::{Dimension, Vector};
 use crate::algebra::{JetOf, Scalar};
 use std::fmt::Debug;
 
-/// A smooth manifold with a chart around each of its points.
+/// A smooth manifold with a chart around each point.
 ///
-/// `retract(x, δ)` maps a tangent vector at `x` to a point, `local` is its inverse:
+/// `retract(x, δ)` maps a tangent vector at `x` to a point, and `local` is its inverse:
 /// `x.retract(&x.local(&y)) == y`, and `x.retract(&0) == x`.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` cannot be a variable: it is not a `Manifold`",
@@ -15,24 +15,24 @@ use std::fmt::Debug;
 pub trait Manifold: Clone + Debug + Send + Sync + 'static {
     /// Dimension of the tangent space, at most 32.
     type Dim: Dimension;
-    /// The same point over another scalar; `Of<f64>` need not be `Self`.
+    /// The point type over the scalar `T`; `Of<f64>` need not be `Self`.
     type Of<T: Scalar>;
-    /// A name for each tangent direction, in tangent order; what `fixed = [...]` and reports use.
+    /// A name for each tangent direction, in tangent order. `fixed = [...]` and reports use these names.
     const TANGENT: &'static [&'static str];
 
-    /// The same point over `T`, with no derivative.
+    /// Returns the point over `T`, with derivative zero.
     fn lift<T: Scalar>(&self) -> Self::Of<T>;
 
-    /// `retract(self, δ)` at δ = 0, with its derivative by δ.
+    /// Returns `retract(self, δ)` at δ = 0, with its derivative with respect to δ.
     ///
-    /// Write the derivative of the chart itself: running the exponential map on duals costs more
-    /// and meets its singularity at zero.
+    /// Write the derivative of the chart directly: the exponential map on dual numbers costs more and is
+    /// singular at zero.
     fn seed(&self) -> Self::Of<JetOf<Self::Dim>>;
 
-    /// The point that the tangent vector `delta` leads to.
+    /// Returns the point that the tangent vector `delta` leads to.
     fn retract(&self, delta: &Vector<Self::Dim>) -> Self;
 
-    /// The tangent vector that leads to `other`.
+    /// Returns the tangent vector that leads to `other`.
     fn local(&self, other: &Self) -> Vector<Self::Dim>;
 
     /// Returns whether every coordinate is finite.

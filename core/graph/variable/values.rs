@@ -11,27 +11,27 @@ use std::any::TypeId;
 #[serde(transparent)]
 pub struct Values(IndexMap<Key, Box<dyn Variable>, foldhash::fast::RandomState>);
 
-/// Why a value could not be had.
+/// The error for a value that is missing or has the wrong type.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValueError {
-    /// No variable of that name.
+    /// There is no variable with this name.
     #[error("there is no variable `{key}`")]
     Missing {
-        /// The key that was asked for.
+        /// The requested key.
         key: Key,
     },
-    /// A variable of another type.
+    /// The variable has a different type.
     #[error("the variable `{key}` is of type {found}, not {expected}")]
     WrongType {
-        /// The key that was asked for.
+        /// The requested key.
         key: Key,
-        /// The type that was asked for.
+        /// The requested type.
         expected: &'static str,
-        /// The type that it has.
+        /// The type of the variable.
         found: &'static str,
     },
-    /// A value with a coordinate that is not finite.
+    /// The value has a coordinate that is not finite.
     #[error("the value of `{key}` is not finite")]
     NotFinite {
         /// Its key.
@@ -40,11 +40,11 @@ pub enum ValueError {
 }
 
 impl Values {
-    /// No values.
+    /// Makes an empty set of values.
     pub fn new() -> Self {
         Self::default()
     }
-    /// Sets the value of a key, and returns the one that it had.
+    /// Sets the value of a key, and returns its previous value.
     pub fn insert(
         &mut self,
         key: impl Into<Key>,
@@ -52,18 +52,18 @@ impl Values {
     ) -> Option<Box<dyn Variable>> {
         self.insert_boxed(key.into(), Box::new(value))
     }
-    /// Sets the value of a key, and returns the one that it had.
+    /// Sets the value of a key, and returns its previous value.
     pub fn insert_boxed(&mut self, key: Key, value: Box<dyn Variable>) -> Option<Box<dyn Variable>> {
         self.0.insert(key, value)
     }
-    /// The value of a key, of any type.
+    /// Returns the value of a key, of any type.
     pub fn variable(&self, key: &str) -> Option<&dyn Variable> {
         self.0.get(key).map(|v| &**v)
     }
-    /// The value of a key.
+    /// Returns the value of a key.
     ///
     /// # Errors
-    /// If there is none, or one of another type.
+    /// If there is no value, or its type is not `M`.
     pub fn get<M: Variable + 'static>(&self, key: impl AsRef<str>) -> Result<&M, ValueError> {
         let key = key.as_ref();
         let value = self.variable(key).ok_or_else(|| ValueError::Missing { key: key.into() })?;
@@ -73,31 +73,31 @@ impl Values {
             found: value.typetag_name(),
         })
     }
-    /// All values of one type, in order.
+    /// Returns all values of one type, in order.
     pub fn all<M: Variable + 'static>(&self) -> impl Iterator<Item = (&Key, &M)> {
         self.iter().filter_map(|(key, v)| Some((key, v.erased().as_any().downcast_ref()?)))
     }
-    /// All values, in order.
+    /// Returns all values, in order.
     pub fn iter(&self) -> impl Iterator<Item = (&Key, &dyn Variable)> {
         self.0.iter().map(|(key, value)| (key, &**value))
     }
-    /// The value of a key, of any type, and its place in the order.
+    /// Returns the value of a key, of any type, and its position in the order.
     pub fn find(&self, key: &str) -> Option<(usize, &dyn Variable)> {
         self.0.get_full(key).map(|(place, _, value)| (place, &**value))
     }
-    /// The place of a key in the order.
+    /// Returns the position of a key in the order.
     pub fn position(&self, key: &str) -> Option<usize> {
         self.0.get_index_of(key)
     }
-    /// Removes a key; the others keep their order.
+    /// Removes a key. The remaining ones keep their order.
     pub fn remove(&mut self, key: &str) -> Option<Box<dyn Variable>> {
         self.0.shift_remove(key)
     }
-    /// Returns whether there is a value of that key.
+    /// Returns whether the key has a value.
     pub fn contains(&self, key: &str) -> bool {
         self.0.contains_key(key)
     }
-    /// Number of values.
+    /// Returns the number of values.
     pub fn len(&self) -> usize {
         self.0.len()
     }

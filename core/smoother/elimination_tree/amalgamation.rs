@@ -1,14 +1,16 @@
-//! Fewer and larger fronts, at the price of some zeros: relaxed amalgamation (Ashcraft and Grimes, 1989).
+//! Relaxed amalgamation (Ashcraft and Grimes, 1989): fewer and larger fronts with some explicit zeros.
 use super::order::Group;
 
-/// Returns whether a front of `width` columns is worth so many zeros among its entries. Wider than where a whole graph is factorized
-/// at once: a front that is redone costs its assembly and its structure, too.
+/// Returns whether a merged front of `width` columns may have `zeros` explicit zeros among its `entries`.
+///
+/// The limits are wider than in the batch solver: each recomputed front also costs assembly and symbolic
+/// work.
 fn is_worth(width: usize, zeros: usize, entries: usize) -> bool {
     let share = zeros as f64 / entries as f64;
     width <= 18 || (width <= 36 && share < 0.2) || (width <= 72 && share < 0.05) || share < 0.01
 }
 
-/// A group in scalars.
+/// Size of a group, in scalars.
 #[derive(Clone, Copy)]
 struct Size {
     width: usize,
@@ -16,15 +18,17 @@ struct Size {
     zeros: usize,
 }
 
-/// Merges groups into their parents; a group that is merged is left without blocks. `parents` are by group, later than
-/// their children, [`NONE`](super::NONE) for a root, and are those that are left afterwards.
+/// Merges groups into their parents. A merged group is left without blocks.
+///
+/// `parents` is indexed by group. A parent has a larger index than its children, and a root has
+/// [`NONE`](super::NONE). On return, `parents` holds the parents after the merges.
 pub(super) fn merge(groups: &mut [Group], parents: &mut [u32], dim: impl Fn(u32) -> usize) {
     let n = groups.len();
     let scalars = |of: &[u32]| of.iter().map(|v| dim(*v)).sum::<usize>();
     let size = |group: &Group| Size { width: scalars(&group.blocks), below: scalars(&group.rows), zeros: 0 };
     let mut sizes: Vec<Size> = groups.iter().map(size).collect();
     let mut into: Vec<u32> = (0..n as u32).collect();
-    // by parent, its children with the most rows first
+    // sorted by parent; the children with the most rows come first
     let mut children: Vec<(u32, usize, u32)> = (0..n)
         .filter(|g| parents[*g] != super::NONE)
         .map(|g| (parents[g], usize::MAX - sizes[g].below, g as u32))
@@ -43,7 +47,7 @@ pub(super) fn merge(groups: &mut [Group], parents: &mut [u32], dim: impl Fn(u32)
             sizes[p] = Size { width, zeros, ..parent };
         }
     }
-    // from the roots down: a parent's own fate is known
+    // from the roots down, so that the merges of a parent are already resolved
     for g in (0..n).rev() {
         into[g] = into[into[g] as usize];
         if parents[g] != super::NONE {

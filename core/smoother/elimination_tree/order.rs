@@ -1,46 +1,49 @@
-//! An order of elimination for a part of the graph: minimum degree, with some variables last.
+//! Order of elimination for a part of the graph: minimum degree, with some variables forced to the end.
 //!
-//! Approximate minimum degree (Amestoy, Davis and Duff, 1996) on a quotient graph. The boundaries of subtrees that stay as
-//! they are enter as its first elements. An element is what a pivot leaves behind: the clique of its neighbours. So each
-//! pivot's element is at the same time the rows of its columns, and no symbolic factorization has to follow.
+//! Approximate minimum degree (Amestoy, Davis and Duff, 1996) on a quotient graph. An element is the clique
+//! of neighbours that an eliminated pivot leaves behind. The boundaries of kept subtrees are the first
+//! elements. The element of a pivot is also the set of rows of its columns, so no symbolic factorization
+//! follows.
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Variables that are eliminated one after the other, with the same rows below them.
+/// Variables that are eliminated in sequence, with a common set of rows below them.
 #[derive(Debug, Default)]
 pub(super) struct Group {
     pub(super) blocks: Vec<u32>,
-    /// In no order.
+    /// Unordered.
     pub(super) rows: Vec<u32>,
 }
 
-/// A local graph, in memory that is kept from one update to the next. Variables count from 0.
+/// A local graph. Its memory is reused by the next update. Variables count from 0.
 #[derive(Debug, Default)]
 pub(super) struct Order {
-    /// By variable: those that it is coupled to, and its elements.
+    /// Neighbours and elements of each variable.
     coupled: Vec<Vec<u32>>,
     elements: Vec<Vec<u32>>,
-    /// Members of all elements, one after the other; of each, where they are and how many scalars of them are left.
+    /// Members of all elements, concatenated. `range` is the part of each element, `left` the number of its
+    /// scalars that are not eliminated yet.
     members: Vec<u32>,
     range: Vec<(u32, u32)>,
     left: Vec<u32>,
     absorbed: Vec<bool>,
-    /// By variable.
+    /// Indexed by variable, like the next four fields.
     dim: Vec<u32>,
     is_last: Vec<bool>,
     degree: Vec<u32>,
     alive: Vec<bool>,
     mark: Vec<u32>,
-    /// By element: the pivot that it was looked at for, and how many of its scalars are outside of that pivot's element.
+    /// By element: the pivot of the last count, and the number of its scalars outside of that pivot's
+    /// element.
     outside: Vec<(u32, u32)>,
-    /// Variables by degree, those that come last behind all others. Entries that no longer hold are skipped.
+    /// Variables by degree, last variables at the end. Outdated entries are skipped.
     queue: BinaryHeap<Reverse<(bool, u32, u32)>>,
 }
 
 const NONE: u32 = u32::MAX;
 
 impl Order {
-    /// Begins a graph of variables with these dimensions.
+    /// Starts a graph of variables with these dimensions. The flag forces a variable to the end.
     pub(super) fn begin(&mut self, variables: impl Iterator<Item = (u32, bool)>) {
         self.dim.clear();
         self.is_last.clear();
@@ -57,7 +60,7 @@ impl Order {
         self.members.clear();
     }
 
-    /// Adds a variable that another is coupled to. It has to be said of both.
+    /// Adds one direction of an edge. The caller adds both directions.
     pub(super) fn couple(&mut self, variable: usize, other: u32) {
         self.coupled[variable].push(other);
     }
@@ -72,7 +75,7 @@ impl Order {
         self.range.push((begin, self.members.len() as u32));
     }
 
-    /// All variables in groups, in an order of elimination.
+    /// Returns all variables as groups, in an order of elimination.
     pub(super) fn groups(&mut self) -> Vec<Group> {
         let n = self.dim.len();
         let cliques = self.range.len();
@@ -97,7 +100,7 @@ impl Order {
         groups
     }
 
-    /// Degrees in scalars, exact: cliques overlap.
+    /// Computes exact degrees in scalars. Overlaps of cliques count once.
     fn degrees(&mut self) {
         let n = self.dim.len();
         self.queue.clear();
@@ -119,7 +122,7 @@ impl Order {
         refill(&mut self.mark, n, NONE);
     }
 
-    /// Eliminates a pivot, and with it those variables that are coupled to nothing else than it is.
+    /// Eliminates a pivot together with all variables that have no neighbours outside of its element.
     fn eliminate(&mut self, pivot: u32, element: u32) -> Group {
         let p = pivot as usize;
         let range = self.new_element(pivot);
@@ -151,14 +154,15 @@ impl Order {
             }
             (self.elements[v], self.coupled[v]) = (elements, coupled);
         }
-        // neighbours stand in an order that depends on history
+        // the order of the neighbours depends on history
         group.blocks[1..].sort_unstable();
         group.rows.extend(self.members[range].iter().copied().filter(|v| self.alive[*v as usize]));
         self.left[element as usize] = group.rows.iter().map(|v| self.dim[*v as usize]).sum();
         group
     }
 
-    /// The neighbours of a pivot, which are marked: members of its elements, which are absorbed, and those it is coupled to.
+    /// Collects and marks the neighbours of a pivot. They are its coupled variables and the members of its
+    /// elements, which are absorbed.
     fn new_element(&mut self, pivot: u32) -> std::ops::Range<usize> {
         let (p, begin) = (pivot as usize, self.members.len());
         (self.alive[p], self.mark[p]) = (false, pivot);
@@ -183,7 +187,7 @@ impl Order {
         }
     }
 
-    /// Of each element that a neighbour of the pivot is in: how many of its scalars are no neighbours.
+    /// Counts, for each element of the pivot's neighbours, the scalars that are not neighbours of the pivot.
     fn look_outside(&mut self, pivot: u32, neighbours: &std::ops::Range<usize>) {
         for i in neighbours.clone() {
             let v = self.members[i] as usize;
@@ -211,7 +215,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
-    /// Rows of each variable's column by elimination, one by one.
+    /// Returns the rows of each variable's column by plain elimination.
     fn rows(n: usize, edges: &[(u32, u32)], order: &[u32]) -> Vec<BTreeSet<u32>> {
         let mut near: Vec<BTreeSet<u32>> = vec![BTreeSet::new(); n];
         for &(a, b) in edges {
@@ -254,7 +258,7 @@ mod tests {
                 edges.extend(clique.iter().flat_map(|a| clique.iter().filter(move |b| a > b).map(move |b| (*a, *b))));
             }
             let groups = order.groups();
-            // history shows in the order of lists: the groups are the same
+            // a different history only changes the order of lists; the groups have to be equal
             let mut other = Order::default();
             other.begin((0..m).map(|v| (1 + v % 3, last.contains(&v))));
             for clique in cliques.iter().rev() {

@@ -1,9 +1,9 @@
-//! The tree as it is saved, and checked when it is read.
+//! Saving the tree, and checking it when it is loaded.
 use super::{Couplings, Front, NONE, Tree};
 use crate::saved::SavedFront;
 
 impl Tree {
-    /// All fronts, children before parents.
+    /// Returns all fronts, children before parents.
     pub(crate) fn save(&self) -> Vec<SavedFront> {
         let mut order = vec![];
         let mut open = self.roots();
@@ -30,8 +30,10 @@ impl Tree {
         roots
     }
 
-    /// The tree of such fronts; `None` where they do not eliminate each variable that `is_in` once, those that are coupled in
-    /// fronts one above the other.
+    /// Builds the tree from saved fronts.
+    ///
+    /// Returns `None` unless the fronts eliminate each variable that `is_in` exactly once, and coupled
+    /// variables lie on one path to the root.
     pub(crate) fn load(
         saved: Vec<SavedFront>,
         graph: &impl Couplings,
@@ -60,7 +62,7 @@ impl Tree {
             let coupled = blocks.iter().flat_map(|v| graph.coupled(*v)).filter(|u| is_in(*u));
             let mut later = coupled.filter(|u| tree.front_of[*u as usize] > f);
             later.all(|u| is_row[u as usize] == f).then_some(())?;
-            // it stands in front of its rows, and has none where it is a root
+            // a front has a parent exactly if it has rows, and the parent comes later
             (parent.is_some() != rows.is_empty() && parent.is_none_or(|p| p > f)).then_some(())?;
             let mut front = Front { blocks, rows, parent: parent.unwrap_or(NONE), ..Front::default() };
             front.measure(|v| graph.dim(v));

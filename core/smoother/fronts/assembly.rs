@@ -1,17 +1,17 @@
-//! What a front takes from its children.
+//! Addition of the children's updates to a front.
 
-/// Rows of a child's update that follow each other in its parent's front too.
+/// Consecutive rows of a child's update that are also consecutive in the parent's front.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run {
-    /// In the child's update.
+    /// Rows in the child's update.
     pub(super) start: usize,
     pub(super) end: usize,
-    /// In the parent's front.
+    /// First row in the parent's front.
     pub(super) place: usize,
 }
 
-/// A front under assembly: a panel of `width` columns, and the update of the other columns. The last row of both is the
-/// right-hand side.
+/// A front under assembly: a panel of `width` columns, and the update with the remaining columns. The last
+/// row of both is the right-hand side.
 pub(super) struct Open<'a> {
     pub(super) panel: &'a mut [f64],
     pub(super) update: &'a mut [f64],
@@ -20,7 +20,7 @@ pub(super) struct Open<'a> {
 }
 
 impl Open<'_> {
-    /// A column of the panel from its first row on, or of the update from row `width` on; and the first row of it.
+    /// Returns a column with the number of its first row: 0 in the panel, `width` in the update.
     #[inline(always)]
     fn column<const PANEL: bool>(&mut self, column: usize) -> (&mut [f64], usize) {
         let below = self.height - self.width;
@@ -34,9 +34,11 @@ impl Open<'_> {
     }
 }
 
-/// Adds a child's update, a square of `n` columns, to the panel of its parent (`PANEL`) or to the update. A child that was
-/// kept may have been built for another order of elimination: then its runs are permuted, and entries from below its
-/// diagonal may belong above that of the parent, which is on the other side.
+/// Adds a child's update, a square of `n` columns, to the panel of its parent (`PANEL`) or to the update.
+///
+/// A kept child may have been built for a different order of elimination. Its runs are then permuted, and
+/// entries below the child's diagonal can belong above the parent's diagonal. These are added to the mirrored
+/// position.
 #[inline(always)]
 pub(super) fn assemble<const PANEL: bool>(from: &[f64], n: usize, runs: &[Run], to: &mut Open<'_>) {
     let width = to.width;
@@ -78,7 +80,7 @@ mod tests {
     proptest! {
         #[test]
         fn rows_may_be_permuted(order in Just((0..9usize).collect::<Vec<_>>()).prop_shuffle(), width in 1..9usize, n in 1..9usize) {
-            // symmetric, as a function of the parent's rows; the last row is the right-hand side's
+            // symmetric in the parent's rows; the last row is the right-hand side
             let value = |a: usize, b: usize| (1 + a.min(b)) as f64 + 0.01 * a.max(b) as f64;
             let places: Vec<usize> = order[..n].iter().copied().chain([9]).collect();
             let mut from = vec![f64::NAN; (n + 1) * (n + 1)];

@@ -1,4 +1,4 @@
-//! How a front comes about: what factors say, what its children hand up, and the elimination of its columns.
+//! Computation of a front: factor terms, updates of its children, and elimination of its columns.
 use super::assembly::{Open, Run, assemble};
 use super::{Fronts, Numbers, Scalar};
 use crate::elimination_tree::{Front, Tree};
@@ -6,15 +6,16 @@ use crate::model::{Blocks, Overflow};
 use manifactor_solve::front::eliminate;
 use pulp::{Simd, WithSimd};
 
-/// A pivot below this share of a diagonal entry of H is rounding: nothing constrains the direction. It is held at its
-/// linearization point, as a direction without a gradient is left alone by a batch solver.
+/// A pivot below this share of the diagonal entry of H is rounding error, so no factor constrains the
+/// direction. It is held at its linearization point. Batch solvers do not move such a direction either,
+/// because it has no gradient.
 const OPEN: f64 = 1e-14;
-/// The assembly and elimination of new fronts.
+/// Assembly and elimination of new fronts.
 pub(super) struct Build<'a> {
     pub(super) fronts: &'a mut Fronts,
     pub(super) tree: &'a Tree,
     pub(super) blocks: &'a Blocks,
-    /// Children before parents.
+    /// Front numbers, children before parents.
     pub(super) new: &'a [u32],
 }
 
@@ -23,7 +24,7 @@ impl WithSimd for Build<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        // a loop: a closure would be compiled for the least processor
+        // a loop, because a closure would be compiled for the baseline instruction set
         for f in self.new {
             build(simd, self.fronts, self.tree, self.blocks, *f)?;
         }
@@ -31,7 +32,8 @@ impl WithSimd for Build<'_> {
     }
 }
 
-/// Assembles and factorizes one front. Where a direction turns out to be open, once more, with that direction held.
+/// Assembles and factorizes one front. Each unconstrained direction that it finds is held, and the front is
+/// built again.
 #[inline(always)]
 fn build<S: Simd>(
     simd: S,
@@ -67,14 +69,14 @@ fn build<S: Simd>(
             Some(column) => held.push(column),
         }
     };
-    // even a front that failed owns its memory, so that dropping it gives that back
+    // a failed front still owns its memory, so that dropping it returns the memory to the pool
     held.sort_unstable();
     let open = held.iter().map(|c| scalar_of(blocks, front, *c)).collect();
     fronts.numbers[f as usize] = Numbers { panel, update, open };
     built.map_err(|column| Overflow(scalar_of(blocks, front, column).0))
 }
 
-/// The variable and direction of a front's column.
+/// Returns the variable and the tangent direction of a column.
 fn scalar_of(blocks: &Blocks, front: &Front, column: usize) -> Scalar {
     let mut first = 0;
     for v in &front.blocks {
@@ -92,7 +94,7 @@ fn precision_of(blocks: &Blocks, front: &Front, column: usize) -> f64 {
     blocks.precision(variable)[direction as usize]
 }
 
-/// The first column of a factorized panel whose pivot is rounding.
+/// Returns the first column of a factorized panel whose pivot is only rounding error.
 #[inline(always)]
 fn first_open(blocks: &Blocks, front: &Front, panel: &[f64], held: &[usize]) -> Option<usize> {
     let height = front.width + front.below + 1;
@@ -109,7 +111,7 @@ fn first_open(blocks: &Blocks, front: &Front, panel: &[f64], held: &[usize]) -> 
     None
 }
 
-/// Fills a panel with what factors say, and notes where the front's variables have their rows.
+/// Fills a panel with the terms of the factors, and stores the first row of each variable.
 #[inline(always)]
 fn fill(fronts: &mut Fronts, blocks: &Blocks, front: &Front, panel: &mut [f64]) {
     let height = front.width + front.below + 1;
@@ -150,8 +152,8 @@ fn fill(fronts: &mut Fronts, blocks: &Blocks, front: &Front, panel: &mut [f64]) 
     }
 }
 
-/// Adds what a front's children hand up to its panel, before elimination; or to its update, after it, so that the update
-/// need not be filled with zeros.
+/// Adds the updates of a front's children: to its panel before elimination, or to its update afterwards. The
+/// update therefore needs no fill with zeros.
 #[inline(always)]
 fn take_children<const PANEL: bool>(
     fronts: &mut Fronts,
@@ -174,7 +176,7 @@ fn take_children<const PANEL: bool>(
     }
 }
 
-/// Appends rows to the last run, where they follow it.
+/// Appends rows to the last run if they continue it; starts a new run otherwise.
 #[inline(always)]
 fn add_run(runs: &mut Vec<Run>, row: usize, place: usize, rows: usize) {
     match runs.last_mut() {

@@ -1,29 +1,30 @@
-//! Memory that goes from front to front.
+//! Memory that is reused between fronts.
 
-/// Lists that are not in use, by size: eighths of powers of two, so that at most an eighth of a list is wasted.
+/// Free lists by size class. Classes are eighths of powers of two, so at most an eighth of a list is wasted.
 #[derive(Debug, Default)]
 pub(super) struct Pool {
     classes: Vec<Vec<Vec<f64>>>,
-    /// Values that wait here, and those that are in use.
+    /// Number of free values (`waiting`) and of values in use (`used`).
     waiting: usize,
     used: usize,
 }
 
-/// So many values may wait, or half of those that are in use: more are needed only where everything is made anew.
+/// Largest number of free values, or half of the values in use if that is more. Only an update that rebuilds
+/// everything needs more.
 const WAITING: usize = 1 << 18;
 
-/// The class for so many values, and its size.
+/// Returns the class for `n` values, and its size.
 fn class(n: usize) -> (usize, usize) {
     let n = n.max(16);
     let shift = (usize::BITS - 4 - n.leading_zeros()) as usize;
     let eighths = n.div_ceil(1 << shift);
-    // sixteen eighths are eight of the next power
+    // sixteen eighths are eight eighths of the next power
     let (shift, eighths) = if eighths == 16 { (shift + 1, 8) } else { (shift, eighths) };
     (shift * 8 + eighths - 8, eighths << shift)
 }
 
 impl Pool {
-    /// At least so many values, with whatever they are.
+    /// Returns a list of at least `n` values with undefined content.
     pub(super) fn take(&mut self, n: usize) -> Vec<f64> {
         if n == 0 {
             return vec![];
@@ -52,7 +53,7 @@ impl Pool {
         self.classes[class].push(values);
     }
 
-    /// Bytes in use, and waiting.
+    /// Returns the bytes in use and in free lists.
     pub(super) fn bytes(&self) -> usize {
         8 * (self.used + self.waiting)
     }

@@ -1,11 +1,11 @@
-//! Triangular solves with a front's panel, whose last row is the right-hand side.
+//! Triangular solves with the panel of a front. Its last row is the right-hand side.
 use pulp::{Simd, WithSimd};
 
-/// Columns whose sums are made side by side: they do not wait for each other.
+/// Number of columns whose sums run in parallel; they do not depend on each other.
 const COLUMNS: usize = 4;
 
-/// x ← L₁⁻ᵀ (y − L₂ᵀ x₂), where x has room for the panel's own columns, and then x₂, the values of its rows; y is the last
-/// row of the panel.
+/// Computes x ← L₁⁻ᵀ (y − L₂ᵀ x₂). `x` holds `width` unknowns of the panel's columns, then x₂, the values of
+/// its rows. y is the last row of the panel.
 pub(super) struct Backward<'a> {
     pub(super) panel: &'a [f64],
     pub(super) width: usize,
@@ -34,11 +34,11 @@ impl WithSimd for Backward<'_> {
     }
 }
 
-/// Products of up to four columns, from a row on, with a vector. There is no closure in it: one would be compiled for the
-/// least processor.
+/// Returns the products of up to four columns, from row `from` on, with a vector. It has no closure, because
+/// that would be compiled for the baseline instruction set.
 #[inline(always)]
 fn dots<S: Simd>(simd: S, columns: &[f64], height: usize, from: usize, x: &[f64]) -> [f64; COLUMNS] {
-    // fewer than four columns: the last one again
+    // with fewer than four columns, the last one is repeated
     let last = columns.len() / height - 1;
     let (a, a_tail) = S::as_simd_f64s(&columns[from..][..x.len()]);
     let (b, b_tail) = S::as_simd_f64s(&columns[last.min(1) * height + from..][..x.len()]);
@@ -65,7 +65,7 @@ fn dots<S: Simd>(simd: S, columns: &[f64], height: usize, from: usize, x: &[f64]
     total
 }
 
-/// x ← L₁⁻¹ x for the panel's own columns, and what that takes from the rows below, from their `below`.
+/// Computes x ← L₁⁻¹ x for the panel's columns, and subtracts their contribution from `below`.
 pub(super) fn forward(panel: &[f64], x: &mut [f64], below: &mut [f64]) {
     let width = x.len();
     for (c, column) in panel.chunks_exact(width + below.len() + 1).enumerate() {

@@ -1,19 +1,18 @@
-//! The blocks of H and g: sums over the regions of factors, made anew where a factor has changed.
+//! Blocks of H and g: sums over the regions of the factors, recomputed if a factor has changed.
 //!
-//! A sum is taken in the order of the factors' numbers, so that it depends on the factors that are there and not on how they
-//! came.
+//! Terms are added in the order of the factor numbers, so that a sum does not depend on the history.
 use super::regions::Regions;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
-/// Variables that share a factor.
+/// A neighbour that shares a factor, and the index of the pair with their block.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Coupling {
     pub other: u32,
     pub pair: u32,
 }
 
-/// A factor of a variable, where its region is, and where the variable begins among the factor's scalars.
+/// A factor of a variable, its region, and the variable's first scalar in the region.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     factor: u32,
@@ -21,7 +20,7 @@ struct Part {
     at: u32,
 }
 
-/// A factor of two variables.
+/// A factor of a pair of variables, its region, and the first scalar of each variable in the region.
 #[derive(Debug, Clone, Copy)]
 struct Shared {
     factor: u32,
@@ -30,14 +29,14 @@ struct Shared {
     higher: u32,
 }
 
-/// The block of two variables: rows of the higher one, columns of the lower.
+/// The block of two variables. Its rows belong to the higher variable number, its columns to the lower.
 #[derive(Debug, Clone, Default)]
 struct Pair {
     lower: u32,
     higher: u32,
     at: usize,
     entries: u32,
-    /// By ascending factor: where its region is, and where both begin among its scalars.
+    /// By ascending factor number.
     factors: SmallVec<[Shared; 2]>,
     is_dirty: bool,
 }
@@ -45,12 +44,12 @@ struct Pair {
 #[derive(Debug, Clone, Default)]
 struct Variable {
     dim: u32,
-    /// Its first scalar, in the order of variables.
+    /// First scalar, in the order of the variables.
     start: usize,
     diagonal: usize,
-    /// A bit for each direction that is held.
+    /// One bit per held direction.
     held: u32,
-    /// Damping: a number that is added to the diagonal of its block, so that steps are shorter.
+    /// Damping, added to the diagonal of its block so that its steps become shorter.
     damping: f64,
     factors: Vec<Part>,
     coupled: Vec<Coupling>,
@@ -62,12 +61,12 @@ struct Variable {
 pub(crate) struct Blocks {
     variables: Vec<Variable>,
     pairs: Vec<Pair>,
-    /// By number of entries.
+    /// Free pairs, by number of entries.
     unused: BTreeMap<u32, Vec<u32>>,
-    /// Column-major; of diagonal blocks, the lower triangle.
+    /// Column-major. Diagonal blocks use only the lower triangle.
     diagonals: Vec<f64>,
     off_diagonals: Vec<f64>,
-    /// By scalar: the gradient, and the root of the diagonal of H, which is how precise the factors around are.
+    /// By scalar: the gradient, and √Hᵢᵢ, the precision of the surrounding factors.
     gradient: Vec<f64>,
     precision: Vec<f64>,
     dirty: Vec<u32>,
@@ -85,7 +84,7 @@ impl Blocks {
         self.variables.push(Variable { dim, start, diagonal, held, ..Variable::default() });
     }
 
-    /// Keeps the first variables; the others are without factors.
+    /// Removes all variables after the first `variables` ones. The removed ones must have no factors.
     pub(crate) fn truncate(&mut self, variables: usize) {
         let Some(first) = self.variables.get(variables) else { return };
         self.gradient.truncate(first.start);
@@ -95,14 +94,14 @@ impl Blocks {
         self.dirty.retain(|v| (*v as usize) < variables);
     }
 
-    /// Scalars of all variables.
+    /// Returns the number of scalars of all variables.
     pub(crate) fn scalars(&self) -> usize {
         self.gradient.len()
     }
     pub(crate) fn dim(&self, variable: u32) -> usize {
         self.variables[variable as usize].dim as usize
     }
-    /// A variable's scalars.
+    /// Returns the scalars of a variable.
     #[inline(always)]
     pub(crate) fn range(&self, variable: u32) -> std::ops::Range<usize> {
         let v = &self.variables[variable as usize];
@@ -112,18 +111,18 @@ impl Blocks {
     pub(crate) fn gradient(&self, variable: u32) -> &[f64] {
         &self.gradient[self.range(variable)]
     }
-    /// √Hᵢᵢ by scalar.
+    /// Returns √Hᵢᵢ by scalar.
     #[inline(always)]
     pub(crate) fn precision(&self, variable: u32) -> &[f64] {
         &self.precision[self.range(variable)]
     }
-    /// A variable's own block, of which the lower triangle counts.
+    /// Returns the diagonal block of a variable. Only its lower triangle is used.
     #[inline(always)]
     pub(crate) fn diagonal(&self, variable: u32) -> &[f64] {
         let v = &self.variables[variable as usize];
         &self.diagonals[v.diagonal..v.diagonal + (v.dim * v.dim) as usize]
     }
-    /// The block of a pair, rows of the higher variable.
+    /// Returns the block of a pair, with the rows of the higher variable.
     #[inline(always)]
     pub(crate) fn block(&self, pair: u32) -> &[f64] {
         let pair = &self.pairs[pair as usize];
@@ -140,7 +139,7 @@ impl Blocks {
         self.mark(variable);
     }
 
-    /// Damps the steps of a variable by this much, in units of H; 0 for not at all.
+    /// Sets the damping of a variable, in units of H. 0 disables it.
     pub(crate) fn damp(&mut self, variable: u32, damping: f64) {
         self.variables[variable as usize].damping = damping;
         self.mark(variable);
@@ -150,7 +149,7 @@ impl Blocks {
     }
 
     fn pair(&self, a: u32, b: u32) -> Option<u32> {
-        // the shorter list: an object has many more neighbours than the pose that sees it
+        // search the shorter list: an object has many more neighbours than a pose that observes it
         let (a, b) = if self.coupled(a).len() <= self.coupled(b).len() { (a, b) } else { (b, a) };
         self.coupled(a).iter().find(|c| c.other == b).map(|c| c.pair)
     }
@@ -170,7 +169,7 @@ impl Blocks {
         pair
     }
 
-    /// Adds a factor of these variables, which ascend, each with its first scalar among the factor's.
+    /// Adds a factor of these variables. They ascend, each with its first scalar among the factor's scalars.
     pub(crate) fn connect(&mut self, factor: u32, region: u32, members: &[(u32, u32)]) {
         for (n, &(v, at)) in members.iter().enumerate() {
             let factors = &mut self.variables[v as usize].factors;
@@ -186,7 +185,7 @@ impl Blocks {
         self.mark_factor(members);
     }
 
-    /// Takes a factor away.
+    /// Removes a factor.
     pub(crate) fn disconnect(&mut self, factor: u32, members: &[(u32, u32)]) {
         self.mark_factor(members);
         for (n, &(v, _)) in members.iter().enumerate() {
@@ -211,7 +210,7 @@ impl Blocks {
         }
     }
 
-    /// Marks the sums that a factor is part of for another evaluation.
+    /// Marks the sums that contain this factor as outdated.
     pub(crate) fn mark_factor(&mut self, members: &[(u32, u32)]) {
         for (n, &(v, _)) in members.iter().enumerate() {
             self.mark(v);
@@ -224,7 +223,7 @@ impl Blocks {
         }
     }
 
-    /// Makes the sums anew that a changed factor is part of.
+    /// Recomputes the outdated sums.
     pub(crate) fn sum_up(&mut self, regions: &Regions) {
         for v in std::mem::take(&mut self.dirty) {
             self.variables[v as usize].is_dirty = false;
@@ -236,7 +235,7 @@ impl Blocks {
         }
     }
 
-    /// The sum of a variable's own block, as it would be if all its factors counted that `counts` names.
+    /// Returns the diagonal block of a variable as a sum over the factors that `counts` selects.
     pub(crate) fn own_block(
         &self,
         variable: u32,
@@ -293,14 +292,15 @@ impl Blocks {
         }
     }
 
-    /// Returns whether the diagonal of H and the gradient of a variable are finite: that bounds the rest.
+    /// Returns whether the diagonal of H and the gradient of a variable are finite. They bound all other
+    /// entries.
     pub(crate) fn is_finite(&self, variable: u32) -> bool {
         let own = self.precision(variable).iter().chain(self.gradient(variable));
         own.into_iter().all(|x| x.is_finite())
     }
 }
 
-/// Adds a variable's own part of a region, lower triangle.
+/// Adds a variable's diagonal block of a region, lower triangle.
 #[inline(always)]
 fn add_diagonal(h: &mut [f64], d: usize, region: u32, at: usize, regions: &Regions) {
     let region = regions[region];

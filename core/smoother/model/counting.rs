@@ -1,16 +1,16 @@
-//! Which factors count, and how much.
+//! Weights of factors, and rejection.
 use super::{Factor, Model};
 use std::collections::BTreeSet;
 
 impl Model {
-    /// Makes a factor count so many times; returns how many times it did.
+    /// Sets the weight of a factor. Returns the previous weight.
     pub(crate) fn weigh(&mut self, number: u32, weight: f64) -> Option<f64> {
         let factor = self.factors.get_mut(number)?;
         self.batches.as_mut_slice()[factor.batch as usize].set_weight(factor.index as usize, weight);
         Some(std::mem::replace(&mut factor.weight, weight))
     }
 
-    /// Lets a factor count by a share of its weight alone.
+    /// Reduces the weight of a factor to a share of it.
     pub(crate) fn attenuate(&mut self, number: u32, share: f64) {
         let Some(factor) = self.factors.get_mut(number) else { return };
         factor.share = share;
@@ -18,7 +18,7 @@ impl Model {
         batch.set_weight(factor.index as usize, share * factor.weight);
     }
 
-    /// Leaves a factor out as an outlier: it couples its variables no more. Returns whether it was in.
+    /// Rejects a factor as an outlier: it no longer couples its variables. Returns whether it counted before.
     pub(crate) fn reject(&mut self, number: u32) -> bool {
         let Some(factor) = self.factors.get(number) else { return false };
         let is_in = self.rejected.insert(number);
@@ -28,41 +28,42 @@ impl Model {
         is_in
     }
 
-    /// Takes a factor in again that was left out; returns whether it was. It is to be linearized after that.
+    /// Readmits a rejected factor. Returns whether it was rejected. The caller linearizes it afterwards.
     pub(crate) fn readmit(&mut self, number: u32) -> bool {
         let Some(factor) = self.factors.get(number).filter(|_| self.rejected.remove(&number)) else {
             return false;
         };
         self.blocks.connect(number, factor.region, &factor.members);
-        // what is held of its variables may have changed since
+        // the held directions may have changed since
         self.hold_in(number);
         true
     }
 
-    /// The factors that are left out as outliers.
+    /// Returns the factors that are rejected as outliers.
     pub(crate) fn rejected(&self) -> &BTreeSet<u32> {
         &self.rejected
     }
 
-    /// Returns whether a factor is left out as an outlier.
+    /// Returns whether a factor is rejected as an outlier.
     pub(crate) fn is_rejected(&self, number: u32) -> bool {
         self.rejected.contains(&number)
     }
 
-    /// The rejected factors of a variable.
+    /// Returns the rejected factors of a variable.
     pub(crate) fn rejected_of(&self, variable: u32) -> Vec<u32> {
         let is_of = |f: &u32| self.factor(*f).is_some_and(|f| f.variables().any(|v| v == variable));
         self.rejected.iter().copied().filter(is_of).collect()
     }
 
-    /// Tells a factor what is held of its variables.
+    /// Passes the held directions of a factor's variables to its batch.
     pub(crate) fn hold_in(&mut self, number: u32) {
         let Some(factor) = self.factors.get(number).filter(|factor| factor.entry.is_some()) else { return };
         let (starts, held) = self.starts(factor, self.regions[factor.region]);
         self.batches.as_mut_slice()[factor.batch as usize].hold(factor.index as usize, &starts, &held);
     }
 
-    /// Sets what is held of a variable; returns what was. Its factors are to be linearized after that.
+    /// Sets the held directions of a variable. Returns the previous ones. The caller linearizes its factors
+    /// afterwards.
     pub(crate) fn hold(&mut self, variable: u32, held: u32) -> u32 {
         let before = std::mem::replace(&mut self.places[variable as usize].held, held);
         self.blocks.hold(variable, held);
@@ -72,7 +73,7 @@ impl Model {
         before
     }
 
-    /// Returns whether a factor was defined where it was last linearized.
+    /// Returns whether a factor was defined at its last linearization.
     pub(crate) fn is_defined(&self, number: u32) -> bool {
         self.factor(number).is_some_and(|factor| {
             let batch = || &self.batches.as_slice()[factor.batch as usize];
@@ -80,18 +81,19 @@ impl Model {
         })
     }
 
-    /// Returns whether a factor takes part: it is defined where it was last linearized, and counts.
+    /// Returns whether a factor takes part: it was defined at its last linearization, and its weight is not
+    /// zero.
     pub(crate) fn takes_part(&self, number: u32) -> bool {
         self.is_defined(number) && self.factor(number).is_some_and(|factor| factor.weight != 0.0)
     }
 
-    /// Returns whether a factor is no outlier, and none of its variables is parked.
+    /// Returns whether a factor is not rejected and has no parked variable.
     pub(crate) fn is_whole(&self, number: u32) -> bool {
         let is_in = |factor: &Factor| factor.variables().all(|v| !self.is_parked(v));
         self.factor(number).is_some_and(|factor| !self.is_rejected(number) && is_in(factor))
     }
 
-    /// Says whether a factor's part counts in the sums.
+    /// Sets whether the terms of a factor are included in the sums.
     pub(crate) fn count(&mut self, number: u32, counts: bool) {
         let Some(factor) = self.factors.get(number) else { return };
         if self.regions.count(factor.region, counts) != counts {

@@ -1,4 +1,4 @@
-//! Factors at the trial points, and variables on their way to these: a few of each.
+//! Evaluation of a few factors at the trial points, and moves of a few trial points.
 use super::{Factor, Model};
 use manifactor_graph::Variable;
 use manifactor_graph::batch::Evaluation;
@@ -6,8 +6,8 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
 impl Model {
-    /// Linearizes factors at the trial points, batch by batch. What they had is gone; at the same points, they have the same
-    /// bits again.
+    /// Linearizes factors at the trial points, batch by batch, and overwrites their previous terms. Equal
+    /// points give equal bits.
     pub(crate) fn linearize(&mut self, factors: &[u32]) -> Evaluation {
         let mut listed = std::mem::take(&mut self.listed);
         listed.resize_with(self.batches.as_slice().len(), Vec::new);
@@ -31,12 +31,12 @@ impl Model {
         total
     }
 
-    /// Returns whether a factor's part of H and g is finite.
+    /// Returns whether a factor's terms of H and g are finite.
     pub(crate) fn is_finite(&self, factor: u32) -> bool {
         self.factor(factor).is_none_or(|factor| self.regions.is_finite(factor.region))
     }
 
-    /// The factors of some variables, ascending.
+    /// Returns the factors of some variables, ascending.
     pub(crate) fn factors_of(&self, variables: &[u32]) -> Vec<u32> {
         let mut factors: Vec<u32> = variables.iter().flat_map(|v| self.blocks.factors(*v)).collect();
         factors.sort_unstable();
@@ -44,9 +44,12 @@ impl Model {
         factors
     }
 
-    /// The cost of factors at the trial points, over those that took part in their last linearization. It is summed in the
-    /// order of `factors`, one by one: where they are in their batches depends on history.
-    /// `delta` are the steps to the trial points, by scalar of all variables; `None` where these are the linearization points.
+    /// Returns the cost of factors at the trial points, without factors that took no part in their last
+    /// linearization.
+    ///
+    /// Terms are added in the order of `factors`, because positions in the batches depend on history. `delta`
+    /// holds the steps to the trial points, by scalar of all variables. `None` means that the trial points
+    /// are the linearization points.
     pub(crate) fn cost(&self, factors: &[u32], delta: Option<&[f64]>) -> Evaluation {
         let factors = factors.iter().filter_map(|f| self.factor(*f));
         let one = |factor: &Factor| match factor.entry.is_some() {
@@ -56,13 +59,14 @@ impl Model {
         factors.map(one).fold(Evaluation::default(), Evaluation::and)
     }
 
-    /// Returns whether any factor has a loss.
+    /// Returns whether any factor has a robust loss.
     pub(crate) fn has_losses(&self) -> bool {
         self.robust > 0
     }
 
-    /// Returns the change of each variable's gradient if robust weights are those of the trial points, not of the linearization
-    /// points. It is infinite if a factor had weight zero and has one above zero now. `variables` ascend, and so do the results.
+    /// Returns the change of each variable's gradient if robust weights are taken at the trial points instead
+    /// of the linearization points. It is infinite if a weight rises from zero. `variables` ascend, and the
+    /// results have their order.
     pub(crate) fn reweighed(&self, variables: &[u32], delta: &[f64]) -> Vec<SmallVec<[f64; 9]>> {
         let mut changes: Vec<SmallVec<[f64; 9]>> =
             variables.iter().map(|v| SmallVec::from_elem(0.0, self.blocks.dim(*v))).collect();
@@ -98,7 +102,7 @@ impl Model {
         changes
     }
 
-    /// g + Hδ of a factor's own part, over its scalars.
+    /// Returns g + Hδ of a factor alone, over its scalars.
     fn gradient_of(&self, factor: &Factor, delta: &[f64]) -> SmallVec<[f64; 18]> {
         let region = self.regions[factor.region];
         let n = region.scalars as usize;
@@ -116,12 +120,12 @@ impl Model {
         g
     }
 
-    /// Makes the sums anew that a changed factor is part of.
+    /// Recomputes the outdated sums.
     pub(crate) fn sum_up(&mut self) {
         self.blocks.sum_up(&self.regions);
     }
 
-    /// A variable's own block of H over the factors that `counts` names; see [`Blocks::own_block`].
+    /// Returns a variable's block of H over the factors that `counts` selects; see [`Blocks::own_block`].
     pub(crate) fn own_block(&self, variable: u32, counts: impl Fn(u32) -> bool) -> SmallVec<[f64; 36]> {
         self.blocks.own_block(variable, &self.regions, counts)
     }
@@ -132,8 +136,11 @@ impl Model {
         self.trial.column_mut(column).retract_at(self.points.column(column), index, step);
     }
 
-    /// The same, to linearize there: the point is as its text says. One that comes of a step may know more, a cosine that was
-    /// not taken of its angle, say, and would have other bits after it was saved and loaded.
+    /// Moves the trial point of a variable to a point where factors are linearized.
+    ///
+    /// The point is normalized to the value that its saved text gives. After a plain step it may hold more,
+    /// for example a cosine that was not computed from its angle, and would have different bits after saving
+    /// and loading.
     pub(crate) fn try_point(&mut self, variable: u32, step: &[f64]) {
         self.try_step(variable, step);
         let (column, index) = self.places[variable as usize].in_columns();
@@ -144,20 +151,20 @@ impl Model {
         }
     }
 
-    /// Puts the trial point of a variable back to its linearization point.
+    /// Resets the trial point of a variable to its linearization point.
     pub(crate) fn reset_trial(&mut self, variable: u32) {
         let (column, index) = self.places[variable as usize].in_columns();
         self.trial.column_mut(column).copy_at(self.points.column(column), index);
     }
 
-    /// Makes the trial point of a variable its linearization point.
+    /// Sets the linearization point of a variable to its trial point.
     pub(crate) fn accept(&mut self, variable: u32) {
         let (column, index) = self.places[variable as usize].in_columns();
         self.points.column_mut(column).copy_at(self.trial.column(column), index);
     }
 }
 
-/// The same point, by a step of zero.
+/// Normalizes a point by a step of zero.
 pub(super) fn plain(point: &dyn Variable) -> Option<Box<dyn Variable>> {
     let zeros: SmallVec<[f64; 9]> = SmallVec::from_elem(0.0, point.erased().dim());
     point.erased().retract(&zeros)

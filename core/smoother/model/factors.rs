@@ -1,5 +1,5 @@
-//! Factors by number. Numbers are never used again, and most factors go in the order in which they came: a page of numbers whose
-//! factors are gone takes eight bytes.
+//! Factors by number, in pages. Numbers are never reused, and most factors are removed in the order of their
+//! insertion. A page without factors takes eight bytes.
 use super::Factor;
 
 const PAGE: usize = 256;
@@ -10,11 +10,11 @@ struct Page {
     len: usize,
 }
 
-/// The factors that are there.
+/// All present factors.
 #[derive(Default)]
 pub(super) struct Factors {
     pages: Vec<Option<Box<Page>>>,
-    /// The number that the next new factor has.
+    /// Number of the next new factor.
     pub(super) next: u32,
 }
 
@@ -29,7 +29,7 @@ impl Factors {
         page.factors.get_mut(number as usize % PAGE)?.as_mut()
     }
 
-    /// Puts a factor under a number that is unused.
+    /// Inserts a factor under an unused number.
     pub(super) fn insert(&mut self, number: u32, factor: Factor) {
         let (page, place) = (number as usize / PAGE, number as usize % PAGE);
         if self.pages.len() <= page {
@@ -55,7 +55,7 @@ impl Factors {
         Some(factor)
     }
 
-    /// All factors, by ascending number.
+    /// Returns all factors, by ascending number.
     pub(super) fn iter(&self) -> impl Iterator<Item = (u32, &Factor)> {
         self.pages.iter().enumerate().flat_map(|(p, page)| {
             page.iter()

@@ -1,11 +1,11 @@
-//! Variables that are parked: they wait outside of the tree for factors that determine them.
+//! Parked variables: undetermined variables, which are excluded from the tree until factors determine them.
 use std::collections::BTreeSet;
 
 /// The numbers of parked variables.
 #[derive(Debug, Default)]
 pub(super) struct Parked {
     numbers: BTreeSet<u32>,
-    /// Variables that were parked or unparked since the last look.
+    /// Variables that were parked or unparked since the last `has_changed`.
     changed: BTreeSet<u32>,
 }
 
@@ -14,7 +14,7 @@ impl Parked {
         self.numbers.contains(&variable)
     }
 
-    /// All parked variables, ascending.
+    /// Returns all parked variables, ascending.
     pub(super) fn iter(&self) -> impl Iterator<Item = u32> {
         self.numbers.iter().copied()
     }
@@ -25,7 +25,7 @@ impl Parked {
             true => self.numbers.insert(variable),
             false => self.numbers.remove(&variable),
         };
-        // a change back is none
+        // a change and its reversal cancel
         if has_changed && !self.changed.remove(&variable) {
             self.changed.insert(variable);
         }

@@ -1,28 +1,28 @@
-//! Regions of the normal equations: each factor adds its part to one of its own, so that it can be made again, or taken
-//! away, without a look at any other.
+//! Regions of the normal equations. Each factor adds its terms to a separate region, so that they can be
+//! recomputed or removed independently.
 use manifactor_graph::normal_equations::NormalEquations;
 use std::collections::BTreeMap;
 use std::ops::Index;
 
-/// A factor's region: the packed lower triangle of H over its own `scalars`, and its gradient.
+/// The region of a factor: the packed lower triangle of H over the factor's `scalars`, and its gradient.
 ///
-/// Scalars are those of its variables one after the other, by ascending number of the variable.
+/// The scalars of its variables are concatenated by ascending variable number.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Region {
     pub h: usize,
     pub g: usize,
     pub scalars: u32,
-    /// True if its part counts: not where a variable is parked.
+    /// True if the region is included in the sums. It is not if a variable is parked.
     pub counts: bool,
 }
 
 impl Region {
-    /// Entries of the triangle.
+    /// Returns the number of entries of the triangle.
     pub(crate) fn entries(self) -> usize {
         let n = self.scalars as usize;
         n * (n + 1) / 2
     }
-    /// Index of the entry (column, column) of the triangle.
+    /// Returns the index of the entry (column, column) of the triangle.
     #[inline(always)]
     pub(crate) fn column(self, column: usize) -> usize {
         let n = self.scalars as usize;
@@ -30,13 +30,13 @@ impl Region {
     }
 }
 
-/// All regions by their place, and their memory. That of factors that are gone is used again.
+/// All regions and their memory. Regions of removed factors are reused.
 #[derive(Debug, Default)]
 pub(crate) struct Regions {
     all: Vec<Region>,
     pub h: Vec<f64>,
     pub g: Vec<f64>,
-    /// By number of scalars.
+    /// Free regions, by number of scalars.
     unused: BTreeMap<u32, Vec<u32>>,
 }
 
@@ -49,7 +49,7 @@ impl Index<u32> for Regions {
 }
 
 impl Regions {
-    /// The place of a region that counts.
+    /// Returns the index of an unused region, and includes it in the sums.
     pub(crate) fn take(&mut self, scalars: u32) -> u32 {
         if let Some(place) = self.unused.get_mut(&scalars).and_then(Vec::pop) {
             self.all[place as usize].counts = true;
@@ -66,7 +66,7 @@ impl Regions {
         self.unused.entry(self[place].scalars).or_default().push(place);
     }
 
-    /// Sets whether a region counts; returns whether it did.
+    /// Sets whether a region is included in the sums. Returns the previous value.
     pub(crate) fn count(&mut self, place: u32, counts: bool) -> bool {
         std::mem::replace(&mut self.all[place as usize].counts, counts)
     }
@@ -77,7 +77,7 @@ impl Regions {
         self.g[region.g..region.g + region.scalars as usize].fill(0.0);
     }
 
-    /// Returns whether all numbers of a region are finite.
+    /// Returns whether all values of a region are finite.
     pub(crate) fn is_finite(&self, place: u32) -> bool {
         let region = self[place];
         let (h, g) =

@@ -1,13 +1,14 @@
-//! Marginalization: variables that leave become a linear prior on those that stay, at the linearization points.
+//! Marginalization: eliminated variables are replaced by a linear prior on their neighbours, at the
+//! linearization points.
 //!
-//! With the quadratic ½ δᵀHδ + gᵀδ + c of the factors of a variable, split into its own part L and the others' part B,
-//! eliminating it leaves the Schur complement H_BB − H_BL H_LL⁻¹ H_LB, and g and c in the same way.
+//! The factors of a variable L form the quadratic ½ δᵀHδ + gᵀδ + c over L and its neighbours B. Eliminating L
+//! leaves the Schur complement H_BB − H_BL H_LL⁻¹ H_LB. The terms g and c are reduced in the same way.
 use super::{Factor, Model, Overflow};
 use manifactor_graph::batch::Evaluation;
 use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
 
-/// A linear prior: ½ δᵀHδ + gᵀδ + constant, δ the steps of its variables from their linearization points.
+/// A linear prior ½ δᵀHδ + gᵀδ + constant, with the steps δ of its variables from their linearization points.
 #[derive(Debug, Default)]
 pub(crate) struct Prior {
     /// Ascending.
@@ -18,12 +19,12 @@ pub(crate) struct Prior {
     pub constant: f64,
 }
 
-/// A pivot below this share of the diagonal entry is rounding: the direction is held where it is, as in the fronts.
+/// A pivot below this share of the diagonal entry is rounding error. The direction is held, as in the fronts.
 const OPEN: f64 = 1e-14;
-/// Information below this share of what there was before is what cancellation has left.
+/// Information below this share of the original information is left over from cancellation.
 const ROUNDING: f64 = 1e-13;
 
-/// A dense system: variables with their first scalars, the lower triangle of a square, and g.
+/// A dense system: the lower triangle of an n × n matrix, and g.
 struct Dense {
     n: usize,
     h: Vec<f64>,
@@ -31,10 +32,11 @@ struct Dense {
 }
 
 impl Model {
-    /// Eliminates a variable from these factors. Returns the linear prior of the others; `None` if they have no information.
+    /// Eliminates a variable from these factors. Returns the linear prior on their remaining variables, or
+    /// `None` if that has no information.
     ///
     /// # Errors
-    /// If the prior is not finite, or too large for sums with other factors.
+    /// If the prior is not finite, or too large to be added to other factors.
     pub(crate) fn without(&self, variable: u32, factors: &[u32]) -> Result<Option<Prior>, Overflow> {
         let of_factors = factors.iter().filter_map(|f| self.factor(*f)).flat_map(|f| f.variables());
         let mut others: Vec<u32> =
@@ -58,7 +60,7 @@ impl Model {
         let columns = (own..n).map(|c| &dense.h[c * n + c..(c + 1) * n]);
         let h: Vec<f64> = columns.flatten().copied().collect();
         let g = dense.g[own..].to_vec();
-        // their sums with other factors have to be finite too
+        // sums with other factors have to be finite too
         let is_small = h.iter().chain(&g).chain([&constant]).all(|x| x.abs() < 1e150);
         let says_something = h.iter().any(|x| *x != 0.0);
         match is_small {
@@ -67,7 +69,7 @@ impl Model {
         }
     }
 
-    /// The sum of factors over these variables, in their order; others are left out.
+    /// Returns the sum of factors over these variables, in their order. Other variables are left out.
     fn gather(&self, variables: &[u32], factors: &[u32]) -> Dense {
         let mut n = 0;
         let first = |v: &u32| {
@@ -100,13 +102,14 @@ impl Model {
         dense
     }
 
-    /// H and g of factors over these variables, in their order.
+    /// Returns H and g of factors over these variables, in their order.
     pub(crate) fn sums(&self, variables: &[u32], factors: &[u32]) -> (DMatrix<f64>, DVector<f64>) {
         let Dense { n, h, g } = self.gather(variables, factors);
         (DMatrix::from_fn(n, n, |r, c| h[r.min(c) * n + r.max(c)]), DVector::from_vec(g))
     }
 
-    /// The value of a prior at these steps, by scalar of all variables.
+    /// Returns the value of a prior at the steps `delta`, by scalar of all variables. `None` means zero
+    /// steps.
     pub(super) fn prior_cost(&self, factor: &Factor, delta: Option<&[f64]>) -> Evaluation {
         let mut cost = factor.constant;
         let Some(delta) = delta else { return Evaluation { cost, ..Evaluation::default() } };
@@ -121,7 +124,7 @@ impl Model {
         Evaluation { cost, ..Evaluation::default() }
     }
 
-    /// Puts a prior in, under a number that is unused.
+    /// Inserts a prior under an unused number.
     pub(crate) fn insert_prior(&mut self, number: u32, prior: &Prior) {
         let mut scalars = 0;
         let first = |v: &u32| {
@@ -138,7 +141,7 @@ impl Model {
         self.factors.insert(number, Factor::prior(members, place, prior.constant));
     }
 
-    /// The prior under a number; `None` where that is a factor or nothing.
+    /// Returns the prior with this number; `None` if the number belongs to a factor or is unused.
     pub(crate) fn prior(&self, number: u32) -> Option<Prior> {
         let factor = self.factor(number).filter(|factor| factor.entry.is_none())?;
         let region = self.regions[factor.region];
@@ -150,15 +153,15 @@ impl Model {
         })
     }
 
-    /// The numbers of all priors.
+    /// Returns the numbers of all priors.
     pub(crate) fn priors(&self) -> impl Iterator<Item = u32> {
         self.factors.iter().filter(|(_, factor)| factor.entry.is_none()).map(|(f, _)| f)
     }
 }
 
 impl Dense {
-    /// Eliminates a scalar, the ones before it being gone, unless its pivot is less than that; returns by how much that
-    /// lowers the constant.
+    /// Eliminates scalar `k` after all earlier ones, unless its pivot is `least` or lower. Returns the
+    /// decrease of the constant.
     fn eliminate(&mut self, k: usize, least: f64) -> f64 {
         let Self { n, h, g } = self;
         let n = *n;
@@ -177,7 +180,7 @@ impl Dense {
         0.5 * g[k] * g[k] / pivot
     }
 
-    /// Takes a scalar out whose information is less than that.
+    /// Clears the row and column of a scalar whose information is `least` or lower.
     fn clear_rounding(&mut self, i: usize, least: f64) {
         if self.h[i * (self.n + 1)] <= least {
             (0..=i).for_each(|c| self.h[c * self.n + i] = 0.0);

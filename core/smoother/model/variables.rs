@@ -1,5 +1,5 @@
-//! Variables that come and go. The number of one that is gone is used again by the next of its type, so that memory stays
-//! with what is there.
+//! Insertion and removal of variables. The number of a removed variable is reused by the next one of its
+//! type, so that memory depends only on the present variables.
 use super::{Model, Place, evaluation::plain};
 use manifactor_graph::{Key, Variable};
 use std::any::TypeId;
@@ -8,20 +8,20 @@ use std::any::TypeId;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct NewNumber {
     pub number: u32,
-    /// True if another variable had it before.
+    /// True if a removed variable had this number.
     pub is_reused: bool,
 }
 
-/// Numbers that variables will have that are not in the model yet.
+/// Numbers that are reserved for variables that are not in the model yet.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Reserved {
     new: u32,
-    /// By type, how many numbers of those that are gone.
+    /// Number of reserved numbers of removed variables, by type.
     reused: Vec<(TypeId, usize)>,
 }
 
 impl Model {
-    /// The number of a variable that comes after those that are reserved.
+    /// Reserves the next number for a variable of this type.
     pub(crate) fn reserve(&self, id: TypeId, reserved: &mut Reserved) -> NewNumber {
         let place = reserved.reused.iter().position(|(other, _)| *other == id).unwrap_or_else(|| {
             reserved.reused.push((id, 0));
@@ -41,7 +41,7 @@ impl Model {
         }
     }
 
-    /// Puts a variable in, under the number that was reserved for it. It is parked until its factors are looked at.
+    /// Inserts a variable under its reserved number. It is parked until its factors are checked.
     pub(crate) fn push_variable(&mut self, key: Key, value: &dyn Variable, held: u32, at: NewNumber) {
         let (id, tangent) = (value.erased().type_id(), value.erased().tangent());
         let column = self.points.position(id).unwrap_or_else(|| {
@@ -82,7 +82,7 @@ impl Model {
         }
     }
 
-    /// Takes a variable out again that was put in under this number; the last that came goes first.
+    /// Undoes the insertion of a variable. The last insertion is undone first.
     pub(crate) fn take_out(&mut self, at: NewNumber) {
         self.born -= 1;
         self.ordinals[self.places[at.number as usize].column as usize] -= 1;
@@ -99,7 +99,7 @@ impl Model {
         self.blocks.truncate(self.places.len());
     }
 
-    /// Forgets a variable, which has no factors any more.
+    /// Removes a variable that has no factors.
     pub(crate) fn forget(&mut self, variable: u32) {
         let place = &mut self.places[variable as usize];
         place.is_there = false;
@@ -108,7 +108,7 @@ impl Model {
         self.parked.set(variable, false);
     }
 
-    /// The variables that are there, in the order in which they came.
+    /// Returns the present variables in the order of their insertion.
     pub(crate) fn by_age(&self) -> Vec<u32> {
         let is_there = |v: &u32| self.places[*v as usize].is_there;
         let mut all: Vec<u32> = (0..self.places.len() as u32).filter(is_there).collect();
@@ -116,13 +116,14 @@ impl Model {
         all
     }
 
-    /// How many variables have come, those that are gone among them.
+    /// Returns the number of variables ever added.
     pub(crate) fn born(&self) -> u64 {
         self.born
     }
 
-    /// The same by type, in the order in which types first appear among the variables. A type that a failed update has brought
-    /// has a column and no variable: a session that is loaded knows nothing of it.
+    /// Returns the number of variables ever added by type, in the order in which the types first appear. A
+    /// type without any variable is left out: it comes from a failed update, and a loaded smoother does not
+    /// have it.
     pub(crate) fn ordinals(&self) -> Vec<u64> {
         let mut columns: Vec<u32> = vec![];
         for place in &self.places {
@@ -133,12 +134,13 @@ impl Model {
         columns.into_iter().map(|column| self.ordinals[column as usize]).collect()
     }
 
-    /// The numbers of variables that are gone, those of one type in the order in which they were last used.
+    /// Returns the numbers of removed variables. Within a type, they are in the order in which they became
+    /// free.
     pub(crate) fn unused(&self) -> Vec<u32> {
         self.unused.iter().flatten().copied().collect()
     }
 
-    /// The state of a model that was saved: how many variables have come, by column too, and which are gone; whether that can be.
+    /// Restores the counts and the removed variables of a saved model. Returns whether they are consistent.
     pub(crate) fn restore(&mut self, born: u64, ordinals: &[u64], unused: &[u32]) -> bool {
         if ordinals.len() != self.ordinals.len() {
             return false;

@@ -1,4 +1,5 @@
-//! Changes of a session: checked when they are asked for, made by the next update, and taken back where that fails.
+//! Changes of the graph: checked when they are requested, applied by the next update, and undone if that
+//! fails.
 mod change;
 
 pub(super) use change::{Change, Touched};
@@ -11,26 +12,26 @@ use indexmap::IndexMap;
 use manifactor_graph::{FactorEntry, Fixed, Graph, GraphError, Key, Resolved, Values, Variable};
 use std::any::TypeId;
 
-/// A variable that comes with the next update.
+/// A variable that the next update adds.
 pub(super) struct NewVariable {
     pub(super) value: Box<dyn Variable>,
     pub(super) held: u32,
     pub(super) at: NewNumber,
-    /// When it comes, by the time that is set.
+    /// Time of its insertion, by the clock of the caller.
     pub(super) time: f64,
 }
 
-/// Changes that the next update makes.
+/// Changes that the next update applies.
 #[derive(Default)]
 pub(super) struct Pending {
     pub(super) variables: IndexMap<Key, NewVariable>,
     reserved: Reserved,
     /// The time that was set since the last update.
     pub(super) time: Option<f64>,
-    /// Variables that are to leave.
+    /// Variables to marginalize.
     pub(super) leaving: Vec<Key>,
     pub(super) changes: Vec<Change>,
-    /// Numbers of factors: the next one; and whether those with changes are there, after these.
+    /// The next factor number, and the changed factors after these changes; `None` for a removed factor.
     numbers: Option<u32>,
     is_there: IndexMap<u32, Option<FactorEntry>>,
 }
@@ -42,15 +43,16 @@ impl Pending {
 }
 
 impl Session {
-    /// Adds variables with their first values, and factors between any variables, new or not. What `factors` hold fixed is
-    /// held. Takes effect at the next [`update`](Self::update). Returns the factors' ids, in order.
+    /// Adds variables with their initial values, and factors between new or existing variables. Variables
+    /// that `factors` fixes are held. Takes effect at the next [`update`](Self::update). Returns the ids of
+    /// the factors, in order.
     ///
-    /// A variable that nothing determines yet, a point that is seen once, say, is *parked*: it waits with its factors,
-    /// and the report names it.
+    /// A variable that its factors do not determine yet is *parked*, for example a point that was observed
+    /// once. It waits with its factors, and the report names it.
     ///
     /// # Errors
-    /// If a variable is there already, or factors do not fit: everything that is wrong with them; where the window is by seconds,
-    /// and no time is set. Nothing is added then.
+    /// If a variable exists already, if the factors do not fit (all errors are listed), or if the window is
+    /// in seconds and no time is set. Nothing is added then.
     pub fn push(&mut self, factors: &Graph, values: &Values) -> Result<Vec<FactorId>, ChangeError> {
         let time = self.schedule.time_of_new(self.pending.time)?;
         let is_known = |key: &Key| {
@@ -116,12 +118,12 @@ impl Session {
         Ok(ids.collect())
     }
 
-    /// Says what time it is: variables that are pushed from now on come at this time. The unit is a second, the origin is free. A
-    /// window by seconds needs it before the first [`push`](Self::push). Takes effect at the next [`update`](Self::update), and is taken
-    /// back with it where that fails.
+    /// Sets the time of variables that are pushed from now on. The unit is a second, and the origin is free.
+    /// A window in seconds needs it before the first [`push`](Self::push). Takes effect at the next
+    /// [`update`](Self::update), and is undone if that fails.
     ///
     /// # Errors
-    /// If `time` is not finite, or before the one that was set last.
+    /// If `time` is not finite or lies before the last one.
     pub fn set_time(&mut self, time: f64) -> Result<(), ChangeError> {
         self.schedule.check_time(self.pending.time, time)?;
         self.pending.time = Some(time);
@@ -135,11 +137,11 @@ impl Session {
         FactorId(number)
     }
 
-    /// Takes factors away. Takes effect at the next [`update`](Self::update). A variable that nothing determines any more
-    /// is parked.
+    /// Removes factors. Takes effect at the next [`update`](Self::update). Variables that become undetermined
+    /// are parked.
     ///
     /// # Errors
-    /// If one of them is not there. None is taken away then.
+    /// If one of them does not exist. None is removed then.
     pub fn remove(&mut self, factors: &[FactorId]) -> Result<(), ChangeError> {
         let mut seen = std::collections::HashSet::new();
         if let Some(factor) = factors.iter().find(|f| self.entry(**f).is_none() || !seen.insert(**f)) {
@@ -152,11 +154,11 @@ impl Session {
         Ok(())
     }
 
-    /// Puts another factor in the place of one: another measurement, noise or loss. It keeps the id and the variables, and
-    /// counts once. Takes effect at the next [`update`](Self::update).
+    /// Replaces a factor by one with a different measurement, noise or loss. It keeps the id and the
+    /// variables; its weight becomes 1. Takes effect at the next [`update`](Self::update).
     ///
     /// # Errors
-    /// If there is no such factor, or `entry` does not fit, or is between other variables.
+    /// If there is no such factor, or `entry` does not fit or has different variables.
     pub fn replace(&mut self, factor: FactorId, entry: FactorEntry) -> Result<(), ChangeError> {
         let before = self.entry(factor).ok_or_else(|| self.no_factor(factor))?;
         if before.keys != entry.keys {
@@ -170,8 +172,8 @@ impl Session {
         Ok(())
     }
 
-    /// Makes a factor count so many times, on top of its loss; 0 leaves it out. Takes effect at the next
-    /// [`update`](Self::update).
+    /// Sets the weight of a factor, which multiplies its loss. 0 leaves the factor out. Takes effect at the
+    /// next [`update`](Self::update).
     ///
     /// # Errors
     /// If there is no such factor, or the weight is negative or not finite.
@@ -184,8 +186,8 @@ impl Session {
         Ok(())
     }
 
-    /// Holds a variable, or some directions of its tangent space, at the estimate; or frees it, by
-    /// `Fixed::Whole(false)`. Takes effect at the next [`update`](Self::update).
+    /// Holds a variable, or some directions of its tangent space, at the estimate. `Fixed::Whole(false)`
+    /// frees it. Takes effect at the next [`update`](Self::update).
     ///
     /// # Errors
     /// If there is no such variable, or its tangent space has no such direction.
@@ -211,7 +213,7 @@ impl Session {
         Ok(())
     }
 
-    /// A factor, as it will be after the next update; `None` where it is not there.
+    /// Returns a factor as of the next update; `None` if there is no such factor.
     pub fn entry(&self, factor: FactorId) -> Option<&FactorEntry> {
         match self.pending.is_there.get(&factor.0) {
             Some(pending) => pending.as_ref(),
@@ -219,12 +221,12 @@ impl Session {
         }
     }
 
-    /// How often a factor counts, as of the last update; `None` where it is not there.
+    /// Returns the weight of a factor, as of the last update; `None` if there is no such factor.
     pub fn weight(&self, factor: FactorId) -> Option<f64> {
         self.model.factor(factor.0).filter(|factor| factor.entry.is_some()).map(|factor| factor.weight)
     }
 
-    /// The number and the type of a variable, of a pending one too.
+    /// Returns the number and the type of a variable. It may be pending.
     pub(crate) fn find(&self, key: &str) -> Option<(usize, TypeId)> {
         if let Some(variable) = self.model.variable(key) {
             return Some((variable as usize, self.model.type_of(variable)?));

@@ -1,4 +1,5 @@
-//! The factorization: the elimination tree, the numbers of its fronts, and the directions that no factor constrains.
+//! The factorization: the elimination tree, the values of its fronts, and the directions that no factor
+//! constrains.
 mod covariance;
 
 pub use covariance::CovarianceError;
@@ -15,12 +16,12 @@ use std::collections::BTreeSet;
 pub(super) struct Factorization {
     tree: Tree,
     fronts: Fronts,
-    /// Directions that no factor constrains, of all fronts.
+    /// Directions of all fronts that no factor constrains.
     open: BTreeSet<Scalar>,
 }
 
 impl Factorization {
-    /// Makes room for so many variables.
+    /// Makes room for `variables` variables.
     pub(super) fn resize(&mut self, variables: usize) {
         self.tree.resize(variables);
         self.fronts.resize(variables);
@@ -31,7 +32,7 @@ impl Factorization {
         self.tree.front_of(variable) != NONE
     }
 
-    /// Directions that no factor constrains: they are held.
+    /// Returns the directions that no factor constrains. They are held.
     pub(super) fn open(&self) -> impl Iterator<Item = Scalar> {
         self.open.iter().copied()
     }
@@ -41,27 +42,28 @@ impl Factorization {
         self.open.range((variable, 0)..=(variable, u32::MAX)).next().is_some()
     }
 
-    /// Bytes of all fronts.
+    /// Returns the bytes of all fronts.
     pub(super) fn bytes(&self) -> usize {
         self.fronts.bytes()
     }
 
-    /// Multiply-adds of fronts.
+    /// Returns the multiply-adds of some fronts.
     pub(super) fn operations(&self, fronts: &[u32]) -> f64 {
         fronts.iter().map(|f| self.tree.fronts[*f as usize].operations).sum()
     }
 
-    /// Number of variables that a front eliminates.
+    /// Returns the number of variables that a front eliminates.
     pub(super) fn width(&self, front: u32) -> usize {
         self.tree.fronts[front as usize].blocks.len()
     }
 
-    /// Adds a variable's front and those above it to the affected ones.
+    /// Adds the front of a variable and all fronts above it to the affected ones.
     pub(super) fn touch(&mut self, variable: u32, affected: &mut Affected) {
         self.tree.touch(variable, affected);
     }
 
-    /// Touches a variable's front and those of its neighbours: all fronts that have it among their rows are above those.
+    /// Adds the fronts of a variable and its neighbours to the affected ones. All fronts with the variable
+    /// among their rows are above one of these.
     pub(super) fn touch_around(&mut self, model: &Model, variable: u32, affected: &mut Affected) {
         self.tree.touch(variable, affected);
         model.coupled(variable).for_each(|other| self.tree.touch(other, affected));
@@ -72,10 +74,11 @@ impl Factorization {
         self.tree.untouch(affected, first);
     }
 
-    /// Replaces the affected fronts: orders and factorizes their variables again, those of `last` last.
+    /// Replaces the affected fronts: reorders and factorizes their variables, with the variables of `last` at
+    /// the end.
     ///
     /// # Errors
-    /// If a sum is not finite. The factorization is as before then.
+    /// If a sum is not finite. The factorization is unchanged then.
     pub(super) fn rebuild(
         &mut self,
         model: &Model,
@@ -105,25 +108,26 @@ impl Factorization {
         Ok(redone)
     }
 
-    /// Checks H and g of new fronts: a number that is not finite would spread.
+    /// Checks H and g of new fronts, because values that are not finite would spread.
     fn check_finite(&self, model: &Model, redone: &Redone) -> Result<(), Overflow> {
         let blocks = redone.new.iter().flat_map(|f| &self.tree.fronts[*f as usize].blocks);
         let bad = blocks.copied().find(|v| !model.blocks.is_finite(*v));
         bad.map_or(Ok(()), |v| Err(Overflow(v)))
     }
 
-    /// All fronts without a parent.
+    /// Returns all fronts without a parent.
     pub(super) fn roots(&self) -> Vec<u32> {
         self.tree.roots()
     }
 
-    /// The rows of a front, and the fronts below it.
+    /// Returns the rows of a front and its children.
     pub(super) fn below(&self, front: u32) -> (&[u32], &[u32]) {
         let front = &self.tree.fronts[front as usize];
         (&front.rows, &front.children)
     }
 
-    /// A front's variables and their steps, one after the other, from the steps of its rows: `delta` by scalar of all variables.
+    /// Returns the variables of a front and their steps, concatenated. `delta` holds the steps of all
+    /// variables by scalar; the steps of the front's rows are its input.
     pub(super) fn solve(&mut self, model: &Model, front: u32, delta: &[f64]) -> (&[u32], &[f64]) {
         let Self { tree, fronts, .. } = self;
         let number = front;
@@ -131,12 +135,13 @@ impl Factorization {
         (&front.blocks, fronts.solve(front, number, &model.blocks, delta))
     }
 
-    /// The elimination tree, to be saved.
+    /// Returns the elimination tree for saving.
     pub(super) fn save(&self) -> Vec<SavedFront> {
         self.tree.save()
     }
 
-    /// The factorization in a saved elimination tree. `Ok(None)` if it does not fit the model.
+    /// Factorizes the model in a saved elimination tree. Returns `Ok(None)` if the tree does not fit the
+    /// model.
     ///
     /// # Errors
     /// If a sum is not finite.

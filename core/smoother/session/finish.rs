@@ -1,4 +1,4 @@
-//! The whole of a session as one batch.
+//! Batch solution of the whole graph.
 mod prior;
 
 use super::Session;
@@ -10,21 +10,21 @@ use crate::report::Report;
 use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Noise, Values};
 use manifactor_solve::{CompileError, Observer, Optimizer, Outcome, Problem};
 
-/// A session that was solved as one batch.
+/// The result of a batch solve.
 #[derive(Debug, Clone)]
 pub struct Finished {
-    /// The estimate of each variable; those that were parked are where they were.
+    /// The estimate of each variable. Parked variables are unchanged.
     pub values: Values,
-    /// Outcome of the solver. Its factors count from 0 in the order of `factors`; after these come the rows of linear
-    /// priors.
+    /// Outcome of the solver. Its factors count from 0 in the order of `factors`, followed by the rows of the
+    /// linear priors.
     pub outcome: Outcome,
-    /// The factors that took part: all, but for those of parked variables.
+    /// The factors that took part: all except for factors of parked variables.
     pub factors: Vec<FactorId>,
 }
 
 impl Session {
-    /// The factors that count, as a graph with what is held, and their ids. What variables have left behind that are gone is
-    /// not among them.
+    /// Returns the factors that count, as a graph with its held variables, and their ids. Linear priors of
+    /// marginalized variables are not included.
     pub fn graph(&self) -> (Graph, Vec<FactorId>) {
         let (mut graph, mut ids) = (Graph::new(), vec![]);
         for f in self.counted() {
@@ -48,10 +48,10 @@ impl Session {
         (graph, ids)
     }
 
-    /// Solves all that is there as one batch, from the estimate. The session stays as it is.
+    /// Solves the whole graph as one batch, starting at the estimate. The smoother does not change.
     ///
     /// # Errors
-    /// If there is nothing to solve for, or there is no memory.
+    /// If there is nothing to solve for, or not enough memory.
     pub fn finish(
         &self,
         optimizer: &dyn Optimizer,
@@ -71,7 +71,7 @@ impl Session {
         let of_priors = std::iter::repeat_n(1.0, graph.factors().len() - factors.len());
         let weights: Vec<f64> = weights.chain(of_priors).collect();
         if weights.iter().any(|weight| *weight != 1.0) {
-            // they were checked when they were set
+            // the weights were checked when they were set
             let _ = problem.set_weights(&weights);
         }
         let outcome = optimizer.descend(&mut problem, observer);
@@ -81,7 +81,7 @@ impl Session {
         Ok(Finished { values, outcome, factors })
     }
 
-    /// Adds what variables that are gone have left behind.
+    /// Adds the linear priors of marginalized variables.
     fn add_priors(&self, graph: &mut Graph) {
         for prior in self.model.priors().filter_map(|f| self.model.prior(f)) {
             let points = prior.variables.iter().filter_map(|v| self.model.point(*v)).collect();
@@ -98,8 +98,8 @@ impl Session {
         }
     }
 
-    /// Goes on from other values, those of [`finish`](Self::finish), say: all is linearized there. Keys that the session
-    /// does not have are left out.
+    /// Continues from other values, such as the result of [`finish`](Self::finish), and relinearizes all
+    /// factors there. Unknown keys are ignored.
     pub(super) fn adopt(&mut self, values: &Values, report: &mut Report) -> Result<(), Overflow> {
         let mut points = vec![];
         for v in self.model.by_age() {

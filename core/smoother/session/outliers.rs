@@ -1,12 +1,13 @@
-//! Factors that may be wrong, mostly loop closures: they are tested before they count.
+//! Outlier test of factors that may be wrong, mostly loop closures. They are tested before they count.
 //!
-//! A candidate is rejected at first. After the other factors of the update, its cost on top of them is computed:
-//! min ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ over its own variables, with their joint covariance Σ. This is the squared Mahalanobis distance of
-//! its innovation, and has the χ² distribution if the factor is right. A candidate above the quantile stays out, and counts as soon
-//! as it fits the estimate. A candidate that no longer fits is rejected again, the worst first.
+//! A candidate is rejected at first. After the remaining factors of the update, its additional cost is
+//! computed: min ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ over its variables, with their joint covariance Σ. This is the squared
+//! Mahalanobis distance of its innovation, and has the χ² distribution if the factor is right. A candidate
+//! above the quantile stays out, and counts as soon as it fits the estimate. A candidate that no longer fits
+//! is rejected again, the worst first.
 //!
-//! This rule trusts the factors that came first. If other rejected factors confirm a candidate, or if it fails by little, a
-//! [`trial`] decides whether they are right and the factors that count are wrong.
+//! This rule trusts the factors that came first. If other rejected factors confirm a candidate, or if it
+//! fails by little, a [`trial`] decides whether they are right and the factors that count are wrong.
 mod candidates;
 mod fit;
 mod trial;
@@ -24,11 +25,12 @@ use manifactor_graph::{FactorEntry, Resolved};
 use manifactor_solve::is_sequential;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Most factors that one update rejects because they no longer fit.
+/// Largest number of factors that one update rejects because they no longer fit.
 const DROPS: usize = 4;
 
 impl Session {
-    /// The factors that are rejected as outliers, in the order of their ids; see [`Outliers`](crate::Outliers).
+    /// Returns the factors that are rejected as outliers, in the order of their ids; see
+    /// [`Outliers`](crate::Outliers).
     pub fn rejections(&mut self) -> Vec<Rejection> {
         let rejected: Vec<u32> = self.model.rejected().iter().copied().collect();
         let one = |f: u32| {
@@ -38,8 +40,9 @@ impl Session {
         rejected.into_iter().filter_map(one).collect()
     }
 
-    /// If an update brings several factors between the same variables, returns the number of the one that fits the current values
-    /// best. It counts as odometry if the variables are neighbours; the order of the factors does not matter.
+    /// Returns the factor that fits the current values best, for each set of variables with several factors
+    /// in this update. It counts as odometry if the variables are neighbours. The order of the factors does
+    /// not matter.
     pub(super) fn best_between(&self, changes: &[Change]) -> BTreeMap<Vec<u32>, u32> {
         let mut all: BTreeMap<Vec<u32>, Vec<(u32, &FactorEntry)>> = BTreeMap::new();
         if self.schedule.settings().outliers.is_some() {
@@ -79,7 +82,8 @@ impl Session {
         (is_named && couples).then_some(Candidate { bound, gain, since: self.schedule.updates() + 1 })
     }
 
-    /// Returns whether a new factor between these variables is odometry: they are neighbours, and no trusted factor connects them yet.
+    /// Returns whether a new factor between these variables is odometry: they are neighbours, and no trusted
+    /// factor connects them yet.
     fn is_odometry(&self, variables: &[u32]) -> bool {
         let places = variables.iter().map(|v| self.model.place(*v));
         if !is_sequential(places.map(|place| (place.column as usize, place.ordinal))) {
@@ -95,7 +99,8 @@ impl Session {
         !self.model.factors_of(variables).iter().any(is_trusted)
     }
 
-    /// Adds new candidates as rejected, and forgets removed ones. Returns the new candidates that are in the model.
+    /// Inserts new candidates as rejected, and forgets removed ones. Returns the new candidates that are in
+    /// the model.
     pub(super) fn enter(&mut self, new: BTreeMap<u32, Candidate>, removed: &[u32]) -> Vec<u32> {
         removed.iter().for_each(|f| self.candidates.forget(*f));
         let new = new.into_iter().filter(|(f, _)| self.model.factor(*f).is_some());
@@ -111,7 +116,8 @@ impl Session {
         if self.candidates.is_empty() {
             return;
         }
-        // a single candidate is trusted more if few were wrong so far: by Bayes' rule, the odds in nats add to the gain
+        // a single candidate is trusted more if few were wrong so far: by Bayes' rule, the odds in nats add
+        // to the gain
         let rejected = self.model.rejected().len();
         let out = rejected - new.len();
         let counted = self.candidates.len() - rejected;
@@ -141,7 +147,8 @@ impl Session {
         self.try_rejected(&failing, report);
     }
 
-    /// Lets rejected factors count, and returns whether they do. If the linear system overflows with them, they stay out.
+    /// Accepts rejected factors, and returns whether they count. If the linear system overflows with them,
+    /// they stay out.
     fn admit(&mut self, factors: &[u32], report: &mut Report) -> bool {
         let changes = factors.iter().map(|f| Change::Readmit { number: *f }).collect();
         if factors.is_empty() {
@@ -154,8 +161,8 @@ impl Session {
         true
     }
 
-    /// Returns rejected factors with moved variables that fit the estimate itself. A fit within Σ is not enough: after many tests
-    /// a wrong factor would pass one by chance.
+    /// Returns rejected factors with moved variables that fit the estimate itself. A fit within Σ is not
+    /// enough: after many tests a wrong factor would pass one by chance.
     fn returning(&mut self, new: &[u32], moved: &BTreeSet<u32>) -> Vec<u32> {
         let old = self.model.rejected().iter().copied().filter(|f| !new.contains(f));
         let has_moved = |f: u32| {
@@ -195,13 +202,14 @@ impl Session {
         factors.iter().map(share).max_by(|(f, a), (g, b)| a.total_cmp(b).then(g.cmp(f)))
     }
 
-    /// The fit of rejected factors to the estimate.
+    /// Returns the fit of rejected factors to the estimate.
     fn fit(&mut self) -> Fit<'_> {
         let Self { model, steps, factorization, .. } = self;
         Fit { model, steps, factorization }
     }
 
-    /// Applies changes, solves again, and returns the changes that undo them. If that fails, everything is as before.
+    /// Applies changes, solves again, and returns the changes that undo them. If that fails, everything is as
+    /// before.
     fn turn_over(
         &mut self,
         changes: Vec<Change>,

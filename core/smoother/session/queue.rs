@@ -1,45 +1,46 @@
-//! Variables that wait for their relinearization.
+//! The queue of variables for relinearization.
 
-/// The variables to examine at the next turn: they have left the region of their linearization, or moved in a graph with losses.
+/// Variables to examine at the next turn. They have left the region of their linearization, or moved in a
+/// graph with robust losses.
 #[derive(Debug, Default)]
 pub(super) struct RelinearizationQueue {
-    /// Each once.
+    /// Without duplicates.
     waiting: Vec<u32>,
-    /// By variable.
+    /// Membership in `waiting`, by variable.
     is_waiting: Vec<bool>,
-    /// Variables that may be too far out to wait; some may be back, or be named twice.
+    /// Variables that may be too far out to wait. Some may be back within their regions, or occur twice.
     urgent: Vec<u32>,
-    /// How many of those that wait the budget has postponed.
+    /// Number of waiting variables that the budget has postponed.
     postponed: usize,
 }
 
 impl RelinearizationQueue {
-    /// Makes room for so many variables.
+    /// Makes room for `variables` variables.
     pub(super) fn resize(&mut self, variables: usize) {
         self.is_waiting.resize(variables, false);
     }
 
-    /// The variables that wait, in the order in which they came.
+    /// Returns the waiting variables, in the order of their insertion.
     pub(super) fn waiting(&self) -> &[u32] {
         &self.waiting
     }
 
-    /// The variables that may not be able to wait.
+    /// Returns the variables that may not be able to wait.
     pub(super) fn urgent(&self) -> &[u32] {
         &self.urgent
     }
 
-    /// How many variables the budget has postponed.
+    /// Returns the number of variables that the budget has postponed.
     pub(super) fn postponed(&self) -> usize {
         self.postponed
     }
 
-    /// Sets how many variables the budget has postponed.
+    /// Sets the number of variables that the budget has postponed.
     pub(super) fn set_postponed(&mut self, postponed: usize) {
         self.postponed = postponed;
     }
 
-    /// Adds a variable, once.
+    /// Adds a variable, unless it is already waiting.
     pub(super) fn push(&mut self, variable: u32) {
         if !std::mem::replace(&mut self.is_waiting[variable as usize], true) {
             self.waiting.push(variable);
@@ -51,7 +52,7 @@ impl RelinearizationQueue {
         self.urgent.push(variable);
     }
 
-    /// Removes variables that can wait after all. Returns whether any cannot.
+    /// Removes variables that can wait. Returns whether any remain.
     pub(super) fn retain_urgent(&mut self, is_urgent: impl Fn(u32) -> bool) -> bool {
         self.urgent.retain(|v| is_urgent(*v));
         self.urgent.sort_unstable();
@@ -59,7 +60,7 @@ impl RelinearizationQueue {
         !self.urgent.is_empty()
     }
 
-    /// Removes relinearized variables. After a turn, only those of `out`, which ascend, still wait.
+    /// Removes relinearized variables. After a turn, only variables of `out`, which ascend, still wait.
     pub(super) fn relinearized(&mut self, variables: &[u32], out: Option<&[u32]>) {
         variables.iter().for_each(|v| self.is_waiting[*v as usize] = false);
         if out.is_none() && variables.is_empty() {
@@ -81,7 +82,7 @@ impl RelinearizationQueue {
         self.urgent.retain(|v| *v != variable);
     }
 
-    /// A saved queue, whose variables are below `variables`.
+    /// Restores a saved queue. Its variables are below `variables`.
     pub(super) fn load(mut waiting: Vec<u32>, urgent: Vec<u32>, postponed: usize, variables: usize) -> Self {
         waiting.dedup();
         let mut is_waiting = vec![false; variables];

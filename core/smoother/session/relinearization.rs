@@ -1,15 +1,18 @@
-//! Variables that have moved out of the region where their linearization holds.
+//! Relinearization of variables that have left the region of their linearization.
 //!
-//! The error of a linearization grows with the square of the step, so that the largest step is the root of the largest error: |δᵢ| ≤ √(bend · σᵢ) with σᵢ = 1/√Hᵢᵢ, the precision of the factors around. Thresholds in radians and metres would
-//! be too coarse for precise data and too fine for coarse data, and need one number for each type of variable.
+//! The error of a linearization grows with the square of the step. The limit of a step is therefore |δᵢ| ≤
+//! √(bend · σᵢ), with σᵢ = 1/√Hᵢᵢ, the precision of the surrounding factors. Thresholds in radians and metres
+//! would be too coarse for precise data and too fine for coarse data, and would need one number for each type
+//! of variable.
 //!
-//! A robust loss adds a second error: its weights are those of the linearization points. New weights change the gradient by
-//! Δg = Σ (w/w₀ − 1) w₀Jᵀr. About ½ (Δgᵢ σᵢ)² nats could be gained with them, and at most ½ nat is left, however short the step is.
+//! A robust loss adds a second error: its weights are taken at the linearization points. New weights change
+//! the gradient by Δg = Σ (w/w₀ − 1) w₀Jᵀr. They could gain about ½ (Δgᵢ σᵢ)² nats. The limit leaves at most
+//! ½ nat, however short the step is.
 use super::Session;
 use crate::elimination_tree::{Affected, Couplings};
 use smallvec::SmallVec;
 
-/// Variables at new points.
+/// Relinearized variables, and their factors.
 #[derive(Debug, Default)]
 pub(super) struct Relinearized {
     pub(super) variables: Vec<u32>,
@@ -23,18 +26,20 @@ pub(super) struct Choice {
     pub(super) waiting: Option<Vec<u32>>,
 }
 
-/// Most halvings of a step that leaves the domain of a factor; after them the variable keeps its point.
+/// Largest number of halvings of a step that leaves the domain of a factor. After them, the variable keeps
+/// its point.
 const HALVINGS: u32 = 4;
-/// Rounds of such halvings, each of some variables, before all of them stay.
+/// Rounds of such halvings, each for some variables, before all variables keep their points.
 const ROUNDS: usize = 16;
 
 impl Session {
-    /// The error of a variable's linearization by the length of its step, as a share of its limit.
+    /// Returns the linearization error of a variable due to the length of its step, as a share of its limit.
     pub(super) fn excess(&self, variable: u32) -> f64 {
         self.steps.excess(&self.model, variable, *self.schedule.settings().bend)
     }
 
-    /// Returns whether something cannot wait for the next turn: after a large loop closure, a step is no estimate of anything.
+    /// Returns whether a variable cannot wait for the next turn. After a large loop closure, the steps are
+    /// not a useful estimate.
     pub(super) fn is_urgent(&mut self) -> bool {
         let most = self.schedule.urgent_excess();
         let mut queue = std::mem::take(&mut self.queue);
@@ -43,8 +48,8 @@ impl Session {
         is_urgent
     }
 
-    /// Chooses the variables to relinearize: `chosen`, and at a turn those outside of their regions, within the budget. `spent` is
-    /// the number of operations of the update so far.
+    /// Chooses the variables to relinearize: `chosen`, and at a turn the ones outside of their regions,
+    /// within the budget. `spent` is the number of operations of the update so far.
     pub(super) fn choose(
         &mut self,
         mut chosen: Vec<u32>,
@@ -74,8 +79,8 @@ impl Session {
         Choice { chosen, waiting: is_turn.then(|| out.into_iter().map(|(_, v)| v).collect()) }
     }
 
-    /// The variables outside of the regions of their linearizations, ascending, each with its excess: by the length of its step,
-    /// or by new weights of losses.
+    /// Returns the variables outside of the regions of their linearizations, ascending, each with its excess
+    /// due to the length of its step or to new weights of losses.
     fn out(&mut self) -> Vec<(f64, u32)> {
         let mut moved: Vec<u32> = match self.schedule.is_idle() {
             true => {
@@ -96,8 +101,8 @@ impl Session {
         out
     }
 
-    /// The gain in cost that new weights of losses promise at each variable, as a share of ½ nat. A short step can change the
-    /// weights of a robust loss much.
+    /// Returns the gain in cost that new robust weights promise at each variable, as a share of ½ nat. Even a
+    /// short step can change robust weights much.
     fn excesses_by_weight(&mut self, variables: &[u32]) -> Vec<f64> {
         let around = self.model.factors_of(variables);
         let changes = self
@@ -111,8 +116,9 @@ impl Session {
         variables.iter().zip(changes).map(share).collect()
     }
 
-    /// Keeps those variables that the budget allows for, the furthest out first. What a relinearization costs is what the
-    /// fronts above the variable cost as they are; those that are `affected` anyway come first.
+    /// Returns the variables that the budget allows, the largest excess first. The budget pays for the fronts
+    /// that are already `affected` first. A relinearization costs as much as the current fronts above its
+    /// variable.
     fn afford(
         &mut self,
         mut by_excess: Vec<(f64, u32)>,
@@ -141,24 +147,26 @@ impl Session {
         variables
     }
 
-    /// Returns whether a variable is out of the region of its linearization, and solved for.
+    /// Returns whether a variable is outside of the region of its linearization, and solved for.
     pub(super) fn is_out(&self, variable: u32) -> bool {
         self.excess(variable) > self.schedule.largest_excess() && self.may_move(variable)
     }
 
-    /// Variables whose steps are damped: such a step is none to the minimum, however short, and another has to follow.
+    /// Returns the damped variables. A damped step does not reach the minimum, however short it is, so it is
+    /// followed by more.
     pub(super) fn damped_now(&self) -> impl Iterator<Item = u32> {
         self.steps.damped().filter(|v| self.may_move(*v))
     }
 
-    /// Returns whether a variable may be linearized anew: it is solved for, and no prior holds its point.
+    /// Returns whether a variable may be relinearized: it is solved for, and no linear prior fixes its point.
     fn may_move(&self, variable: u32) -> bool {
         self.factorization.contains(variable) && self.model.place(variable).sealed == 0
     }
 
-    /// Linearizes the factors of these variables, which ascend, where the variables are estimated to be; their steps are
-    /// still what they were. Where a factor is not defined there any more, or not finite, its variables go half the way,
-    /// then half of that; at last, they stay. `held` are those that have to be linearized, wherever that is.
+    /// Linearizes the factors of these variables, which ascend, at the estimate. The steps are not changed.
+    ///
+    /// If a factor is not defined or not finite there, its variables take half of the step, then half of
+    /// that. In the end they keep their points. Variables of `held` are linearized in every case.
     pub(super) fn relinearize(&mut self, mut variables: Vec<u32>, held: &[u32]) -> Relinearized {
         let factors = self.model.factors_of(&variables);
         let took_part: Vec<bool> = factors.iter().map(|f| self.model.takes_part(*f)).collect();
@@ -191,7 +199,7 @@ impl Session {
         Relinearized::default()
     }
 
-    /// Moves a variable's trial point by its step, halved so many times.
+    /// Moves the trial point of a variable by its step, halved `halvings` times.
     fn try_share(&mut self, variable: u32, halvings: u32) {
         if halvings >= HALVINGS {
             self.model.reset_trial(variable);
@@ -203,8 +211,8 @@ impl Session {
         self.model.try_point(variable, &step);
     }
 
-    /// Linearizes some of the `factors`, and names those that cannot be: they took part before and do not any more, or are
-    /// not finite.
+    /// Linearizes `some` of the `factors`. Returns the ones that fail: they are not finite, or took part
+    /// before and no longer do.
     fn linearize_within(&mut self, some: &[u32], factors: &[u32], took_part: &[bool]) -> Vec<u32> {
         let evaluation = self.model.linearize(some);
         let has_left = |f: &u32| {
@@ -216,15 +224,15 @@ impl Session {
         out
     }
 
-    /// Goes back to the old linearization points.
+    /// Restores the old linearization points.
     pub(super) fn take_back_points(&mut self, relinearized: &Relinearized) {
         relinearized.variables.iter().for_each(|v| self.model.reset_trial(*v));
-        // at the old points, they have their old bits
+        // equal points give equal bits
         self.model.linearize(&relinearized.factors);
         self.undetermined.note_activities(&self.model, &relinearized.factors);
     }
 
-    /// Makes the new points those of the session. After a turn, the variables of `waiting` that keep their points still wait.
+    /// Accepts the new points. After a turn, the variables of `waiting` that keep their points still wait.
     pub(super) fn accept_points(&mut self, relinearized: &Relinearized, waiting: Option<&[u32]>) {
         for v in &relinearized.variables {
             self.model.accept(*v);
@@ -233,7 +241,8 @@ impl Session {
         self.queue.relinearized(&relinearized.variables, waiting);
     }
 
-    /// Notes a variable for the next turn if its step is too long for its linearization, or may have changed weights of losses.
+    /// Queues a variable for the next turn if its step is too long for its linearization, or may have changed
+    /// robust weights.
     pub(super) fn note_excess(&mut self, variable: u32) {
         let excess = self.excess(variable);
         let is_out = excess > self.schedule.largest_excess() || self.model.has_losses();

@@ -1,4 +1,4 @@
-//! A session that goes on after a restart.
+//! Saving a smoother, and continuing after a restart.
 use super::Session;
 use super::factorization::Factorization;
 use super::queue::RelinearizationQueue;
@@ -8,11 +8,12 @@ use crate::model::{Model, NewNumber, Prior};
 use crate::saved::{LoadError, SaveError, Saved, SavedFactor, SavedPrior, SavedVariable};
 
 impl Session {
-    /// The session as text. [`load`](Self::load) makes a session of it that goes on with the same bits, on a processor of the
-    /// same kind; on another, estimates are the same until the next update, and then up to rounding.
+    /// Returns the smoother as text. [`load`](Self::load) restores it with equal bits on a processor of this
+    /// kind. On a different processor, estimates are equal until the next update, and afterwards up to
+    /// rounding.
     ///
     /// # Errors
-    /// If there are changes that no update has made yet, or a factor or value has no text.
+    /// If there are changes that no update has made yet, or a factor or value cannot be written as text.
     pub fn save(&self) -> Result<String, SaveError> {
         if !self.pending.is_empty() {
             return Err(SaveError::Pending);
@@ -62,11 +63,11 @@ impl Session {
         saved.write()
     }
 
-    /// A session as it was [saved](Self::save).
+    /// Restores a [saved](Self::save) smoother.
     ///
     /// # Errors
-    /// If the text is none, is damaged, or is of another version; where this program does not have a type of its variables
-    /// or factors; where it contradicts itself.
+    /// If the text is not a saved smoother, is damaged, has a different version, has a type that this program
+    /// does not have, or contradicts itself.
     pub fn load(text: &str) -> Result<Self, LoadError> {
         let saved = Saved::read(text)?;
         let mut session = Session::new(saved.settings);
@@ -90,7 +91,7 @@ impl Session {
                 .model
                 .point(v as u32)
                 .and_then(|point| point.erased().retract(session.steps.of(&session.model, v as u32)));
-            // the sum of a finite point and a finite step may be infinite
+            // a finite point and a finite step may have an infinite sum
             if !estimate.is_some_and(|estimate| estimate.erased().is_finite()) {
                 return Err(LoadError::Inconsistent("a variable's key, point or step"));
             }
@@ -99,7 +100,7 @@ impl Session {
                 session.steps.note_damped(v as u32);
             }
         }
-        // counters that go on from there must not wrap around
+        // counters that continue from here must not wrap around
         let is_young = saved.ordinals.iter().chain([&saved.born]).all(|count| *count < 1 << 62)
             && saved.updates < 1 << 62
             && saved.next_factor < 1 << 31;
@@ -130,7 +131,7 @@ impl Session {
         Some(SavedPrior { number, variables, h: bits(h), g: bits(g), constant: constant.to_bits() })
     }
 
-    /// Traces of variables that are gone.
+    /// Inserts the linear priors of marginalized variables.
     fn put_priors(&mut self, priors: &[SavedPrior], next: u32) -> Result<(), LoadError> {
         let n = self.model.variables() as u32;
         for SavedPrior { number, variables, h, g, constant } in priors {
@@ -155,7 +156,7 @@ impl Session {
         Ok(())
     }
 
-    /// Factors, linearized where they were.
+    /// Inserts factors and linearizes them at the saved points.
     fn put_factors(&mut self, factors: &[SavedFactor], next: u32) -> Result<(), LoadError> {
         let mut errors = vec![];
         for (i, SavedFactor { number, weight, entry, suspect }) in factors.iter().enumerate() {
@@ -195,7 +196,7 @@ fn insert(model: &mut Model, saved: &SavedVariable) -> Result<(), LoadError> {
     let SavedVariable { key, born, point, step, held, parked, .. } = saved;
     let value = point.erased();
     let dim = value.dim();
-    // a number that is free may have had the name of a variable that is there
+    // a free number may hold the key of a variable that exists
     let is_known = born.is_some() && model.variable(key.as_str()).is_some_and(|v| model.place(v).is_there);
     if is_known || step.len() != dim || !value.is_finite() {
         return Err(LoadError::Inconsistent("a variable's key, point or step"));

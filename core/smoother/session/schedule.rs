@@ -1,13 +1,13 @@
-//! The settings, and the updates that were made: when to relinearize, and how exactly.
+//! The settings, and the count of updates: when to relinearize, and how exactly.
 mod window;
 
 use crate::settings::Settings;
 use window::SlidingWindow;
 
-/// Limits of an idle update, as shares of the limits of other updates.
+/// Share of the normal limits that applies in an idle update.
 const FINE: f64 = 1e-8;
 
-/// The settings of a smoother, the count of its updates, and its window.
+/// The settings of the smoother, the count of its updates, and its window.
 #[derive(Debug)]
 pub(super) struct Schedule {
     settings: Settings,
@@ -20,12 +20,12 @@ pub(super) struct Schedule {
 }
 
 impl Schedule {
-    /// A schedule without updates.
+    /// Creates a schedule without updates.
     pub(super) fn new(settings: Settings) -> Self {
         Self { settings, updates: 0, is_quiet: false, is_idle: false, window: SlidingWindow::default() }
     }
 
-    /// The schedule of a saved smoother.
+    /// Restores the schedule of a saved smoother.
     pub(super) fn restore(&mut self, updates: usize, is_quiet: bool) {
         self.updates = updates;
         self.is_quiet = is_quiet;
@@ -35,7 +35,7 @@ impl Schedule {
         &self.settings
     }
 
-    /// Number of updates that have succeeded.
+    /// Returns the number of updates that have succeeded.
     pub(super) fn updates(&self) -> usize {
         self.updates
     }
@@ -50,33 +50,35 @@ impl Schedule {
         self.is_idle
     }
 
-    /// Begins an update, with changes or without.
+    /// Begins an update. `is_quiet` is true if it has no changes.
     pub(super) fn begin(&mut self, is_quiet: bool) {
         self.is_idle = is_quiet && self.is_quiet;
     }
 
-    /// Counts the update that has begun: it has succeeded.
+    /// Counts the current update, which has succeeded.
     pub(super) fn complete(&mut self, is_quiet: bool) {
         self.updates += 1;
         self.is_quiet = is_quiet;
     }
 
-    /// Returns whether the update that has begun relinearizes by its turn.
+    /// Returns whether the current update relinearizes at a regular turn.
     pub(super) fn is_turn(&self) -> bool {
         self.is_idle || (self.updates + 1).is_multiple_of(self.settings.relinearize_every.get())
     }
 
-    /// The largest error of a linearization that stays, as a share of the setting `bend`: an idle update leaves far less.
+    /// Returns the largest linearization error that remains, as a share of the setting `bend`. An idle update
+    /// leaves far less.
     pub(super) fn largest_excess(&self) -> f64 {
         if self.is_idle { FINE } else { 1.0 }
     }
 
-    /// The same share from which on a variable does not wait for its turn.
+    /// Returns the linearization error above which a variable does not wait for its turn, as a share of
+    /// `bend`.
     pub(super) fn urgent_excess(&self) -> f64 {
         self.settings.urgent.powi(2)
     }
 
-    /// The largest change of a step that is not passed on, in σ.
+    /// Returns the largest change of a step that is not propagated. Unit: σ.
     pub(super) fn deviation(&self) -> f64 {
         if self.is_idle { FINE * *self.settings.deviation } else { *self.settings.deviation }
     }

@@ -1,9 +1,9 @@
-//! Variables that leave: their factors are sealed into a linear prior of their neighbours, which keep their linearization
-//! points from then on.
+//! Marginalization: the factors of a variable become a linear prior on its neighbours. The neighbours keep
+//! their linearization points from then on.
 //!
-//! Points that stay are what makes it consistent: a prior that is evaluated at one point and factors that are linearized at
-//! another would tell the estimate of directions that nothing has measured (first estimates; Huang, Mourikis and Roumeliotis,
-//! 2008).
+//! Fixed points are necessary for consistency. If a prior were evaluated at one point and factors linearized
+//! at a second one, the estimate would gain information on directions that no factor has measured
+//! (first-estimates Jacobians; Huang, Mourikis and Roumeliotis, 2008).
 use super::Session;
 use super::changes::{Change, Touched};
 use super::undetermined::Moves;
@@ -14,7 +14,8 @@ use crate::model::{Overflow, Prior};
 use crate::report::Report;
 use manifactor_graph::Key;
 
-/// Changes of the model by a sealing, so that they can be taken back. Factors are gone once it succeeds.
+/// Changes of the model by a marginalization, so that they can be undone. Removed factors are recorded as
+/// such once it succeeds.
 #[derive(Default)]
 struct Sealing {
     steps: Vec<Step>,
@@ -22,7 +23,7 @@ struct Sealing {
     dropped: Vec<u32>,
 }
 
-/// A step that takes one change of the model back.
+/// A step that undoes one change of the model.
 enum Step {
     /// Inserts a factor again, with the share of its weight.
     Factor(Change, u32, f64),
@@ -35,15 +36,16 @@ enum Step {
 }
 
 impl Session {
-    /// Has variables leave, at the end of the next [`update`](Self::update): what their factors say of others stays, as a linear
-    /// prior, and those others keep their linearization points until they leave as well. Estimates and covariances of what
-    /// stays are what they were. Factors that do not count where they are left, as they are not defined there or hang
-    /// on something that is parked, are dropped, and the report names them. If a prior overflows, all of these variables stay, and the
-    /// report names them as well. One that has no factors then leaves nothing behind: another may have
-    /// its key.
+    /// Marginalizes variables at the end of the next [`update`](Self::update).
+    ///
+    /// Their factors become a linear prior on the neighbours. The neighbours keep their linearization points
+    /// until they are marginalized as well. Estimates and covariances of the remaining variables do not
+    /// change. Factors that do not count, because they are not defined at the last linearization or have a
+    /// parked variable, are dropped, and the report names them. If a prior overflows, all of these variables
+    /// stay, and the report names them. The key of a variable without factors can be used again.
     ///
     /// # Errors
-    /// If a variable is not there, or gone already. None leaves then.
+    /// If a variable does not exist, or is marginalized already. None is marginalized then.
     pub fn marginalize<K: AsRef<str>>(&mut self, keys: &[K]) -> Result<(), ChangeError> {
         for key in keys.iter().map(AsRef::as_ref) {
             if self.find(key).is_none() {
@@ -54,7 +56,7 @@ impl Session {
         Ok(())
     }
 
-    /// Why a key is none of a variable.
+    /// Returns the error for a key without a variable.
     pub(super) fn no_variable(&self, key: &Key) -> ChangeError {
         match self.model.removed.keys.contains(key.as_str()) {
             true => ChangeError::Gone { key: key.clone() },
@@ -62,7 +64,7 @@ impl Session {
         }
     }
 
-    /// Why an id is none of a factor.
+    /// Returns the error for an id without a factor.
     pub(super) fn no_factor(&self, factor: FactorId) -> ChangeError {
         match self.model.removed.factors.contains(u64::from(factor.0)) {
             true => ChangeError::GoneFactor { factor },
@@ -70,13 +72,13 @@ impl Session {
         }
     }
 
-    /// Seals what these variables leave behind, one after the other, and solves again. If that fails, all of them stay, with their
-    /// factors.
+    /// Marginalizes these variables, one after the other, and solves again. If that fails, all of them stay,
+    /// with their factors.
     pub(super) fn seal(&mut self, leaving: &[u32], report: &mut Report) -> Result<(), Overflow> {
         if leaving.is_empty() {
             return Ok(());
         }
-        // what is frozen should not be far off; where it cannot be linearized anew, it stays as it is
+        // points that are about to be fixed should be accurate; a failed pass leaves them unchanged
         let is_stale = |v: &u32| self.is_out(*v) || self.model.coupled(*v).any(|u| self.is_out(u));
         if leaving.iter().any(is_stale) {
             let _ = self.pass(&Touched::default(), &Moves::default(), true, report);
@@ -91,7 +93,7 @@ impl Session {
                 return Err(overflow);
             }
         }
-        // those that leave one after the other are each other's neighbours
+        // variables that are marginalized together are neighbours of each other
         let is_there = |session: &Self, v: u32| !leaving.contains(&v) && session.model.place(v).is_there;
         touched.doubtful.retain(|v| is_there(self, *v));
         let moves = Moves::of(&mut self.model, &self.factorization, &mut touched);
@@ -101,7 +103,7 @@ impl Session {
             return Err(overflow);
         }
         for f in sealing.gone {
-            // the numbers of priors too: no one holds them, and the runs have no gaps
+            // this includes the numbers of priors: no caller has them, and the ranges stay without gaps
             self.model.removed.factors.insert(u64::from(f));
             self.undetermined.forget_factor(f);
             self.candidates.forget(f);
@@ -116,7 +118,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a sealing back that failed, the last step first.
+    /// Undoes a failed marginalization, the last step first.
     fn take_back_sealing(&mut self, sealing: Sealing) {
         let (mut touched, mut factors) = (Touched::default(), vec![]);
         for step in sealing.steps.into_iter().rev() {
@@ -140,7 +142,7 @@ impl Session {
             }
         }
         self.sort(&mut factors);
-        // at the same points, they have the same bits
+        // equal points give equal bits
         self.model.linearize(&factors);
         for f in factors {
             self.model.count(f, self.model.is_whole(f));
@@ -148,7 +150,7 @@ impl Session {
         self.model.sum_up();
     }
 
-    /// Puts a prior in the place of a variable's factors. It is in the tree until the next pass.
+    /// Replaces the factors of a variable by a prior. The variable is in the tree until the next pass.
     fn seal_one(
         &mut self,
         variable: u32,
@@ -186,7 +188,7 @@ impl Session {
         Ok(())
     }
 
-    /// Removes a factor or a linear prior, and notes the step that takes that back.
+    /// Removes a factor or a linear prior, and records the step that undoes this.
     fn remove_sealed(&mut self, number: u32, sealing: &mut Sealing) {
         let Some(factor) = self.model.factor(number) else { return };
         let share = factor.share;
@@ -204,7 +206,8 @@ impl Session {
         sealing.gone.push(number);
     }
 
-    /// Priors of some of the others: they become part of the new one, so that there are no more of them than have to be.
+    /// Returns the priors whose variables are all among the neighbours. They become part of the new prior, so
+    /// that the number of priors stays small.
     fn covered(&self, factors: &[u32], variable: u32) -> Vec<u32> {
         let variables = factors.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables());
         let mut around: Vec<u32> = variables.collect();
@@ -222,7 +225,7 @@ impl Session {
         of_these.into_iter().filter(is_covered).collect()
     }
 
-    /// Forgets a variable that is out of the tree.
+    /// Removes all records of a variable that is out of the tree.
     fn forget(&mut self, variable: u32) {
         self.steps.forget(&self.model, variable);
         self.queue.forget(variable);

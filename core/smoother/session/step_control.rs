@@ -1,9 +1,11 @@
-//! Steps that are too long, so that the true cost rises. Where a few variables step far, what is known of them is little: they are
-//! damped one by one, as Levenberg and Marquardt damp all. Where many do, a loop moves as a whole: half the way is tried, and half
-//! of that. At last, a batch solve.
+//! Control of steps that are so long that they raise the true cost.
 //!
-//! A variable is damped by λ on the diagonal of its block of H, a prior at its linearization point. That moves no minimum: each update
-//! linearizes the variable anew, with less damping.
+//! If a few variables step far, they are poorly determined. They are damped one by one, as Levenberg and
+//! Marquardt damp all variables. If many step far, a loop moves as a whole: the step is halved, repeatedly.
+//! The last resort is a batch solve.
+//!
+//! A variable is damped by λ on the diagonal of its block of H. This is a prior at its linearization point.
+//! It does not move the minimum, because each update relinearizes the variable with less damping.
 use super::Session;
 use super::changes::Touched;
 use super::undetermined::Moves;
@@ -12,18 +14,20 @@ use manifactor_solve::{DiagonalLimits, LevenbergMarquardt, Silent};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
-/// Variables that are damped at most; more are a loop.
+/// Largest number of variables that are damped. More variables belong to a loop.
 const FEW: usize = 16;
-/// Rounds of such halvings before a batch solve, and rounds of damping.
+/// Rounds of halving before a batch solve, and rounds of damping.
 const ROUNDS: usize = 3;
 const DAMPINGS: usize = 6;
-/// A rise by less than this share is rounding.
+/// A smaller rise, as a share of the cost, is rounding error.
 const ROUNDING: f64 = 1e-12;
 
 impl Session {
-    /// Shortens steps that have raised the cost of the factors around. It examines only steps far outside of the region of their
-    /// linearization, as one shorter step does little harm. Many of them can: Gauss-Newton may circle around a minimum for ever.
-    /// An idle update therefore examines all steps, and solves a batch if the cost has risen.
+    /// Shortens steps that have raised the cost of the surrounding factors.
+    ///
+    /// It examines only steps far outside of the region of their linearization, because a single short step
+    /// does little harm. Many short steps can: Gauss-Newton may circle around a minimum forever. An idle
+    /// update therefore examines all steps, and solves a batch if the cost has risen.
     pub(super) fn control_step(&mut self, report: &mut Report) {
         if self.schedule.is_idle() {
             let (_, before, after) = self.steps.last_step(&mut self.model);
@@ -35,19 +39,19 @@ impl Session {
         }
     }
 
-    /// Shortens long steps that have raised the cost; whether it has ceased to rise.
+    /// Shortens long steps that have raised the cost. Returns whether the cost no longer rises.
     pub(super) fn steady(&mut self, report: &mut Report) -> bool {
         !self.is_urgent()
             || if self.queue.urgent().len() > FEW { self.halve(report) } else { self.damp(report) }
     }
 
-    /// Halves the last step, and linearizes there.
+    /// Halves the last step and linearizes there. Returns whether the cost no longer rises.
     fn halve(&mut self, report: &mut Report) -> bool {
         for _ in 0..ROUNDS {
             if !self.is_urgent() || !self.shorten(report) {
                 return true;
             }
-            // from the shorter step, linearized there
+            // continue from the shorter step, with factors linearized there
             let held = Touched { held: self.steps.moved().collect(), ..Touched::default() };
             if self.pass(&held, &Moves::default(), false, report).is_err() {
                 return true;
@@ -62,8 +66,8 @@ impl Session {
         halvings > 0
     }
 
-    /// Damps variables whose steps are far too long, as long as the cost of the factors around has risen since before; whether
-    /// it has ceased to.
+    /// Damps variables whose steps are far too long, while the cost of the surrounding factors is above its
+    /// value before the steps. Returns whether the cost no longer rises.
     fn damp(&mut self, report: &mut Report) -> bool {
         let mut before: BTreeMap<u32, SmallVec<[f64; 9]>> = BTreeMap::new();
         for _ in 0..DAMPINGS {
@@ -84,7 +88,8 @@ impl Session {
         !(self.is_urgent() && self.steps.has_risen(&mut self.model, &before))
     }
 
-    /// Solves all of it as one batch from the estimate, and goes on from there; whether the cost has fallen.
+    /// Solves the whole graph as one batch from the estimate and continues from the result. Returns whether
+    /// the cost has fallen.
     pub(super) fn settle(&mut self, report: &mut Report) -> bool {
         let Ok(finished) = self.finish(&batch_solver(), &mut Silent) else { return false };
         finished.outcome.final_cost < finished.outcome.initial_cost
@@ -92,8 +97,8 @@ impl Session {
     }
 }
 
-/// Damping of one size for all directions, as above: in proportion to the diagonal of H, a direction that has all but lost its
-/// derivative would go for good.
+/// Returns the batch solver. It damps all directions by one size. Damping in proportion to the diagonal of H
+/// would let a direction whose derivative has almost vanished run away.
 fn batch_solver() -> LevenbergMarquardt {
     LevenbergMarquardt { diagonal: DiagonalLimits::EVEN, ..LevenbergMarquardt::default() }
 }

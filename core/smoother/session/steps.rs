@@ -6,7 +6,7 @@ use crate::elimination_tree::Redone;
 use crate::model::Model;
 use std::collections::BTreeSet;
 
-/// The steps of all variables, as they were last passed on.
+/// The steps of all variables, as last propagated.
 #[derive(Debug, Default)]
 pub(super) struct Steps {
     /// By scalar of all variables.
@@ -28,7 +28,7 @@ impl Steps {
         self.changed.resize(variables, 0);
     }
 
-    /// The steps of all variables, by scalar.
+    /// Returns the steps of all variables, by scalar.
     pub(super) fn all(&self) -> &[f64] {
         &self.delta
     }
@@ -38,7 +38,7 @@ impl Steps {
         self.delta = delta;
     }
 
-    /// The step of a variable.
+    /// Returns the step of a variable.
     pub(super) fn of(&self, model: &Model, variable: u32) -> &[f64] {
         &self.delta[model.blocks.range(variable)]
     }
@@ -58,19 +58,20 @@ impl Steps {
         model.place(variable).is_there && self.of(model, variable).iter().any(|step| *step != 0.0)
     }
 
-    /// The error of a variable's linearization by the length of its step, as a share of `bend`.
+    /// Returns the linearization error of a variable due to the length of its step, as a share of `bend`.
     pub(super) fn excess(&self, model: &Model, variable: u32, bend: f64) -> f64 {
         let steps = self.of(model, variable).iter().zip(model.blocks.precision(variable));
         steps.map(|(step, precision)| step * step * precision / bend).fold(0.0, f64::max)
     }
 
-    /// Variables whose steps the last pass has changed.
+    /// Returns the variables whose steps the last pass has changed.
     pub(super) fn moved(&self) -> impl Iterator<Item = u32> {
         self.moved.iter().map(|(v, _)| *v)
     }
 
-    /// Back-substitutes from the root downwards as far as steps change by more than `deviation`: through the new fronts, and
-    /// the fronts below them whose rows have changed; or through all fronts. Returns the number of variables.
+    /// Back-substitutes from the root downwards while steps change by more than `deviation`. It visits the
+    /// new fronts and the fronts below them whose rows have changed, or all fronts if `redone` is `None`.
+    /// Returns the number of solved variables.
     pub(super) fn solve(
         &mut self,
         model: &Model,
@@ -114,7 +115,7 @@ impl Steps {
             let range = model.blocks.range(*v);
             let (step, rest) = x.split_at(range.len());
             x = rest;
-            // compared with what was last passed on, so that small changes add up
+            // compared with the last propagated step, so that small changes add up
             let old = &mut delta[range];
             let precision = model.blocks.precision(*v);
             let mut changes = step.iter().zip(&*old).zip(precision);
@@ -128,7 +129,7 @@ impl Steps {
         variables.len()
     }
 
-    /// Variables whose steps are damped.
+    /// Returns the variables whose steps are damped.
     pub(super) fn damped(&self) -> impl Iterator<Item = u32> {
         self.damped.iter().copied()
     }
@@ -138,7 +139,7 @@ impl Steps {
         self.damped.contains(&variable)
     }
 
-    /// Notes that a variable's steps are damped.
+    /// Marks the steps of a variable as damped.
     pub(super) fn note_damped(&mut self, variable: u32) {
         self.damped.insert(variable);
     }

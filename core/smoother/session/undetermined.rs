@@ -1,8 +1,9 @@
-//! Variables that nothing determines yet: they wait outside of the tree, with all their factors.
+//! Undetermined variables. They are parked: excluded from the tree, with all their factors.
 //!
-//! A variable is parked while its own block of H has no full rank: a point that was seen once, or a pose whose only factor
-//! is not defined. Its factors would say nothing of their other variables, so leaving them out is exact. What the own block
-//! cannot show, two poses that are tied to each other alone, is found by pivots: see [`Fronts`](crate::fronts::Fronts).
+//! A variable is parked while its diagonal block of H is rank deficient. Examples are a point that was
+//! observed once, and a pose whose only factor is not defined. Its factors carry no information on their
+//! other variables, so leaving them out is exact. The diagonal block does not show two poses that are only
+//! tied to each other. Pivots find these: see [`Fronts`](crate::fronts::Fronts).
 use super::changes::Touched;
 use super::factorization::Factorization;
 use crate::elimination_tree::Couplings;
@@ -11,16 +12,16 @@ use crate::report::Shared;
 use manifactor_graph::Key;
 use std::collections::{BTreeSet, VecDeque};
 
-/// A block has no full rank where a pivot of it, scaled to a unit diagonal, is smaller.
+/// Smallest pivot of a block with full rank, after scaling to a unit diagonal.
 const RANK: f64 = 1e-8;
 
-/// Variables that begin or cease to be solved for.
+/// Variables that enter or leave the tree.
 #[derive(Debug, Default)]
 pub(super) struct Moves {
     /// Both ascend.
     pub(super) entering: Vec<u32>,
     pub(super) leaving: Vec<u32>,
-    /// Those that were looked at, ascending, and those of them whose flag has changed.
+    /// Checked variables (`judged`), ascending, and the ones whose flag has changed (`flipped`).
     pub(super) judged: Vec<u32>,
     pub(super) flipped: Vec<u32>,
 }
@@ -30,13 +31,14 @@ impl Moves {
     pub(super) fn of(model: &mut Model, factorization: &Factorization, touched: &mut Touched) -> Self {
         let candidates: BTreeSet<u32> = touched.doubtful.iter().copied().collect();
         let was_parked: Vec<(u32, bool)> = candidates.iter().map(|v| (*v, model.is_parked(*v))).collect();
-        // as many as possible are in; those that cannot be are taken out, and with them what hangs on them
+        // start with all of them in the tree; park the undetermined ones, then neighbours that depended on
+        // these
         candidates.iter().for_each(|v| _ = model.set_parked(*v, false));
         let mut parked = BTreeSet::new();
         let mut queue: VecDeque<u32> = candidates.iter().copied().collect();
         while let Some(v) = queue.pop_front() {
             let place = model.place(v);
-            // a prior says something of the others, also where it leaves this one open
+            // a prior constrains its other variables even if it does not determine this one
             if !model.is_parked(v) && !place.is_held() && place.sealed == 0 && !is_determined(model, v) {
                 model.set_parked(v, true);
                 parked.insert(v);
@@ -74,7 +76,7 @@ impl Moves {
         moves
     }
 
-    /// Takes the decisions back.
+    /// Undoes the decisions.
     pub(super) fn take_back(&self, model: &mut Model) {
         for v in &self.flipped {
             let is_parked = model.is_parked(*v);
@@ -91,36 +93,36 @@ impl Moves {
 /// Variables and factors that take no part.
 #[derive(Debug, Default)]
 pub(super) struct Undetermined {
-    /// Parked variables whose factors were linearized anew since they were judged.
+    /// Parked variables whose factors were relinearized since the last check.
     doubtful: Vec<u32>,
-    /// Factors that are not defined where they were linearized, or have no weight.
+    /// Factors that were not defined at their last linearization, or have no weight.
     inactive: BTreeSet<u32>,
-    /// The keys of parked variables, for reports.
+    /// Keys of parked variables, for reports.
     parked_keys: Shared<Key>,
 }
 
 impl Undetermined {
-    /// Parked variables to judge again.
+    /// Returns the parked variables to check again.
     pub(super) fn doubtful(&self) -> &[u32] {
         &self.doubtful
     }
 
-    /// Sets the parked variables to judge again.
+    /// Sets the parked variables to check again.
     pub(super) fn doubt(&mut self, variables: Vec<u32>) {
         self.doubtful = variables;
     }
 
-    /// Notes variables that were judged, ascending.
+    /// Removes checked variables from this list. `judged` ascends.
     pub(super) fn note_judged(&mut self, judged: &[u32]) {
         self.doubtful.retain(|v| judged.binary_search(v).is_err());
     }
 
-    /// Number of factors that take no part.
+    /// Returns the number of factors that take no part.
     pub(super) fn inactive(&self) -> usize {
         self.inactive.len()
     }
 
-    /// The keys of parked variables.
+    /// Returns the keys of parked variables.
     pub(super) fn list_parked(&mut self, model: &mut Model) -> Shared<Key> {
         if let Some(keys) = model.changed_parked_keys() {
             self.parked_keys = keys;
@@ -147,7 +149,7 @@ impl Undetermined {
         self.doubtful.dedup();
     }
 
-    /// Notes which factors take no part; variables that lose one may not be determined any more.
+    /// Records which factors take no part. Their variables may have become undetermined.
     pub(super) fn doubt_inactive(&mut self, model: &Model, touched: &mut Touched) {
         self.forget_inactive(model, &touched.removed);
         for f in &touched.factors {
@@ -164,14 +166,15 @@ impl Undetermined {
         }
     }
 
-    /// Notes whether factors take part where they were linearized.
+    /// Records whether factors took part in their last linearization.
     pub(super) fn note_activities(&mut self, model: &Model, factors: &[u32]) {
         for f in factors {
             self.note_activity(model, *f);
         }
     }
 
-    /// Notes whether a factor takes part where it was linearized; whether it has just ceased to.
+    /// Records whether a factor took part in its last linearization. Returns whether it has just become
+    /// inactive.
     pub(super) fn note_activity(&mut self, model: &Model, factor: u32) -> bool {
         match model.is_rejected(factor) || model.takes_part(factor) {
             true => {
@@ -183,7 +186,8 @@ impl Undetermined {
     }
 }
 
-/// Returns whether the factors that could count determine a variable, all others being known.
+/// Returns whether its factors determine a variable, given its neighbours. Factors with a parked neighbour do
+/// not count.
 fn is_determined(model: &Model, variable: u32) -> bool {
     let others_are_in = |f: u32| {
         let mut others = model.factor(f).into_iter().flat_map(|f| f.variables());
@@ -193,7 +197,8 @@ fn is_determined(model: &Model, variable: u32) -> bool {
     has_full_rank(&mut h, model.dim(variable))
 }
 
-/// Returns whether a symmetric matrix, of which the lower triangle counts, has full rank once it is scaled to a unit diagonal.
+/// Returns whether a symmetric matrix has full rank after scaling to a unit diagonal. Only its lower triangle
+/// is used.
 fn has_full_rank(h: &mut [f64], d: usize) -> bool {
     let scale: Vec<f64> = (0..d).map(|c| 1.0 / h[c * d + c].sqrt()).collect();
     if !scale.iter().all(|s| s.is_finite()) {

@@ -1,4 +1,4 @@
-//! One update: changes, the part of the tree that they touch, and the steps that follow from it.
+//! One update: changes, the part of the tree that they affect, and new steps.
 use super::Session;
 use super::changes::{Change, NewVariable, Touched};
 use super::relinearization::Choice;
@@ -11,7 +11,7 @@ use crate::report::Report;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-/// The state that takes changes back.
+/// The inverse changes of an update, to undo it.
 #[derive(Default)]
 pub(super) struct Undo {
     pub(super) variables: Vec<NewNumber>,
@@ -19,20 +19,22 @@ pub(super) struct Undo {
     pub(super) moves: Moves,
 }
 
-/// Touched variables that are eliminated last; where there are more, so many of them.
+/// Largest number of touched variables that are eliminated last. If there are more, only the `NEWEST` are: a
+/// new object with all its poses would fill the root (measured on fr2/desk, see `docs/decisions/online.md`).
 const MANY: usize = 32;
 const NEWEST: usize = 8;
 
 impl Session {
-    /// Makes the changes since the last update, and brings the estimate up to date. Then variables leave
-    /// that are to; those whose linear prior overflows stay, and the report names them in [`stayed`](Report::stayed).
+    /// Applies the changes since the last update and updates the estimate. Then variables are marginalized.
+    /// Variables whose linear prior overflows stay, and [`stayed`](Report::stayed) names them.
     ///
-    /// From the second update without changes on, updates are *idle*: their limits are 1e-8 of [`bend`](crate::Settings::bend) and
-    /// [`deviation`](crate::Settings::deviation), so that repeated updates lead to the minimum.
+    /// An update is *idle* if it and the previous one have no changes. Its limits are 1e-8 of
+    /// [`bend`](crate::Settings::bend) and [`deviation`](crate::Settings::deviation), so that repeated
+    /// updates converge to the minimum.
     ///
     /// # Errors
-    /// If a factor that was pushed or changed is not finite, or the linear system overflows. All changes since the last
-    /// update are taken back then, and the session is as that left it; ids of the pushed factors are void.
+    /// If a factor that was pushed or changed is not finite, or the linear system overflows. All changes
+    /// since the last update are undone then, and the ids of the pushed factors are void.
     pub fn update(&mut self) -> Result<Report, UpdateError> {
         let pending = std::mem::take(&mut self.pending);
         let is_quiet = pending.is_empty();
@@ -53,7 +55,7 @@ impl Session {
         let best = self.best_between(&pending.changes);
         for mut change in pending.changes {
             if let Change::Insert { number, entry, resolved, rejected, .. } = &mut change {
-                // one that replaces another has its number
+                // a replacement has the number of the replaced factor
                 suspects.remove(number);
                 if let Some(suspect) = self.suspect(entry, resolved, *number, &best) {
                     *rejected = true;
@@ -95,8 +97,8 @@ impl Session {
         Ok(report)
     }
 
-    /// Shortens steps that are too long, and takes those passes that cannot wait. What the changes need has been done: a pass
-    /// that fails leaves that as it is.
+    /// Shortens steps that are too long, and takes the passes that cannot wait. The changes are already
+    /// applied; a pass that fails does not undo them.
     pub(super) fn follow_up(&mut self, report: &mut Report) {
         self.control_step(report);
         for _ in 0..self.schedule.settings().passes {
@@ -107,7 +109,7 @@ impl Session {
         }
     }
 
-    /// Room for as many variables as the model has.
+    /// Makes room for all variables of the model.
     pub(super) fn resize(&mut self) {
         let n = self.model.variables();
         self.factorization.resize(n);
@@ -115,14 +117,14 @@ impl Session {
         self.queue.resize(n);
     }
 
-    /// The factors of a list that are there, each once.
+    /// Sorts a list of factors. Removes duplicates and factors that do not exist.
     pub(super) fn sort(&self, factors: &mut Vec<u32>) {
         factors.retain(|f| self.model.factor(*f).is_some());
         factors.sort_unstable();
         factors.dedup();
     }
 
-    /// Takes changes back, the last first.
+    /// Undoes changes, the last one first.
     pub(super) fn take_back(&mut self, undo: Undo) {
         undo.moves.take_back(&mut self.model);
         let mut touched = Touched::default();
@@ -141,7 +143,7 @@ impl Session {
         self.resize();
     }
 
-    /// Redoes what is touched and what is relinearized, and solves.
+    /// Recomputes the touched and the relinearized part of the tree, and solves for the steps.
     pub(super) fn pass(
         &mut self,
         touched: &Touched,
@@ -197,9 +199,12 @@ impl Session {
         Ok(())
     }
 
-    /// The variables to eliminate last: those that are touched will be touched again. Where there are new ones, that is said of these and
-    /// of what they are coupled with: an old pose whose factor was removed or replaced is done with. Where all that is many, an object with all
-    /// poses that have seen it, they would fill the root: then the newest of them.
+    /// Returns the variables to eliminate last.
+    ///
+    /// These are the touched variables, because they will be touched again. If there are new variables, only
+    /// they and their touched neighbours count: an old pose whose factor was removed or replaced will not be
+    /// touched again. If more than `MANY` remain, such as an object with all its poses, only the newest are
+    /// returned, because all of them would fill the root.
     fn last(&self, touched: &Touched, new: &[u32]) -> Vec<u32> {
         let mut last = touched.variables.clone();
         last.sort_unstable();
@@ -218,7 +223,8 @@ impl Session {
         last
     }
 
-    /// Solves for the steps, and notes variables that have moved. An idle update solves for all. Returns the number of variables.
+    /// Solves for the steps, and records the variables that have moved. An idle update solves for all
+    /// variables. Returns the number of solved variables.
     fn solve(&mut self, redone: &Redone) -> usize {
         let redone = (!self.schedule.is_idle()).then_some(redone);
         let Self { steps, model, factorization, .. } = self;

@@ -1,51 +1,51 @@
-//! What a window keeps, and how long.
+//! Settings of the window.
 use manifactor_graph::catalogue;
 use manifactor_graph::checked::Positive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
-/// A window that moves with the newest variables. Older ones leave at the end of an update, as
-/// [`Session::marginalize`](crate::Session::marginalize) takes them out.
+/// A window that moves with the newest variables. Older variables are marginalized at the end of an update,
+/// as by [`Session::marginalize`](crate::Session::marginalize).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Document", into = "Document")]
 #[schemars(with = "Document")]
 pub struct Window {
-    /// How far back it reaches.
+    /// Length of the window.
     pub span: Span,
-    /// Types whose variables never leave.
+    /// Types whose variables always stay.
     pub keep: Vec<ManifoldType>,
 }
 
-/// How far back a window reaches.
+/// Length of a window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Span {
-    /// So many variables stay, the newest of those whose type is not kept.
+    /// Number of variables that stay: the newest ones, without the types that are kept.
     Poses(NonZeroUsize),
-    /// Variables stay that came within so many seconds before now, and always the newest. Now is the last
-    /// [`Session::set_time`](crate::Session::set_time).
+    /// Seconds for which a variable stays after it was pushed. The newest variable always stays. The current
+    /// time is the last [`Session::set_time`](crate::Session::set_time).
     Seconds(Positive),
 }
 
-/// The window as it is written.
+/// The window as written in a document.
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Window")]
 struct Document {
-    /// Variables that stay, the newest of those whose type is not kept; at least one. Older ones leave at the end of an update,
-    /// as `Session::marginalize` takes them out. Either this or `seconds`.
+    /// Number of variables that stay, at least one: the newest ones, without the types of `keep`. Older ones
+    /// are marginalized at the end of an update, as by `Session::marginalize`. Either this or `seconds`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     poses: Option<NonZeroUsize>,
-    /// Seconds for which a variable stays after it came, by the times of `Session::set_time`; the newest always stays. Either this or
-    /// `poses`.
+    /// Time for which a variable stays after it was pushed, by the clock of `Session::set_time`. The newest
+    /// variable always stays. Either this or `poses`. Unit: seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     seconds: Option<Positive>,
-    /// Names of types whose variables never leave: `"dual_quadric"`, say. Default: none.
+    /// Names of types whose variables always stay, for example `"dual_quadric"`. Default: none.
     #[serde(default)]
     keep: Vec<ManifoldType>,
 }
 
-/// A window by poses and by seconds, or by neither.
+/// A window with both `poses` and `seconds`, or with neither.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "expected either `poses` or `seconds`, found {}; give one of them: `poses = 200`, or `seconds = 60.0`",
@@ -78,7 +78,7 @@ impl From<Window> for Document {
 }
 
 impl From<Span> for Window {
-    /// With no type that is kept.
+    /// Returns a window that keeps no type.
     fn from(span: Span) -> Self {
         Self { span, keep: vec![] }
     }
@@ -90,7 +90,7 @@ impl From<Span> for Window {
 #[schemars(with = "String")]
 pub struct ManifoldType(String);
 
-/// A name that no type of variables has.
+/// A name that is not a registered type of variables.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown type of variables `{name}`: {}", advice(.name))]
 pub struct UnknownManifold {
@@ -103,7 +103,7 @@ fn advice(name: &str) -> String {
     advice.unwrap_or_else(|| "this program has none; link the crate that registers it".to_owned())
 }
 
-/// What the catalogue calls a type of variables.
+/// Name of the kind of variables in the catalogue.
 const KIND: &str = <dyn manifactor_graph::Variable as catalogue::Kind>::NAME;
 
 impl TryFrom<String> for ManifoldType {
@@ -123,7 +123,7 @@ impl From<ManifoldType> for String {
 }
 
 impl ManifoldType {
-    /// The name.
+    /// Returns the name.
     pub fn as_str(&self) -> &str {
         &self.0
     }

@@ -1,4 +1,4 @@
-//! Sessions against fresh builds.
+//! The incremental smoother, compared with a new build.
 #![allow(missing_docs, clippy::unwrap_used)]
 mod clocks;
 mod errors;

@@ -15,7 +15,7 @@ fn session(span: Span) -> Session {
     Session::new(Settings { window: Some(span.into()), ..Settings::default() })
 }
 
-/// A pose that comes at this time; which ones have left.
+/// Adds a pose at this time. Returns the marginalized poses.
 fn pose(session: &mut Session, i: usize, time: f64) -> Vec<String> {
     session.set_time(time).unwrap();
     let (graph, values) = step(i);
@@ -43,10 +43,10 @@ fn stamps_may_be_uneven() {
     let none: [&str; 0] = [];
     assert_eq!(pose(&mut session, 0, -1.0), none);
     assert_eq!(pose(&mut session, 1, 0.5), none);
-    // two at one time; one that is as old as the window stays
+    // two poses at one time; a pose exactly as old as the window stays
     assert_eq!(pose(&mut session, 2, 0.5), none);
     assert_eq!(pose(&mut session, 3, 2.5), ["x0"]);
-    // nothing for a while: the newest stays, however old
+    // no pose for a while: the newest stays, however old
     session.set_time(100.0).unwrap();
     let report = session.update().unwrap();
     assert_eq!((report.sealed.len(), session.variables()), (2, 1));
@@ -87,7 +87,7 @@ fn time_does_not_go_back() {
     session.set_time(11.0).unwrap();
     assert!(session.set_time(10.75).is_err(), "one that no update has seen yet counts too");
     session.set_time(11.0).unwrap();
-    // without a window, or with one by poses, the time is not needed
+    // without a window, or with a window by poses, no time is needed
     let mut other = Session::new(Settings::default());
     other.push(&graph, &values).unwrap();
 }
@@ -105,7 +105,7 @@ fn an_update_that_fails_takes_the_time_back() {
     one.push(&graph, &values).unwrap();
     assert!(matches!(one.update(), Err(UpdateError::NonFinite { .. })));
     assert_eq!((one.variables(), bits(&one)), (4, bits(&other)));
-    // 50 s has never been: time goes on from 5 s
+    // the update at 50 s failed, so time continues from 5 s
     assert_eq!(pose(&mut one, 6, 6.0), pose(&mut other, 6, 6.0));
     assert_eq!(bits(&one), bits(&other));
 }

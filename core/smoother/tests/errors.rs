@@ -1,4 +1,4 @@
-//! A session that refuses something is as it was.
+//! A failed call leaves the smoother unchanged.
 use crate::toy::{Apart, At, Careless, Plane};
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Fixed, Graph, Noise, Values};
@@ -41,7 +41,7 @@ fn a_factor_that_is_not_finite_takes_all_changes_back() {
     assert!(error.to_string().contains("(new)"), "{error}");
     assert!(session.estimate("new").is_none() && session.entry(failed[1]).is_none());
     assert_eq!(bits(&session), before);
-    // and goes on as if nothing had been
+    // it continues like a smoother without the failed update
     let mut graph = Graph::new();
     graph.add(["x5"], At { at: [6.0, 0.0] });
     session.push(&graph, &Values::new()).unwrap();
@@ -76,7 +76,7 @@ fn what_does_not_fit_is_refused_with_its_name() {
 #[test]
 fn sums_that_overflow_are_refused_and_taken_back() {
     let mut session = chain(4);
-    // what the last update has left
+    // finish the work that the last update has left
     (0..3).for_each(|_| _ = session.update().unwrap());
     let before = bits(&session);
     let mut graph = Graph::new();
@@ -100,7 +100,8 @@ fn settings_outside_their_domain_are_refused() {
     }
 }
 
-/// Two variables whose numbers are close to the largest, and fit only as long as both are there.
+/// Creates two variables whose entries of H and g are close to the largest f64. Their sums are only finite as
+/// long as both are present.
 fn close_to_overflow() -> (Session, Vec<FactorId>) {
     let (mut session, ids) = pushed_close_to_overflow(never_linearized_anew());
     session.update().unwrap();
@@ -117,7 +118,7 @@ fn never_linearized_anew() -> Settings {
     }
 }
 
-/// The same before the first update.
+/// Creates this smoother before the first update.
 fn pushed_close_to_overflow(settings: Settings) -> (Session, Vec<FactorId>) {
     let mut session = Session::new(settings);
     let (mut graph, mut values) = (Graph::new(), Values::new());
@@ -148,7 +149,7 @@ fn variables_stay_if_their_linear_prior_overflows() {
     assert!(ids.iter().all(|id| session.entry(*id).is_some()));
     assert_eq!((bits(&session), session.cost().to_bits()), (before, cost.to_bits()));
     assert_eq!(bits(&saved(&session)), bits(&session));
-    // and goes on as if they had not been asked to leave
+    // it continues as if the marginalization had not been requested
     let mut graph = Graph::new();
     graph.add(["c"], At { at: [3.0, 0.0] });
     let (mut other, _) = close_to_overflow();
@@ -158,7 +159,7 @@ fn variables_stay_if_their_linear_prior_overflows() {
         session.update().unwrap();
     }
     assert_eq!(bits(&session), bits(&other));
-    // c alone is small enough to leave
+    // `c` alone does not overflow
     session.marginalize(&["c"]).unwrap();
     assert_eq!(session.update().unwrap().sealed[..], ["c".into()]);
 }
@@ -169,7 +170,7 @@ fn a_window_tries_again_what_could_not_leave() {
     let (mut session, ids) = pushed_close_to_overflow(Settings { window, ..never_linearized_anew() });
     assert_eq!(session.update().unwrap().stayed[..], ["a".into(), "b".into()]);
     assert!(session.update().unwrap().sealed.is_empty());
-    // without the strong factors
+    // without the strong factors, nothing overflows
     session.remove(&ids[..4]).unwrap();
     let report = session.update().unwrap();
     assert_eq!((report.sealed.len(), report.stayed.len()), (2, 0), "{report:?}");
@@ -182,7 +183,8 @@ fn variables_stay_if_the_sums_without_them_overflow() {
     let strong = || Noise::sigma(2.0_f64.sqrt() * 1e-154).unwrap();
     values.insert("a", Plane { x: 0.0, y: 0.0 });
     values.insert("b", Plane { x: 0.0, y: 0.0 });
-    // the gradient of b is finite as long as that of `a` is part of the sum; nothing else holds `a`, so that no prior remains
+    // the gradient of `b` is only finite together with the term of `a`; no other factor holds `a`, so no
+    // prior remains
     graph.add(["b"], At { at: [-1.8, 0.0] }).noise(strong());
     graph.add(["a", "b"], Apart { by: [1.8, 0.0] }).noise(strong());
     graph.add(["b"], At { at: [-1.8, 0.0] }).noise(strong());

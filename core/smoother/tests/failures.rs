@@ -1,4 +1,4 @@
-//! An update that failed leaves no trace, also not in what comes after it.
+//! A failed update leaves no trace, and does not affect later updates.
 use crate::history::{Change, History, allowed, bits, change, outliers, window};
 use crate::toy::{At, Careless, Plane};
 use crate::world::{Shadow, Space};
@@ -8,13 +8,14 @@ use manifactor_smoother::{Report, Session, Settings};
 use proptest::prelude::*;
 use std::num::NonZeroUsize;
 
-/// Pushes, removes, re-weights and holds, and fails at last: by a residual that is not finite, or a sum that overflows.
+/// Pushes, removes, weights and holds, and then fails: by a residual that is not finite, or by a sum that
+/// overflows.
 fn fail(history: &mut History, n: usize, overflows: bool) {
     let session = &mut history.session;
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("new", Plane { x: -4.0, y: 1.0 });
     if n.is_multiple_of(3) {
-        // of a type that the session may not have had before
+        // a type that the smoother may not have had before
         values.insert("space", Space { at: [1.0, 2.0, 3.0] });
         graph.add(["new", "space"], Shadow { by: [0.0, 0.0] });
     }
@@ -66,7 +67,7 @@ proptest! {
         prop_assert!(loaded.is_ok(), "{}", loaded.err().map(|error| error.to_string()).unwrap_or_default());
         prop_assert_eq!(bits(&loaded.unwrap()), bits(&other.session));
         for change in after.iter().chain(&[Change::Update]) {
-            // ids go on where the failed update left them
+            // ids continue after the ones of the failed update
             let [one, other] = [&mut one, &mut other].map(|history| {
                 history.apply(change).map(|report| Report { dropped: vec![], rejected: vec![], readmitted: vec![], ..report })
             });

@@ -1,4 +1,5 @@
-//! Whatever comes and goes, and in whatever order: the estimate is that of a graph that is built at once.
+//! After any sequence of insertions and removals, the estimate equals the estimate of a graph that is built
+//! at once.
 use crate::toy::{Apart, At, Centre, Distance, Plane};
 use crate::world::{Beyond, Near, Shadow, Space};
 use manifactor_graph::checked::NotNegative;
@@ -49,7 +50,7 @@ pub(crate) fn outliers() -> impl Strategy<Value = Option<Outliers>> {
     prop_oneof![Just(None), Just(Some(Outliers::default()))]
 }
 
-/// A change of something that has left a window is refused, and that is all.
+/// Accepts the rejection of a change to a marginalized variable or factor, and no other error.
 pub(crate) fn allowed<T: Default>(result: Result<T, ChangeError>) -> T {
     match result {
         Err(ChangeError::Gone { .. } | ChangeError::GoneFactor { .. } | ChangeError::Sealed { .. }) => {
@@ -59,7 +60,7 @@ pub(crate) fn allowed<T: Default>(result: Result<T, ChangeError>) -> T {
     }
 }
 
-/// A session, and what has been done to it.
+/// A smoother with its keys and factor ids.
 pub(crate) struct History {
     pub(crate) session: Session,
     pub(crate) keys: Vec<Key>,
@@ -76,7 +77,7 @@ impl History {
         self.keys[v].as_str().starts_with('p')
     }
 
-    /// Something that differs from factor to factor.
+    /// Returns a number that differs from factor to factor.
     fn number(&mut self) -> f64 {
         self.count += 1;
         (self.count as f64 * 0.7).sin()
@@ -119,12 +120,12 @@ impl History {
         graph
     }
 
-    /// The same history, with another session.
+    /// Returns this history with a different smoother.
     pub(crate) fn with(&self, session: Session) -> Self {
         Self { session, keys: self.keys.clone(), ids: self.ids.clone(), count: self.count }
     }
 
-    /// The keys of variables that are there.
+    /// Returns the keys of the present variables.
     pub(crate) fn present(&self) -> Vec<&str> {
         self.keys.iter().map(Key::as_str).filter(|key| self.session.estimate(key).is_some()).collect()
     }
@@ -133,7 +134,7 @@ impl History {
         changes.iter().filter_map(|change| self.apply(change)).collect()
     }
 
-    /// Makes a change; the report, where that is an update.
+    /// Applies a change. Returns the report of an update.
     pub(crate) fn apply(&mut self, change: &Change) -> Option<Report> {
         let (n, m) = (self.keys.len(), self.ids.len());
         match *change {
@@ -188,7 +189,7 @@ impl History {
     }
 }
 
-/// All estimates, bit by bit.
+/// Returns the bits of all estimates.
 pub(crate) fn bits(session: &Session) -> Vec<(Key, Vec<u64>)> {
     let numbers = |value: &dyn Variable| -> Vec<f64> {
         let (plane, space) = (Plane { x: 0.0, y: 0.0 }, Space { at: [0.0; 3] });
@@ -205,7 +206,7 @@ fn difference(a: &Values, b: &Values) -> f64 {
         .fold(0.0, |most, step| if step.is_nan() { f64::INFINITY } else { f64::max(most, step.abs()) })
 }
 
-/// Everything relinearized, and every change passed on: steps of Gauss-Newton.
+/// Everything is relinearized, and every change is propagated: updates are Gauss-Newton steps.
 fn exact() -> Settings {
     Settings {
         relinearize_every: NonZeroUsize::MIN,
@@ -228,7 +229,7 @@ proptest! {
             report = history.session.update().unwrap();
             quiet = if report.damped + report.halved == 0 && !report.solved_batch { quiet + 1 } else { 0 };
         }
-        // a few updates after the last, nothing is damped any more
+        // a few updates after the last change, no step is damped
         prop_assume!(report.undetermined.is_empty() && quiet > 8);
         let (graph, _) = history.session.graph();
         let mut values = history.session.estimates();
@@ -236,7 +237,8 @@ proptest! {
             values.remove(key.as_str());
         }
         prop_assume!(!values.is_empty());
-        // the same factors, pushed at once, where the estimate is: both take the same step from there
+        // push the factors at once into a new smoother at the current estimate: both take equal steps from
+        // there
         let mut fresh = Session::new(exact());
         let ids = fresh.push(&graph, &values).unwrap();
         for (id, old) in ids.iter().zip(history.session.graph().1) {
@@ -245,15 +247,15 @@ proptest! {
         let anew = fresh.update().unwrap();
         prop_assert!(anew.undetermined.is_empty() && anew.parked.is_empty());
         let last = history.session.update().unwrap();
-        // rounding can tip the balance where a step has to be damped, or a factor fits by a hair
+        // rounding can decide whether a step is damped, or whether a factor at the limit fits
         prop_assume!(last.damped + last.halved + anew.damped + anew.halved == 0 && !last.solved_batch);
         prop_assume!(last.rejected.is_empty() && last.readmitted.is_empty());
         let now = history.session.estimates();
         let apart = difference(&fresh.estimates(), &now);
-        // Gauss-Newton may step far on ranges
+        // Gauss-Newton may take long steps on ranges
         let far = 1.0 + difference(&values, &now);
         prop_assert!(apart < 1e-10 * far, "{apart} of {far}");
-        // where Gauss-Newton has settled, a batch solver stays
+        // at a fixed point of Gauss-Newton, a batch solver does not move
         if difference(&values, &now) < 1e-9 && let Ok(finished) = history.session.finish(&GaussNewton::default(), &mut Silent) {
             prop_assert!(difference(&now, &finished.values) < 1e-6);
         }

@@ -1,4 +1,4 @@
-//! Updates without changes lead to the minimum that the estimate is nearest to.
+//! Updates without changes converge to the nearest minimum.
 use crate::toy::{Apart, At, Distance, Plane};
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::loss::{Cauchy, Dcs, Fair, GemanMcClure, Huber, L1, Loss, Tukey, Welsch};
@@ -9,11 +9,11 @@ use proptest::prelude::*;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-/// Nats that may be left.
+/// Largest remaining cost above the minimum. Unit: nats.
 const LEFT: f64 = 1e-3;
 
-/// The cost of the session above the cost that a batch solver reaches from its estimate with this number of iterations. It ends by
-/// that number, and so does not leave a saddle.
+/// Returns the cost of the smoother minus the cost that a batch solver reaches from its estimate with this
+/// number of iterations. Only that number ends the solve, so the solver does not escape from a saddle point.
 fn left(session: &mut Session, iterations: usize) -> f64 {
     let stop = Stopping {
         max_iterations: iterations,
@@ -48,7 +48,7 @@ fn a_step_too_short_for_a_new_linearization_still_changes_robust_weights() {
     assert!(left(&mut session, 100) < LEFT, "{p:?}");
 }
 
-/// All losses; the first [`CONVEX`] of them are convex.
+/// All losses. The first [`CONVEX`] of them are convex.
 fn losses() -> Vec<Option<Arc<dyn Loss>>> {
     vec![
         None,
@@ -64,7 +64,7 @@ fn losses() -> Vec<Option<Arc<dyn Loss>>> {
 }
 const CONVEX: usize = 4;
 
-/// A factor of a random graph: its variables, what it says, its σ.
+/// A factor of a random graph: its two variables, its measurement, and its σ.
 type Link = (usize, usize, f64, f64, f64);
 
 fn link() -> impl Strategy<Value = Link> {
@@ -107,9 +107,9 @@ proptest! {
         for _ in 0..300 {
             session.update().unwrap();
         }
-        // with several minima, one iteration shows whether the estimate is at one of them
+        // with several minima, one iteration shows whether the estimate is at a minimum
         let left = left(&mut session, if is_convex { 100 } else { 1 });
-        // reweighting approaches the kinks of L1 ever more slowly
+        // reweighting converges ever more slowly towards the kinks of L1
         let most = if is_l1 { 10.0 * LEFT } else { LEFT };
         prop_assert!(left < most, "{left} nats");
     }

@@ -1,4 +1,4 @@
-//! Factors that may be wrong.
+//! Outlier tests of factors that may be wrong.
 use crate::toy::{Apart, Plane};
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Graph, Noise, Values};
@@ -9,12 +9,13 @@ fn with(outliers: Outliers) -> Session {
     Session::new(Settings { outliers: Some(outliers), ..Settings::default() })
 }
 
-/// One that lets a closure in though no other bears it out.
+/// Creates a smoother that accepts a loop closure without confirmation.
 fn session() -> Session {
     with(Outliers { gain: NotNegative::literal(100.0), ..Outliers::default() })
 }
 
-/// A step of 1 m to the next plane, and closures from there: to which plane, and where that seems to be from here.
+/// Adds a plane 1 m ahead, and loop closures from it. Each closure has the number of a plane and its measured
+/// relative position.
 fn step(session: &mut Session, i: usize, closures: &[(usize, [f64; 2])]) -> (Report, Vec<FactorId>) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert(format!("p{i}"), Plane { x: i as f64, y: 0.0 });
@@ -41,12 +42,12 @@ fn a_false_closure_stays_out_and_a_true_one_counts() {
     assert_eq!((&report.rejected[..], report.readmitted.len()), (&ids[..1], 0), "{report:?}");
     let [out] = session.rejections()[..] else { panic!("{:?}", session.rejections()) };
     assert_eq!((out.factor, out.since), (ids[0], 10));
-    // 9 m and 5 m off, at 5 cm
+    // 9 m and 5 m off, with a σ of 5 cm
     assert!(out.cost.unwrap() > 1e4, "{out:?}");
     assert!(!session.graph().1.contains(&ids[0]) && session.graph().1.contains(&ids[1]));
     let finished = session.finish(&LevenbergMarquardt::default(), &mut Silent).unwrap();
     assert!(finished.outcome.final_cost < 1.0 && !finished.factors.contains(&ids[0]));
-    // the closure that counts has moved it
+    // the accepted closure has moved the pose
     assert!(session.get::<Plane>("p9").unwrap().x > 9.05);
 }
 
@@ -54,7 +55,7 @@ fn a_false_closure_stays_out_and_a_true_one_counts() {
 fn what_was_rejected_comes_back_when_the_estimate_has_moved_there() {
     let mut session = session();
     (0..9).for_each(|i| _ = step(&mut session, i, &[]));
-    // odometry was 1.3 m short, which nothing but this closure says so far
+    // odometry was 1.3 m short, and only this closure indicates it so far
     let (_, out) = step(&mut session, 9, &[(0, [-10.3, 0.0])]);
     assert_eq!(session.rejections()[0].factor, out[0]);
     let mut back = vec![];
@@ -76,7 +77,7 @@ fn what_was_rejected_comes_back_when_the_estimate_has_moved_there() {
 fn a_false_closure_that_came_first_is_outvoted() {
     let mut session = session();
     (0..20).for_each(|i| _ = step(&mut session, i, &[]));
-    // within what odometry leaves open, so that it counts: σ is 0.45 m by now
+    // odometry leaves this open, so the closure counts: σ is 0.45 m by now
     let (report, wrong) = step(&mut session, 20, &[(0, [-20.0, 1.2])]);
     assert!(report.rejected.is_empty(), "{report:?}");
     assert!(session.get::<Plane>("p20").unwrap().y < -1.1);
@@ -93,7 +94,7 @@ fn what_nothing_is_known_of_contradicts_nothing() {
     let mut session = session();
     step(&mut session, 0, &[]);
     let (mut graph, mut values) = (Graph::new(), Values::new());
-    // two that are tied by a candidate alone: not one after the other
+    // two variables that only a candidate ties to the map; they are not consecutive
     values.insert("q", Plane { x: 3.0, y: 3.0 });
     graph.add(["p0", "q"], Apart { by: [7.0, 0.0] });
     values.insert("r", Plane { x: 5.0, y: 5.0 });
@@ -144,12 +145,12 @@ fn a_closure_that_says_much_waits_for_another_that_bears_it_out() {
     assert_eq!((report.trials, &report.readmitted[..]), (1, &first[..]), "{report:?} {second:?}");
     let out: Vec<FactorId> = session.rejections().iter().map(|r| r.factor).collect();
     assert_eq!(out, wrong);
-    // what says little is tested by what is known, and needs no other
+    // a factor with little information is tested by the estimate alone, and needs no confirmation
     let (report, _) = step(&mut session, 23, &[(3, [-20.2, 0.0])]);
     assert!(report.rejected.is_empty() && report.trials == 0, "{report:?}");
 }
 
-/// A step of 1 m to the next plane, with another factor between the same two, before or after it.
+/// Adds a plane 1 m ahead, with a wrong second factor before or after the right one.
 fn twice(session: &mut Session, i: usize, wrong_first: bool) -> [FactorId; 2] {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert(format!("p{i}"), Plane { x: i as f64, y: 0.0 });
@@ -199,7 +200,7 @@ fn a_factor_that_replaces_a_candidate_at_once_is_judged_anew() {
     session.replace(replaced[0], entry).unwrap();
     session.update().unwrap();
     assert!((session.get::<Plane>("p3").unwrap().x - 3.5).abs() < 1e-9);
-    // counted once, wherever it is linearized
+    // it counts once, wherever it is linearized
     (0..5).for_each(|_| _ = session.update().unwrap());
     assert!((session.get::<Plane>("p3").unwrap().x - 3.5).abs() < 1e-9);
     assert!(session.rejections().is_empty());

@@ -1,4 +1,4 @@
-//! Variables that nothing determines.
+//! Undetermined variables.
 use crate::toy::{At, Distance, Logarithm, Plane};
 use crate::world::Ahead;
 use manifactor_graph::{Graph, Key, Noise, Values};
@@ -29,7 +29,7 @@ fn a_point_that_ranges_do_not_determine_waits_for_another() {
     assert_eq!(report.parked[..], [Key::from("point")]);
     assert!(report.undetermined.is_empty());
     assert!(matches!(session.covariance(&["point"]), Err(CovarianceError::Parked { .. })));
-    // its range says nothing of `a`
+    // its range carries no information on `a`
     assert!(session.get::<Plane>("a").unwrap().x.abs() < 1e-12);
     let mut graph = Graph::new();
     graph.add(["b", "point"], Distance { by: 2.0 });
@@ -48,7 +48,7 @@ fn a_covariance_that_is_too_large_for_a_number_is_an_error() {
         let (key, before) =
             (Key::indexed("p", i), i.checked_sub(1).map_or("a".into(), |i| Key::indexed("p", i)));
         values.insert(key.clone(), Plane { x: 0.0, y: 0.0 });
-        // information just above the least number with all its digits
+        // information just above the smallest normal f64
         graph.add([before, key], crate::toy::Apart { by: [0.0, 0.0] }).noise(Noise::sigma(6.5e153).unwrap());
     }
     session.push(&graph, &values).unwrap();
@@ -101,7 +101,7 @@ fn a_parked_variable_enters_when_its_factors_become_defined_elsewhere() {
     graph.add(["a"], At { at: [0.0, 0.0] });
     graph.add(["a", "b"], Ahead { by: [1.0, 0.0] });
     session.push(&graph, &values).unwrap();
-    // there is no logarithm of b − a, until `a` is linearized at its estimate
+    // b − a has no logarithm until `a` is linearized at its estimate
     let report = session.update().unwrap();
     assert_eq!((&report.parked[..], report.inactive), (&[Key::from("b")][..], 1));
     session.update().unwrap();

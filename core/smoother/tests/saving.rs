@@ -1,4 +1,4 @@
-//! A session that was saved goes on as if nothing had been.
+//! A saved and loaded smoother continues like the original.
 use crate::history::{Change, History, bits, change, outliers, window};
 use crate::toy::{Plane, Valley};
 use manifactor_graph::checked::NotNegative;
@@ -71,7 +71,7 @@ fn changes_that_no_update_has_made_are_not_lost_silently() {
     session.save().unwrap();
 }
 
-/// The same text with another document, and the checksum that fits it.
+/// Returns a saved text with a different document and a matching checksum.
 pub(crate) fn resealed(json: &str) -> String {
     let fnv = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     let checksum = json.bytes().fold(0xcbf2_9ce4_8422_2325, fnv);
@@ -83,7 +83,7 @@ proptest! {
     fn a_document_that_contradicts_itself_is_no_panic(place in any::<prop::sample::Index>(), digit in 0..10u8, other in any::<prop::sample::Index>(), window in prop_oneof![Just(None), window().prop_map(Some)]) {
         let text = session(window).save().unwrap();
         let json = text.split_once('\n').unwrap().1.trim_end();
-        // digits are what structure and numbers are made of: one of the fronts, and one of all
+        // structure and numbers consist of digits: change one in the fronts, and one anywhere
         let digits = |from: usize| -> Vec<usize> {
             json.bytes().enumerate().skip(from).filter(|(_, b)| b.is_ascii_digit()).map(|(i, _)| i).collect()
         };

@@ -14,7 +14,7 @@ fn a_step_that_raises_the_cost_is_damped() {
     values.insert("p", Plane { x: -1.2, y: 1.0 });
     graph.add(["p"], Valley {});
     session.push(&graph, &values).unwrap();
-    // Gauss-Newton goes to (1, −3.84) at once, which costs a hundred times as much
+    // Gauss-Newton goes to (1, −3.84) at once, and the cost there is a hundred times as large
     let report = session.update().unwrap();
     assert!(report.damped > 0 && !report.solved_batch, "{report:?}");
     assert!(session.cost() < 12.1, "{}", session.cost());
@@ -22,12 +22,12 @@ fn a_step_that_raises_the_cost_is_damped() {
         session.update().unwrap();
     }
     assert!(session.cost() < 1e-6, "{}", session.cost());
-    // damping goes where it is not needed any more: what is known is as it is without
+    // damping disappears when it is no longer needed: covariances are those without damping
     let one = session.covariance(&["p"]).unwrap();
     let mut fresh = Session::new(Settings::default());
     fresh.push(&session.graph().0, &session.estimates()).unwrap();
     assert_eq!(fresh.update().unwrap().damped, 0);
-    // but for points of linearization that are not quite the same
+    // except for slightly different linearization points
     assert!((&one - fresh.covariance(&["p"]).unwrap()).amax() < 0.05 * one.amax());
 }
 
@@ -40,7 +40,7 @@ fn a_linearization_stays_in_the_domain_of_its_factors() {
     graph.add(["p"], At { at: [0.0, 0.0] }).noise(Noise::sigma(100.0).unwrap());
     session.push(&graph, &values).unwrap();
     for _ in 0..30 {
-        // from x = 9, a full step leads to x < 0, where there is no logarithm
+        // from x = 9, a full step leads to x < 0, outside of the domain of the logarithm
         assert_eq!(session.update().unwrap().inactive, 0);
     }
     assert!((session.get::<Plane>("p").unwrap().x - 0.5).abs() < 1e-3);
@@ -99,12 +99,12 @@ fn damped_steps_lead_along_a_narrow_valley() {
     let mut session = Session::new(Settings::default());
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: -1.2, y: 1.0 });
-    // so narrow that steps of Gauss-Newton leave it again and again
+    // so narrow that Gauss-Newton steps leave it repeatedly
     graph.add(["p"], Valley {}).noise(Noise::sigmas(&[1e-2, 1.0]).unwrap());
     let ids = session.push(&graph, &values).unwrap();
     let mut updates = 0;
     while updates == 0 || session.cost() > 0.1 {
-        // an update without changes would solve it as a batch
+        // an update without changes would solve a batch
         session.set_weight(ids[0], 1.0).unwrap();
         assert!(!session.update().unwrap().solved_batch && updates < 600, "{}", session.cost());
         updates += 1;
@@ -121,7 +121,7 @@ fn a_factor_that_would_leave_its_domain_does_not_stop_others() {
     };
     let mut session = Session::new(patient);
     let (mut graph, mut values) = (Graph::new(), Values::new());
-    // the first step leads to x ≈ −8000, and an eighth of it is too far
+    // the first step leads to x ≈ −8000, and even an eighth of it is too long
     values.insert("out", Plane { x: 1000.0, y: 0.0 });
     graph.add(["out"], Logarithm { to: 0.1 }).noise(Noise::sigma(1e-3).unwrap());
     graph.add(["out"], At { at: [-1e5, 0.0] }).noise(Noise::sigma(1e3).unwrap());

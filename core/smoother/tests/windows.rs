@@ -1,4 +1,4 @@
-//! Variables that leave, and what they leave behind.
+//! Marginalized variables, and the linear priors that replace their factors.
 use crate::history::{Change, History, change};
 use crate::toy::{Apart, At, Distance, Logarithm, Plane};
 use crate::world::Ahead;
@@ -9,7 +9,7 @@ use manifactor_solve::{LevenbergMarquardt, Problem, Silent};
 use proptest::prelude::*;
 use std::num::NonZeroUsize;
 
-/// Nothing is linearized anew, and every change passed on: what is solved is one linear system.
+/// No relinearization, and every change is propagated: the solution is that of one linear system.
 fn linear() -> Settings {
     Settings {
         relinearize_every: NonZeroUsize::MAX,
@@ -54,12 +54,13 @@ proptest! {
         }
         let after = session.covariance(&stay).unwrap();
         prop_assert!((&after - &covariance).amax() <= 1e-9 * covariance.amax().max(1.0), "{after} {covariance}");
-        // what a prior costs is the least that those who left could cost; the rest is linear here, or nearly
+        // the cost of a prior is the minimum over the marginalized variables; the remaining cost is linear,
+        // or nearly
         prop_assert!(session.cost().is_finite() && cost.is_finite());
     }
 }
 
-/// x0 at the origin, and steps of one.
+/// Returns pose `i` of a chain that starts at the origin with steps of one.
 pub(crate) fn step(i: usize) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let key = Key::indexed("x", i);
@@ -120,7 +121,7 @@ fn what_is_gone_is_named_and_nothing_can_be_added_to_it() {
     assert!(session.entry(ids[0]).is_none() && session.estimate("x0").is_none());
     let held = session.fix(&"x3".into(), &Fixed::Whole(true)).unwrap_err();
     assert_eq!(held, ChangeError::Sealed { key: "x3".into() });
-    // what has left nothing behind is gone as well, but another may have its name
+    // a variable without factors is gone as well, but its key can be used again
     let bare = |at: f64| {
         let (mut graph, mut values) = (Graph::new(), Values::new());
         graph.add(["b7"], At { at: [at, 0.0] });
@@ -172,7 +173,7 @@ fn a_factor_that_takes_no_part_is_dropped_and_named() {
         values.insert(key, Plane { x, y: 0.0 });
         graph.add([key], At { at: [x, 0.0] });
     }
-    // b is not ahead of a, and c's own logarithm is that of a negative number
+    // `b` is not ahead of `a`, and `d` would need the logarithm of a negative number
     graph.add(["a", "b"], Ahead { by: [1.0, 0.0] });
     graph.add(["a", "c"], Distance { by: 2.0 });
     values.insert("d", Plane { x: -1.0, y: 0.0 });

@@ -1,4 +1,4 @@
-//! A second manifold, of another dimension, and factors between the two.
+//! A second manifold with a different dimension, and factors between both manifolds.
 use crate::toy::Plane;
 use manifactor_graph::{
     Dimension, Jet, JetOf, Lifted, Manifold, Refs, Residual, Scalar, register_factor, register_manifold,
@@ -50,7 +50,7 @@ impl Residual for Beyond {
 }
 register_factor!("toy_beyond", Beyond);
 
-/// r = p − the first two coordinates of s − by, with some of the third.
+/// r = p − (first two coordinates of s) − by, with a share of the third coordinate.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct Shadow {
     pub(crate) by: [f64; 2],
@@ -79,7 +79,7 @@ impl Residual for Near {
 }
 register_factor!("toy_near", Near);
 
-/// r = (ln(b.x − a.x) − ln by.x, b.y − a.y − by.y): nothing where b is not ahead.
+/// r = (ln(b.x − a.x) − ln by.x, b.y − a.y − by.y); not defined unless `b` is ahead of `a`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct Ahead {
     pub(crate) by: [f64; 2],

@@ -1,39 +1,40 @@
-//! What stands out at the values that a solve is to begin with.
+//! Diagnosis of the initial values of a solve.
 use crate::inspect::CovarianceError;
 use crate::outcome::{InactiveFactor, Undetermined, Untouched};
 use crate::problem::Problem;
 use serde::Serialize;
 
-/// Variables up to which the linear system is looked at: it takes some factorizations.
+/// Above this number of variables, the linear system is not analysed, since that takes several
+/// factorizations.
 const LARGE: usize = 50_000;
-/// A condition number from which on a solution has few digits left of sixteen.
+/// Condition number above which a solution keeps few of its sixteen digits.
 const WEAK: f64 = 1e10;
 
-/// What stands out at the values that a solve is to begin with. None of it is an error but a factor that is not finite.
+/// Diagnosis of the initial values of a solve. Only `not_finite` is an error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct AtStart {
-    /// ½ Σ ρ over the factors that are defined there.
+    /// ½ Σ ρ over the factors that are defined at these values.
     pub cost: f64,
-    /// Number of factors that are not defined there, and the first of them.
+    /// Number of factors that are undefined at these values.
     pub inactive: usize,
-    /// See `inactive`.
+    /// The first of these undefined factors.
     pub inactive_factors: Vec<InactiveFactor>,
-    /// A factor that is defined there, and whose residual or derivative is not finite all the same.
+    /// A factor that is defined, although its residual or derivative is not finite.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_finite: Option<InactiveFactor>,
-    /// Variables that no factor touches which is defined there.
+    /// Variables without a factor that is defined at these values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub untouched: Option<Untouched>,
-    /// A direction that nothing constrains there: a gauge that is not held, an object that is seen from one place.
+    /// An undetermined direction, such as a gauge freedom, or the depth of an object with a single view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub undetermined: Option<Undetermined>,
-    /// A direction that next to nothing constrains there: too small a parallax, say.
+    /// A direction that is almost undetermined, for example because of a small parallax.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weak: Option<Weak>,
 }
 
-/// The direction that is constrained least.
+/// The direction with the weakest constraint.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Weak {
     /// See [`Problem::condition`].
@@ -43,8 +44,8 @@ pub struct Weak {
 }
 
 impl Problem {
-    /// Looks at the estimate as the start of a solve. Directions are not looked for among more than 50,000 variables, nor where
-    /// something is not finite or untouched.
+    /// Diagnoses the estimate as the start of a solve. Skips the search for weak and undetermined
+    /// directions above 50,000 variables, and if a factor is not finite or a variable has no factor.
     pub fn at_start(&mut self) -> AtStart {
         let evaluation = self.linearize();
         let named = |factor: usize| InactiveFactor {

@@ -1,22 +1,22 @@
-//! How well the linear system is conditioned.
+//! Condition number of the linear system.
 use crate::inspect::null_space::name;
 use crate::inspect::{Factorized, Weak};
 use crate::linear::system::{dot, norm};
 use crate::problem::Problem;
 
-/// Most steps of either iteration.
+/// Maximum number of steps of the power iteration and of the inverse power iteration.
 const STEPS: usize = 30;
-/// An estimate that a step changes by less than this share is good enough.
+/// Relative change of an eigenvalue estimate below which an iteration stops.
 const SETTLED: f64 = 0.01;
 
 impl Problem {
-    /// An estimate of the condition number of H = JᵀJ at the estimate, scaled to ones on its diagonal: the ratio of
-    /// its largest eigenvalue to its smallest, by power iteration and inverse power iteration. `None` where H is not
-    /// positive definite.
+    /// Estimates the condition number of H = JᵀJ at the estimate, scaled to a unit diagonal. It is the
+    /// ratio of the largest to the smallest eigenvalue, by power iteration and inverse power iteration.
+    /// `None` if H is not positive definite.
     ///
-    /// The scaling takes out the units of the variables. Each iteration approaches its eigenvalue from inside the
-    /// spectrum, so the condition is underestimated, as a rule by a few percent. With 16 digits in all, about as many
-    /// of a solution are lost as the estimate has.
+    /// The scaling removes the units of the variables. Each iteration approaches its eigenvalue from inside
+    /// the spectrum, so the condition is usually underestimated by a few percent. A condition number of 10ⁿ
+    /// costs about n of the 16 digits of a solution.
     pub fn condition(&mut self) -> Option<f64> {
         self.factorized().ok()?.condition()
     }
@@ -28,13 +28,13 @@ impl Factorized<'_> {
         self.extremes().map(|(condition, ..)| condition)
     }
 
-    /// The direction that is constrained least, and the condition number.
+    /// Returns the direction with the weakest constraint, and the condition number.
     pub(crate) fn weakest(&mut self) -> Option<Weak> {
         let (condition, v, diagonal) = self.extremes()?;
         Some(Weak { condition, direction: name(&self.problem.model, &v, &diagonal) })
     }
 
-    /// The condition number, the direction that is constrained least, and the diagonal of H.
+    /// Returns the condition number, the direction with the weakest constraint, and the diagonal of H.
     fn extremes(&mut self) -> Option<(f64, Vec<f64>, Vec<f64>)> {
         let Problem { system, .. } = &mut *self.problem;
         let diagonal: Vec<f64> = system.diagonal().copied().collect();
@@ -61,10 +61,10 @@ impl Factorized<'_> {
     }
 }
 
-/// The largest eigenvalue of a symmetric positive definite matrix, from below, by Rayleigh quotients; and nearly its
-/// eigenvector.
+/// Returns the largest eigenvalue of a symmetric positive definite matrix, approached from below by
+/// Rayleigh quotients, and an approximate eigenvector.
 fn dominant(n: usize, mut multiply: impl FnMut(&mut [f64])) -> (f64, Vec<f64>) {
-    // a start with a part in every direction
+    // a start vector with a component in every direction
     let mut x: Vec<f64> = (0..n).map(|i| ((i * 7919 % 104_729) as f64 + 1.0).sin()).collect();
     let (mut before, mut value) = (vec![], 0.0);
     for _ in 0..STEPS {

@@ -8,11 +8,11 @@ use nalgebra::DMatrix;
 use serde::{Serialize, Serializer};
 use std::collections::HashSet;
 
-/// Why there are no covariances.
+/// The error of a covariance computation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CovarianceError {
-    /// Something is not constrained: its covariance is infinite.
+    /// A direction is undetermined, so its covariance is infinite.
     #[error("the covariance is infinite: {0}")]
     Indeterminate(Undetermined),
     /// The Hessian is not positive definite to working precision.
@@ -23,21 +23,22 @@ pub enum CovarianceError {
     /// A variable that the problem does not have.
     #[error("there is no variable `{0}`")]
     Unknown(String),
-    /// They do not fit into memory.
+    /// The covariances do not fit into memory.
     #[error("no memory for the covariances of {unknowns} unknowns")]
     OutOfMemory {
         /// Size of the linear system.
         unknowns: usize,
     },
-    /// A graph that is not the one that was solved.
+    /// The graph differs from the solved one.
     #[error(transparent)]
     Compile(#[from] CompileError),
 }
 
-/// If fewer than one variable in this many is asked for, each is computed by itself; else the selected inverse is faster.
+/// Marginals are computed one by one if fewer than one variable in `FEW` is requested. Above that, the
+/// selected inverse is faster.
 const FEW: usize = 8;
 
-/// The uncertainty of one variable.
+/// Marginal covariance of one variable.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Marginal {
     /// The variable.
@@ -54,11 +55,11 @@ fn by_rows<S: Serializer>(matrix: &DMatrix<f64>, serializer: S) -> Result<S::Ok,
 }
 
 impl Solution {
-    /// The marginal covariances of the variables that `keys` names, or of all where it names none; see
-    /// [`Factorized::marginals`](crate::Factorized::marginals).
+    /// Returns the marginal covariances of the variables in `keys`, or of all variables if `keys` is empty;
+    /// see [`Factorized::marginals`](crate::Factorized::marginals).
     ///
     /// # Errors
-    /// If a key is unknown, something is not constrained, or `graph` is not the one that was solved.
+    /// If a key is unknown, a direction is undetermined, or `graph` is not the solved graph.
     pub fn marginals(&self, graph: &Graph, keys: &[&str]) -> Result<Vec<Marginal>, CovarianceError> {
         if let Some(unknown) = keys.iter().find(|key| !self.values.contains(key)) {
             return Err(CovarianceError::Unknown((*unknown).to_owned()));
@@ -80,28 +81,30 @@ impl Solution {
         Ok(wanted.filter_map(marginal).collect())
     }
 
-    /// The leverage of each row of each factor; see [`Problem::leverages`].
+    /// Returns the leverage of each row of each factor; see [`Problem::leverages`].
     ///
     /// # Errors
-    /// Those of [`Problem::leverages`], and where `graph` is not the one that was solved.
+    /// As [`Problem::leverages`], or if `graph` is not the solved graph.
     pub fn leverages(&self, graph: &Graph) -> Result<Vec<Vec<f64>>, CovarianceError> {
         self.ask(graph, Problem::leverages)?
     }
 }
 
 impl Problem {
-    /// The marginal covariance of each variable at the estimate; see [`Factorized::marginals`](crate::Factorized::marginals).
+    /// Returns the marginal covariance of each variable at the estimate; see
+    /// [`Factorized::marginals`](crate::Factorized::marginals).
     ///
     /// # Errors
-    /// If something is not constrained, or there is no memory.
+    /// If a direction is undetermined, or there is no memory.
     pub fn marginals(&mut self) -> Result<Vec<(Key, DMatrix<f64>)>, CovarianceError> {
         self.factorized()?.marginals()
     }
 
-    /// The joint covariance of a few variables at the estimate; see [`Factorized::joint`](crate::Factorized::joint).
+    /// Returns the joint covariance of several variables at the estimate; see
+    /// [`Factorized::joint`](crate::Factorized::joint).
     ///
     /// # Errors
-    /// If a key is unknown, or something is not constrained.
+    /// If a key is unknown, or a direction is undetermined.
     pub fn joint_covariance(&mut self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
         self.factorized()?.joint(keys)
     }

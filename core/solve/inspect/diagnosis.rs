@@ -1,4 +1,4 @@
-//! What is worth a look after a solve: the worst factors, and the condition of the linear system.
+//! Diagnosis after a solve: the factors with the largest costs, and the condition of the linear system.
 use crate::Solution;
 use crate::inspect::CovarianceError;
 use crate::outcome::Undetermined;
@@ -9,43 +9,44 @@ use manifactor_graph::{FactorEntry, Graph, Key};
 use serde::Serialize;
 use std::borrow::Cow;
 
-/// Factors in the table of the worst.
+/// Number of factors in the table of the worst.
 const WORST: usize = 10;
-/// Variables up to which the linear system is looked at: it takes some factorizations.
+/// Above this number of variables, the linear system is not analysed, since that takes several
+/// factorizations.
 const LARGE: usize = 50_000;
 
-/// What is worth a look after a solve.
+/// Diagnosis after a solve.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
-    /// The ten factors that cost the most, the worst first; none that cost nothing.
+    /// The ten factors with the largest costs, in descending order, without those of zero cost.
     pub worst: Vec<FactorCost>,
-    /// See [`Problem::condition`]; `None` also where something is undetermined, and for more than 50,000 variables.
+    /// See [`Problem::condition`]. `None` if a direction is undetermined, and above 50,000 variables.
     pub condition: Option<f64>,
-    /// A direction that nothing constrains at the estimate; not looked for among more than 50,000 variables.
+    /// An undetermined direction at the estimate; not searched for above 50,000 variables.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub undetermined: Option<Undetermined>,
 }
 
-/// What one factor costs at the estimate.
+/// Cost of one factor at the estimate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FactorCost {
-    /// Its place in the graph, from 0.
+    /// Index in the graph, from 0.
     pub factor: usize,
-    /// Its name, or else that of its type.
+    /// Its name, or else the name of its type.
     pub name: Cow<'static, str>,
     /// Its variables.
     pub keys: Vec<Key>,
-    /// Its residual, not whitened.
+    /// Its unwhitened residual.
     pub residual: Vec<f64>,
-    /// ½ρ, as much as it counts.
+    /// Cost ½ρ, with its weight.
     pub cost: f64,
-    /// How much it counts: by its loss, and by the solver's weight where that weighs factors.
+    /// Weight from its loss, multiplied by the weight of the solver if the solver weights factors.
     pub weight: f64,
 }
 
 impl Problem {
-    /// A direction that nothing constrains at the estimate, as far as f64 can tell: neither damping nor what a solver
-    /// found on its way has a part in it.
+    /// Returns an undetermined direction at the estimate, as far as f64 can tell. The result depends
+    /// neither on damping nor on directions that a solver found on its way.
     pub fn undetermined(&mut self) -> Option<Undetermined> {
         match self.factorized() {
             Err(CovarianceError::Indeterminate(open)) => Some(open),
@@ -55,10 +56,11 @@ impl Problem {
 }
 
 impl Solution {
-    /// Looks for what is wrong: the factors that fit worst, and a linear system that is close to open.
+    /// Looks for problems: the factors with the largest costs, and an ill-conditioned or singular linear
+    /// system.
     ///
     /// # Errors
-    /// If `graph` is not the one that was solved.
+    /// If `graph` is not the solved graph.
     pub fn diagnose(&self, graph: &Graph) -> Result<Diagnosis, CompileError> {
         let look = |problem: &mut Problem| match problem.factorized() {
             Ok(mut system) => (None, system.condition()),

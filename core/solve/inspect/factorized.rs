@@ -1,4 +1,4 @@
-//! The linear system at the estimate, factorized once for any number of questions.
+//! The linear system at the estimate, factorized once for any number of queries.
 use crate::inspect::CovarianceError;
 use crate::inspect::null_space::undetermined;
 use crate::linear::Cholesky;
@@ -8,8 +8,8 @@ use manifactor_graph::Key;
 use nalgebra::DMatrix;
 use std::time::Instant;
 
-/// H = JᵀJ at the estimate, factorized without damping, with robust weights as they are there. Covariances are blocks of
-/// H⁻¹, in the units of the noise; what is held, whole or in part, has zeros.
+/// The factorization of H = JᵀJ at the estimate, without damping, with the robust weights at the estimate.
+/// Covariances are blocks of H⁻¹, in the units of the noise. Fixed variables and directions have zeros.
 ///
 /// ```
 /// # use manifactor_solve::Problem;
@@ -26,11 +26,11 @@ pub struct Factorized<'a> {
 }
 
 impl Problem {
-    /// The factorization of H at the estimate. The one at hand, where neither the estimate nor a weight nor a measurement
-    /// has changed since the last question; else H is factorized anew.
+    /// Returns the factorization of H at the estimate. Reuses the last one if neither the estimate nor a
+    /// weight nor a measurement has changed since.
     ///
     /// # Errors
-    /// If something is not constrained, or there is no memory for a factor.
+    /// If a direction is undetermined, or there is no memory for a factor.
     pub fn factorized(&mut self) -> Result<Factorized<'_>, CovarianceError> {
         self.linearize_once();
         let revision = Some(self.model.revision());
@@ -43,7 +43,7 @@ impl Problem {
             if let Some(open) = undetermined(self, failed, 0.0) {
                 return Err(CovarianceError::Indeterminate(open));
             }
-            // the search may have left another factorization
+            // the search may have replaced the factorization by its own
             if !self.system.is_factorized() {
                 self.factorize_directly().map_err(|_| CovarianceError::NotPositiveDefinite)?;
             }
@@ -65,8 +65,8 @@ impl Problem {
 }
 
 impl Factorized<'_> {
-    /// The covariance of a variable, in its tangent space. It takes as many half solves as that has dimensions, each along
-    /// one path of the elimination tree.
+    /// Returns the covariance of a variable in its tangent space. Takes one half solve per tangent
+    /// dimension, each along one path of the elimination tree.
     ///
     /// # Errors
     /// If there is no such variable.
@@ -74,12 +74,12 @@ impl Factorized<'_> {
         self.joint(&[key])
     }
 
-    /// The joint covariance of a few variables, in the order of `keys`.
+    /// Returns the joint covariance of several variables, in the order of `keys`.
     ///
     /// # Errors
     /// If a key is unknown.
     pub fn joint(&mut self, keys: &[&str]) -> Result<DMatrix<f64>, CovarianceError> {
-        // by row of the result: its unknown, `None` for what is held
+        // the unknown of each row of the result, `None` for a fixed direction
         let mut unknowns = vec![];
         for key in keys {
             let place = self.problem.model.place(key);
@@ -114,8 +114,8 @@ impl Factorized<'_> {
         Ok(joint)
     }
 
-    /// The covariance of each variable, in the order of the values. All of them together take about as long as ten
-    /// factorizations.
+    /// Returns the covariance of each variable, in the order of the values. All of them together take about
+    /// as long as ten factorizations.
     ///
     /// # Errors
     /// If there is no memory.

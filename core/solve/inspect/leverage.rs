@@ -1,26 +1,27 @@
-//! How much of each measurement the estimate takes up: its leverage.
+//! Leverage of measurements: the share of a measurement that the estimate absorbs.
 use crate::inspect::CovarianceError;
 use crate::linear::system::NoFactor;
 use crate::problem::Problem;
 
 /// Damping, as a share of the diagonal of H.
 const SHIFT: f64 = 1e-11;
-/// Of the largest entry of the diagonal: less than this share of it counts as this share.
+/// Lower bound of diagonal entries for the damping, as a share of the largest entry.
 const FLOOR: f64 = 1e-9;
 
 impl Problem {
-    /// The leverage of each row of each factor at the estimate, in the order of the graph: the diagonal of J H⁻¹ Jᵀ, J
-    /// whitened and with robust weights. From 0, where all other measurements say the same, to 1, where no other measurement
-    /// says anything and the residual is zero whatever is measured. One less it is the row's redundancy; all leverages
-    /// together are the number of unknowns that anything constrains. Empty for a factor that takes no part.
+    /// Returns the leverage of each row of each factor at the estimate, in the order of the graph. It is
+    /// the diagonal of J H⁻¹ Jᵀ, with J whitened and with robust weights. A leverage near 0 means that the
+    /// remaining measurements determine the row's value. At 1 no further measurement constrains it, and its
+    /// residual is always zero. 1 - leverage is the redundancy of the row. All leverages add up to the
+    /// number of determined unknowns. Empty for an inactive factor.
     ///
     /// # Errors
-    /// If there is no memory, or something is not finite.
+    /// If there is no memory, or a value is not finite.
     pub fn leverages(&mut self) -> Result<Vec<Vec<f64>>, CovarianceError> {
         self.linearize_once();
         let out_of_memory = self.out_of_memory();
         let floor = FLOOR * self.system.largest();
-        // a direction that nothing constrains has rows of zeros in J: it takes nothing up, however it is held
+        // undetermined directions have zeros in J, so their leverage is zero, whatever their damping
         let damping: Vec<f64> = self.system.diagonal().map(|d| SHIFT * d.max(floor)).collect();
         match self.system.factorize_directly(Some(&damping)) {
             Ok(()) => {}
@@ -33,7 +34,7 @@ impl Problem {
         let mut all = vec![vec![]; model.factors.len()];
         model.rows(&mut |factor| {
             let rows = factor.residual.len();
-            // the columns of J, with the unknown that each belongs to
+            // the columns of J, each with its unknown
             let columns: Vec<(usize, &[f64])> = factor
                 .blocks
                 .iter()

@@ -1,11 +1,11 @@
-//! What still moves where a solve runs out of iterations.
+//! Variables that still move when a solve runs out of iterations.
 use crate::inspect::null_space::name;
 use crate::outcome::{Moving, Undetermined};
 use crate::problem::Problem;
 use manifactor_graph::column::Columns;
 
 impl Problem {
-    /// The step between the last trial and the estimate; `None` where they are the same.
+    /// Returns the step between the last trial and the estimate; `None` if they are equal.
     pub(crate) fn moving(&self) -> Option<Moving> {
         let mut step = vec![0.0; self.dim()];
         for place in &self.model.variables {

@@ -1,40 +1,40 @@
-//! Which variables, in which direction, nothing constrains.
+//! Search for undetermined variables and directions.
 use crate::linear::Method;
 use crate::linear::system::NoFactor;
 use crate::outcome::Undetermined;
 use crate::problem::{Model, Problem};
 use std::time::Instant;
 
-/// A pivot below this share of its diagonal entry calls for a closer look.
+/// A pivot below this share of its diagonal entry triggers the search.
 const PIVOT: f64 = 1e-11;
-/// A direction in which ‖J v‖² is below this, where v has length one by the diagonal, is open.
+/// A direction v of unit length in the metric of the diagonal is undetermined if ‖J v‖² is below this.
 const OPEN: f64 = 1e-15;
-/// An entry of the diagonal below this share of the largest is nothing but rounding.
+/// A diagonal entry below this share of the largest is rounding error.
 const ROUNDING: f64 = 1e-24;
-/// Lengths are measured by the diagonal, or by this share of its largest entry where it is less.
+/// Lower bound of diagonal entries in that metric, as a share of the largest entry.
 const FLOOR: f64 = 1e-9;
-/// Damping that lets the matrix be factorized for the search.
+/// Damping that makes the matrix positive definite for the search.
 const SHIFT: f64 = 1e-10;
-/// Variables named in a report.
+/// Number of variables named in a report.
 const NAMED: usize = 3;
 
-/// Looks for an open direction of the linearized problem, where its last factorization failed or has
-/// pivots that little but rounding and `damping` keeps from zero: a share of the diagonal, times the
-/// number of unknowns that it may have added up over.
+/// Looks for an undetermined direction of the linearized problem. Searches only if the last factorization
+/// failed, or if a pivot is so small that it may come from rounding and damping alone. `damping` is a share
+/// of the diagonal, times the number of unknowns over which it may have accumulated.
 ///
-/// Overwrites the factorization if it looks closer.
+/// The search overwrites the factorization.
 pub(crate) fn undetermined(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermined> {
     let clock = Instant::now();
     let has_factor = problem.system.cholesky().is_some();
     let found = match problem.system.method {
         Method::Cholesky(_) => search(problem, failed, damping),
-        // others have no pivots to look at
+        // the remaining methods have no pivots to inspect
         Method::Qr(_) => match problem.system.factorize_directly(None) {
             Err(NoFactor::OutOfMemory) => None,
             done => search(problem, done.is_err(), 0.0),
         },
         Method::ConjugateGradients(_) if failed => search(problem, true, damping),
-        // or where they have been factorized for a question
+        // or if a query has factorized them before
         Method::ConjugateGradients(_) if has_factor => search(problem, failed, damping),
         Method::ConjugateGradients(_) => None,
     };
@@ -49,7 +49,7 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
         let mut suspicious = false;
         let share = PIVOT.max(10.0 * damping);
         system.pivots(&mut |pivot, entry| {
-            // a pivot that is not a number is suspicious too
+            // a pivot that is NaN is suspicious too
             suspicious |= pivot.is_nan() || pivot < share * entry || entry <= ROUNDING * largest;
         });
         if !suspicious {
@@ -60,7 +60,7 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
     let scale: Vec<f64> = system.diagonal().map(|d| d.max(floor)).collect();
     let shift: Vec<f64> = scale.iter().map(|d| SHIFT * d).collect();
     system.factorize_directly(Some(&shift)).ok()?;
-    // inverse iteration from a start with a part in every direction
+    // inverse iteration from a start vector with a component in every direction
     let mut v: Vec<f64> = (0..scale.len()).map(|i| ((i * 7919 % 104_729) as f64 + 1.0).sin()).collect();
     for _ in 0..6 {
         v.iter_mut().zip(&scale).for_each(|(v, d)| *v *= d);
@@ -68,7 +68,7 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
         let length = v.iter().zip(&scale).map(|(v, d)| v * v * d).sum::<f64>().sqrt();
         v.iter_mut().for_each(|v| *v /= length);
     }
-    // through the rows of J: the quadratic form of H would drown in rounding
+    // by the rows of J, because rounding would dominate the quadratic form of H
     let mut bent: f64 = system.held.iter().map(|i| v[*i] * v[*i]).sum();
     model.rows(&mut |factor| {
         let rows = factor.residual.len();
@@ -82,7 +82,7 @@ fn search(problem: &mut Problem, failed: bool, damping: f64) -> Option<Undetermi
     (bent < OPEN).then(|| name(model, &v, &scale))
 }
 
-/// The direction in terms of variables and the names of their tangent directions.
+/// Describes a direction by variables and the names of their tangent directions.
 pub(crate) fn name(model: &Model, v: &[f64], scale: &[f64]) -> Undetermined {
     let mut moves: Vec<(usize, f64)> = vec![];
     for (i, place) in model.variables.iter().enumerate() {
@@ -102,7 +102,7 @@ pub(crate) fn name(model: &Model, v: &[f64], scale: &[f64]) -> Undetermined {
         let Some(start) = place.start else { continue };
         let part = &v[start..start + place.tangent.len()];
         let largest = part.iter().fold(0.0, |m, x| f64::max(m, x.abs()));
-        // a direction has no sign: let its largest entry be positive
+        // the sign of a direction is arbitrary: make its largest entry positive
         let sign = part.iter().find(|x| x.abs() == largest).map_or(1.0, |x| x.signum());
         let entries = part.iter().zip(place.tangent).filter(|(x, _)| x.abs() > 0.1 * largest);
         direction.extend(entries.map(|(x, name)| (place.key.clone(), *name, sign * x / largest)));

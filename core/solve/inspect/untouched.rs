@@ -1,13 +1,13 @@
-//! What takes no part in a solve: factors that are not defined, and variables that no other factor touches.
+//! Factors and variables that a solve excludes: undefined factors, and variables without an active factor.
 use crate::outcome::{InactiveFactor, Untouched};
 use crate::problem::Problem;
 use manifactor_graph::Key;
 
-/// Inactive factors that an outcome names.
+/// Number of inactive factors that an outcome names.
 const NAMED: usize = 10;
 
 impl Problem {
-    /// The first of the factors that were not defined at the last linearization.
+    /// Returns the first of the factors that were undefined at the last linearization.
     pub(crate) fn inactive_factors(&self) -> Vec<InactiveFactor> {
         let mut factors = vec![];
         self.model.batches.iter().for_each(|batch| batch.inactive(&mut |factor| factors.push(factor)));
@@ -21,14 +21,14 @@ impl Problem {
         named.map(describe).collect()
     }
 
-    /// The free variables that no factor touches which took part in the last linearization; `None` where there are
-    /// none.
+    /// Returns the free variables without a factor that was active in the last linearization; `None` if
+    /// there are none.
     pub(crate) fn untouched(&self) -> Option<Untouched> {
         let mut takes_part = vec![true; self.factors()];
         self.model.batches.iter().for_each(|batch| batch.inactive(&mut |factor| takes_part[factor] = false));
         takes_part.iter_mut().zip(self.weights()).for_each(|(part, weight)| *part &= *weight != 0.0);
         if self.has_flat_variable() {
-            // a redescending loss gives no weight to what is far off
+            // a redescending loss gives weight zero to outliers
             let idle = self.model.inspect().into_iter().filter(|state| state.weight == 0.0);
             idle.for_each(|state| takes_part[state.entry] = false);
         }
@@ -43,7 +43,7 @@ impl Problem {
         (!keys.is_empty()).then(|| Untouched { keys, active, factors: self.factors() })
     }
 
-    /// Returns whether there is a free variable on which no residual depends to first order.
+    /// Returns whether a free variable has no residual that depends on it to first order.
     fn has_flat_variable(&self) -> bool {
         let diagonal: Vec<f64> = self.system.diagonal().copied().collect();
         self.model.variables.iter().any(|place| {

@@ -1,12 +1,13 @@
-//! Symmetric positive definite systems of small dense blocks: A X = B, for callers with their own linear systems.
+//! Symmetric positive definite systems of small dense blocks, A X = B, for callers with their own linear
+//! systems.
 use crate::linear::Cholesky;
 use crate::linear::layout::Layout;
 use crate::linear::ordering::Order;
 
 /// A symmetric matrix of blocks with a fixed pattern, and its sparse Cholesky factor.
 ///
-/// The pattern is ordered and analysed once; blocks may be set to other values and factorized again. Vectors
-/// hold the entries of block 0, then those of block 1, and so on.
+/// The pattern is ordered and analysed once; then the blocks may change and be factorized again. Vectors
+/// hold the entries of block 0, then the entries of block 1, and so on.
 ///
 /// ```
 /// use manifactor_solve::BlockSystem;
@@ -26,30 +27,30 @@ pub struct BlockSystem {
     cholesky: Cholesky,
     /// Lower triangle, in the order of elimination.
     values: Vec<f64>,
-    /// Dimension of each block, and where it begins in the vectors of the caller.
+    /// Dimension of each block, and its start in the vectors of the caller.
     blocks: Vec<(usize, usize)>,
     /// A vector in the order of elimination.
     ordered: Vec<f64>,
 }
 
-/// Why a block system has no factor.
+/// The error of a block system without a factor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BlockSystemError {
     /// It does not fit into memory.
     #[error("no memory for a linear system of {unknowns} unknowns")]
     OutOfMemory {
-        /// Its size.
+        /// Number of scalar unknowns.
         unknowns: usize,
     },
-    /// Some direction is left open, or goes the wrong way.
+    /// A direction is undetermined, or has negative curvature.
     #[error("the matrix is not positive definite")]
     NotPositiveDefinite,
 }
 
 impl BlockSystem {
-    /// Zero, with blocks of these dimensions on the diagonal and those of `pairs` beside it, in any order
-    /// and however often. Pairs of blocks that are not there are passed over.
+    /// Makes a zero matrix with diagonal blocks of these dimensions and off-diagonal blocks for `pairs`.
+    /// Pairs may be in any order and repeat; pairs with unknown blocks are ignored.
     ///
     /// # Errors
     /// If its factor does not fit into memory.
@@ -69,7 +70,7 @@ impl BlockSystem {
         Ok(Self { layout, cholesky, values, blocks, ordered: vec![0.0; unknowns] })
     }
 
-    /// Number of scalar unknowns.
+    /// Returns the number of scalar unknowns.
     pub fn dim(&self) -> usize {
         self.ordered.len()
     }
@@ -79,8 +80,8 @@ impl BlockSystem {
         self.values.fill(0.0);
     }
 
-    /// A ← A + block at (a, b), and its transpose at (b, a); column-major. Of a block on the diagonal the
-    /// lower triangle is read. Returns whether the pattern has such a block and it is of that size.
+    /// A ← A + block at (a, b), and its transpose at (b, a); column-major. Only the lower triangle of a
+    /// diagonal block is read. Returns whether the pattern has the block and the size fits.
     pub fn add(&mut self, a: usize, b: usize, block: &[f64]) -> bool {
         let (Some(&(rows, _)), Some(&(columns, _))) = (self.blocks.get(a), self.blocks.get(b)) else {
             return false;
@@ -98,7 +99,7 @@ impl BlockSystem {
         true
     }
 
-    /// Factorizes the matrix as it stands.
+    /// Factorizes the current matrix.
     ///
     /// # Errors
     /// If it is not positive definite, as far as f64 can tell.
@@ -107,8 +108,8 @@ impl BlockSystem {
         done.map_err(|_| BlockSystemError::NotPositiveDefinite)
     }
 
-    /// The smallest pivot of the last factorization, as a share of its entry on A's diagonal: about 1e-16 where
-    /// rounding alone makes a singular matrix positive definite.
+    /// Returns the smallest pivot of the last factorization, as a share of its diagonal entry in A. It is
+    /// about 1e-16 if a singular matrix is positive definite only because of rounding.
     pub fn smallest_pivot(&self) -> f64 {
         let mut smallest = f64::INFINITY;
         self.cholesky.pivots(&mut |i, pivot| {
@@ -118,7 +119,7 @@ impl BlockSystem {
         smallest
     }
 
-    /// x ← A⁻¹x, by the last factorization. Entries of `x` beyond the system's dimension stay as they are.
+    /// x ← A⁻¹x, by the last factorization. Entries of `x` beyond the system's dimension stay unchanged.
     pub fn solve(&mut self, x: &mut [f64]) {
         for (&(dim, from), to) in self.blocks.iter().zip(&self.layout.start) {
             let (Some(x), Some(to)) =

@@ -1,4 +1,4 @@
-//! Supernodal sparse Cholesky: structure once, numbers many times, in memory that is reused.
+//! Supernodal sparse Cholesky: one symbolic analysis for many numeric factorizations, in reused memory.
 mod inverse;
 pub(crate) mod kernel;
 pub(crate) mod large;
@@ -13,42 +13,42 @@ use std::ops::Range;
 use structure::{Node, Structure};
 use subtrees::subtrees;
 
-/// A factorization of a symmetric matrix with a fixed pattern, already ordered.
+/// A factorization of a symmetric matrix with a fixed, already ordered pattern.
 pub(crate) struct Cholesky {
     pub(super) structure: Structure,
     /// Panels of L.
     pub(super) values: Vec<f64>,
-    /// For all nodes, in order.
+    /// Workspace for all nodes, in order.
     whole: Workspace,
-    /// For subtrees, at the same time; made when first needed.
+    /// Workspaces for parallel subtrees; created on first use.
     parts: Option<Vec<Part>>,
-    /// Rows below a supernode, of a right-hand side.
+    /// Entries of a right-hand side in the rows below a supernode.
     below: Vec<f64>,
     arch: Arch,
 }
 
-/// Where nodes are factorized.
+/// Memory for the factorization of some nodes.
 struct Workspace {
-    /// Updates on their way to their parents, of nodes on even and on odd levels.
+    /// Pending updates for parent nodes, from nodes on even and on odd levels.
     updates: [Vec<f64>; 2],
-    /// Where they begin on the stacks of the whole.
+    /// Start of each of the two in the stacks of the whole tree.
     base: [usize; 2],
-    /// Nodes whose updates are on the stack.
+    /// Nodes with an update on the stack.
     open: Vec<usize>,
     memory: Scratch,
 }
 
-/// A subtree, and where it is factorized.
+/// A subtree with its workspace.
 struct Part {
     nodes: Range<usize>,
     workspace: Workspace,
 }
 
-/// Operations from which on subtrees are factorized at the same time, if there are threads for it.
+/// Operations above which subtrees are factorized in parallel, if there are threads.
 const WORTH_THREADS: f64 = 5e7;
 
 impl Cholesky {
-    /// Memory for a factor of this structure; `None` where there is none.
+    /// Allocates a factor with this structure; `None` if there is no memory.
     pub(crate) fn new(structure: Structure) -> Option<Self> {
         let most = structure.nodes.iter().map(|n| n.below).max().unwrap_or(0);
         let nodes = 0..structure.nodes.len();
@@ -62,8 +62,8 @@ impl Cholesky {
         })
     }
 
-    /// Factorizes a matrix with these values in its lower triangle, and `added` to its diagonal. On the way,
-    /// while panels are at hand, x ← L⁻¹ x. The same to the last bit for any number of threads.
+    /// Factorizes the matrix with lower triangle `h`, plus `added` on its diagonal. Also computes x ← L⁻¹ x
+    /// while the panels are in cache. The result is bitwise identical for any number of threads.
     pub(crate) fn factorize(
         &mut self,
         h: &[f64],
@@ -73,7 +73,7 @@ impl Cholesky {
         if rayon::current_num_threads() == 1 || self.structure.flops < WORTH_THREADS {
             return self.in_turn(h, added, x);
         }
-        // into the pool once, and not for each front
+        // enter the pool once instead of once per front
         rayon::scope(|_| self.together(h, added, x))
     }
 
@@ -89,7 +89,7 @@ impl Cholesky {
         self.arch.dispatch(Factorize { of, nodes, panels, workspace: &mut self.whole, parts: &[], right })
     }
 
-    /// Subtrees at the same time, then what is above them; large fronts are shared in either.
+    /// Factorizes subtrees in parallel, then the nodes above them. Threads share large fronts in both.
     fn together(
         &mut self,
         h: &[f64],
@@ -136,13 +136,13 @@ impl Cholesky {
         self.arch.dispatch(Solve { cholesky: self, x, lower: true, upper: true });
     }
 
-    /// x ← L⁻ᵀ x: the rest of a solve whose first half was made while factorizing.
+    /// x ← L⁻ᵀ x: the second half of a solve, if the factorization made the first.
     pub(crate) fn solve_upper(&mut self, x: &mut [f64]) {
         self.arch.dispatch(Solve { cholesky: self, x, lower: false, upper: true });
     }
 
-    /// x ← x + L⁻¹ eᵢ, for x zero along the way: only the supernodes from that of the unknown i to its root have a part in
-    /// it. Returns their columns.
+    /// x ← x + L⁻¹ eᵢ, if x is zero along the path. Only the supernodes from unknown i to its root
+    /// contribute. Returns their columns.
     pub(crate) fn solve_unit(&mut self, i: usize, x: &mut [f64]) -> Vec<Range<usize>> {
         let mut columns = vec![];
         x[i] = 1.0;
@@ -157,7 +157,7 @@ impl Cholesky {
         columns
     }
 
-    /// The pivots: squares of the factor's diagonal.
+    /// Visits the pivots: squares of the factor's diagonal.
     pub(crate) fn pivots(&self, visit: &mut impl FnMut(usize, f64)) {
         for node in &self.structure.nodes {
             for c in 0..node.width {
@@ -175,13 +175,13 @@ impl std::fmt::Debug for Cholesky {
 }
 
 pub(super) fn zeros(n: usize) -> Option<Vec<f64>> {
-    // ask first; then take zeroed pages as the system has them, without writing to each
+    // check that the memory can be had; `vec!` then gets zeroed pages without writing to each
     Vec::<f64>::new().try_reserve_exact(n).ok()?;
     Some(vec![0.0; n])
 }
 
 impl Workspace {
-    /// For these nodes, which are whole subtrees; `None` where there is no memory for it.
+    /// Allocates a workspace for these nodes, which are whole subtrees; `None` if there is no memory.
     fn new(structure: &Structure, nodes: Range<usize>) -> Option<Self> {
         let nodes = &structure.nodes[nodes];
         let of_level = |level: u32| nodes.iter().filter(move |n| n.level % 2 == level);
@@ -205,7 +205,7 @@ impl Part {
         subtrees(structure, rayon::current_num_threads()).into_iter().map(part).collect()
     }
 
-    /// The update of its root.
+    /// Returns the update of the subtree's root.
     fn update(&self, root: &Node) -> &[f64] {
         let level = root.level as usize % 2;
         let at = root.update - self.workspace.base[level];
@@ -213,7 +213,7 @@ impl Part {
     }
 }
 
-/// What is factorized.
+/// The matrix to be factorized.
 #[derive(Clone, Copy)]
 struct Matrix<'a> {
     structure: &'a Structure,
@@ -221,16 +221,16 @@ struct Matrix<'a> {
     added: Option<&'a [f64]>,
 }
 
-/// The factorization of some nodes.
+/// A factorization of some nodes in progress.
 struct Factorize<'a> {
     of: Matrix<'a>,
     nodes: Range<usize>,
-    /// Panels, and where the first is in the factor.
+    /// Panels, and the position of the first one in the factor.
     panels: (&'a mut [f64], usize),
     workspace: &'a mut Workspace,
-    /// Subtrees that are done.
+    /// Subtrees that are already factorized.
     parts: &'a [Part],
-    /// A right-hand side for L⁻¹, and room for its rows below a supernode.
+    /// A right-hand side for L⁻¹, and a buffer for its rows below a supernode.
     right: Option<(&'a mut [f64], &'a mut [f64])>,
 }
 
@@ -246,7 +246,7 @@ impl WithSimd for Factorize<'_> {
         let mut n = self.nodes.start;
         while n < self.nodes.end {
             let part = parts.next_if(|part| part.nodes.start == n);
-            // fronts that have to be there before their first descendant; those of a part are its own matter
+            // early fronts must exist before their first descendant; a part creates its own
             while let Some((begin, front)) = early.next_if(|(begin, _)| *begin as usize <= n) {
                 let front = *front as usize;
                 let is_of_part = part.is_some_and(|part| front < part.nodes.end);
@@ -266,7 +266,7 @@ impl WithSimd for Factorize<'_> {
 }
 
 impl Factorize<'_> {
-    /// The entries of H in the columns of a front, with what is added to its diagonal.
+    /// Fills the panel of a front with the entries of H, and adds the damping to its diagonal.
     #[inline(always)]
     fn fill(&mut self, node: &Node) {
         let Matrix { structure, h, added } = self.of;
@@ -282,7 +282,7 @@ impl Factorize<'_> {
         }
     }
 
-    /// Makes a front that takes each child's update as it comes.
+    /// Creates a front that receives the updates of its children one by one.
     #[inline(always)]
     fn begin_early(&mut self, front: &Node) {
         self.fill(front);
@@ -291,7 +291,7 @@ impl Factorize<'_> {
         updates[level][front.update - base[level]..][..front.below.pow(2)].fill(0.0);
     }
 
-    /// Eliminates a front: children's updates into its panel, then L, then the rest of the updates into its own.
+    /// Eliminates a front: adds the children's updates to its panel, computes L, and writes its own update.
     #[inline(always)]
     fn eliminate<S: Simd>(&mut self, simd: S, node: &Node) -> Result<(), NotPositiveDefinite> {
         if !node.early {
@@ -311,7 +311,7 @@ impl Factorize<'_> {
             };
             (update, child.rows(&structure.places))
         };
-        // an early front has had its children's updates
+        // an early front has its children's updates already
         let children = if node.early { open.len() } else { open.len() - node.children };
         for child in &open[children..] {
             let (from, places) = of_child(*child);
@@ -332,7 +332,8 @@ impl Factorize<'_> {
         Ok(())
     }
 
-    /// Adds the update of front `n`, which `part` may have, to its parent's where that is early; else it waits for it.
+    /// Adds the update of front `n`, or of `part`, to its parent if that is early. Otherwise the update
+    /// stays on the stack.
     #[inline(always)]
     fn hand_on(&mut self, n: usize, part: Option<&Part>) {
         let structure = self.of.structure;
@@ -356,7 +357,7 @@ impl Factorize<'_> {
     }
 }
 
-/// The part of x ← L⁻¹ x that one panel has.
+/// The contribution of one panel to x ← L⁻¹ x.
 #[inline(always)]
 fn solve_lower(node: &Node, structure: &Structure, panel: &[f64], x: &mut [f64], below: &mut [f64]) {
     let below = &mut below[..node.below];
@@ -368,7 +369,7 @@ fn solve_lower(node: &Node, structure: &Structure, panel: &[f64], x: &mut [f64],
 struct Solve<'a> {
     cholesky: &'a mut Cholesky,
     x: &'a mut [f64],
-    /// Whether to apply L⁻¹, and L⁻ᵀ after it.
+    /// Whether to apply L⁻¹, and then L⁻ᵀ.
     lower: bool,
     upper: bool,
 }
@@ -411,7 +412,7 @@ mod tests {
         )
     }
 
-    /// Cameras in a row, and points that six neighbours see: fronts with many children.
+    /// Cameras in a row, and points with six neighbouring views each: fronts with many children.
     fn bundle() -> (Vec<usize>, Vec<(u32, u32)>) {
         let (cameras, points) = (60, 8000);
         let seen = |p: u32| (0..6).map(move |k| (p % (cameras - 5) + k, cameras + p));
@@ -419,13 +420,13 @@ mod tests {
         (dims, (0..points).flat_map(seen).collect())
     }
 
-    /// Two groups of blocks, all coupled, that overlap: large fronts, one with an update.
+    /// Two overlapping groups of fully coupled blocks: large fronts, one with an update.
     fn cliques() -> (Vec<usize>, Vec<(u32, u32)>) {
         let clique = |from: u32, to: u32| (from..to).flat_map(move |a| (from..a).map(move |b| (a, b)));
         (vec![6; 120], clique(0, 80).chain(clique(40, 120)).collect())
     }
 
-    /// Factor and solution of a system on `threads` threads.
+    /// Returns factor and solution of a system on `threads` threads.
     fn solved((dims, pairs): (Vec<usize>, Vec<(u32, u32)>), threads: usize) -> (Vec<f64>, Vec<f64>) {
         let layout = Layout::new(&dims, pairs, &Order::Best).unwrap();
         let mut h: Vec<f64> = (0..layout.row_idx.len()).map(|i| (i as f64 * 0.7).sin()).collect();

@@ -1,7 +1,7 @@
 //! Preconditioned conjugate gradients, on H or on the Schur complement of some of its blocks.
 //!
-//! The complement S = H_uu − H_um H_mm⁻¹ H_mu is never formed: H_mm, of blocks that are not coupled among each other, is
-//! inverted block by block (Agarwal, Snavely, Seitz and Szeliski, *Bundle adjustment in the large*, 2010).
+//! The complement S = H_uu − H_um H_mm⁻¹ H_mu is never formed. H_mm is block-diagonal and is inverted block
+//! by block (Agarwal, Snavely, Seitz and Szeliski, *Bundle adjustment in the large*, 2010).
 mod diagonal_blocks;
 
 use crate::linear::NotPositiveDefinite;
@@ -10,20 +10,19 @@ use crate::linear::settings::ConjugateGradients as Settings;
 use diagonal_blocks::DiagonalBlocks;
 use manifactor_graph::normal_equations::Slot;
 
-/// Vectors and blocks of an iteration, in memory that is reused.
+/// Vectors and blocks of an iteration, in reused memory.
 #[derive(Debug)]
 pub(crate) struct ConjugateGradients {
     settings: Settings,
-    /// By block in the order of elimination: its first scalar.
+    /// First scalar of each block, in the order of elimination.
     first: Vec<usize>,
-    /// By block: whether it is eliminated.
+    /// For each block, whether it is eliminated.
     eliminated: Vec<bool>,
-    /// By scalar: the same.
+    /// For each scalar, whether it is eliminated.
     is_eliminated: Vec<bool>,
-    /// Pairs of an eliminated block and one that is left, sorted by the first: their place in H, from the one that is
-    /// left to the eliminated one.
+    /// Pairs of an eliminated and a remaining block, sorted by the eliminated one, with their slot in H.
     couplings: Vec<Coupling>,
-    /// Inverses of the eliminated blocks on the diagonal, and those of the preconditioner.
+    /// Inverses of the eliminated diagonal blocks, and of the preconditioner's blocks.
     diagonal: DiagonalBlocks,
     r: Vec<f64>,
     z: Vec<f64>,
@@ -36,7 +35,7 @@ pub(crate) struct ConjugateGradients {
 struct Coupling {
     eliminated: usize,
     left: usize,
-    /// Of the block (left, eliminated).
+    /// Slot of the block (left, eliminated).
     slot: Slot,
 }
 
@@ -58,7 +57,7 @@ impl Damped<'_> {
         self.layout.multiply_add(self.h, x, y);
     }
 
-    /// Entry (row, column) of a block.
+    /// Returns entry (row, column) of a block.
     fn entry(self, slot: Slot, row: usize, column: usize) -> f64 {
         let (row, column) = if slot.swapped { (column, row) } else { (row, column) };
         self.h[slot.index(row, column)]
@@ -66,8 +65,8 @@ impl Damped<'_> {
 }
 
 impl ConjugateGradients {
-    /// For matrices of this layout; `eliminated` marks blocks by their place in the order of elimination, of which no
-    /// two may be coupled.
+    /// Allocates memory for matrices with this layout. `eliminated` marks blocks by their position in the
+    /// order of elimination; no two of them may be coupled.
     pub(crate) fn new(layout: &Layout, eliminated: Vec<bool>, settings: Settings) -> Self {
         let first = layout.first_scalars();
         let n = layout.dim();
@@ -100,7 +99,7 @@ impl ConjugateGradients {
         }
     }
 
-    /// x ← (H + diag(added))⁻¹ x, as far as it gets while `go_on` is true.
+    /// x ← (H + diag(added))⁻¹ x; stops early, with an approximate solution, if `go_on` returns false.
     pub(crate) fn solve(
         &mut self,
         system: Damped<'_>,
@@ -120,7 +119,7 @@ impl ConjugateGradients {
         }
         let mut step = vec![0.0; n];
         self.iterate(system, &mut step, go_on);
-        // back to what was eliminated: H_mm⁻¹ (b_m − H_mu x_u)
+        // back-substitution for the eliminated part: H_mm⁻¹ (b_m − H_mu x_u)
         system.multiply(&step, &mut self.q);
         for i in 0..n {
             self.z[i] = if self.is_eliminated[i] { self.eliminated_part[i] - self.q[i] } else { 0.0 };
@@ -132,13 +131,13 @@ impl ConjugateGradients {
         Ok(())
     }
 
-    /// x ← S⁻¹ r, from zero.
+    /// x ← S⁻¹ r, starting from zero.
     fn iterate(&mut self, system: Damped<'_>, x: &mut [f64], go_on: &mut dyn FnMut() -> bool) {
         let mut rho = self.preconditioned_residual();
         let target = rho * self.settings.tolerance.powi(2);
         self.p.copy_from_slice(&self.z);
         for _ in 0..self.settings.max_iterations {
-            // the right-hand side may be zero
+            // `<=` because the right-hand side may be zero
             if rho <= target || !go_on() {
                 break;
             }
@@ -159,14 +158,14 @@ impl ConjugateGradients {
         }
     }
 
-    /// z ← M⁻¹ r; rᵀz.
+    /// z ← M⁻¹ r; returns rᵀz.
     fn preconditioned_residual(&mut self) -> f64 {
         self.z.copy_from_slice(&self.r);
         self.diagonal.solve(&mut self.z);
         self.r.iter().zip(&self.z).map(|(r, z)| r * z).sum()
     }
 
-    /// q ← S p, where p and q are zero at what is eliminated.
+    /// q ← S p; p and q are zero in the eliminated part.
     fn multiply_complement(&mut self, system: Damped<'_>) {
         system.multiply(&self.p, &mut self.q);
         if self.couplings.is_empty() {
@@ -186,7 +185,8 @@ impl ConjugateGradients {
         keep(false, &self.is_eliminated, &mut self.q);
     }
 
-    /// The blocks on the diagonal, of what is left those of the complement.
+    /// Computes the block-Jacobi preconditioner; for blocks that remain after elimination, from the
+    /// diagonal blocks of the Schur complement.
     fn precondition(&mut self, system: Damped<'_>) -> Result<(), NotPositiveDefinite> {
         let diagonal = system.layout.diagonal();
         for b in 0..self.eliminated.len() {
@@ -206,7 +206,7 @@ impl ConjugateGradients {
         for coupling in &self.couplings {
             let dim = self.first[coupling.eliminated + 1] - self.first[coupling.eliminated];
             let left = self.first[coupling.left + 1] - self.first[coupling.left];
-            // rows of H_um L⁻ᵀ, whose products are taken off
+            // rows of H_um L⁻ᵀ, whose products are subtracted
             rows.clear();
             for r in 0..left {
                 rows.extend((0..dim).map(|c| system.entry(coupling.slot, r, c)));
@@ -227,7 +227,7 @@ impl ConjugateGradients {
     }
 }
 
-/// Sets to zero all but what is eliminated, or all but what is left.
+/// Sets x to zero outside of the eliminated part, or outside of the remaining part.
 fn keep(eliminated: bool, is_eliminated: &[bool], x: &mut [f64]) {
     x.iter_mut().zip(is_eliminated).filter(|(_, e)| **e != eliminated).for_each(|(x, _)| *x = 0.0);
 }

@@ -2,10 +2,10 @@
 //!
 //! Liu, *The role of elimination trees in sparse factorization* (1990).
 
-/// No parent: a root.
+/// Parent of a root.
 pub(crate) const ROOT: u32 = u32::MAX;
 
-/// The pattern of a lower triangle, in compressed columns; the diagonal may be left out.
+/// The pattern of a lower triangle, in compressed columns; the diagonal is optional.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pattern<'a> {
     pub ptr: &'a [usize],
@@ -13,14 +13,14 @@ pub(crate) struct Pattern<'a> {
 }
 
 impl Pattern<'_> {
-    /// Number of columns.
+    /// Returns the number of columns.
     pub(crate) fn len(&self) -> usize {
         self.ptr.len() - 1
     }
     pub(crate) fn column(&self, j: usize) -> &[u32] {
         &self.rows[self.ptr[j]..self.ptr[j + 1]]
     }
-    /// By row: the columns left of the diagonal, in order.
+    /// Returns, for each row, the columns left of the diagonal, in order.
     fn by_row(&self) -> (Vec<usize>, Vec<u32>) {
         let n = self.len();
         let mut ptr = vec![0; n + 1];
@@ -42,14 +42,14 @@ impl Pattern<'_> {
 /// The elimination tree of a matrix, and the size of each column of its factor.
 #[derive(Debug, Clone)]
 pub(crate) struct Tree {
-    /// By block; [`ROOT`] for those without.
+    /// Parent of each block; [`ROOT`] for a root.
     pub parent: Vec<u32>,
-    /// By block: scalar rows of the factor from this block's own on.
+    /// For each block, scalar rows of the factor from the block's own on.
     pub height: Vec<usize>,
 }
 
 impl Tree {
-    /// Of a matrix whose blocks have these dimensions.
+    /// Computes the tree of a matrix with blocks of these dimensions.
     pub(crate) fn new(lower: Pattern<'_>, dim: impl Fn(usize) -> usize) -> Self {
         let n = lower.len();
         let (ptr, columns) = lower.by_row();
@@ -57,7 +57,7 @@ impl Tree {
         let mut ancestor = vec![ROOT; n];
         for i in 0..n {
             for &j in &columns[ptr[i]..ptr[i + 1]] {
-                // up to the root so far, whose parent is i; the next time from i on
+                // up to the current root, whose parent becomes i; path compression lets the next search jump to i
                 let mut j = j as usize;
                 loop {
                     let next = std::mem::replace(&mut ancestor[j], i as u32);
@@ -71,7 +71,7 @@ impl Tree {
                 }
             }
         }
-        // row i of the factor has an entry in each column on the way from a column of the matrix to i
+        // row i of the factor has an entry in each column on the path from a column of the matrix to i
         let mut height: Vec<usize> = (0..n).map(&dim).collect();
         let mut seen = vec![ROOT; n];
         for i in 0..n {
@@ -88,12 +88,13 @@ impl Tree {
         Self { parent, height }
     }
 
-    /// Children before parents, subtrees together; of the children of a block, the highest last.
+    /// Returns a postorder: children before parents, subtrees contiguous, and the highest child of a block
+    /// last.
     pub(crate) fn postorder(&self) -> Vec<u32> {
         let n = self.parent.len();
         let mut by_height: Vec<u32> = (0..n as u32).collect();
         by_height.sort_by_key(|j| self.height[*j as usize]);
-        // lists of children, the lowest first: prepend from the highest on
+        // child lists with the lowest first: prepend from the highest on
         let (mut first, mut next) = (vec![ROOT; n], vec![ROOT; n]);
         for &j in by_height.iter().rev() {
             if let Some(first) = first.get_mut(self.parent[j as usize] as usize) {

@@ -1,34 +1,34 @@
-//! The structure of the normal equations: which blocks there are, in which order, and where.
+//! Layout of the normal equations: existing blocks, their order, and their positions.
 use crate::linear::cholesky::structure::Structure;
 use crate::linear::elimination::Pattern;
 use crate::linear::ordering::adjacency::Adjacency;
 use crate::linear::ordering::{Elimination, Order};
 use manifactor_graph::normal_equations::Slot;
 
-/// The lower triangle of H in compressed columns, by scalars, and the place of each block in it.
+/// The lower triangle of H in compressed columns, by scalars, and the position of each block in it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Layout {
-    /// Where block i begins in g and in the columns of H.
+    /// Start of block i in g and in the columns of H.
     pub start: Vec<u32>,
-    /// Place of block i in the elimination order.
+    /// Position of block i in the elimination order.
     pub rank: Vec<u32>,
     pub col_ptr: Vec<usize>,
     pub row_idx: Vec<u32>,
-    /// By block column in elimination order: blocks at and below the diagonal, by rank.
+    /// For each block column in elimination order, the blocks at and below the diagonal, by rank.
     block_ptr: Vec<usize>,
     block_rows: Vec<u32>,
     /// Index of entry (0, 0) of each of those blocks.
     block_at: Vec<usize>,
-    /// By block column in elimination order, its first scalar, and one past the last.
+    /// First scalar of each block column in elimination order, and one past the last.
     first: Vec<u32>,
 }
 
 impl Layout {
-    /// Orders blocks of these dimensions, coupled by `pairs` (in any order, repeats welcome).
+    /// Orders blocks with these dimensions, coupled by `pairs` (in any order; repeats are allowed).
     pub(crate) fn new(dims: &[usize], mut pairs: Vec<(u32, u32)>, order: &Order) -> Option<Self> {
         pairs.iter_mut().filter(|(a, b)| a < b).for_each(|p| *p = (p.1, p.0));
         pairs.retain(|(a, b)| a != b);
-        // as one number: compared without a branch
+        // as one number, so that the comparison has no branch
         pairs.sort_unstable_by_key(|(a, b)| u64::from(*a) << 32 | u64::from(*b));
         pairs.dedup();
         let weights = dims.iter().map(|dim| *dim as u32).collect();
@@ -73,23 +73,23 @@ impl Layout {
         (self.rank, self.block_ptr, self.block_rows) = (lower.rank, lower.ptr, lower.rows);
     }
 
-    /// What the factor of a matrix with this layout looks like, sparse or `dense`.
+    /// Returns the structure of the factor for this layout, sparse or `dense`.
     pub(crate) fn structure(&self, dense: bool) -> Structure {
         let blocks = Pattern { ptr: &self.block_ptr, rows: &self.block_rows };
         Structure::new(blocks, &self.first, &self.col_ptr, &self.row_idx, dense)
     }
 
-    /// Number of scalar unknowns.
+    /// Returns the number of scalar unknowns.
     pub(crate) fn dim(&self) -> usize {
         self.col_ptr.len() - 1
     }
 
-    /// By block in the order of elimination: its first scalar; and one past the last.
+    /// Returns the first scalar of each block in the order of elimination, and one past the last.
     pub(crate) fn first_scalars(&self) -> Vec<usize> {
         self.first.iter().map(|f| *f as usize).collect()
     }
 
-    /// Visits the blocks below the diagonal: places of row and column in the order of elimination, and where it is.
+    /// Visits the blocks below the diagonal: ranks of row and column, and the slot.
     pub(crate) fn couplings(&self, mut visit: impl FnMut(usize, usize, Slot)) {
         for column in 0..self.rank.len() {
             for i in self.block_ptr[column] + 1..self.block_ptr[column + 1] {
@@ -113,13 +113,13 @@ impl Layout {
         }
     }
 
-    /// Index of each diagonal entry in the values of H.
+    /// Returns the index of each diagonal entry in the values of H.
     pub(crate) fn diagonal(&self) -> &[usize] {
         // in a lower triangle the diagonal comes first in its column
         &self.col_ptr[..self.dim()]
     }
 
-    /// Where the block of blocks `a` and `b` goes.
+    /// Returns the slot for the pair of blocks `a` and `b`; `None` if they are not coupled.
     pub(crate) fn slot(&self, a: usize, b: usize) -> Option<Slot> {
         let (row, column) = (self.rank[a].max(self.rank[b]), self.rank[a].min(self.rank[b]) as usize);
         let range = self.block_ptr[column]..self.block_ptr[column + 1];

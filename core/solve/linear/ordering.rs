@@ -1,4 +1,4 @@
-//! Orders of elimination: which variables first. The fill of the factor, and so the time, follows from them.
+//! Elimination orders. They determine the fill of the factor, and with it the time.
 pub(crate) mod adjacency;
 mod column_degree;
 mod dissection;
@@ -8,33 +8,35 @@ mod separator;
 use crate::linear::elimination::{Pattern, Tree};
 use adjacency::Adjacency;
 
-/// How to find an order of elimination of blocks.
+/// A method to find an elimination order of blocks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) enum Order {
-    /// The one of the least work, of those that pay for being looked for.
+    /// The order with the least work among the methods that pay off for this graph.
     #[default]
     Best,
     Natural,
     MinimumDegree,
     ColumnDegree,
     NestedDissection,
-    /// As listed, each block once at most; then the others, by minimum degree.
+    /// The listed blocks in this order, each at most once; then the remaining ones, by minimum degree.
     Given(Vec<usize>),
-    /// The marked blocks first, then the others, each by minimum degree.
+    /// The marked blocks first, then the remaining ones, each group by minimum degree.
     First(Vec<bool>),
 }
 
-/// Other orders are tried if the factorization takes more operations per block than this. Each try takes about 1 µs per block; on graphs in space, the
-/// best of three saves up to a fifth of the operations, at each of some six factorizations.
+/// Operations per block above which further orders are tried. Each try takes about 1 µs per block. On 3D
+/// graphs, the best of three saves up to a fifth of the operations, at each of about six factorizations.
 const WORTH_TRIES: f64 = 2e4;
-/// The same of nested dissection, which takes about 6 µs a block and pays on large graphs in space.
+/// Operations per block above which nested dissection is tried. It takes about 6 µs per block, and pays off
+/// on large 3D graphs.
 const WORTH_DISSECTION: f64 = 1e6;
-/// The same where a factor has so many times the entries of its matrix: no order has fewer than the matrix, and one that
-/// fills nothing in takes the fewest operations. A dense graph is such a one, whatever the order.
+/// Fill ratio above which further orders are tried: entries of the factor, as a multiple of the entries of
+/// the matrix. The ratio is at least 1, and an order without fill has the fewest operations. A dense graph
+/// has ratio 1 with every order.
 const WORTH_FILL: f64 = 1.1;
 
 impl Order {
-    /// Blocks in an order of elimination, subtrees together; `None` where there is no memory for it.
+    /// Returns an elimination order with contiguous subtrees; `None` if there is no memory.
     pub(crate) fn of(&self, graph: &Adjacency) -> Option<Elimination> {
         let order = match self {
             Self::Best => return best(graph),
@@ -53,7 +55,8 @@ impl Order {
     }
 }
 
-/// Minimum degree depends on the order that breaks its ties: tried are the given one, and breadth first from either end.
+/// Returns the best of several orders. Ties of minimum degree depend on the order of its input, so the
+/// given order and breadth-first orders from either end are tried.
 fn best(graph: &Adjacency) -> Option<Elimination> {
     let mut best = Elimination::new(graph, &minimum_degree::minimum_degree(graph)?);
     let operations = best.worth();
@@ -77,7 +80,7 @@ fn best(graph: &Adjacency) -> Option<Elimination> {
     Some(best)
 }
 
-/// The blocks that are listed, in order, then the others by minimum degree.
+/// Returns the listed blocks, in order, then the remaining ones by minimum degree.
 fn listed_first(graph: &Adjacency, mut order: Vec<usize>) -> Option<Vec<usize>> {
     let mut is_listed = vec![false; graph.len()];
     order.iter().for_each(|v| is_listed[*v] = true);
@@ -87,19 +90,20 @@ fn listed_first(graph: &Adjacency, mut order: Vec<usize>) -> Option<Vec<usize>> 
     Some(order)
 }
 
-/// An order of elimination, and what follows from it.
+/// An elimination order, and the resulting structure.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Elimination {
-    /// Blocks, subtrees of the elimination tree together, so that updates of a factorization are on a stack.
+    /// Blocks in order. Subtrees of the elimination tree are contiguous, so that updates of a factorization
+    /// form a stack.
     pub order: Vec<usize>,
-    /// By block: its place in the order.
+    /// Position of each block in the order.
     pub rank: Vec<u32>,
-    /// The lower triangle by ranks, in compressed columns, the diagonal included.
+    /// The lower triangle by ranks, in compressed columns, including the diagonal.
     pub ptr: Vec<usize>,
     pub rows: Vec<u32>,
     /// Multiplications and additions of a factorization, without the zeros of merged supernodes.
     pub flops: f64,
-    /// Entries of the factor, by those of the matrix.
+    /// Entries of the factor, as a multiple of the entries of the matrix.
     pub fill: f64,
 }
 
@@ -124,7 +128,7 @@ impl Elimination {
         elimination
     }
 
-    /// Operations a block that another order may save some of.
+    /// Returns the operations per block that a better order may reduce; zero without fill.
     fn worth(&self) -> f64 {
         if self.fill > WORTH_FILL { self.flops / self.order.len() as f64 } else { 0.0 }
     }
@@ -133,7 +137,7 @@ impl Elimination {
         Pattern { ptr: &self.ptr, rows: &self.rows }
     }
 
-    /// Rows of a column ascending.
+    /// Builds the lower triangle for an order. Rows of a column are ascending.
     fn lower_triangle(graph: &Adjacency, order: Vec<usize>) -> Self {
         let mut rank = vec![0_u32; order.len()];
         order.iter().enumerate().for_each(|(r, block)| rank[*block] = r as u32);
@@ -193,7 +197,7 @@ mod tests {
                 sorted.sort_unstable();
                 prop_assert_eq!(sorted, (0..n as usize).collect::<Vec<_>>(), "{:?}", kind);
             }
-            // subtrees of marked blocks may stand beside others, but never above them
+            // subtrees of marked blocks may be next to unmarked ones, but never above them
             let elimination = Order::First(first.clone()).of(&graph).unwrap();
             let tree = Tree::new(elimination.pattern(), |_| 1);
             for (rank, parent) in tree.parent.iter().enumerate().filter(|(_, p)| **p as usize != u32::MAX as usize) {

@@ -1,4 +1,5 @@
-//! Least squares by the sparse QR factorization of J: min ‖J δ + r‖, without squaring its condition.
+//! Least squares min ‖J δ + r‖ by the sparse QR factorization of J, which does not square the condition
+//! number.
 use crate::linear::NotPositiveDefinite;
 use faer::Col;
 use faer::linalg::solvers::SolveLstsq;
@@ -10,7 +11,7 @@ use faer::sparse::{SparseColMat, SymbolicSparseColMat, Triplet};
 pub(crate) struct Qr {
     entries: Vec<Triplet<usize, usize, f64>>,
     right: Vec<f64>,
-    /// Of the last pattern: factors that leave their domain take their rows along.
+    /// Symbolic factorization of the last pattern. The pattern changes when factors become undefined.
     symbolic: Option<(SymbolicSparseColMat<usize>, SymbolicQr<usize>)>,
 }
 
@@ -27,10 +28,10 @@ impl Qr {
         self.right.push(-residual);
     }
 
-    /// The solution, for `x.len()` unknowns.
+    /// Writes the solution to `x`, one entry for each unknown.
     ///
     /// # Errors
-    /// If there is none, or it is not finite.
+    /// If there is no solution, or it is not finite.
     pub(crate) fn solve(&mut self, x: &mut [f64]) -> Result<(), NotPositiveDefinite> {
         let (rows, columns) = (self.right.len(), x.len());
         if rows < columns {

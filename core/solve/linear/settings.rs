@@ -1,10 +1,10 @@
-//! How the linear system of each step is solved, as a config says it.
+//! Settings of the linear solver, as written in a config.
 use manifactor_graph::Key;
 use manifactor_graph::checked::NotNegative;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the linear system of each step is solved.
+/// Solver of the linear system of each step.
 ///
 /// ```toml
 /// linear = { method = "cholesky", ordering = "nested_dissection", refinements = 1 }
@@ -15,48 +15,50 @@ use serde::{Deserialize, Serialize};
 pub struct LinearSolver {
     /// The method.
     pub method: Method,
-    /// The order of elimination.
+    /// The elimination order.
     pub ordering: Ordering,
-    /// Most steps of iterative refinement after each solve, by Cholesky: each brings the residual of a badly
-    /// conditioned system down, for the time of a solve. They end once a correction is more than half of the one
-    /// before: what is left is rounding.
+    /// Maximum number of steps of iterative refinement after each solve, for Cholesky. Each step reduces
+    /// the residual of a badly conditioned system, and takes the time of a solve. Refinement stops if a
+    /// correction is more than half of the previous one, as rounding then dominates.
     pub refinements: usize,
-    /// When conjugate gradients stop, and what they are preconditioned by.
+    /// Stopping criteria and preconditioner of conjugate gradients.
     pub conjugate_gradients: ConjugateGradients,
-    /// Most memory that the factor may take, in GiB; what the system has available, where it is not given.
+    /// Maximum memory of the factor, in GiB. Default: the available memory of the system.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub memory_gib: Option<NotNegative>,
 }
 
-/// A way to solve (H + damping) δ = -g.
+/// A method to solve (H + damping) δ = -g.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Cholesky; conjugate gradients where its factor does not fit into memory.
+    /// Cholesky; conjugate gradients if its factor does not fit into memory.
     #[default]
     Auto,
     /// The supernodal sparse Cholesky factorization of H.
     Cholesky,
     /// The Cholesky factorization of H as one dense matrix.
     Dense,
-    /// The sparse QR factorization of J: where H, whose condition is the square of J's, is too close to singular. Several
-    /// times slower than Cholesky.
+    /// The sparse QR factorization of J, for problems with a nearly singular H, since the condition number
+    /// of H is the square of J's. Several times slower than Cholesky.
     Qr,
-    /// Conjugate gradients, for problems whose factor does not fit into memory: preconditioned by the diagonal blocks of
-    /// H, or of its Schur complement where variables of one type are eliminated first (Schur-Jacobi): those that
-    /// `ordering = { first = … }` names, or else those of the uncoupled type that leaves the smallest system.
+    /// Conjugate gradients, for problems whose factor does not fit into memory. The preconditioner uses the
+    /// diagonal blocks of H, or of its Schur complement if variables of one type are eliminated first
+    /// (Schur-Jacobi). These are the variables in `ordering = { first = … }`, or else of the uncoupled type
+    /// that leaves the smallest system.
     ConjugateGradients,
 }
 
-/// When to stop iterating, and how to precondition.
+/// Stopping criteria and preconditioner of conjugate gradients.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConjugateGradients {
-    /// What the preconditioner knows.
+    /// The preconditioner.
     pub preconditioner: Preconditioner,
     /// Stop once the residual is this share of the right-hand side, in the preconditioner's norm.
     pub tolerance: NotNegative,
-    /// Most iterations; the step is then the best found, which lowers the quadratic model all the same.
+    /// Maximum number of iterations. The step is then the best one so far, which still lowers the quadratic
+    /// model.
     pub max_iterations: usize,
 }
 
@@ -70,26 +72,26 @@ impl Default for ConjugateGradients {
     }
 }
 
-/// What conjugate gradients are preconditioned by.
+/// A preconditioner of conjugate gradients.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preconditioner {
     /// The diagonal blocks of H.
     BlockJacobi,
-    /// Those of the Schur complement; of H where no type of variables can be eliminated.
+    /// The diagonal blocks of the Schur complement; of H if no type of variables can be eliminated.
     #[default]
     SchurJacobi,
 }
 
-/// The order in which variables are eliminated. Fill, memory and time of a factorization follow from it.
+/// Elimination order of the variables. It determines fill, memory and time of a factorization.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Ordering {
-    /// The one of the least predicted work, of minimum degree with several ways to break ties and, for large graphs,
-    /// nested dissection.
+    /// The order with the least predicted work: minimum degree with several tie-breaking rules, and for
+    /// large graphs nested dissection.
     #[default]
     Auto,
-    /// That of the values.
+    /// The order of the values.
     Natural,
     /// Approximate minimum degree.
     Amd,
@@ -97,8 +99,9 @@ pub enum Ordering {
     Colamd,
     /// Nested dissection by multilevel vertex separators.
     NestedDissection,
-    /// Variables of these types first, then the others, each by minimum degree: the Schur complement of the others.
+    /// Variables of these types first, then the remaining ones, each group by minimum degree. Forms the
+    /// Schur complement on the remaining variables.
     First(Vec<String>),
-    /// These variables first, as listed; then the others, by minimum degree.
+    /// These variables first, as listed; then the remaining ones, by minimum degree.
     Given(Vec<Key>),
 }

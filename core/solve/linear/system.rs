@@ -1,38 +1,38 @@
-//! The linear system of a step: H, g, and whatever factorizes them.
+//! The linear system of a step: H, g, and their factorization.
 use crate::linear::layout::Layout;
 use crate::linear::memory;
 use crate::linear::{Cholesky, Damped, Method, NotPositiveDefinite, Qr};
 use manifactor_graph::batch::FactorRows;
 use manifactor_graph::normal_equations::NormalEquations;
 
-/// Visits the rows of the whitened and weighted Jacobian, for methods that take J in place of H.
+/// A visitor of the rows of the whitened and weighted Jacobian, for methods that use J instead of H.
 pub(crate) type Rows<'a> = &'a dyn Fn(&mut dyn FnMut(FactorRows<'_>));
 
-/// Why there is no factor by Cholesky.
+/// The error of a Cholesky factorization.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum NoFactor {
     NotPositiveDefinite,
     OutOfMemory,
 }
 
-/// (H + damping) δ = -g. The structure is analysed once; numbers come and go.
+/// The system (H + damping) δ = -g. Its structure is analysed once and reused for all steps.
 pub(crate) struct LinearSystem {
     pub layout: Layout,
     /// The lower triangle of H, by compressed columns in the order of elimination.
     pub h: Vec<f64>,
     pub g: Vec<f64>,
-    /// Scalar unknowns that are held: one on the diagonal of H, zero in the rest of their rows.
+    /// Fixed scalar unknowns: one on the diagonal of H, zero in the rest of their rows.
     pub held: Vec<usize>,
     pub method: Method,
-    /// Most steps of iterative refinement after each solve.
+    /// Maximum number of steps of iterative refinement after each solve.
     refinements: usize,
-    /// Damping of the last factorization, kept for its refinement.
+    /// Damping of the last factorization, needed for refinement.
     damping: Vec<f64>,
-    /// -L⁻¹g of the last factorization, or the step itself, by what the method is.
+    /// -L⁻¹g of the last factorization for Cholesky; the step itself for the remaining methods.
     half_step: Vec<f64>,
-    /// A factor by Cholesky where the method has none.
+    /// A Cholesky factor, if the method does not have one.
     direct: Option<Cholesky>,
-    /// Whether the factor by Cholesky is that of H as it is, without damping.
+    /// Whether the Cholesky factor belongs to the current H without damping.
     is_factorized: bool,
 }
 
@@ -57,7 +57,7 @@ impl LinearSystem {
         self.g.len()
     }
 
-    /// Zeros, for factors to add to.
+    /// Sets H and g to zero, for factors to add to.
     pub(crate) fn begin(&mut self) -> NormalEquations<'_> {
         self.is_factorized = false;
         self.direct = None;
@@ -66,47 +66,48 @@ impl LinearSystem {
         NormalEquations { h: &mut self.h, g: &mut self.g }
     }
 
-    /// The factor that is kept beside the method's own, to be put back after a linearization.
+    /// Takes the separate Cholesky factor, so that it survives a linearization.
     pub(crate) fn take_direct(&mut self) -> Option<Cholesky> {
         self.direct.take()
     }
 
-    /// Puts a factor back.
+    /// Restores the separate Cholesky factor.
     pub(crate) fn put_direct(&mut self, direct: Option<Cholesky>) {
         self.direct = direct;
     }
 
-    /// Once all factors are added: the diagonal of what is held.
+    /// Sets the diagonal of fixed unknowns, after all factors are added.
     pub(crate) fn finish(&mut self) {
         for &i in &self.held {
             self.h[self.layout.diagonal()[i]] = 1.0;
         }
     }
 
-    /// Returns whether g and H are finite. No entry of a sum of JᵀJ is larger than those on its diagonal, so these will do.
+    /// Returns whether g and H are finite. In a sum of JᵀJ no entry exceeds the largest diagonal entry, so
+    /// only the diagonal is checked.
     pub(crate) fn is_finite(&self) -> bool {
         self.g.iter().chain(self.diagonal()).all(|x| x.is_finite())
     }
 
-    /// The diagonal of H.
+    /// Returns the diagonal of H.
     pub(crate) fn diagonal(&self) -> impl Iterator<Item = &f64> {
         self.layout.diagonal().iter().map(|i| &self.h[*i])
     }
 
-    /// The largest entry on the diagonal of H.
+    /// Returns the largest entry on the diagonal of H.
     pub(crate) fn largest(&self) -> f64 {
         self.diagonal().fold(0.0, |most, d| f64::max(most, *d))
     }
 
-    /// H x.
+    /// Returns H x.
     pub(crate) fn multiply(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];
         self.layout.multiply_add(&self.h, x, &mut y);
         y
     }
 
-    /// Factorizes H + diag(damping) by the method that was chosen, and takes -g half the way to the step. Iterations end
-    /// where `go_on` is false, with the step as far as it is.
+    /// Factorizes H + diag(damping) with the chosen method, and computes the first half of the step from
+    /// -g. Iterative methods stop if `go_on` returns false, with the step so far.
     pub(crate) fn factorize(
         &mut self,
         damping: Option<&[f64]>,
@@ -144,9 +145,9 @@ impl LinearSystem {
         }
     }
 
-    /// -(H + diag(damping))⁻¹ g of the last factorization, into `step`, refined as often as is asked for, as long as each
-    /// correction is less than half of the one before (Higham, *Accuracy and Stability of Numerical Algorithms*,
-    /// chapter 12): what follows is rounding.
+    /// Writes -(H + diag(damping))⁻¹ g of the last factorization to `step`, with the requested number of
+    /// refinements. Stops if a correction is more than half of the previous one, since rounding then
+    /// dominates (Higham, *Accuracy and Stability of Numerical Algorithms*, chapter 12).
     pub(crate) fn newton_step(&mut self, step: &mut Vec<f64>, go_on: &mut dyn FnMut() -> bool) {
         step.clear();
         step.extend_from_slice(&self.half_step);
@@ -157,7 +158,7 @@ impl LinearSystem {
             if !go_on() {
                 break;
             }
-            // what is left of -g - (H + diag(damping)) δ
+            // the residual -g - (H + diag(damping)) δ
             let added = Some(&self.damping[..]).filter(|damping| !damping.is_empty());
             let rest = &mut self.half_step;
             Damped { layout: &self.layout, h: &self.h, added }.multiply(step, rest);
@@ -175,7 +176,8 @@ impl LinearSystem {
         }
     }
 
-    /// Factorizes H + diag(damping) by Cholesky, whatever the method is. It is there until the next linearization.
+    /// Factorizes H + diag(damping) by Cholesky, for any method. The factor is valid until the next
+    /// linearization.
     pub(crate) fn factorize_directly(&mut self, damping: Option<&[f64]>) -> Result<(), NoFactor> {
         self.is_factorized = false;
         if !matches!(self.method, Method::Cholesky(_)) && self.direct.is_none() {
@@ -190,7 +192,7 @@ impl LinearSystem {
         }
         let done = match (&mut self.method, &mut self.direct) {
             (Method::Cholesky(cholesky), _) => cholesky.factorize(&self.h, damping, &mut self.half_step),
-            // the method's own step stays as it is
+            // the step of the chosen method stays unchanged
             (_, Some(cholesky)) => cholesky.factorize(&self.h, damping, &mut vec![0.0; self.g.len()]),
             (_, None) => return Err(NoFactor::OutOfMemory),
         };
@@ -198,12 +200,12 @@ impl LinearSystem {
         done.map_err(|_| NoFactor::NotPositiveDefinite)
     }
 
-    /// Returns whether the factor by Cholesky is that of H as it is, without damping.
+    /// Returns whether the Cholesky factor belongs to the current H without damping.
     pub(crate) fn is_factorized(&self) -> bool {
         self.is_factorized
     }
 
-    /// Visits the pivots of the last factor by Cholesky, each with its entry on the diagonal of H.
+    /// Visits the pivots of the last Cholesky factor, each with its diagonal entry of H.
     pub(crate) fn pivots(&self, visit: &mut impl FnMut(f64, f64)) {
         let cholesky = match &self.method {
             Method::Cholesky(cholesky) => Some(cholesky),
@@ -215,7 +217,8 @@ impl LinearSystem {
         }
     }
 
-    /// The last factor by Cholesky: the method's own, or that of [`factorize_directly`](Self::factorize_directly).
+    /// Returns the last Cholesky factor: the method's own, or the one of
+    /// [`factorize_directly`](Self::factorize_directly).
     pub(crate) fn cholesky(&mut self) -> Option<&mut Cholesky> {
         match &mut self.method {
             Method::Cholesky(cholesky) => Some(cholesky),
@@ -224,7 +227,7 @@ impl LinearSystem {
     }
 }
 
-/// Rows of a factor, one by one.
+/// Adds the rows of a factor.
 fn push_rows(qr: &mut Qr, factor: &FactorRows<'_>) {
     let rows = factor.residual.len();
     for (row, residual) in factor.residual.iter().enumerate() {

@@ -1,16 +1,16 @@
-//! What still moves where a solve runs out of iterations.
+//! Variables that still move when a solve runs out of iterations.
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::fmt;
 
-/// The variables that the last step moved the most, by the diagonal of H.
+/// The variables that the last step moved most, in the metric of the diagonal of H.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Moving {
-    /// The first the most.
+    /// Their keys, in descending order of motion.
     pub keys: Vec<Key>,
-    /// How each of them moves: name of the tangent direction, and its share.
+    /// Motion of each of these variables: name of the tangent direction, and its share.
     pub direction: Vec<(Key, &'static str, f64)>,
-    /// How many variables move at all.
+    /// Total number of moving variables.
     pub moving: usize,
 }
 

@@ -1,36 +1,36 @@
-//! How a solve ended, and why.
+//! Terminations of a solve, and their reasons.
 use crate::outcome::Untouched;
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::fmt;
 
-/// How a solve ended. The values are the best found, whatever the ending.
+/// Termination of a solve. The values are the best found, for every termination.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Termination {
-    /// A minimum, to the tolerance named.
+    /// A minimum, to the given tolerance.
     Converged {
-        /// Which tolerance was met.
+        /// The tolerance that was met.
         reason: Tolerance,
     },
-    /// As many iterations as were allowed.
+    /// The maximum number of iterations was reached.
     MaxIterations,
     /// No step lowers the cost, and no tolerance is met.
     Stalled {
-        /// Why there is no step.
+        /// The reason for the missing step.
         reason: Stall,
     },
-    /// Some variables are touched by no factor that takes part; the others are at a minimum.
+    /// Some variables have no active factor; the remaining ones are at a minimum.
     Indeterminate(Untouched),
-    /// A residual, a derivative or a step that is not finite: at the values, or wherever a step leads.
+    /// A residual, a derivative or a step is not finite, at the current values or after every step.
     NonFinite {
-        /// The factor's place in the graph, from 0.
+        /// Index of the factor in the graph, from 0.
         factor: usize,
         /// Its variables.
         keys: Vec<Key>,
     },
-    /// An observer asked to stop.
+    /// An observer requested the end.
     Interrupted,
 }
 
@@ -38,41 +38,41 @@ pub enum Termination {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tolerance {
-    /// The cost changed by less than a share of itself.
+    /// The relative change of the cost is below its tolerance.
     RelativeCost,
-    /// The cost is as good as zero.
+    /// The cost is below its tolerance.
     AbsoluteCost,
-    /// The gradient is as good as zero.
+    /// The gradient is below its tolerance.
     Gradient,
-    /// The step is as good as zero.
+    /// The step is below its tolerance.
     Step,
 }
 
-/// Reasons not to find a step.
+/// Reasons for a missing step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stall {
-    /// Damping has reached its bound, and still no step lowers the cost.
+    /// Damping is at its maximum, and still no step lowers the cost.
     Damping,
-    /// The cost rises by more than rounding however short the step is: it has a jump or a kink there, and
-    /// is least beside it.
+    /// The cost rises by more than rounding for arbitrarily short steps. It has a jump or a kink here, with
+    /// its minimum next to it.
     Jump,
-    /// The trust region has shrunk to nothing.
+    /// The radius of the trust region has become zero.
     TrustRegion,
-    /// Each step leaves the domain of a factor, however short.
+    /// Every step leaves the domain of a factor, even very short ones.
     Domain,
-    /// Gauss-Newton's steps have been raising the cost.
+    /// Several Gauss-Newton steps in a row raised the cost.
     Diverging,
 }
 
-/// A direction in which the cost does not change.
+/// A direction along which the cost is constant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Undetermined {
-    /// The variables that move the most, the first the most.
+    /// The variables that move most, in descending order of motion.
     pub keys: Vec<Key>,
-    /// How each of them moves: name of the tangent direction, and its share.
+    /// Motion of each of these variables: name of the tangent direction, and its share.
     pub direction: Vec<(Key, &'static str, f64)>,
-    /// How many variables move at all.
+    /// Total number of moving variables.
     pub moving: usize,
 }
 

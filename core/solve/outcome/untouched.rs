@@ -1,28 +1,28 @@
-//! What takes no part in a solve: factors that are not defined, and variables that no other factor touches.
+//! Factors and variables that a solve excludes: undefined factors, and variables without an active factor.
 use manifactor_graph::Key;
 use serde::Serialize;
 use std::borrow::Cow;
 use std::fmt;
 
-/// A factor that is not defined at the final values.
+/// A factor that is undefined at the final values.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct InactiveFactor {
-    /// Its place in the graph, from 0.
+    /// Index in the graph, from 0.
     pub factor: usize,
-    /// Its name, or else that of its type.
+    /// Its name, or else the name of its type.
     pub name: Cow<'static, str>,
     /// Its variables.
     pub keys: Vec<Key>,
 }
 
-/// Variables that no factor which takes part touches: nothing is known of them.
+/// Variables without an active factor, and so without information.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Untouched {
-    /// Their keys, in the order of the values. Those that are held are not among them.
+    /// Their keys, in the order of the values, without fixed variables.
     pub keys: Vec<Key>,
-    /// Factors that take part: they are defined, and their weight is not zero.
+    /// Number of active factors: they are defined, and have nonzero weight.
     pub active: usize,
-    /// Factors in the problem.
+    /// Number of factors in the problem.
     pub factors: usize,
 }
 

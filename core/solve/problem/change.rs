@@ -1,58 +1,59 @@
-//! Measurements and noise of a compiled problem, changed in place: the loop of a tracker.
+//! In-place changes of measurements and noise in a compiled problem, as a tracker needs in its loop.
 use crate::problem::Problem;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{Noise, Residual, Version};
 use std::any::type_name;
 
-/// Why a factor of a compiled problem cannot be changed. The problem is as it was.
+/// The error for a factor that cannot be changed. The problem is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ChangeError {
-    /// A factor that is not there.
+    /// The factor does not exist.
     #[error("there is no factor {factor}: the problem has {factors}, from 0")]
     NoFactor {
-        /// What was asked for.
+        /// The requested factor.
         factor: usize,
-        /// How many there are.
+        /// Number of factors.
         factors: usize,
     },
-    /// A factor of another type, or one whose number of rows is its own.
+    /// The factor has a different type, or a type that leaves the number of rows open.
     #[error("factor {factor} is a {found}, which cannot be changed as `{expected}`")]
     Type {
-        /// Its place in the graph, from 0.
+        /// Index in the graph, from 0.
         factor: usize,
-        /// Its type's name.
+        /// Name of its type.
         found: &'static str,
-        /// The Rust type that it was taken for.
+        /// The requested Rust type.
         expected: &'static str,
     },
-    /// Noise that does not fit the residual.
+    /// The noise does not fit the residual.
     #[error("factor {factor}: {source}")]
     Noise {
-        /// Its place in the graph, from 0.
+        /// Index in the graph, from 0.
         factor: usize,
-        /// What is wrong.
+        /// The error of the noise.
         source: NoiseError,
     },
-    /// Noise of another kind: factors with the same kind of noise are stored together.
+    /// The noise is of a different kind. Factors with one kind of noise are stored together.
     #[error(
         "factor {factor}: its noise was compiled as another kind (none, `sigma`, `sigmas`, or a matrix); \
          compile the graph again, or give noise of the same kind"
     )]
     NoiseKind {
-        /// Its place in the graph, from 0.
+        /// Index in the graph, from 0.
         factor: usize,
     },
 }
 
 impl Problem {
-    /// The residual of a factor, to be changed: its measurement, say. Nothing is compiled again; the next solve or
-    /// question takes it as it is. `R` is the type that was added to the graph.
+    /// Returns the residual of a factor for modification, for example of its measurement. Nothing is
+    /// compiled again; the next solve or query uses the new value. `R` is the type that was added to the
+    /// graph.
     ///
-    /// The graph keeps what it has: from now on the problem answers for itself, and not for that graph.
+    /// The graph stays unchanged, so from now on the problem no longer corresponds to it.
     ///
     /// # Errors
-    /// If there is no such factor, or it is no `R`.
+    /// If there is no such factor, or it is not of type `R`.
     pub fn factor_mut<R: Residual>(&mut self, factor: usize) -> Result<&mut R, ChangeError> {
         let factors = self.factors();
         let Some(place) = self.model.factors.get(factor) else {
@@ -72,7 +73,7 @@ impl Problem {
     /// Sets the noise of a factor. Nothing is compiled again; see [`factor_mut`](Self::factor_mut).
     ///
     /// # Errors
-    /// If there is no such factor, or the noise does not fit it or is of another kind than before.
+    /// If there is no such factor, or the noise does not fit it or is of a different kind than before.
     pub fn set_noise(&mut self, factor: usize, noise: &Noise) -> Result<(), ChangeError> {
         let factors = self.factors();
         let Some(place) = self.model.factors.get(factor) else {

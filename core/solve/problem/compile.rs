@@ -1,4 +1,4 @@
-//! From the dynamic view of a graph to the columnar one.
+//! Compilation of a graph from its dynamic view to the columnar one.
 use crate::linear::layout::Layout;
 use crate::linear::memory::{self, Bytes};
 use crate::linear::settings::LinearSolver;
@@ -12,45 +12,45 @@ use manifactor_graph::column::{Columns, FIXED};
 use manifactor_graph::{Graph, GraphError, Key, Resolved, Values};
 use std::time::Instant;
 
-/// Why a graph cannot be compiled.
+/// The error of a compilation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompileError {
-    /// Factors, values and what is held do not fit each other: everything that is wrong.
+    /// Factors, values and fixed variables do not fit each other. Lists all errors.
     #[error("the graph does not fit its values:{}", GraphError::list(.0))]
     Graph(Vec<GraphError>),
-    /// There is nothing to solve for.
+    /// There is no free variable.
     #[error("there is no variable to solve for: {0}")]
     Empty(&'static str),
     /// The linear solver does not fit the graph.
     #[error("the linear solver does not fit the graph: {0}")]
     LinearSolver(String),
-    /// A solver that names a factor which is not there.
+    /// A solver names a factor that does not exist.
     #[error("there is no factor {factor}: the graph has {factors}, from 0")]
     NoFactor {
-        /// What was asked for.
+        /// The requested factor.
         factor: usize,
-        /// How many there are.
+        /// Number of factors.
         factors: usize,
     },
     /// The graph does not fit into memory.
     #[error("no memory for a graph of {factors} factors: it takes at least {}, and there are {}; allow more, or take fewer threads", Bytes(*.needed), Bytes(*.available))]
     TooLarge {
-        /// How many it has.
+        /// Number of factors.
         factors: usize,
-        /// Bytes that it takes once it is compiled, without a factorization.
+        /// Memory of the compiled graph in bytes, without a factorization.
         needed: u64,
-        /// Bytes that there are.
+        /// Available bytes.
         available: u64,
     },
     /// The linear system does not fit into memory.
     #[error("no memory for a linear system of {unknowns} unknowns{}", shortage(*.needed, *.available))]
     OutOfMemory {
-        /// Its size.
+        /// Number of scalar unknowns.
         unknowns: usize,
-        /// Bytes that its factor takes, where that is known.
+        /// Memory of its factor in bytes, if known.
         needed: Option<u64>,
-        /// Bytes that there are for it.
+        /// Bytes available for the factor.
         available: u64,
     },
 }
@@ -129,9 +129,9 @@ pub(crate) fn compile(
     Ok(Problem::new(model, system, graph.version(), times))
 }
 
-/// Refuses a graph for which there is no memory, before any of it is taken.
+/// Rejects a graph that does not fit into memory, before allocating any of it.
 fn check_memory(graph: &Graph, values: &Values) -> Result<(), CompileError> {
-    // fewer are had without asking, which takes longer than they do
+    // below this number, the query of the available memory takes longer than the allocation
     const FEW: usize = 100_000;
     let factors = graph.factors().len();
     if factors < FEW && memory::memory_limit().is_none() {
@@ -144,7 +144,7 @@ fn check_memory(graph: &Graph, values: &Values) -> Result<(), CompileError> {
     }
 }
 
-/// Values into columns, by type.
+/// Sorts values into columns, by type.
 fn columns(graph: &Graph, values: &Values) -> (Vec<Place>, Columns) {
     let mut columns = Columns::default();
     let mut sizes: Vec<usize> = vec![];
@@ -165,7 +165,8 @@ fn columns(graph: &Graph, values: &Values) -> (Vec<Place>, Columns) {
     (variables, columns)
 }
 
-/// Factors into batches, by residual type, kind of noise and type of loss; and by factor, where it went.
+/// Sorts factors into batches, by residual type, kind of noise and type of loss. Also returns the position
+/// of each factor.
 fn batches(
     graph: &Graph,
     resolved: Vec<Resolved>,
@@ -174,7 +175,8 @@ fn batches(
     layout: &Layout,
 ) -> (Vec<Box<dyn Batch>>, Vec<FactorPlace>) {
     let mut batches = Batches::default();
-    // by factor its batch, and by batch the numbers of factors and of their variables: room is made once
+    // the batch of each factor, and for each batch the number of factors and of their variables, so that
+    // memory is reserved only once
     let mut places = Vec::with_capacity(resolved.len());
     let mut sizes: Vec<(usize, usize)> = vec![];
     for (factor, Resolved { variables, whitener }) in graph.factors().iter().zip(&resolved) {

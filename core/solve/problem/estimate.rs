@@ -1,35 +1,36 @@
-//! Values and weights that are put into a compiled problem, checked.
+//! Checked updates of values and weights in a compiled problem.
 use crate::problem::Problem;
 use manifactor_graph::{ValueError, Values};
 
-/// Why weights of factors are refused. The problem keeps those that it had.
+/// The error for invalid weights of factors. The problem keeps its previous weights.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightError {
-    /// Too many or too few of them.
+    /// The number of weights differs from the number of factors.
     #[error("expected a weight for each of the {factors} factors, in the order of the graph, got {weights}")]
     Count {
-        /// Weights that were given.
+        /// Number of given weights.
         weights: usize,
-        /// Factors in the problem.
+        /// Number of factors in the problem.
         factors: usize,
     },
-    /// A weight that no factor can have.
+    /// A weight is negative or not finite.
     #[error("factor {factor}: expected a finite weight, 0 or more, got {weight}")]
     Domain {
-        /// The factor's place in the graph, from 0.
+        /// Index of the factor in the graph, from 0.
         factor: usize,
-        /// What was given.
+        /// The given weight.
         weight: f64,
     },
 }
 
 impl Problem {
-    /// Sets the estimate of the variables that `values` has; the others keep theirs, and the structure stays.
+    /// Sets the estimate of the variables in `values`. The remaining variables keep their estimate, and the
+    /// structure stays.
     ///
     /// # Errors
-    /// If `values` has a key that the problem does not know, another type, or a value that is not finite. The
-    /// estimate is then as it was.
+    /// If `values` has an unknown key, a different type, or a value that is not finite. The estimate is
+    /// then unchanged.
     pub fn set_values(&mut self, values: &Values) -> Result<(), ValueError> {
         let mut known = 0;
         for place in &self.model.variables {
@@ -55,7 +56,7 @@ impl Problem {
         Ok(())
     }
 
-    /// Makes each factor count as often as its weight says, on top of its loss.
+    /// Sets the weight of each factor, which multiplies the weight of its loss.
     ///
     /// # Errors
     /// If there is not one weight for each factor, or one is negative or not finite.

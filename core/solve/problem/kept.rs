@@ -1,4 +1,4 @@
-//! The problem that was solved, kept for questions about its estimate: they need no second compilation.
+//! The solved problem, kept for queries about its estimate without a second compilation.
 use crate::Solution;
 use crate::linear::Method;
 use crate::problem::CompileError;
@@ -6,7 +6,7 @@ use crate::problem::Problem;
 use manifactor_graph::Graph;
 use std::sync::{Arc, Mutex};
 
-/// A compiled problem that is asked by one at a time.
+/// A compiled problem that handles one query at a time.
 #[derive(Debug, Clone)]
 pub(crate) struct Kept(Arc<Mutex<Problem>>);
 
@@ -17,11 +17,12 @@ impl Kept {
 }
 
 impl Solution {
-    /// Asks the problem that was solved, at the estimate and with the weights that the solver has left; a new one where
-    /// that has no factorization of its own, is busy, or `graph` has been changed since.
+    /// Runs a query on the solved problem, at the estimate and with the final weights of the solver.
+    /// Compiles a new problem if the solved one has no factorization (conjugate gradients), is busy, or
+    /// `graph` has changed since.
     ///
     /// # Errors
-    /// If `graph` is not the one that was solved.
+    /// If `graph` is not the solved graph.
     pub(crate) fn ask<R>(
         &self,
         graph: &Graph,
@@ -31,7 +32,7 @@ impl Solution {
             && !matches!(problem.system.method, Method::ConjugateGradients(_))
             && problem.version == graph.version()
         {
-            // not at once: what an earlier question has factorized would be lost
+            // only if necessary, because the factorization of an earlier query would be lost
             if !problem.model.is_at(&self.values) {
                 problem.model.put(&self.values);
             }
@@ -40,10 +41,10 @@ impl Solution {
         Ok(question(&mut self.problem(graph)?))
     }
 
-    /// The problem at the estimate, compiled anew, with the weights that the solver has left.
+    /// Compiles the problem again, at the estimate and with the final weights of the solver.
     ///
     /// # Errors
-    /// If `graph` is not the one that was solved.
+    /// If `graph` is not the solved graph.
     pub fn problem(&self, graph: &Graph) -> Result<Problem, CompileError> {
         let mut problem = Problem::compile(graph, &self.values)?;
         if !self.weights.is_empty() {

@@ -1,4 +1,4 @@
-//! From the linear solver that a config names to the one that a problem has.
+//! Construction of the linear solver of a problem from its settings.
 use crate::linear::layout::Layout;
 use crate::linear::ordering::Order;
 use crate::linear::settings::{self as chosen, LinearSolver, Ordering, Preconditioner};
@@ -8,13 +8,13 @@ use crate::problem::model::Place;
 use manifactor_graph::{Key, Values};
 use std::collections::HashMap;
 
-/// Systems of at most this many unknowns are factorized as one dense matrix.
+/// Systems with at most this number of unknowns are factorized as one dense matrix.
 const DENSE: usize = 24;
 
-/// The blocks of a linear system: what variables they are.
+/// The blocks of a linear system, with their variables.
 pub(crate) struct Blocks<'a> {
     keys: Vec<&'a Key>,
-    /// By block: the number of its type.
+    /// Index of each block's type.
     kinds: Vec<usize>,
     /// Names of the types.
     names: Vec<&'static str>,
@@ -47,7 +47,7 @@ impl<'a> Blocks<'a> {
     }
 
     fn listed(&self, keys: &[Key]) -> Result<Vec<usize>, CompileError> {
-        // by key: its block, until it is listed
+        // the block of each key, until it is listed
         let mut blocks: HashMap<&Key, Option<usize>> =
             self.keys.iter().enumerate().map(|(block, key)| (*key, Some(block))).collect();
         let place = |key: &Key| {
@@ -59,10 +59,10 @@ impl<'a> Blocks<'a> {
     }
 }
 
-/// How to order the blocks.
+/// Returns the ordering method for the blocks.
 pub(crate) fn order(linear: &LinearSolver, blocks: &Blocks<'_>) -> Result<Order, CompileError> {
     Ok(match &linear.ordering {
-        // iterations do not fill anything in
+        // an iterative method has no fill, and a dense factor has all of it
         _ if matches!(linear.method, chosen::Method::ConjugateGradients | chosen::Method::Dense) => {
             Order::Natural
         }
@@ -76,7 +76,7 @@ pub(crate) fn order(linear: &LinearSolver, blocks: &Blocks<'_>) -> Result<Order,
     })
 }
 
-/// The method, with the memory that it needs.
+/// Returns the method, and allocates its memory.
 pub(crate) fn method(
     linear: &LinearSolver,
     blocks: &Blocks<'_>,
@@ -102,7 +102,8 @@ pub(crate) fn method(
     Cholesky::new(structure).map(Method::Cholesky).ok_or(error)
 }
 
-/// Bytes for a factor. Small ones are had without asking the system, which takes longer than they do.
+/// Returns the bytes available for a factor. For a small factor, the query of the available memory would
+/// take longer than the allocation.
 fn available(linear: &LinearSolver, needed: u64, entries: usize) -> u64 {
     const SMALL: u64 = 256 << 20;
     match linear.memory_gib {
@@ -137,7 +138,7 @@ fn iterative(linear: &LinearSolver, blocks: &Blocks<'_>, layout: &Layout) -> Res
     Ok(Method::ConjugateGradients(ConjugateGradients::new(layout, by_rank, settings)))
 }
 
-/// Two marked blocks that are coupled, by their places in the order of elimination.
+/// Returns two marked blocks that are coupled, by their positions in the elimination order.
 fn coupled(layout: &Layout, marked: &[bool]) -> Option<(usize, usize)> {
     let mut by_rank = vec![false; marked.len()];
     layout.rank.iter().zip(marked).for_each(|(rank, mark)| by_rank[*rank as usize] = *mark);
@@ -150,7 +151,8 @@ fn coupled(layout: &Layout, marked: &[bool]) -> Option<(usize, usize)> {
     found
 }
 
-/// Marks the blocks of that type whose blocks are not coupled among each other and which leaves the smallest system.
+/// Marks the blocks of one type: among the types without couplings between their own blocks, the one that
+/// leaves the smallest system.
 fn largest_uncoupled(blocks: &Blocks<'_>, layout: &Layout) -> Vec<bool> {
     let first = layout.first_scalars();
     let unknowns = |marked: &[bool]| -> usize {

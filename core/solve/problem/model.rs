@@ -1,4 +1,4 @@
-//! The columnar side of a problem: variables, factors and weights, and the estimate.
+//! The columnar side of a problem: variables, factors, weights and the estimate.
 use manifactor_graph::batch::{Batch, Evaluation, FactorRows, FactorState};
 use manifactor_graph::column::Columns;
 use manifactor_graph::normal_equations::NormalEquations;
@@ -10,18 +10,18 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub(crate) struct Place {
     pub key: Key,
-    /// Which column, and where in it.
+    /// Its column, and its index in the column.
     pub column: usize,
     pub index: usize,
     pub tangent: &'static [&'static str],
-    /// Where it begins in the linear system; `None` for one that is held.
+    /// Its start in the linear system; `None` for a fixed variable.
     pub start: Option<usize>,
-    /// A bit for each direction that is held.
+    /// One bit per tangent direction, set if the direction is fixed.
     pub held: u32,
 }
 
 impl Place {
-    /// By direction of its tangent space: its scalar unknown, `None` for one that is held.
+    /// Returns the scalar unknown of each tangent direction; `None` for a fixed one.
     pub(crate) fn unknowns(&self) -> impl Iterator<Item = Option<usize>> {
         let free = |d: usize| self.start.filter(|_| self.held >> d & 1 == 0).map(|start| start + d);
         (0..self.tangent.len()).map(free)
@@ -32,23 +32,23 @@ impl Place {
 #[derive(Debug, Clone)]
 pub(crate) struct FactorPlace {
     pub variables: VariableIndices,
-    /// Its type's name; and its own, where it has one.
+    /// Name of its type, and its own name if it has one.
     pub name: &'static str,
     pub own_name: Option<Arc<str>>,
-    /// Rows of its residual, and those that were observed.
+    /// Rows of its residual, and the number of observed rows.
     pub all_rows: u32,
     pub rows: u32,
-    /// Which batch, and where in it.
+    /// Its batch, and its index in the batch.
     pub batch: u32,
     pub index: u32,
 }
 
 impl FactorPlace {
-    /// What reports call it.
+    /// Returns the label in reports.
     pub(crate) fn label(&self) -> Cow<'static, str> {
         self.own_name.as_ref().map_or(Cow::Borrowed(self.name), |name| Cow::Owned((**name).to_owned()))
     }
-    /// Counts the rows that such noise says were observed.
+    /// Counts the rows that are observed with this noise.
     pub(crate) fn observe(&mut self, noise: &Noise) {
         self.rows = noise.observed().map_or(self.all_rows, |all| all.iter().filter(|o| **o).count() as u32);
     }
@@ -58,15 +58,15 @@ impl FactorPlace {
 pub(crate) struct Model {
     pub variables: Vec<Place>,
     pub factors: Vec<FactorPlace>,
-    /// The weight of each factor; empty if none were set.
+    /// The weight of each factor; empty if none was set.
     weights: Vec<f64>,
-    /// The estimate, and room for a trial step.
+    /// The estimate, and memory for a trial step.
     columns: Columns,
     trial: Columns,
-    /// By column: where each variable begins in the linear system.
+    /// For each column, the start of each variable in the linear system.
     starts: Vec<Vec<u32>>,
     pub batches: Vec<Box<dyn Batch>>,
-    /// Counts changes of the estimate, of weights and of measurements: what is known of the problem may be out of date.
+    /// Counts changes of the estimate, of weights and of measurements, to detect outdated results.
     revision: u64,
 }
 
@@ -86,7 +86,7 @@ impl Model {
         self.revision
     }
 
-    /// Batches, to be changed.
+    /// Returns the batches for modification.
     pub(crate) fn batches_mut(&mut self) -> &mut [Box<dyn Batch>] {
         self.revision += 1;
         &mut self.batches
@@ -104,13 +104,13 @@ impl Model {
         self.variables.iter().find(|place| place.key.as_str() == key)
     }
 
-    /// The variables of a factor.
+    /// Returns the variables of a factor.
     pub(crate) fn keys(&self, factor: usize) -> Vec<Key> {
         let variables = self.factors.get(factor).into_iter().flat_map(|place| &place.variables);
         variables.map(|v| self.variables[*v as usize].key.clone()).collect()
     }
 
-    /// The estimate, in the order of the values that the problem was compiled with.
+    /// Returns the estimate, in the order of the values at compilation.
     pub(crate) fn values(&self) -> Values {
         let mut values = Values::new();
         for place in &self.variables {
@@ -121,7 +121,7 @@ impl Model {
         values
     }
 
-    /// Sets the estimate to values that are known to fit; variables that it does not have keep theirs.
+    /// Sets the estimate to values that are known to fit. Variables without a value keep theirs.
     pub(crate) fn put(&mut self, values: &Values) {
         self.revision += 1;
         for place in &self.variables {
@@ -131,7 +131,7 @@ impl Model {
         }
     }
 
-    /// Returns whether the estimate is these values: then what is known of it still holds.
+    /// Returns whether the estimate equals these values, so that results for it are still valid.
     pub(crate) fn is_at(&self, values: &Values) -> bool {
         self.variables.iter().all(|place| {
             let here = self.columns.column(place.column).get(place.index);
@@ -140,7 +140,7 @@ impl Model {
         })
     }
 
-    /// Goes back to an estimate of before.
+    /// Restores an earlier estimate.
     pub(crate) fn restore(&mut self, columns: Columns) {
         self.revision += 1;
         self.columns = columns;
@@ -150,7 +150,7 @@ impl Model {
         &self.weights
     }
 
-    /// Sets weights that are known to fit; a factor without one counts once.
+    /// Sets weights that are known to fit. A factor without one gets weight 1.
     pub(crate) fn weigh(&mut self, weights: &[f64]) {
         self.revision += 1;
         self.weights.clear();
@@ -159,13 +159,13 @@ impl Model {
         self.batches.iter_mut().for_each(|b| b.set_weights(&self.weights));
     }
 
-    /// Adds all factors to H and g, and decides which of them take part.
+    /// Adds all factors to H and g, and decides which of them are active.
     pub(crate) fn linearize(&mut self, to: &mut NormalEquations<'_>) -> Evaluation {
         let columns = &self.columns;
         self.batches.iter_mut().fold(Evaluation::default(), |total, b| total.and(b.linearize(columns, to)))
     }
 
-    /// Cost at the estimate, over the factors that took part in the last linearization.
+    /// Evaluates the cost at the estimate, over the factors that were active at the last linearization.
     pub(crate) fn cost(&self) -> Evaluation {
         self.cost_at(&self.columns)
     }
@@ -174,14 +174,14 @@ impl Model {
         self.batches.iter().map(|b| b.cost(columns)).fold(Evaluation::default(), Evaluation::and)
     }
 
-    /// Makes `estimate ⊞ step` the trial.
+    /// Sets the trial to `estimate ⊞ step`.
     pub(crate) fn retract(&mut self, step: &[f64]) {
         for (i, starts) in self.starts.iter().enumerate() {
             self.trial.column_mut(i).retract_from(self.columns.column(i), starts, step);
         }
     }
 
-    /// Makes `estimate ⊞ step` the trial, and returns its cost.
+    /// Sets the trial to `estimate ⊞ step`, and returns its cost.
     pub(crate) fn try_step(&mut self, step: &[f64]) -> Evaluation {
         self.retract(step);
         self.cost_at(&self.trial)
@@ -193,12 +193,12 @@ impl Model {
         std::mem::swap(&mut self.columns, &mut self.trial);
     }
 
-    /// ½ρ of each factor at the estimate, whatever its weight; zero where it is not defined.
+    /// Computes ½ρ of each factor at the estimate, without its weight; zero if it is undefined.
     pub(crate) fn factor_costs(&self, costs: &mut Vec<f64>) {
         self.factor_costs_at(&self.columns, costs);
     }
 
-    /// The same at `estimate ⊞ step`, which becomes the trial.
+    /// Computes ½ρ of each factor at `estimate ⊞ step`, which becomes the trial.
     pub(crate) fn factor_costs_beside(&mut self, step: &[f64], costs: &mut Vec<f64>) {
         self.retract(step);
         self.factor_costs_at(&self.trial, costs);
@@ -209,7 +209,7 @@ impl Model {
         self.batches.iter().for_each(|b| b.costs(columns, costs));
     }
 
-    /// Each factor as it stands at the estimate, in the order of the graph.
+    /// Returns the state of each factor at the estimate, in the order of the graph.
     pub(crate) fn inspect(&self) -> Vec<FactorState> {
         let mut all: Vec<_> = self.batches.iter().flat_map(|b| b.inspect(&self.columns)).collect();
         all.sort_by_key(|f| f.entry);
@@ -221,8 +221,8 @@ impl Model {
         self.batches.iter().for_each(|b| b.rows(&self.columns, visit));
     }
 
-    /// The factor with a residual or a derivative that is not finite; where all are, the one with the largest. Walks
-    /// through the rows of all factors: for solves that have failed.
+    /// Returns the factor with a residual or a derivative that is not finite; if all are finite, the factor
+    /// with the largest one. Visits the rows of all factors, so it is for failed solves only.
     pub(crate) fn not_finite_factor(&self) -> usize {
         let (mut factor, mut largest) = (0, f64::NEG_INFINITY);
         self.rows(&mut |rows| {
@@ -235,7 +235,7 @@ impl Model {
     }
 }
 
-/// Largest entry of a factor's rows; infinite where one is not a number.
+/// Returns the largest entry of a factor's rows; infinite if an entry is NaN.
 fn size(rows: &FactorRows<'_>) -> f64 {
     let entries = rows.residual.iter().chain(rows.blocks.iter().flat_map(|(_, block)| block));
     entries.fold(0.0, |most, x| if x.is_nan() { f64::INFINITY } else { f64::max(most, x.abs()) })

@@ -1,4 +1,4 @@
-//! The default: what needs no tuning.
+//! The default solver, which needs no tuning.
 mod search;
 mod watch;
 
@@ -21,15 +21,19 @@ use watch::{Pause, Watch};
 
 pub(crate) use search::starts;
 
-/// Gauss-Newton steps that are damped once one fails, and another start where the first leads nowhere.
+/// Gauss-Newton steps, with damping once a step fails, and further starts if the given values lead to no
+/// minimum.
 ///
-/// Begins at the given values. Where a full step raises the cost and the next is not much shorter, where the cost has not
-/// settled after ten steps, or where a registered start doubts the minimum, every registered start that applies to the
-/// graph is tried, those of the lowest cost first, until one leads to a minimum. The best minimum found is the estimate.
-/// If no start leads to a minimum, a dogleg from the given values is the last attempt.
-/// None of this depends on the unit of the noise: covariances that are too small by a factor change nothing. Where no
-/// start applies, it is Levenberg-Marquardt with next to no damping. Starts need the graph, and those of a plugin are there
-/// once it is linked: so a compiled problem alone (`descend`) is moved by damped steps from where it is.
+/// Begins at the given values. Further starts are tried if a full step raises the cost and the next one is
+/// not much shorter. They are also tried if the cost has not converged after ten steps, or if a registered
+/// start doubts the minimum. Every registered start that applies to the graph is then tried, in ascending
+/// order of cost, until one leads to a minimum. The best minimum found is the estimate. If no start leads
+/// to a minimum, a dogleg from the given values is the last attempt.
+///
+/// None of this depends on the unit of the noise: covariances that are too small by a factor have no
+/// effect. If no start applies, the solver is Levenberg-Marquardt with almost no damping. Starts need the
+/// graph, and the starts of a plugin are available once it is linked. A compiled problem alone (`descend`)
+/// is therefore solved by damped steps from its current estimate.
 ///
 /// ```toml
 /// solver = { type = "auto", stop = { relative_cost = 1e-6 } }
@@ -37,21 +41,23 @@ pub(crate) use search::starts;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Auto {
-    /// When to stop, from each start.
+    /// Stopping criteria, for each start.
     pub stop: Stopping,
-    /// How the linear system of each step is solved.
+    /// Solver of the linear system of each step.
     pub linear: LinearSolver,
 }
 
-/// Damping of the first step, as a share of the diagonal: none to speak of.
+/// Damping of the first step, as a share of the diagonal: negligible.
 const DAMPING: Positive = Positive::literal(1e-10);
-/// All directions are damped alike, but those that the factors leave a standard deviation of more than this, in metres or
-/// radians, the noise scaled to fit the residuals. By the diagonal of H itself, steps run off along what little constrains,
-/// as the size of an object that is seen from one side, and out of factors' domains.
+/// Standard deviation in metres or radians, with the noise scaled to fit the residuals. All directions with
+/// a smaller one are damped equally; the remaining ones are damped by the diagonal of H. With pure diagonal
+/// damping, steps would run off along weakly constrained directions and leave the domains of factors. An
+/// example is the size of an object seen from one side.
 const WEAK: f64 = 0.1;
-/// No direction is damped by less than this share of the others.
+/// Lower bound of the damping of a direction, as a share of the common damping.
 const LEAST: f64 = 1e-6;
-/// Nor by less than this share of the largest entry of H's diagonal, however well the estimate fits.
+/// Lower bound of the common damping, as a share of the largest diagonal entry of H, however well the
+/// estimate fits.
 const FLOOR: f64 = 1e-12;
 
 #[typetag::serialize(name = "auto")]
@@ -83,7 +89,7 @@ impl Optimizer for Auto {
             Termination::Converged { .. } | Termination::Indeterminate(_) => {
                 !search::is_doubted(graph, &problem)
             }
-            // not where the solve began, but where its steps led
+            // over if the initial values are not finite; after a non-finite step the search goes on
             Termination::NonFinite { .. } => !outcome.final_cost.is_finite(),
             Termination::Interrupted | Termination::MaxIterations | Termination::Stalled { .. } => false,
         };
@@ -96,7 +102,8 @@ impl Optimizer for Auto {
 register!(dyn Optimizer, "auto", Auto);
 
 impl Auto {
-    /// Damped steps, the first by so much. The damping follows the noise: (H + λ D) δ = -g is the same for any unit of it.
+    /// Solves by damped steps, beginning with `initial_lambda`. The damping scales with the noise, so (H +
+    /// λ D) δ = -g is independent of the noise's unit.
     fn damped(
         &self,
         initial_lambda: Positive,
@@ -118,8 +125,9 @@ impl Auto {
         GaussNewton { stop: self.stop.clone(), linear: self.linear.clone() }.descend(problem, observer)
     }
 
-    /// Takes a step of this length that has raised the cost, and goes on by full ones, if the next is much shorter: weights
-    /// that span many digits make the cost of a good step rise. Back to before it, where that leads to no minimum.
+    /// Accepts a step of length `step` that raised the cost, and continues with full steps if the next one
+    /// is much shorter. If weights span many orders of magnitude, even a good step may raise the cost.
+    /// Restores the estimate if this leads to no minimum.
     fn go_on(&self, step: f64, problem: &mut Problem, watch: &mut Watch<'_>, outcome: Outcome) -> Outcome {
         let (before, pause) = (problem.model.columns().clone(), watch.pause);
         problem.model.accept();

@@ -1,4 +1,4 @@
-//! A solve under way: what strategies share.
+//! A solve in progress: the common part of all solvers.
 mod account;
 mod best;
 mod minimum;
@@ -14,26 +14,28 @@ use std::time::Instant;
 
 pub(crate) use best::Best;
 
-/// Records that there is room for from the beginning.
+/// Initial capacity of the history, in records.
 const HISTORY: usize = 1000;
 
-/// A step to be tried, and what is expected of it.
+/// A trial step with its prediction.
 #[derive(Debug, Clone, Default)]
 pub struct Step {
     /// δ, in the order of the linear system.
     pub delta: Vec<f64>,
-    /// By how much it lowers ½ρ, by the quadratic model.
+    /// Decrease of ½ρ predicted by the quadratic model.
     pub predicted: f64,
     /// ‖δ‖.
     pub norm: f64,
-    /// What the solver controls it by, for the record: its damping, say, or the radius of its trust region.
+    /// The control parameter of the solver, for the record: its damping or the radius of its trust region,
+    /// for example.
     pub control: f64,
-    /// Share of the slope along the step that damping takes, from 0 to 1: δᵀDδ / δᵀ(H + D)δ. Zero without damping.
+    /// Share of the slope along the step due to damping, from 0 to 1: δᵀDδ / δᵀ(H + D)δ. Zero without
+    /// damping.
     pub damped: f64,
 }
 
 impl Step {
-    /// Half of it. The prediction stays.
+    /// Halves the step. The prediction stays.
     pub(crate) fn halve(&mut self) {
         self.delta.iter_mut().for_each(|d| *d *= 0.5);
         self.norm *= 0.5;
@@ -41,23 +43,23 @@ impl Step {
     }
 }
 
-/// What became of a step.
+/// Result of a trial step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Tried {
     /// It lowered the cost.
     Lower {
-        /// By what share of what the model predicts: 1, where the cost is quadratic.
+        /// Decrease of the cost, as a share of the prediction: 1 if the cost is quadratic.
         gain: f64,
     },
-    /// It raised the cost, or lowered it by nothing.
+    /// It raised the cost, or left it unchanged.
     Higher,
     /// It left the domain of a factor, or its cost is not finite.
     Undefined,
 }
 
-/// A solve under way: the problem, its costs and its records. It is the seam for a solver of one's own: ask for a step,
-/// try it, take it or ask for another.
+/// A solve in progress: the problem, its costs and its records. Custom solvers build on it: compute a step,
+/// try it, then accept it or compute a different one.
 ///
 /// ```
 /// use manifactor_solve::{Descent, Observer, Outcome, Problem, Step, Stopping, Tried};
@@ -85,9 +87,9 @@ pub enum Tried {
 pub struct Descent<'a> {
     pub(crate) problem: &'a mut Problem,
     pub(crate) stop: &'a Stopping,
-    /// At the last linearization.
+    /// Evaluation at the last linearization.
     pub(crate) at: Evaluation,
-    /// Of the last step tried.
+    /// Evaluation of the last trial step.
     pub(crate) trial: Evaluation,
     pub(crate) iterations: usize,
     observer: &'a mut dyn Observer,
@@ -96,11 +98,11 @@ pub struct Descent<'a> {
     compile: f64,
     history: Vec<IterationRecord>,
     interrupted: bool,
-    /// Something is open: steps that are not damped cannot be had.
+    /// A direction is undetermined, so that undamped steps do not exist.
     is_open: bool,
-    /// Stationary points that were left because they are no minima.
+    /// Number of stationary points that were left because they are not minima.
     escapes: usize,
-    /// The last factorization is not that of a step.
+    /// The last factorization does not belong to a step.
     pub(crate) is_refactorized: bool,
 }
 
@@ -108,7 +110,7 @@ impl<'a> Descent<'a> {
     /// Linearizes at the initial estimate.
     ///
     /// # Errors
-    /// The end of the solve, where a residual or a derivative is not finite there.
+    /// The outcome of the solve, if a residual or a derivative is not finite there.
     pub fn begin(
         problem: &'a mut Problem,
         stop: &'a Stopping,
@@ -140,7 +142,7 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// The factor that makes the linearization not finite, if one does.
+    /// Returns the termination for a linearization that is not finite, with the factor that causes it.
     fn not_finite(&self) -> Option<Termination> {
         self.at.not_finite.map(|factor| self.blame(factor))
     }
@@ -149,22 +151,22 @@ impl<'a> Descent<'a> {
         Termination::NonFinite { factor, keys: self.problem.model.keys(factor) }
     }
 
-    /// ½ Σ ρ at the estimate.
+    /// Returns ½ Σ ρ at the estimate.
     pub fn cost(&self) -> f64 {
         self.at.cost
     }
 
-    /// The gradient g = Jᵀr at the estimate.
+    /// Returns the gradient g = Jᵀr at the estimate.
     pub fn gradient(&self) -> &[f64] {
         &self.problem.system.g
     }
 
-    /// The diagonal of H = JᵀJ at the estimate.
+    /// Returns the diagonal of H = JᵀJ at the estimate.
     pub fn diagonal(&self) -> Vec<f64> {
         self.problem.system.diagonal().copied().collect()
     }
 
-    /// A reason to stop before another step; where there is none, that step's iteration begins.
+    /// Returns a reason to stop before the next step. If there is none, the next iteration begins.
     #[allow(clippy::should_implement_trait, reason = "the next iteration; an end has a reason")]
     pub fn next(&mut self) -> Option<Termination> {
         let finished = self.finished();
@@ -172,8 +174,8 @@ impl<'a> Descent<'a> {
         finished
     }
 
-    /// The step (H + diag(damping)) δ = -g. Whether there is one: the matrix is positive definite, δ is finite, and no
-    /// observer has interrupted it.
+    /// Computes the step (H + diag(damping)) δ = -g. Returns `false` if the matrix is not positive
+    /// definite, δ is not finite, or an observer has interrupted the solve.
     pub fn damped(&mut self, damping: &[f64], step: &mut Step) -> bool {
         if !self.factorize(Some(damping)) || !self.newton_step(&mut step.delta) {
             return false;
@@ -186,8 +188,8 @@ impl<'a> Descent<'a> {
         true
     }
 
-    /// The step H δ = -g, as [`damped`](Self::damped). Where something is open, a direction that nothing constrains, it is
-    /// left alone.
+    /// Computes the step H δ = -g; see [`damped`](Self::damped). The step does not move along undetermined
+    /// directions.
     pub fn undamped(&mut self, step: &mut Step) -> bool {
         if !self.factorize_undamped() || !self.newton_step(&mut step.delta) {
             return false;
@@ -198,14 +200,15 @@ impl<'a> Descent<'a> {
         true
     }
 
-    /// Factorizes H + diag(damping), and takes -g half the way to the step; whether that was possible.
+    /// Factorizes H + diag(damping), and computes the first half of the step from -g. Returns whether it
+    /// succeeded.
     fn factorize(&mut self, damping: Option<&[f64]>) -> bool {
         self.is_refactorized = false;
         let Self { problem, observer, interrupted, .. } = self;
         problem.factorize(damping, &mut || go_on(*observer, interrupted)).is_ok()
     }
 
-    /// The step of the last factorization; whether it is finite, and no interrupt has cut it short.
+    /// Computes the step of the last factorization. Returns whether it is finite and was not interrupted.
     fn newton_step(&mut self, delta: &mut Vec<f64>) -> bool {
         let Self { problem, observer, interrupted, .. } = self;
         problem.newton_step(delta, &mut || go_on(*observer, interrupted));
@@ -233,13 +236,14 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Returns whether an observer has asked for an end.
+    /// Returns whether an observer has requested the end.
     pub fn interrupted(&self) -> bool {
         self.interrupted
     }
 
-    /// The share of absolute tolerances that holds here. They are meant for information of one or more, in the units of the
-    /// tangent; if all of it is less, they shrink with it, so that no unit of the noise makes a start look like a minimum.
+    /// Returns the scale of absolute tolerances. They are meant for information of one or more, in tangent
+    /// units. If all information is smaller, they shrink with it, so that initial values do not look like a
+    /// minimum because of the noise's unit.
     pub(crate) fn unit(&self) -> f64 {
         match self.problem.system.largest() {
             largest if largest > 0.0 => largest.min(1.0),
@@ -247,27 +251,28 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// The largest cosine between the residuals and a column of the Jacobian: zero where the gradient is, whatever the units.
-    /// The test `gtol` of MINPACK.
+    /// Returns the largest cosine between the residual vector and a column of the Jacobian. It is zero if
+    /// the gradient is, and independent of units: the test `gtol` of MINPACK.
     fn largest_cosine(&self) -> f64 {
         let length = (2.0 * self.at.cost).sqrt();
         let cosine = |(g, d): (&f64, &f64)| if *d > 0.0 { g.abs() / (d.sqrt() * length) } else { 0.0 };
         self.problem.system.g.iter().zip(self.problem.system.diagonal()).map(cosine).fold(0.0, f64::max)
     }
 
-    /// Returns whether one unknown alone could lower the cost by more than a thousandth: by g²/2H = cos² · cost, by the quadratic model. A
-    /// short step and a small fall are then a sign of damping, or of a plateau, as for a landmark that is very far away.
+    /// Returns whether a single unknown could lower the cost by more than a thousandth: by g²/2H = cos² ·
+    /// cost, in the quadratic model. In that case, a short step with a small decrease indicates damping or
+    /// a plateau, such as with a very distant landmark.
     pub(crate) fn is_steep(&self) -> bool {
         const SHARE: f64 = 1e-3;
         self.largest_cosine().powi(2) > SHARE
     }
 
     fn largest_gradient(&self) -> f64 {
-        // `f64::max` would drop what is not a number
+        // not `f64::max`, which would drop NaN
         self.problem.system.g.iter().fold(0.0, |m, g| if m.is_nan() || g.abs() <= m { m } else { g.abs() })
     }
 
-    /// Evaluates the cost after a step. The estimate stays.
+    /// Evaluates the cost after a step. The estimate stays unchanged.
     pub fn attempt(&mut self, step: &Step) -> Tried {
         self.trial = self.problem.try_step(&step.delta);
         let trial = &self.trial;
@@ -278,25 +283,27 @@ impl<'a> Descent<'a> {
         if trial.cost < self.at.cost && gain > 0.0 { Tried::Lower { gain } } else { Tried::Higher }
     }
 
-    /// Returns whether the last trial and its model both say that there is nothing left to gain.
+    /// Returns whether both the last trial and its model show no further decrease.
     pub(crate) fn settled(&self, step: &Step) -> bool {
         self.is_small(self.at.cost - self.trial.cost) && self.is_small(step.predicted) && !self.is_steep()
     }
 
-    /// Returns whether a change of the cost is within the tolerance.
+    /// Returns whether a change of the cost is within the relative tolerance.
     pub(crate) fn is_small(&self, change: f64) -> bool {
         change.abs() <= *self.stop.relative_cost * self.at.cost.abs()
     }
 
-    /// Why no step is good enough, as the last one shows, which is next to nothing.
+    /// Returns the reason for the lack of an acceptable step, from the last trial step, which is almost
+    /// zero.
     pub fn stalled(&self) -> Termination {
         self.stalled_by(Stall::Damping)
     }
 
-    /// The same; `other`, where the last step shows nothing.
+    /// Returns the reason for the lack of an acceptable step; `other`, if the last step does not show it.
     pub(crate) fn stalled_by(&self, other: Stall) -> Termination {
         const ROUNDING: f64 = 1e-10;
-        /// At a minimum the cost has half of the digits for the estimate: a cosine below this is rounding.
+        /// At a minimum, the estimate has half as many correct digits as the cost: a cosine below this is
+        /// rounding.
         const ORTHOGONAL: f64 = 1e-6;
         let Evaluation { cost, left, not_finite, .. } = self.trial;
         let reason = if self.interrupted {
@@ -315,7 +322,7 @@ impl<'a> Descent<'a> {
         Termination::Stalled { reason }
     }
 
-    /// Takes the last step that was tried, and linearizes there; a reason to stop, if it brings one.
+    /// Accepts the last trial step, and linearizes there. Returns a reason to stop, if there is one.
     pub fn take(&mut self, step: &Step) -> Option<Termination> {
         self.problem.model.accept();
         let (before, after) = (self.at.cost, self.trial.cost);
@@ -325,7 +332,7 @@ impl<'a> Descent<'a> {
         if let Some(termination) = self.not_finite() {
             return Some(termination);
         }
-        // factors that come back into their domain change the cost: go on with them
+        // continue, since factors that become defined again change the cost
         if self.at.inactive != inactive {
             return None;
         }
@@ -340,7 +347,7 @@ impl<'a> Descent<'a> {
     }
 }
 
-/// Returns whether an observer lets a step go on.
+/// Polls the observer. Returns whether the step may continue.
 fn go_on(observer: &mut dyn Observer, interrupted: &mut bool) -> bool {
     *interrupted |= observer.poll().is_break();
     !*interrupted

@@ -14,10 +14,10 @@ use serde::{Deserialize, Serialize};
 
 /// Steps within a trust region, each of which lowers the cost.
 ///
-/// The step is the Gauss-Newton step where that is within the radius, else the point on the path from
-/// the minimum along the gradient to it. Lengths are measured by √diag H, so that radians and metres
-/// compare. A refused step costs neither a linearization nor a factorization. A direction that nothing constrains is
-/// left alone, and named by the outcome.
+/// Within the radius, the step is the Gauss-Newton step. Otherwise it is the point at the radius on the
+/// path to that step by way of the minimum along the gradient. Lengths are scaled by √diag H, which makes
+/// radians and metres comparable. A rejected step costs neither a linearization nor a factorization. The
+/// solver does not move along an undetermined direction; the outcome reports it.
 ///
 /// ```toml
 /// solver = { type = "dogleg", stop = { max_iterations = 50 } }
@@ -25,17 +25,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dogleg {
-    /// Radius of the first step, in standard deviations; the length of the first Gauss-Newton step,
-    /// where it is not given.
+    /// Radius of the first step, in standard deviations. Default: the length of the first Gauss-Newton
+    /// step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub initial_radius: Option<Positive>,
-    /// When to stop.
+    /// Stopping criteria.
     pub stop: Stopping,
-    /// How the linear system of each step is solved.
+    /// Solver of the linear system of each step.
     pub linear: LinearSolver,
 }
 
-/// Least share of the predicted decrease that makes a step good enough to take.
+/// A step is accepted if it reaches this share of the predicted decrease.
 const GAIN: f64 = 1e-4;
 
 #[typetag::serialize(name = "dogleg")]
@@ -61,7 +61,7 @@ impl Optimizer for Dogleg {
 }
 register!(dyn Optimizer, "dogleg", Dogleg);
 
-/// Both ends of the path, and the measure of length.
+/// The dogleg path: its two corners, and the metric for lengths.
 #[derive(Default)]
 struct Path {
     scale: Vec<f64>,
@@ -78,7 +78,7 @@ impl Path {
             _ => 1e-12,
         };
         path.scale.iter_mut().for_each(|d| *d = d.max(least));
-        // steepest descent where lengths are measured by the diagonal: -D⁻¹g
+        // steepest descent in the metric of the diagonal: -D⁻¹g
         path.cauchy = problem.system.g.iter().zip(&path.scale).map(|(g, d)| -g / d).collect();
         let curvature = dot(&path.cauchy, &problem.system.multiply(&path.cauchy));
         let length = -dot(&path.cauchy, &problem.system.g) / curvature.max(f64::MIN_POSITIVE);
@@ -91,7 +91,7 @@ impl Path {
     fn length(&self, a: &[f64]) -> f64 {
         self.inner(a, a).sqrt()
     }
-    /// The point of the path at this distance, or its end.
+    /// Returns the point of the path at this distance, or its end.
     fn point(&self, radius: f64) -> Vec<f64> {
         if self.length(&self.newton) <= radius {
             return self.newton.clone();
@@ -122,11 +122,11 @@ impl Dogleg {
             }
             let path = Path::new(descent.problem, &newton.delta);
             let whole = path.length(&path.newton);
-            // what the whole step would gain: where that is next to nothing, so is what the radius leaves of it
+            // predicted decrease of the whole step; if it is negligible, so is that of a shorter one
             let promises = !descent.is_small(newton.predicted);
             let mut within = radius.unwrap_or(whole);
             loop {
-                // a step that the radius has made small says little of the cost around
+                // a step that is small because of the radius does not show convergence
                 let is_cut = promises && within < whole;
                 let delta = path.point(within);
                 let (g, length) = (dot(&delta, descent.gradient()), path.length(&delta));

@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 
 /// Full steps to the minimum of the linearized cost: H δ = -g.
 ///
-/// The fastest where the start is good. A step may raise the cost; one that leaves the domain of a
-/// factor is halved until it does not. Five rises in a row end the solve, with the best estimate so
-/// far. A direction that nothing constrains is left alone, and named by the outcome.
+/// The fastest solver from a good initial guess. A step may raise the cost. A step that leaves the domain
+/// of a factor is halved until it does not. Five rises in a row end the solve, with the best estimate so
+/// far. The solver does not move along an undetermined direction; the outcome reports it.
 ///
 /// ```toml
 /// solver = { type = "gauss_newton", stop = { max_iterations = 50 } }
@@ -22,15 +22,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GaussNewton {
-    /// When to stop.
+    /// Stopping criteria.
     pub stop: Stopping,
-    /// How the linear system of each step is solved.
+    /// Solver of the linear system of each step.
     pub linear: LinearSolver,
 }
 
-/// Rises of the cost in a row that end a solve.
+/// Consecutive rises of the cost that end a solve.
 const RISES: usize = 5;
-/// Halvings of one step.
+/// Maximum number of halvings of one step.
 const HALVINGS: usize = 30;
 
 #[typetag::serialize(name = "gauss_newton")]
@@ -84,7 +84,7 @@ fn iterate(descent: &mut Descent<'_>, best: &mut Best) -> Termination {
         }
         rises = if descent.trial.cost > descent.at.cost && !descent.settled(&step) { rises + 1 } else { 0 };
         descent.record(&step, true);
-        // a step that was halved is small for another reason
+        // a step that is small because of halvings does not show convergence
         let is_cut = halvings > 0 && !descent.is_small(step.predicted);
         match descent.take(&step) {
             Some(termination) if !is_cut => return termination,

@@ -1,4 +1,4 @@
-//! Graduated non-convexity: outliers told from inliers, without knowing beforehand which is which.
+//! Graduated non-convexity: classifies factors as outliers or inliers without prior knowledge.
 use crate::Solution;
 use crate::linear::settings::LinearSolver;
 use crate::observer::Observer;
@@ -23,17 +23,18 @@ pub use candidates::{Candidates, FactorType, UnknownFactor, is_sequential};
 pub use parameters::{Growth, Probability};
 pub use surrogate::Truncation;
 
-/// Rejects outliers: solves with all factors, then with ever less weight on those that do not fit.
+/// Rejects outliers: solves with all factors, then with decreasing weights on factors that do not fit.
 ///
-/// Yang, Antonante, Tzoumas, Carlone, *Graduated Non-Convexity for Robust Spatial Perception*, RA-L 2020. Each
-/// candidate i costs c²ρ_μ(‖rᵢ‖²/c²), where c² is what an inlier may have; μ leads from a convex ρ_μ to one that is
-/// truncated. For each μ the weighted problem is solved from the last estimate and from the best registered start
-/// for the weighted graph, and the better of the two goes on. At the end the same is tried with fewer and with more
-/// factors than those that fit, as long as that lowers the robust cost.
+/// Yang, Antonante, Tzoumas, Carlone, *Graduated Non-Convexity for Robust Spatial Perception*, RA-L 2020.
+/// Each candidate i costs c²ρ_μ(‖rᵢ‖²/c²), with the inlier bound c². μ leads from a convex ρ_μ to a
+/// truncated one. For each μ the weighted problem is solved from the last estimate and from the best
+/// registered start for the weighted graph. The better of the two results is kept. At the end, solves with
+/// fewer and with more factors than the inliers are tried, as long as they lower the robust cost.
 ///
-/// Candidates are loop closures: factors that couple variables, except the only one between variables that follow one another. A factor's own loss stays; its cost is
-/// what counts as ‖r‖². The outcome lists the factors that are rejected. Its costs are those of the weighted problem:
-/// the first with all factors, the last with what is kept.
+/// Candidates are loop closures: factors that couple variables, except the only factor between two
+/// consecutive variables. A factor's own loss stays; its cost replaces ‖r‖². The outcome lists the rejected
+/// factors. Its costs belong to the weighted problem: the initial cost with all factors, the final cost
+/// with the remaining ones.
 ///
 /// ```toml
 /// solver = { type = "gnc", probability = 0.99, types = ["between_se2"], solver = { type = "dogleg" } }
@@ -43,22 +44,22 @@ pub use surrogate::Truncation;
 pub struct Gnc {
     /// The robust cost.
     pub cost: Truncation,
-    /// Share of the inliers that are to be kept: c² is the χ² quantile for the rows of each factor.
+    /// Share of the inliers to keep: c² is the χ² quantile for the rows of each factor.
     pub probability: Probability,
-    /// c itself, in standard deviations, for all factors, instead of `probability`.
+    /// c in standard deviations, for all factors, instead of `probability`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold: Option<Positive>,
     /// The factors that may be outliers.
     pub candidates: Candidates,
-    /// Of these only the ones of these types, where any are given.
+    /// Restricts the candidates to these factor types. Default: no restriction.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub types: Vec<FactorType>,
-    /// Factors that are trusted in any case: their places in the graph, from 0.
+    /// Factors that are always trusted, by index in the graph, from 0.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inliers: Vec<usize>,
-    /// Factor from one μ to the next; the paper's is 1.4.
+    /// Factor between consecutive values of μ; 1.4 in the paper.
     pub step: Growth,
-    /// Solves with the weights that are found at the end.
+    /// Solver for the final weights.
     pub solver: Arc<dyn Optimizer>,
 }
 
@@ -105,7 +106,7 @@ impl Optimizer for Gnc {
 register!(dyn Optimizer, "gnc", Gnc);
 
 impl Gnc {
-    /// By factor: what an inlier may cost, ½c²; `None` for those that are trusted.
+    /// Returns the inlier bound ½c² of each factor; `None` for trusted factors.
     fn bounds(&self, problem: &Problem) -> Vec<Option<f64>> {
         let named = |name: &str| self.types.is_empty() || self.types.iter().any(|t| t.as_str() == name);
         let mut may = self.candidates.of(problem);

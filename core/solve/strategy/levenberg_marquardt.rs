@@ -14,9 +14,9 @@ use serde::{Deserialize, Serialize};
 
 /// Damped steps, each of which lowers the cost: (H + λ diag H) δ = -g.
 ///
-/// λ falls by up to `decrease` after a step that does what the model predicts, and rises after one that
-/// does not (Nielsen's rule). A refused step costs a factorization, not a linearization. Nothing but
-/// damping may hold a direction: the outcome then names it as undetermined.
+/// λ follows Nielsen's rule: it falls by a factor of up to `decrease` after a step that agrees with the
+/// model, and rises after other steps. A rejected step costs a factorization, not a linearization. If only
+/// damping constrains a direction, the outcome reports it as undetermined.
 ///
 /// ```toml
 /// solver = { type = "levenberg_marquardt", initial_lambda = 1e-5, stop = { relative_cost = 1e-6 } }
@@ -26,17 +26,17 @@ use serde::{Deserialize, Serialize};
 pub struct LevenbergMarquardt {
     /// Damping of the first step, as a share of the diagonal.
     pub initial_lambda: Positive,
-    /// Least damping.
+    /// Minimum damping.
     pub min_lambda: Positive,
-    /// Damping at which a solve gives up.
+    /// Maximum damping, at which a solve gives up.
     pub max_lambda: Positive,
-    /// Largest factor by which one good step lowers the damping.
+    /// Largest factor by which a successful step lowers the damping.
     pub decrease: OneOrMore,
-    /// Least and largest entry of the diagonal that is used for damping.
+    /// Lower and upper bound of the diagonal entries for damping.
     pub diagonal: DiagonalLimits,
-    /// When to stop.
+    /// Stopping criteria.
     pub stop: Stopping,
-    /// How the linear system of each step is solved.
+    /// Solver of the linear system of each step.
     pub linear: LinearSolver,
 }
 
@@ -54,7 +54,7 @@ impl Default for LevenbergMarquardt {
     }
 }
 
-/// The least and the largest entry of the diagonal that is used for damping: two numbers, 0 ≤ least ≤ most.
+/// Lower and upper bound of the diagonal entries for damping: two numbers, 0 ≤ least ≤ most.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "[f64; 2]", into = "[f64; 2]")]
 #[schemars(with = "[f64; 2]")]
@@ -63,7 +63,7 @@ pub struct DiagonalLimits {
     most: f64,
 }
 
-/// Limits that are not in order, or not numbers.
+/// The error for bounds in the wrong order, or NaN.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected two numbers, 0 ≤ least ≤ most, got [{}, {}]", .0[0], .0[1])]
 pub struct NotLimits([f64; 2]);
@@ -82,26 +82,29 @@ impl From<DiagonalLimits> for [f64; 2] {
 }
 
 impl DiagonalLimits {
-    /// Damping by the same number in every direction, instead of the diagonal.
+    /// Equal damping in every direction, instead of the diagonal.
     pub const EVEN: Self = Self { least: 1.0, most: 1.0 };
 }
 
-/// Least share of the predicted decrease that makes a step good enough to take.
+/// A step is accepted if it reaches this share of the predicted decrease.
 const GAIN: f64 = 1e-4;
-/// Damping that changes a step by next to nothing: one that is refused with less calls for more than twice as much.
+/// Minimum λ after a rejected step, because a smaller λ changes the step by almost nothing.
 const NEGLIGIBLE: f64 = 1e-3;
-/// Damping above which a small step alone is no sign of a minimum, as a share of the diagonal.
+/// λ above which a small step alone does not indicate a minimum.
 const TRUSTED: f64 = 1.0;
-/// Share of the slope along a step above which damping holds it back: a diagonal with bounds may be far above that of H.
+/// Share of the slope due to damping above which damping holds the step back. With bounds, the damping
+/// diagonal may far exceed that of H.
 const HELD: f64 = 0.5;
-/// Share of the cost that a step without damping must promise for one that is held back to be no end. Less than that is gained
-/// along directions that next to nothing constrains, by steps without end.
+/// A step that damping holds back does not end the solve if an undamped step predicts a decrease above this
+/// share of the cost. Smaller decreases come from nearly undetermined directions, along which the steps
+/// would never end.
 const MUCH: f64 = 1e-3;
-/// Share of the slope above which damping may hold a step back in one direction of many, such as a landmark's along its ray.
-/// A step without damping may run off in other directions, so that only a promise of half of the cost counts.
+/// Share of the slope due to damping above which damping may hold back a step in one of many directions,
+/// such as a landmark along its ray. The limit for the predicted decrease is then `MOST`, because an
+/// undamped step may diverge in the remaining directions.
 const TOUCHED: f64 = 1e-6;
 const MOST: f64 = 0.5;
-/// Damping up to which one small step means convergence; above, it takes two.
+/// λ up to which one small step means convergence; above, two in a row are required.
 const LIGHT: f64 = 1e-2;
 
 #[typetag::serialize(name = "levenberg_marquardt")]
@@ -117,11 +120,11 @@ impl Optimizer for LevenbergMarquardt {
 }
 register!(dyn Optimizer, "levenberg_marquardt", LevenbergMarquardt);
 
-/// The least and the largest entry of the diagonal that is used for damping, at a linearization.
+/// Lower and upper bound of the diagonal entries for damping, at a linearization.
 pub(crate) type Bounds<'a> = &'a dyn Fn(&Descent<'_>) -> [f64; 2];
 
 impl LevenbergMarquardt {
-    /// As `solve`, with bounds of the diagonal that may follow the cost.
+    /// Like `descend`, with bounds of the diagonal that may depend on the cost.
     pub(crate) fn solve_within(
         &self,
         bounds: Bounds<'_>,
@@ -140,7 +143,7 @@ impl LevenbergMarquardt {
             }
             lambda = *self.initial_lambda;
         };
-        // damping hides what nothing else holds; by now there is little left of it
+        // damping hides undetermined directions; by now it is small enough to detect them
         let open = match termination {
             Termination::Interrupted | Termination::NonFinite { .. } => None,
             _ if descent.iterations == 0 => None,
@@ -177,7 +180,7 @@ impl LevenbergMarquardt {
                         let fall = (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / *self.decrease).min(1.0);
                         (*lambda, rise) = ((*lambda * fall).max(*self.min_lambda), 2.0);
                         let ended = descent.take(&step);
-                        // a step that damping has made small says little of the cost around
+                        // a step that is small because of damping does not show convergence
                         let small = ended.is_some() && is_trusted;
                         match ended {
                             Some(_) if doubt.is_some_and(|share| descent.promises(&mut step, share)) => {

@@ -1,4 +1,4 @@
-//! What a solver is, and when it stops.
+//! The interface of solvers, and stopping criteria.
 use crate::Solution;
 use crate::linear::settings::LinearSolver;
 use crate::observer::Observer;
@@ -11,20 +11,20 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
-/// A strategy that lowers the cost of a problem. Chosen by name.
+/// A solver, which lowers the cost of a problem. Documents choose it by name.
 #[typetag::serialize(tag = "type")]
 pub trait Optimizer: Debug + Send + Sync {
-    /// Moves a compiled problem's estimate downhill from where it is, to a minimum or as far as it gets. The estimate is the
-    /// best found, however that ends. It is what a loop calls that keeps its problem.
+    /// Moves the estimate of a compiled problem to a minimum, or as close as possible. The final estimate
+    /// is the best one found, for every termination. Loops that keep their problem call it directly.
     fn descend(&self, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome;
 
-    /// How the linear system of each step is solved.
+    /// Returns the settings of the linear solver for each step.
     fn linear(&self) -> LinearSolver {
         LinearSolver::default()
     }
 
-    /// Solves a graph: compiles it, and [`descend`](Self::descend)s from `values`. A solver that begins elsewhere as well, as
-    /// `auto` does with the registered starts, overrides this. [`solve`](crate::solve()) calls it.
+    /// Compiles a graph, and [`descend`](Self::descend)s from `values`. Override it in a solver with
+    /// further starts, such as the registered starts of `auto`. [`solve`](crate::solve()) calls it.
     ///
     /// # Errors
     /// If graph and values do not fit each other.
@@ -42,11 +42,11 @@ pub trait Optimizer: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn Optimizer, "solver");
 
-/// When to stop.
+/// Stopping criteria.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Stopping {
-    /// Most linearizations.
+    /// Maximum number of linearizations.
     pub max_iterations: usize,
     /// Stop once a step changes the cost by less than this share of it.
     pub relative_cost: NotNegative,

@@ -1,4 +1,4 @@
-//! Where a solve begins: initial values by a strategy that is chosen by name.
+//! Starts: strategies for initial values, chosen by name.
 use crate::linear::BlockSystemError;
 use manifactor_graph::noise::NoiseError;
 use manifactor_graph::{Graph, Key, ValueError, Values, register};
@@ -6,19 +6,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
-/// A strategy that finds initial values. Chosen by name.
+/// A strategy for initial values. Documents choose it by name.
 #[typetag::serialize(tag = "type")]
 pub trait Start: Debug + Send + Sync {
-    /// Values to begin with: `values`, with those replaced and added that the strategy has something to say
-    /// of. Held variables keep their values, and the order of the values stays.
+    /// Returns initial values: a copy of `values`, with values replaced and added by the strategy. Fixed
+    /// variables keep their values, and the order of the values stays.
     ///
     /// # Errors
     /// If the strategy does not apply to the graph, or the graph does not fit its values.
     fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError>;
 
-    /// Returns whether `minimum`, which a solve from other values has led to, looks wrong, so that it is worth beginning
-    /// here as well. [`Auto`](crate::Auto) asks after each solve: the answer must take almost no time, and may
-    /// not depend on the unit of the noise. Default: no.
+    /// Returns whether `minimum`, the result of a solve from different values, looks wrong, so that this
+    /// start is worth a try. [`Auto`](crate::Auto) calls it after each solve. It must take almost no time,
+    /// and must not depend on the unit of the noise. Default: no.
     fn doubts(&self, _graph: &Graph, _minimum: &Values) -> bool {
         false
     }
@@ -26,52 +26,52 @@ pub trait Start: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn Start, "start");
 
-/// Why there are no initial values.
+/// The error of a start without initial values.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StartError {
-    /// A factor takes a variable for another type than its value has.
+    /// A variable has a different type than its factor requires.
     #[error(transparent)]
     Value(#[from] ValueError),
-    /// Noise of a factor that does not fit its residual.
+    /// The noise of a factor does not fit its residual.
     #[error("factor {factor}: {source}")]
     Noise {
         /// The factor, from 0 in the order of the graph.
         factor: usize,
-        /// What is wrong with it.
+        /// The error of the noise.
         source: NoiseError,
     },
-    /// The strategy finds nothing in the graph to work on.
+    /// The graph contains nothing that the strategy can use.
     #[error(
         "the start `{start}` does not apply to this graph: it needs {needs}; choose another, such as `given`"
     )]
     NotApplicable {
-        /// Its name.
+        /// Name of the start.
         start: &'static str,
-        /// What it would need.
+        /// The requirements of the start.
         needs: &'static str,
     },
-    /// The measurements leave something open.
+    /// The measurements leave variables undetermined.
     #[error(
         "the start `{start}`: the measurements leave the {what} of some of the {variables} variables around \
          `{key}` open, or their noise is too uneven for f64; choose another start, such as `given`"
     )]
     Open {
-        /// The start's name.
+        /// Name of the start.
         start: &'static str,
-        /// What is left open: `rotations`, `positions`.
+        /// The undetermined quantities: `rotations`, `positions`.
         what: &'static str,
         /// The first variable of the system.
         key: Key,
-        /// How many there are.
+        /// Number of variables of the system.
         variables: usize,
     },
-    /// Its linear system does not fit into memory.
+    /// The linear system of the start does not fit into memory.
     #[error(transparent)]
     System(#[from] BlockSystemError),
 }
 
-/// The values that came with the graph, as they are.
+/// The values from the graph's document, unchanged.
 ///
 /// ```toml
 /// start = { type = "given" }

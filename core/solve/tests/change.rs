@@ -28,7 +28,7 @@ fn a_loop_changes_measurements_and_noise_and_compiles_once() {
     problem.set_noise(1, &Noise::sigma(1.0).unwrap()).unwrap();
     let changed = solved(&mut problem);
     let covariance = problem.factorized().unwrap().marginal("x").unwrap();
-    // the same as the graph with these, compiled anew
+    // equals the changed graph, compiled again
     graph.factors_mut()[1] = {
         let mut other = Graph::new();
         other.add(["x"], At { at: [7.0, 0.0] }).noise(Noise::sigma(1.0).unwrap());

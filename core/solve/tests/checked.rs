@@ -1,4 +1,4 @@
-//! What a program hands over is checked, as a config is; and long steps can be interrupted.
+//! Arguments from code are checked like a config, and long steps can be interrupted.
 use crate::toy::*;
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// A number that is no point in the plane.
+/// A number that is not a point in the plane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 struct Other<T = f64>(T);
 
@@ -40,7 +40,7 @@ impl Manifold for Other {
 }
 register_manifold!("test_other", Other);
 
-/// Points in a row, of which the first is known.
+/// Points in a row with a measurement of the first.
 fn row(n: usize) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     graph.add(["p0"], At { at: [0.0, 0.0] });
@@ -91,7 +91,7 @@ fn values_are_checked() {
     assert_eq!(refused("p1", Box::new(Other(0.0))), ValueError::WrongType { key, expected, found });
     let key = "p1".into();
     assert_eq!(refused("p1", Box::new(Plane { x: f64::NAN, y: 0.0 })), ValueError::NotFinite { key });
-    // some of the variables are enough
+    // values for some of the variables are enough
     let mut values = Values::new();
     values.insert("p2", Plane { x: 7.0, y: 7.0 });
     problem.set_values(&values).unwrap();
@@ -113,7 +113,7 @@ fn a_config_is_checked_when_it_is_read() {
     }
 }
 
-/// Says stop when it is asked for the third time.
+/// Requests the end at the third poll.
 struct Third(usize);
 
 impl Observer for Third {

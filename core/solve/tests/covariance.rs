@@ -48,7 +48,7 @@ fn joint_covariances_have_what_is_common() {
     let mut problem = Problem::compile(&graph, &values).unwrap();
     let joint = problem.joint_covariance(&["p7", "p2"]).unwrap();
     assert!((joint[(0, 0)] - 0.32).abs() < 1e-12 && (joint[(3, 3)] - 0.27).abs() < 1e-12);
-    // both have the error of the way to p2
+    // both share the error of the path to p2
     assert!((joint[(0, 2)] - 0.27).abs() < 1e-12 && joint[(0, 3)].abs() < 1e-12);
     let unknown = problem.joint_covariance(&["p2", "q"]).unwrap_err();
     assert_eq!(unknown.to_string(), "there is no variable `q`");
@@ -63,7 +63,7 @@ fn what_is_held_is_certain() {
     let of = |key: &str| &marginals.iter().find(|(k, _)| k.as_str() == key).unwrap().1;
     assert_eq!(of("p3").amax(), 0.0);
     assert!(of("p1")[(0, 0)] == 0.0 && of("p1")[(1, 1)] > 0.0);
-    // between p1 and p3 along x, each of them certain: half the variance of a step
+    // between p1 and p3, which are both fixed along x: half the variance of a step
     assert!((of("p2")[(0, 0)] - 0.005).abs() < 1e-12);
 }
 
@@ -81,7 +81,7 @@ fn nothing_to_hold_it_is_an_error_with_a_name() {
 #[test]
 fn leverages_add_up_to_the_number_of_unknowns() {
     let (mut graph, values) = chain(6);
-    // a chain alone has nothing to spare; a second opinion on its second step shares that step
+    // a chain has no redundancy; a second measurement of one step shares its leverage
     let (by, noise) = ([1.0, 0.0], Noise::sigma(0.1).unwrap());
     graph.add(["p1", "p2"], Apart { by }).noise(noise);
     let leverages = Problem::compile(&graph, &values).unwrap().leverages().unwrap();
@@ -98,7 +98,7 @@ fn what_is_held_takes_nothing_up() {
     let (mut graph, values) = chain(3);
     graph.fix_directions("p1", &["x"]);
     let leverages = Problem::compile(&graph, &values).unwrap().leverages().unwrap();
-    // along x the first point is measured twice: by itself, and by the one that is held
+    // along x the first point has two measurements: its own, and the one from the fixed point
     let total: f64 = leverages.iter().flatten().sum();
     assert!((total - 5.0).abs() < 1e-8, "{leverages:?}");
 }
@@ -124,7 +124,7 @@ fn a_question_takes_the_factorization_at_hand() {
         assert!((&one - of_all).amax() < 1e-12, "{key}");
     }
     assert!(factorized > 0.0 && problem.times().factorize == factorized);
-    // of a changed estimate, the covariance is another: here a weight has changed
+    // a changed problem has a different covariance: here a weight has changed
     problem.set_weights(&vec![0.25; problem.factors()]).unwrap();
     let one = problem.factorized().unwrap().marginal("p77").unwrap();
     assert!((one - &all[77].1 * 4.0).amax() < 1e-9 && problem.times().factorize > factorized);

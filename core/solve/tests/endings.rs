@@ -1,4 +1,5 @@
-//! How solves end: what is not finite, what takes no part and what is open are named, by every solver.
+//! Terminations of all solvers: they report values that are not finite, inactive factors and undetermined
+//! directions.
 use crate::toy::*;
 use manifactor_graph::{Graph, Noise, Values};
 use manifactor_solve::{Optimizer, Outcome, Silent, Solution, Stall, Termination, solve};
@@ -15,20 +16,20 @@ fn solver(name: &str, method: &str) -> Box<dyn Optimizer> {
     serde_json::from_str(&format!(r#"{{"type": "{name}", {settings}}}"#)).unwrap()
 }
 
-/// By every solver.
+/// Solutions of every solver.
 fn solutions(graph: &Graph, values: &Values) -> Vec<(&'static str, Solution)> {
     let one = |name| (name, solve(graph, values, &*solver(name, "auto"), &mut Silent).unwrap());
     SOLVERS.into_iter().map(one).collect()
 }
 
-/// Points, and no factor yet.
+/// Points without a factor.
 fn points(at: &[(&str, [f64; 2])]) -> (Graph, Values) {
     let mut values = Values::new();
     at.iter().for_each(|(key, [x, y])| drop(values.insert(*key, Plane { x: *x, y: *y })));
     (Graph::new(), values)
 }
 
-/// The factor that an outcome blames, and the first of its keys.
+/// The factor that an outcome reports as not finite, and its first key.
 fn blamed(outcome: &Outcome) -> (usize, &str) {
     let Termination::NonFinite { factor, keys } = &outcome.termination else { panic!("{outcome:?}") };
     (*factor, keys[0].as_str())
@@ -130,7 +131,7 @@ fn a_variable_without_a_factor_that_takes_part_is_named() {
             (1, "toy_logarithm", 1),
             "{name}"
         );
-        // the rest is solved, and what nothing touches stays where it is
+        // the rest is solved, and variables without an active factor stay unchanged
         let at = |key| values.get::<Plane>(key).unwrap();
         assert!((at("p").x - 2.0).abs() + (at("p").y - 3.0).abs() < 1e-6, "{name}");
         assert_eq!((at("loose").x, at("behind").x), (1.0, -1.0), "{name}");
@@ -161,7 +162,7 @@ fn a_factor_of_weight_zero_takes_no_part() {
 
 #[test]
 fn all_solvers_agree_where_nothing_holds_a_part() {
-    // two points of known distance and direction, nothing that says where; and one that is known
+    // two points of known distance and direction but undetermined position, and a known point
     let (mut graph, values) = points(&[("a", [0.0, 0.0]), ("b", [5.0, 5.0]), ("c", [5.0, 5.0])]);
     graph.add(["a", "b"], Apart { by: [1.0, 0.0] });
     graph.add(["c"], At { at: [2.0, 3.0] });
@@ -174,7 +175,7 @@ fn all_solvers_agree_where_nothing_holds_a_part() {
             let open =
                 outcome.undetermined.as_ref().unwrap_or_else(|| panic!("{name} {method}: {outcome:?}"));
             assert_eq!(open.moving, 2, "{name} {method}: {open}");
-            // what is open has not run away
+            // the undetermined points have not drifted away
             let a = solution.values.get::<Plane>("a").unwrap();
             assert!((a.x - 2.0).abs() + (a.y - 2.5).abs() < 1e-3, "{name} {method}: {a:?}");
         }

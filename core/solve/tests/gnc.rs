@@ -17,7 +17,7 @@ fn rejected(solution: &Solution) -> Vec<usize> {
     solution.outcome.rejected.iter().map(|r| r.factor).collect()
 }
 
-/// One point, seen at the origin by `right` and at (8, 1) by `wrong`.
+/// One point, measured at the origin by `right` factors and at (8, 1) by `wrong` ones.
 fn votes(right: usize, wrong: usize) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: 8.0, y: 2.0 });
@@ -29,7 +29,7 @@ fn votes(right: usize, wrong: usize) -> (Graph, Values) {
     (graph, values)
 }
 
-/// Points on a line, each tied to the next, and ties between points further apart, `wrong` of them off by metres.
+/// Points on a line with odometry, and loop closures between distant points, `wrong` of them off by metres.
 fn ladder(n: usize, wrong: usize) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let noise = || Noise::sigma(0.1).unwrap();
@@ -79,7 +79,7 @@ fn a_type_that_is_not_named_and_a_factor_that_is_trusted_stay() {
 
 #[test]
 fn the_threshold_is_in_standard_deviations() {
-    // the second of two equal votes is 0.8 away, in σ's of 0.1 eight, of which each side gets four
+    // the mean is 0.2, so the last measurement is 0.6 off: six times its σ of 0.1
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("p", Plane { x: 0.1, y: 0.0 });
     for x in [0.0, 0.0, 0.0, 0.8] {
@@ -107,7 +107,7 @@ fn a_weight_counts_like_so_many_factors() {
     }
     let (a, b) = (weighed.marginals().unwrap(), doubled.marginals().unwrap());
     assert!((&a[0].1 - &b[0].1).norm() < 1e-12);
-    // zero is to leave the factor out
+    // a zero weight equals removing the factor
     weighed.set_weights(&[1.0, 1.0, 1.0, 0.0]).unwrap();
     let mut without = graph.clone();
     without.factors_mut().pop();

@@ -1,4 +1,4 @@
-//! A solve that has ended is at a minimum of the cost: not at a maximum or a saddle, and whatever the unit of the noise.
+//! A solve ends at a minimum of the cost, not at a maximum or a saddle, for any unit of the noise.
 use crate::toy::*;
 use manifactor_graph::loss::Tukey;
 use manifactor_graph::{Graph, Lifted, Noise, Residual, Scalar, Values, register_factor};
@@ -13,7 +13,7 @@ fn solver(name: &str) -> Box<dyn Optimizer> {
     serde_json::from_str(&format!(r#"{{"type": "{name}"}}"#)).unwrap()
 }
 
-/// By every solver.
+/// Solutions of every solver.
 fn solutions(graph: &Graph, values: &Values) -> Vec<(&'static str, Solution)> {
     SOLVERS
         .into_iter()
@@ -54,7 +54,8 @@ impl Residual for FreudensteinRoth {
 }
 register_factor!("toy_freudenstein_roth", FreudensteinRoth);
 
-/// Two anchors at (±1, 0), and a point that is 2 from both: on the line between them the cost has a saddle.
+/// Two anchors at (±1, 0), and a point at distance 2 from both. On the line between them the cost has a
+/// saddle.
 fn between_two_anchors(x: f64, sigma: f64) -> (Graph, Values) {
     let (mut graph, mut values) = point(x, 0.0);
     for (key, x) in [("a", -1.0), ("b", 1.0)] {
@@ -159,7 +160,7 @@ fn a_local_minimum_to_rounding_is_converged() {
 
 #[test]
 fn a_point_that_starts_very_far_off_is_found() {
-    // farther off, the depth is lost in the digits of a number, and the diagnosis says that nothing constrains it
+    // from further away, rounding hides the depth, and the diagnosis reports it as undetermined
     for (far, aside) in [1e2, 1e4, 1e5, 1e6, 1e7].into_iter().flat_map(|far| [(far, 0.3), (far, 1.5)]) {
         let (mut graph, values) = point(0.3, far);
         for from in [0.0, 1.0, -0.5] {

@@ -304,7 +304,7 @@ fn the_diagnosis_names_the_worst_factors_and_the_condition() {
     let first = &diagnosis.worst[0];
     assert_eq!((&*first.name, first.keys[0].as_str(), first.weight), ("toy_at", "p", 1.0));
     assert!((first.cost - 0.5 * 6.5 * 6.5).abs() < 1e-6 && (first.residual[0].abs() - 6.5).abs() < 1e-6);
-    // two blocks that are almost apart: [1, c; c, 1] with c = 0.01/√(14.01·1.01), of which all eigenvalues are 1 ± c
+    // two blocks that are almost uncoupled: [1, c; c, 1] with c = 0.01/√(14.01·1.01) has eigenvalues 1 ± c
     let c = 0.01 / (14.01_f64 * 1.01).sqrt();
     let condition = diagnosis.condition.unwrap();
     assert!(condition >= 1.0 - 1e-9 && condition <= (1.0 + c) / (1.0 - c) + 1e-9, "{condition}");
@@ -312,7 +312,7 @@ fn the_diagnosis_names_the_worst_factors_and_the_condition() {
 
 #[test]
 fn the_condition_is_that_of_the_scaled_matrix() {
-    // two points tied k times as firmly to one another as to the ground: eigenvalues 1 and 1 + 2k
+    // two points with k times more information between them than to the ground: eigenvalues 1 and 1 + 2k
     for k in [10.0, 1e6] {
         let (mut graph, mut values) = (Graph::new(), Values::new());
         for key in ["p", "q"] {

@@ -1,4 +1,4 @@
-//! What a check found, in the names of the factor's variables and directions.
+//! Report of a factor check, with the names of variables and directions.
 use super::Subject;
 use crate::error::LawError;
 use crate::freedom::Freedom;
@@ -13,108 +13,108 @@ use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::fmt::{self, Display, Formatter};
 
-/// What a check found.
+/// Report of a factor check.
 #[derive(Debug, Clone, Serialize)]
 pub struct FactorReport {
-    /// The factor, as a document writes it.
+    /// The factor as in a document.
     pub factor: Value,
-    /// Where the random numbers began.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// How many points were looked at.
+    /// Number of examined points.
     pub drawn: usize,
-    /// At how many of them the factor is defined.
+    /// Number of points at which the factor is defined.
     pub defined: usize,
-    /// How many of those were at or near a singular point of a manifold.
+    /// Number of defined points at or near a singular point of a manifold.
     pub singular: usize,
-    /// The entry of the Jacobian that is furthest from differences, though not too far.
+    /// The entry of the Jacobian with the largest accepted difference from numeric differentiation.
     pub worst: Option<NamedEntry>,
-    /// How many directions the variables have, and how many of them the residual sees.
+    /// Number of directions of all variables.
     pub directions: usize,
-    /// The largest rank of the Jacobian at any point that is neither singular nor at a kink.
+    /// Largest rank of the Jacobian at any point that is neither singular nor at a kink.
     pub rank: usize,
-    /// Directions that the residual does not see, to first order.
+    /// Directions that do not change the residual, to first order.
     pub free: Vec<FreeDirections>,
-    /// Where the residual has no derivative, jumps first.
+    /// Points without a derivative of the residual, jumps first.
     pub kinks: Vec<NamedKink>,
-    /// What its author says leaves it unchanged, and did.
+    /// Stated invariances that held.
     pub unchanged: Vec<Unchanged>,
     /// The law that does not hold.
     pub broken: Option<Broken>,
 }
 
-/// An entry of a Jacobian, by two ways.
+/// An entry of a Jacobian, computed in two ways.
 #[derive(Debug, Clone, Serialize)]
 pub struct NamedEntry {
     /// Variable and direction: `q0.rx`.
     pub direction: String,
-    /// The row, from 0.
+    /// The row, counted from 0.
     pub row: usize,
-    /// By automatic differentiation.
+    /// Value by automatic differentiation.
     pub automatic: f64,
-    /// By differences.
+    /// Value by numeric differentiation.
     pub numeric: f64,
-    /// How far they are apart, relative to the largest entry of the block, or to 1.
+    /// Difference, relative to the largest entry of the block or to 1.
     pub error: f64,
-    /// The point, as a literal graph that reproduces it.
+    /// The point as a graph document that reproduces it.
     pub at: Value,
 }
 
 /// Free directions: single ones, and the number of combinations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FreeDirections {
-    /// How many combinations are free.
+    /// Number of free combinations.
     pub count: usize,
-    /// Of which directions.
+    /// Directions that are combined.
     pub among: Vec<String>,
 }
 
-/// A kink or a jump: entries of the Jacobian that have no derivative at the same points.
+/// A kink or a jump: entries of the Jacobian that have no derivative at common points.
 #[derive(Debug, Clone, Serialize)]
 pub struct NamedKink {
     /// Variables and directions: `q0.rx`.
     pub directions: Vec<String>,
-    /// The rows, from 0.
+    /// The rows, counted from 0.
     pub rows: Vec<usize>,
-    /// Of the entry where it is largest: the derivative from below.
+    /// Derivative from below, of the entry with the largest kink.
     pub before: f64,
-    /// The derivative from above.
+    /// Derivative from above, of this entry.
     pub after: f64,
-    /// How far the residual itself jumps; 0 at a kink.
+    /// Jump of the residual; 0 at a kink.
     pub jump: f64,
-    /// At how many points it was met.
+    /// Number of points with this kink.
     pub points: usize,
-    /// The one where it is largest, as a literal graph.
+    /// The point with the largest kink, as a graph document.
     pub at: Value,
 }
 
 /// A motion that leaves the residual unchanged.
 #[derive(Debug, Clone, Serialize)]
 pub struct Unchanged {
-    /// The motion, in its author's words.
+    /// Description of the motion by the author of the factor.
     pub motion: &'static str,
-    /// At how many points it was tried.
+    /// Number of points at which it was tested.
     pub points: usize,
 }
 
 /// A law that does not hold.
 #[derive(Debug, Clone, Serialize)]
 pub struct Broken {
-    /// What is wrong, and where.
+    /// The error.
     pub message: String,
-    /// The point, as a literal graph that reproduces it.
+    /// The point as a graph document that reproduces it.
     pub at: Value,
 }
 
 impl FactorReport {
-    /// Returns whether every law holds, at one point at least.
+    /// Returns whether every law holds, and the factor is defined at one point at least.
     pub fn holds(&self) -> bool {
         self.broken.is_none() && self.defined > 0
     }
 }
 
-/// Kinks, or jumps, of rows that they have in common.
+/// Kinks, or jumps, with common rows.
 pub(super) struct Met {
-    /// Variable, direction and row.
+    /// Variable, direction and row of each entry.
     entries: BTreeSet<(usize, usize, usize)>,
     largest: Kink,
     points: usize,
@@ -142,7 +142,7 @@ impl Met {
     }
 }
 
-/// What a check has found so far.
+/// Results of a check so far.
 pub(super) struct Gathered {
     pub seed: u64,
     pub drawn: usize,
@@ -172,7 +172,7 @@ impl Gathered {
         }
     }
 
-    /// Keeps an entry, if it is the worst so far.
+    /// Keeps an entry if it is the worst so far.
     pub(super) fn entry(&mut self, subject: &Subject, entry: Option<JacobianEntry>, drawn: &Drawn) {
         let Some(JacobianEntry { variable, column, row, found, expected, error }) = entry else { return };
         if self.worst.as_ref().is_none_or(|worst| error > worst.error) {
@@ -182,7 +182,7 @@ impl Gathered {
         }
     }
 
-    /// Keeps the kinks and jumps of one point. What has a row in common with some that were met before is the same.
+    /// Adds the kinks and jumps of one point. They are merged with known ones that have a row in common.
     pub(super) fn kinks(&mut self, subject: &Subject, kinks: &[Kink], drawn: &Drawn) {
         let (jumps, kinks): (Vec<&Kink>, Vec<&Kink>) = kinks.iter().partition(|kink| kink.jump != 0.0);
         for kinks in [jumps, kinks] {
@@ -214,7 +214,7 @@ impl Gathered {
             {
                 format!("not unchanged by {law}: row {row} is {found} after it, and was {expected}")
             }
-            // the rest of it is the point, which is shown in full
+            // the remaining lines are the point, which is shown in full
             other => other.to_string().lines().next().unwrap_or_default().to_owned(),
         };
         let broken = Some(Broken { message, at: subject.graph(&at.variables) });
@@ -303,13 +303,13 @@ fn points_in_words(n: usize) -> String {
     format!("{n} point{}", if n == 1 { "" } else { "s" })
 }
 
-/// Twelve digits: enough to see by how much two numbers differ that agree to 1e-9.
+/// Formats twelve digits, enough to see the difference of two numbers that agree to 1e-9.
 fn digits(x: f64) -> String {
     let rounded: f64 = format!("{x:.11e}").parse().unwrap_or(x);
     rounded.to_string()
 }
 
-/// `0, 1 and 2`.
+/// Formats a list of numbers: `0, 1 and 2`.
 fn and(numbers: &[usize]) -> String {
     let words: Vec<String> = numbers.iter().map(ToString::to_string).collect();
     match words.split_last() {
@@ -319,7 +319,7 @@ fn and(numbers: &[usize]) -> String {
     }
 }
 
-/// `x0.rx, x0.ry, l0.x`, each variable's directions together: `x0.(rx, ry), l0.x`.
+/// Groups `x0.rx, x0.ry, l0.x` by variable: `x0.(rx, ry), l0.x`.
 fn by_variable(directions: &[String]) -> String {
     let parts = directions.iter().map(|direction| direction.rsplit_once('.').unwrap_or(("", direction)));
     let mut groups: Vec<(&str, Vec<&str>)> = vec![];
@@ -336,7 +336,7 @@ fn by_variable(directions: &[String]) -> String {
     groups.iter().map(group).collect::<Vec<_>>().join(", ")
 }
 
-/// `: q0.(x, y), 2 combinations of q0.(rx, ry, rz)`.
+/// Formats free directions: `: q0.(x, y), 2 combinations of q0.(rx, ry, rz)`.
 fn list(free: &[FreeDirections]) -> String {
     let (alone, mixed): (Vec<_>, Vec<_>) = free.iter().partition(|f| f.count == f.among.len());
     let alone: Vec<String> = alone.iter().flat_map(|f| f.among.iter().cloned()).collect();
@@ -349,7 +349,7 @@ fn list(free: &[FreeDirections]) -> String {
     if parts.is_empty() { String::new() } else { format!(": {}", parts.join("; ")) }
 }
 
-/// A literal graph in TOML, to paste into a file.
+/// Formats a graph document in TOML, to be pasted into a file.
 fn toml(graph: &Value) -> String {
     let inline = |value: &Value| toml::Value::try_from(value).map(|v| v.to_string()).unwrap_or_default();
     let mut out = String::new();

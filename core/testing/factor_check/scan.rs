@@ -1,17 +1,18 @@
-//! Jumps of a residual along a line: a point that happens to be at one is never drawn.
+//! Search for jumps of a residual along a line, because random points almost never hit a jump.
 use crate::jacobian::{At, Kink};
 use manifactor_graph::{Factor, Variable};
 
-/// How far a line goes to both sides, in units of the tangent.
+/// Length of the line to both sides, in units of the tangent.
 const REACH: f64 = 4.0;
-/// Steps of that length; no power of two, so that round numbers are not at their ends.
+/// Number of steps on each side. It is not a power of two, so that round numbers are not at step ends.
 const STEPS: i32 = 37;
-/// Halvings of the step where a row changes most.
+/// Number of halvings of the step with the largest change of a row.
 const HALVINGS: usize = 30;
-/// A change over the shortest step that is no jump yet, relative to the row or to 1.
+/// A smaller change over the shortest step is not a jump, relative to the row or to 1.
 const SMALL: f64 = 1e-6;
 
-/// The jumps along a tangent direction of one variable, the largest of each row, each with the variables just before it.
+/// Finds the jumps along a tangent direction of one variable, the largest one of each row. Each has the
+/// variables just before the jump.
 pub(super) fn jumps(
     factor: &dyn Factor,
     variables: &[&dyn Variable],
@@ -40,8 +41,9 @@ pub(super) fn jumps(
     found
 }
 
-/// Halves a step where a function changes, always the half that changes more; where it ends and how far the function jumps
-/// there. `None` where it is continuous, or not defined somewhere between.
+/// Halves a step repeatedly and keeps the half in which the function changes more. Returns the final position
+/// and the jump there. Returns `None` if the function is continuous, or not defined at an intermediate
+/// position.
 fn narrow(mut from: (f64, f64), mut to: (f64, f64), f: impl Fn(f64) -> Option<f64>) -> Option<(f64, f64)> {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (from.0 + to.0);

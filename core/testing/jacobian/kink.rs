@@ -1,42 +1,42 @@
-//! Places where a residual has no derivative: kinks, where the two sides have different ones, and jumps.
+//! Points without a derivative of the residual: kinks, with different derivatives on both sides, and jumps.
 use crate::differences::{Derivative, differentiate_from, jumps};
 use crate::jacobian::JacobianEntry;
 
-/// How far the derivatives of the two sides are apart, relative to their size, to make a kink.
+/// Smallest difference of the one-sided derivatives at a kink, relative to their size.
 const APART: f64 = 1e-3;
 
 /// An entry of a Jacobian at a kink or at a jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kink {
-    /// The variable's position, from 0.
+    /// Position of the variable, counted from 0.
     pub variable: usize,
-    /// The tangent direction, from 0.
+    /// The tangent direction, counted from 0.
     pub column: usize,
-    /// The row, from 0.
+    /// The row, counted from 0.
     pub row: usize,
     /// The derivative from below.
     pub before: f64,
     /// The derivative from above.
     pub after: f64,
-    /// How far the residual itself jumps; 0 at a kink.
+    /// Jump of the residual; 0 at a kink.
     pub jump: f64,
 }
 
 impl Kink {
-    /// How far the derivative jumps.
+    /// Returns the jump of the derivative.
     pub fn size(&self) -> f64 {
         (self.after - self.before).abs()
     }
 }
 
-/// The two sides of a point along one direction.
+/// Both sides of a point along one direction.
 pub(crate) struct Sides {
     before: Vec<Derivative>,
     after: Vec<Derivative>,
     jumps: Vec<f64>,
 }
 
-/// Looks at both sides; `None` where the residual is not defined on one of them.
+/// Evaluates both sides. Returns `None` if the residual is not defined on one of them.
 pub(crate) fn sides(rows: usize, step: f64, f: impl Fn(f64) -> Option<Vec<f64>>) -> Option<Sides> {
     let (down, up) = (jumps(-1.0, rows, step, &f)?, jumps(1.0, rows, step, &f)?);
     Some(Sides {
@@ -47,8 +47,8 @@ pub(crate) fn sides(rows: usize, step: f64, f: impl Fn(f64) -> Option<Vec<f64>>)
 }
 
 impl Sides {
-    /// The kink or jump that excuses an entry for having no derivative. At a kink the entry is to be that of one of
-    /// the sides, or between them.
+    /// Returns the kink or jump that explains a wrong entry. At a kink, the entry has to be the derivative of
+    /// one side, or lie between both.
     pub(crate) fn kink(&self, entry: &JacobianEntry) -> Option<Kink> {
         let &JacobianEntry { variable, column, row, found, .. } = entry;
         let (before, after, jump) = (self.before[row].value, self.after[row].value, self.jumps[row]);
@@ -62,8 +62,8 @@ impl Sides {
     }
 }
 
-/// The kink that excuses an entry which is among those that it has nearby, where those differ: a generalized gradient in
-/// Clarke's sense.
+/// Returns the kink that explains an entry within the range of different entries nearby. This is a
+/// generalized gradient in the sense of Clarke.
 pub(crate) fn hull(nearby: &[f64], entry: &JacobianEntry) -> Option<Kink> {
     let &JacobianEntry { variable, column, row, found, .. } = entry;
     let before = nearby.iter().copied().reduce(f64::min)?;

@@ -1,4 +1,4 @@
-//! What the program knows and how it is called: commands that read no data.
+//! Commands about the program itself, which read no data.
 mod completions;
 mod explain;
 mod list;

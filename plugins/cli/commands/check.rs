@@ -1,4 +1,4 @@
-//! `manifactor check`: a document, without solving anything.
+//! `manifactor check`: checks a document without solving anything.
 use crate::failure::Failure;
 use crate::input::document::Content;
 use crate::input::graph_file::{self, GraphFile, Reading};
@@ -17,33 +17,34 @@ use manifactor::slam::run::{Mapped, Run as Running};
 use manifactor::solve::{Problem, Silent};
 use serde_json::json;
 
-/// Half the length of an object, in metres, from which on it is more likely to be in millimetres.
+/// Semi-axis above which an object is probably given in millimetres. Unit: metres.
 const LARGE: f64 = 30.0;
 
-/// Check a run, an experiment or a graph without solving it: everything that is wrong, each at its line.
+/// Check a run, an experiment or a graph without solving it, and report every error with its line.
 ///
-/// Of a graph, and with --load of a run, its values are looked at too: factors that are not defined or not finite there,
-/// variables that nothing touches, directions that nothing or next to nothing constrains, signs of other units.
+/// For a graph, and with --load for a run, the initial values are checked too: undefined or non-finite
+/// factors, variables without factors, unconstrained or hardly constrained directions, and values with a
+/// suspicious unit.
 #[derive(Debug, Args)]
 pub(crate) struct Check {
     #[command(flatten)]
     run: RunArguments,
-    /// Load the data of a run and build its graphs too.
+    /// Also load the data of a run and build its graphs.
     #[arg(long)]
     load: bool,
     #[command(flatten)]
     reading: Reading,
-    /// Print JSON: what is wrong, or that nothing is.
+    /// Print JSON: the errors and warnings.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// What there is, and what stands out.
+/// Contents of a document, and warnings about it.
 #[derive(Default)]
 struct Found {
     lines: Vec<String>,
     warnings: Vec<String>,
-    /// Whether a factor is not finite where a solve is to begin.
+    /// Whether a factor is not finite at the initial values.
     is_broken: bool,
 }
 
@@ -74,7 +75,7 @@ impl Check {
         Ok(if *is_broken { Status::Broken } else { Status::Done })
     }
 
-    /// The settings of every trial are read; --load has no meaning here.
+    /// Reads the settings of every trial; --load has no effect.
     fn experiment(&self, mut document: Document) -> Result<Found, Failure> {
         document.set(&self.run.set)?;
         let sweep = Experiment::read(&document)?;
@@ -112,7 +113,7 @@ impl Check {
 }
 
 impl Found {
-    /// Looks at a graph where a solve of it would begin.
+    /// Checks a graph at the values from which a solve would begin.
     fn look(&mut self, graph: &Graph, values: &Values) -> Result<(), Failure> {
         let huge = |(key, value): (&Key, &dyn manifactor::graph::Variable)| {
             let quadric = value.erased().as_any().downcast_ref::<DualQuadric>()?;
@@ -140,7 +141,7 @@ impl Found {
     }
 }
 
-/// What a graph has, with what the reader had to decide on stderr.
+/// Returns the contents of a graph, and prints the decisions of the reader on stderr.
 fn graph(input: &GraphFile) -> Result<Found, Failure> {
     for note in &input.notes {
         output::note(note);
@@ -151,12 +152,13 @@ fn graph(input: &GraphFile) -> Result<Found, Failure> {
     Ok(found)
 }
 
-/// Returns whether a document is a literal graph. A run may have variables of its own, and has a source.
+/// Returns whether a document is a literal graph. A run may define `variables` too, but it also has a
+/// `source`.
 fn is_graph(document: &Document) -> bool {
     has(document, "variables") && !has(document, "source")
 }
 
-/// Returns whether it is an experiment: a run has no axes.
+/// Returns whether a document is an experiment; a run has no `axes`.
 fn is_experiment(document: &Document) -> bool {
     has(document, "axes") && !has(document, "source")
 }

@@ -1,4 +1,4 @@
-//! `manifactor evaluate`: a trajectory against the truth.
+//! `manifactor evaluate`: compares a trajectory with the ground truth.
 use crate::failure::Failure;
 use crate::output;
 use crate::output::text::{self, Table};
@@ -15,29 +15,30 @@ use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-/// Compare two trajectories in TUM's format (timestamp tx ty tz qx qy qz qw): ATE and RPE.
+/// Compare two trajectories in the TUM format (timestamp tx ty tz qx qy qz qw): ATE and RPE.
 ///
-/// With --boxes, compare which boxes go together to objects instead, in two files of detections (CSV, as of the source `tum`).
+/// With --boxes, compare the data association of two files of detections instead (CSV, as for the source
+/// `tum`).
 #[derive(Debug, Args)]
 pub(crate) struct Evaluate {
-    /// The true trajectory; or the true objects of boxes.
+    /// The true trajectory, or with --boxes the detections with their true objects.
     truth: PathBuf,
-    /// The estimated one; or those that they were put to.
+    /// The estimated trajectory, or with --boxes the detections with their estimated objects.
     estimate: PathBuf,
-    /// Compare objects of boxes: of equal boxes at equal times, the `object_key` of the one file with that of the other. Boxes that
-    /// have none, or 0, in the first do not count; in the second they are alone.
+    /// Compare the `object_key` of equal boxes at equal times. Boxes with no key, or with 0, are ignored in
+    /// the first file; in the second, each counts as an object by itself.
     #[arg(long, conflicts_with_all = ["align", "within", "delta", "all_pairs"])]
     boxes: bool,
-    /// How the estimate is brought into the frame of the truth.
+    /// Alignment of the estimate to the frame of the truth.
     #[arg(long, value_enum, default_value = "se3")]
     align: Align,
-    /// How far apart in time two poses of one pair may be, in seconds.
+    /// Largest time difference between two matched poses, in seconds.
     #[arg(long, value_name = "SECONDS", default_value = "0.02", value_parser = positive, allow_negative_numbers = true)]
     within: Positive,
-    /// Poses between the two ends of a relative error.
+    /// Number of poses between the two ends of a relative error.
     #[arg(long, value_name = "POSES", default_value = "1")]
     delta: NonZeroUsize,
-    /// Relative errors from each pose on, not from each end to the next.
+    /// Compute a relative error from every pose, instead of consecutive segments.
     #[arg(long)]
     all_pairs: bool,
     /// Print JSON.
@@ -52,13 +53,13 @@ fn positive(text: &str) -> Result<Positive, String> {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Align {
-    /// The rotation and translation that bring the positions closest.
+    /// Rotation and translation that minimize the distances between the positions.
     Se3,
-    /// And a scale.
+    /// Rotation, translation and scale.
     Sim3,
-    /// So that the first poses agree.
+    /// The transformation that makes the first poses equal.
     First,
-    /// Not at all.
+    /// No alignment.
     None,
 }
 
@@ -123,7 +124,7 @@ impl Evaluate {
 }
 
 impl Evaluate {
-    /// Objects of boxes.
+    /// Compares the objects of the boxes.
     fn boxes(&self) -> Result<Status, Failure> {
         let (truth, put) = (detections::read(&self.truth)?, detections::read(&self.estimate)?);
         let named = pair_boxes(&truth, &put);

@@ -1,4 +1,4 @@
-//! `manifactor experiment`: a sweep from its document to its tables.
+//! `manifactor experiment`: runs a sweep from its document to its tables.
 use crate::failure::Failure;
 use crate::input::document;
 use crate::input::pictures::Look;
@@ -19,12 +19,12 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Run a base config once for each cell of a grid, and put what is measured into tables.
+/// Run a base config once for each cell of a grid, and write tables of the results.
 ///
-/// One trial a core at a time. Each trial that is done is kept in trials.jsonl: after a kill or Ctrl-C, the same command
-/// goes on where it was. Written are trials.csv and trials.parquet (a row a trial), summary.csv, summary.md and
-/// summary.json (means, and paired differences with 95 % bootstrap intervals), times.csv, and report.html, which needs no
-/// network.
+/// Each core runs one trial at a time. Every finished trial is saved in trials.jsonl, so after a kill or
+/// Ctrl-C the same command continues from there. The outputs are trials.csv and trials.parquet (one row per
+/// trial), summary.csv, summary.md and summary.json (means, and paired differences with 95 % bootstrap
+/// intervals), times.csv, and report.html, which needs no network.
 #[derive(Debug, Args)]
 pub(crate) struct Experiment {
     /// The document that describes the experiment.
@@ -32,21 +32,21 @@ pub(crate) struct Experiment {
     /// Set a value of the document, such as `set.solver.stop.max_iterations=50` or `summary.seed=2`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The folder where public data sets lie.
+    /// The folder of the public data sets.
     #[arg(long, value_name = "DIR", env = "MANIFACTOR_DATA")]
     data: Option<PathBuf>,
-    /// The folder for the results. Default: the one that the document names.
+    /// The folder for the results. Default: the one in the document.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write into a folder that holds files of something else, over those of the same names.
+    /// Write into a folder that holds other files, and overwrite files with the same names.
     #[arg(long)]
     force: bool,
-    /// Run the trials again that failed before.
+    /// Repeat the trials that failed before.
     #[arg(long)]
     retry_failed: bool,
-    /// Run one part of the trials only, the K-th of N, and keep what is done in a folder of its own: for several machines
-    /// that write to one disk, as in `--shard $SLURM_ARRAY_TASK_ID/8`. The same command without it takes over what all parts have
-    /// done, runs what is left, and writes the tables.
+    /// Run only part K of N of the trials and save them in a separate folder, for several machines that
+    /// share one disk: `--shard $SLURM_ARRAY_TASK_ID/8`. The same command without --shard collects the
+    /// trials of all parts, runs the missing ones and writes the tables.
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// Print JSON: the summary that is also written.
@@ -86,7 +86,7 @@ impl Experiment {
             ));
             return Ok(status);
         }
-        // one that has ended the trials does not end the drawing as well
+        // a Ctrl-C that ended the trials must not end the drawing too
         if !complete {
             interrupt = Interrupt::default();
         }
@@ -119,16 +119,16 @@ impl Experiment {
     }
 }
 
-/// Writes all files of an experiment: its tables, pictures and page. `text` is its document.
+/// Writes all files of an experiment: tables, pictures and page. `text` is the text of its document.
 ///
 /// # Errors
-/// If one cannot be written; those before it are there.
+/// If a file cannot be written. The files before it are complete.
 pub fn write_experiment(sweep: &Sweep, journal: &TrialLog, text: &str) -> Result<Summary, Failure> {
     write_until(sweep, journal, text, |_| ControlFlow::Continue(())).map(|(summary, _)| summary)
 }
 
-/// Writes all files of an experiment, the pictures last. `goes_on` can end the drawing before each file; returns also
-/// whether all pictures are written.
+/// Writes all files of an experiment, the pictures last. `goes_on` can end the drawing before each file.
+/// The second result is true if all pictures are written.
 fn write_until(
     sweep: &Sweep,
     journal: &TrialLog,
@@ -145,7 +145,7 @@ fn write_until(
     Ok((summary, is_drawn))
 }
 
-/// How far it is: a bar on a terminal, a line now and then in a file.
+/// Progress display: a bar on a terminal, an occasional line in a file.
 enum Bar {
     Terminal(ProgressBar),
     Lines,
@@ -158,7 +158,7 @@ impl Bar {
         }
         let bar = ProgressBar::new(0).with_prefix(on_one_line(title).into_owned());
         let template = "{prefix} {wide_bar} {pos}/{len} trials, {elapsed} gone, {eta} left {msg}";
-        // the template is a literal: without it the default style is as good
+        // if the literal template is invalid, the default style is good enough
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
@@ -170,7 +170,8 @@ impl Bar {
         match self {
             Self::Terminal(bar) => {
                 if done == kept {
-                    // what was kept took no time now, and says nothing of the time left
+                    // saved trials took no time in this process, so they must not count in the remaining
+                    // time
                     bar.set_length(trials as u64);
                     bar.set_position(kept as u64);
                     bar.reset_eta();
@@ -180,7 +181,7 @@ impl Bar {
                 }
                 bar.set_position(done as u64);
             }
-            // twenty lines or so
+            // about twenty lines
             Self::Lines if done == kept || done == trials || done % trials.div_ceil(20) == 0 => {
                 output::say(&format!("{done} of {} done, {kept} of them before", count(trials, "trial")));
             }
@@ -188,7 +189,7 @@ impl Bar {
         }
     }
 
-    /// Names the picture that is drawn, once all trials are done.
+    /// Shows the name of the picture being drawn, after all trials are done.
     fn show_drawing(&self, file: &str) {
         if let Self::Terminal(bar) = self {
             bar.set_message(format!("drawing {file}"));

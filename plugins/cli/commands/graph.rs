@@ -1,4 +1,4 @@
-//! `manifactor graph`: what is in a graph, and what each factor costs.
+//! `manifactor graph`: the contents of a graph and the cost of each factor.
 use crate::failure::Failure;
 use crate::input::graph_file::Reading;
 use crate::input::solver::SolverArguments;
@@ -10,13 +10,13 @@ use clap::{ArgGroup, Args, ValueEnum};
 use manifactor::solve::{Silent, solve};
 use std::path::PathBuf;
 
-/// Show a graph: its factors by key, with residual, cost and weight, before and after a solve.
+/// Show the factors of a graph by key, with residual, cost and weight, before and after a solve.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("form").args(["dot", "json", "svg"]))]
 pub(crate) struct ShowGraph {
-    /// A graph, or the folder of a run's variant: its graph.json.
+    /// A graph, or the folder of a run's variant, which holds graph.json.
     graph: PathBuf,
-    /// Solve it, and show what it comes to.
+    /// Solve the graph and show the result too.
     #[arg(long)]
     solve: bool,
     #[command(flatten)]
@@ -25,19 +25,19 @@ pub(crate) struct ShowGraph {
     solver: SolverArguments,
     #[command(flatten)]
     reading: Reading,
-    /// List the factors in this order. Default: that of the graph.
+    /// Order of the factors. Default: the order in the graph.
     #[arg(long, value_enum, conflicts_with_all = ["dot", "svg"])]
     sort: Option<Order>,
-    /// List the first N factors only.
+    /// List only the first N factors.
     #[arg(long, value_name = "N", conflicts_with_all = ["dot", "svg"])]
     top: Option<usize>,
-    /// Print the language of Graphviz.
+    /// Print a Graphviz file.
     #[arg(long)]
     dot: bool,
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print a picture, seen from above.
+    /// Print an SVG picture, seen from above.
     #[arg(long)]
     svg: bool,
 }
@@ -45,7 +45,7 @@ pub(crate) struct ShowGraph {
 /// An order of factors.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Order {
-    /// The most expensive first: after the solve, if there is one.
+    /// Largest cost first, after the solve if there is one.
     Cost,
 }
 

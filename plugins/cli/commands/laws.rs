@@ -1,4 +1,4 @@
-//! Whether what a plugin adds keeps its laws.
+//! Commands that check whether a plugin's types keep their laws.
 mod factor;
 mod manifold;
 
@@ -9,7 +9,7 @@ use manifactor::graph::catalogue::{Entry, entries, find};
 pub(crate) use factor::CheckFactor;
 pub(crate) use manifold::CheckManifold;
 
-/// The entry of a kind that has this name.
+/// Returns the registered type with this kind and name.
 fn linked(kind: &'static str, name: &str, register: &str) -> Result<&'static Entry, Failure> {
     find(kind, name).ok_or_else(|| {
         let names = entries(kind);

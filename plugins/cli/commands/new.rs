@@ -1,4 +1,4 @@
-//! `manifactor new`: the files to begin with.
+//! `manifactor new`: writes the files of a new crate.
 use crate::failure::Failure;
 use crate::output;
 use crate::status::Status;
@@ -7,7 +7,7 @@ use manifactor::graph::catalogue::find;
 use manifactor::slam::output::write_whole;
 use std::path::{Path, PathBuf};
 
-/// Write the files of something new.
+/// Write the files of a new project.
 #[derive(Debug, Args)]
 pub(crate) struct New {
     #[command(subcommand)]
@@ -19,12 +19,13 @@ enum What {
     Plugin(Plugin),
 }
 
-/// A crate with one factor, its tests, an example graph and run, a binary that knows the factor, and a README.
+/// A crate with one factor, its tests, an example graph and run, a binary that knows the factor, and a
+/// README.
 #[derive(Debug, Args)]
 struct Plugin {
-    /// Its name, in snake case or with hyphens: of the folder, of the crate and of its factor.
+    /// Name of the folder, the crate and the factor, in snake case or with hyphens.
     name: String,
-    /// The checkout of Manifactor to build on; its repository, if not given.
+    /// A local checkout of Manifactor to depend on. Default: its Git repository.
     #[arg(long, value_name = "PATH")]
     manifactor: Option<PathBuf>,
 }
@@ -60,7 +61,7 @@ impl Plugin {
             ));
         }
         let (source, cli_source) = self.sources()?;
-        // a link that leads nowhere is something too
+        // a dangling symbolic link counts as existing too
         if folder.symlink_metadata().is_ok() {
             let there = format!("{} is there already", folder.display());
             return Err(Failure::with_help(there, "choose another name, or remove the folder first"));
@@ -81,7 +82,7 @@ impl Plugin {
         Ok(Status::Done)
     }
 
-    /// Where the two crates come from that a plugin depends on, for its manifest.
+    /// Returns the sources of the two crates that the plugin depends on, for its manifest.
     fn sources(&self) -> Result<(String, String), Failure> {
         let Some(path) = &self.manifactor else {
             let git = format!("git = \"{}\"", env!("CARGO_PKG_REPOSITORY"));
@@ -94,13 +95,13 @@ impl Plugin {
                 format!("{} is no checkout of Manifactor: it has no plugins/cli/Cargo.toml", root.display());
             return Err(Failure::with_help(what, "give the folder that has Manifactor's README in it"));
         }
-        // a basic string of TOML, which JSON's are too, takes any character
+        // a basic string of TOML can hold any character, and JSON strings are valid TOML
         let text = |path: &Path| serde_json::to_string(&path.display().to_string()).unwrap_or_default();
         Ok((format!("path = {}", text(&root)), format!("path = {}", text(&cli))))
     }
 }
 
-/// What things are called.
+/// The names of the crate, the factor and its type.
 struct Names {
     of_crate: String,
     factor: String,
@@ -121,7 +122,7 @@ impl Names {
                 "use words of small letters and digits, joined by `_` or `-`, such as `on_the_shelf`; no keyword of Rust",
             ));
         }
-        // Cargo writes the one as the other
+        // Cargo treats - and _ alike
         if CRATES.contains(&name.replace('-', "_").as_str()) {
             return Err(Failure::with_help(
                 format!(
@@ -139,13 +140,14 @@ impl Names {
     }
 }
 
-/// Words that Rust keeps for later, and files of a crate that are not modules of it.
+/// Reserved words of Rust, and files of a crate that are not modules.
 const TAKEN: [&str; 15] = [
     "abstract", "become", "box", "do", "final", "macro", "override", "priv", "try", "typeof", "unsized",
     "virtual", "yield", "main", "lib",
 ];
 
-/// Crates that a plugin could not be told from: those of Rust, of the workspace and of a plugin's manifest, and the build script.
+/// Crate names that would clash: crates of Rust, of the workspace and of a plugin's manifest, and the build
+/// script.
 const CRATES: [&str; 26] = [
     "alloc",
     "build",
@@ -175,7 +177,7 @@ const CRATES: [&str; 26] = [
     "manifactor_viz",
 ];
 
-/// Words that cannot be the name of a module.
+/// Keywords, which cannot be the name of a module.
 const KEYWORDS: [&str; 38] = [
     "as", "async", "await", "break", "const", "continue", "crate", "dyn", "else", "enum", "extern", "false",
     "fn", "for", "gen", "if", "impl", "in", "let", "loop", "match", "mod", "move", "mut", "pub", "ref",

@@ -1,4 +1,4 @@
-//! `manifactor online`: a run frame by frame, as they come.
+//! `manifactor online`: maps a run frame by frame.
 use super::run::RunOptions;
 use crate::failure::Failure;
 use crate::interrupt;
@@ -19,27 +19,30 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Map frame by frame, as they come, then solve all of it as one batch.
+/// Map frame by frame as the frames arrive, then solve everything as one batch.
 ///
-/// The document is that of `manifactor run`, and so are the results; `live.txt` has the poses as they were estimated when their
-/// frames came, and latency.svg how long each frame took. An object is mapped as soon as it can be placed. Noise is as given until the
-/// end. The table `online` of the document has the settings of the smoother.
+/// The document and the results are the same as for `manifactor run`. In addition, live.txt holds the poses
+/// as estimated when their frames arrived, and latency.svg the time of each frame. An object is added to
+/// the map as soon as it can be initialized. The noise stays as given until the end. The settings of the
+/// smoother are in the table `online` of the document.
 #[derive(Debug, Args)]
 pub(crate) struct Online {
     #[command(flatten)]
     pub(crate) options: RunOptions,
-    /// Wait for each frame's time: 1 is as fast as it was recorded, 2 twice as fast. Default: no waiting.
+    /// Wait for the time of each frame: 1 is recorded speed, 2 is twice that. Default: no waiting.
     #[arg(long, value_name = "X", value_parser = faster)]
     rate: Option<f64>,
-    /// Keep the frames in this file as they come, and begin with those that it has: after a kill, the same command goes on with
-    /// the same map.
+    /// Save the frames in this file as they arrive, and begin with the frames it already holds, so that
+    /// after a kill the same command continues with the same map.
     #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
-    /// Tell of every N-th frame on stderr, and of the one that shows the place in a prior map; with --json, in a line of JSON each.
+    /// Report every N-th frame on stderr, and the frame of the relocalization in a prior map; with --json,
+    /// as one line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
-    /// Serve a page of the map as it grows, and tell its address on stderr. Default: for browsers of this machine, at a free port;
-    /// --view=8080 is another port. Other machines can look with --view=0.0.0.0:8080 and the token in the address.
+    /// Serve a live page of the map, and print its address on stderr. Default: a free port, for browsers on
+    /// this machine only; --view=8080 sets the port. --view=0.0.0.0:8080 admits other machines, which need
+    /// the token in the address.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "0", value_parser = address)]
     view: Option<SocketAddr>,
 }
@@ -89,9 +92,10 @@ impl Online {
     }
 }
 
-/// A journal in the folder of the results could be written over by them, or taken for one of them.
+/// Returns an error if the journal is in the folder of the results, which could overwrite it or be confused
+/// with it.
 fn check_journal(journal: &Path, output: &Path) -> Result<(), RunError> {
-    // the folder of the results is there by now
+    // at this point, the folder of the results exists
     let folder = journal.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let is_inside = match (folder.canonicalize(), output.canonicalize()) {
         (Ok(folder), Ok(output)) => folder.starts_with(output),
@@ -103,17 +107,17 @@ fn check_journal(journal: &Path, output: &Path) -> Result<(), RunError> {
     }
 }
 
-/// Tells of frames, and keeps their time.
+/// Reports frames and waits for their times.
 struct Frames<'a> {
     command: &'a Online,
     interrupt: Interrupt,
     view: Option<&'a View>,
     frames: u64,
-    /// When the first frame came, and its time stamp.
+    /// Arrival time of the first frame, and its timestamp.
     begun: Option<(Instant, f64)>,
 }
 
-/// While it waits, it looks this often whether somebody has interrupted it.
+/// Interval at which a waiting command checks for an interrupt.
 const NAP: Duration = Duration::from_millis(50);
 
 impl Frames<'_> {
@@ -154,7 +158,7 @@ impl Watch for Frames<'_> {
     fn wait(&mut self, timestamp: f64) -> ControlFlow<()> {
         let Some(rate) = self.command.rate else { return ControlFlow::Continue(()) };
         let (begun, first) = *self.begun.get_or_insert((Instant::now(), timestamp));
-        // a stamp that does not come after the first needs no waiting
+        // a timestamp that is not after the first one needs no waiting
         let due = Duration::try_from_secs_f64((timestamp - first) / rate).unwrap_or_default();
         while let Some(left) = due.checked_sub(begun.elapsed()).filter(|_| !self.is_interrupted()) {
             std::thread::sleep(left.min(NAP));

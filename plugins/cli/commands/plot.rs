@@ -1,4 +1,4 @@
-//! `manifactor plot`: the pictures of a run, made again.
+//! `manifactor plot`: draws the pictures of a run again.
 use crate::failure::Failure;
 use crate::input::pictures::Look;
 use crate::interrupt;
@@ -12,19 +12,20 @@ use manifactor::slam::record::{RecordError, RunRecord};
 use manifactor::viz::ply;
 use std::path::PathBuf;
 
-/// Make the pictures of a run again, from its folder: at another size, with another theme.
+/// Draw the pictures of a run again from its folder, with another size or theme.
 ///
-/// Everything is drawn from record.json; nothing is solved. The pictures go where those of the run are, or into --out.
+/// Everything is drawn from record.json; nothing is solved. The pictures replace those of the run, or go to
+/// --out.
 #[derive(Debug, Args)]
 pub(crate) struct Plot {
-    /// The folder of a run, with record.json in it.
+    /// The folder of a run, which holds record.json.
     folder: PathBuf,
     #[command(flatten)]
     look: Look,
-    /// The folder for the pictures. Default: that of the run.
+    /// The folder for the pictures. Default: the folder of the run.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write into --out even where others have written there.
+    /// Write into --out even if it holds other files.
     #[arg(long, requires = "out")]
     force: bool,
 }
@@ -34,7 +35,7 @@ impl Plot {
         let mut interrupt = interrupt::on_ctrl_c();
         let record = RunRecord::read(&self.folder)?;
         let out = self.out.as_ref().unwrap_or(&self.folder);
-        // the run's own pictures are made again; another folder has to be ours
+        // the pictures of the run may be replaced; another folder has to be claimed
         let claim = |out| OutputFolder::claim(out, "plot", &self.folder, self.force);
         let _claimed = self.out.as_deref().map(claim).transpose()?;
         for variant in &record.variants {

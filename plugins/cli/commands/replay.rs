@@ -1,4 +1,4 @@
-//! `manifactor replay`: a pose graph through an incremental smoother, as if it came in just now.
+//! `manifactor replay`: replays a pose graph through the incremental smoother.
 use crate::failure::Failure;
 use crate::input::destination::Destination;
 use crate::input::graph_file::{self, GraphFile};
@@ -22,10 +22,11 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Replay a pose graph (.g2o, TORO, or a literal graph) pose by pose through an incremental smoother.
+/// Replay a pose graph (.g2o, TORO, or a literal graph) pose by pose through the incremental smoother.
 ///
-/// Poses are the variables x0, x1, …, in that order; each starts where odometry leads from the estimate of the pose before it. Held
-/// variables, and those that odometry does not reach, start at the file's values. At the end all is solved as one batch.
+/// The poses are the variables x0, x1, … in this order. The initial value of each comes from odometry and
+/// the estimate of the previous pose. Fixed variables, and those that odometry does not reach, begin at the
+/// values in the file. At the end, the whole graph is solved as one batch.
 #[derive(Debug, Args)]
 pub(crate) struct Replay {
     /// The graph.
@@ -34,10 +35,11 @@ pub(crate) struct Replay {
     solver: SolverArguments,
     #[command(flatten)]
     reading: graph_file::Reading,
-    /// Report every N-th pose, and always the last; with --json, a line of JSON each.
+    /// Report every N-th pose and the last one; with --json, as one line of JSON each.
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u64).range(1..))]
     every: u64,
-    /// At each reported pose, also solve everything so far as one batch, and print by what share the estimate costs more. Not timed.
+    /// At each reported pose, also solve the graph so far as one batch, and print by which fraction the
+    /// estimate costs more (not timed).
     #[arg(long)]
     gap: bool,
     #[command(flatten)]
@@ -45,21 +47,21 @@ pub(crate) struct Replay {
     /// Draw the latency of each update into this folder: latency.svg and latency.png.
     #[arg(long, value_name = "DIR")]
     plot: Option<PathBuf>,
-    /// Print lines of JSON: poses, then a summary.
+    /// Print lines of JSON: the poses, then a summary.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// Rejected factors that are named.
+/// Largest number of rejected factors that are listed.
 const NAMED: usize = 6;
 
-/// What a replay came to.
+/// Result of a replay.
 struct Replayed {
     session: Session,
     times: Vec<f64>,
     report: Report,
     interrupted: bool,
-    /// Factors to variables that the window had no room for any more.
+    /// Number of factors left out because a variable had already left the window.
     left_out: usize,
 }
 
@@ -151,7 +153,7 @@ impl Replay {
         Ok(replayed)
     }
 
-    /// Tells of the last step: of where it stands.
+    /// Reports the state after the last step.
     fn tell_step(&self, replayed: &mut Replayed, input: &GraphFile) -> Result<(), Failure> {
         let Replayed { session, times, report, .. } = replayed;
         let (poses, last) = (times.len(), times.last().copied().unwrap_or_default());
@@ -245,7 +247,7 @@ impl Replay {
     }
 }
 
-/// Leaves out the factors to variables that are gone; how many.
+/// Removes the factors of variables that are no longer in the smoother, and returns their number.
 fn leave_out(step: &mut Step, session: &Session) -> usize {
     let is_there = |key: &Key| step.values.contains(key.as_str()) || session.estimate(key.as_str()).is_some();
     let mut factors = Graph::new();

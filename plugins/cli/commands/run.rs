@@ -1,4 +1,4 @@
-//! `manifactor run`: a run from its document to its files.
+//! `manifactor run`: computes a run from its document and writes its files.
 use crate::failure::Failure;
 use crate::input::pictures::Look;
 use crate::input::run_file::RunArguments;
@@ -18,12 +18,12 @@ use manifactor::viz::{latencies, ply, run_page};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// Build, solve, evaluate and write what a document describes.
+/// Build, solve and evaluate the run that a document describes, and write the results.
 ///
-/// Each variant of the run gets a folder with its settings, trajectory, objects, frames, graph, iterations, metrics, the
-/// map as PLY, and pictures as SVG and PNG (the map from above and from the side, errors and poses over time, residuals,
-/// cost, images). report.html shows all of it, with the map in 3D, and needs no network. `manifactor plot` makes the
-/// pictures again.
+/// Each variant of the run has a folder with its settings, trajectory, objects, frames, graph, iterations
+/// and metrics, the map as PLY, and pictures as SVG and PNG (the map from above and from the side, errors
+/// and poses over time, residuals, cost, images). report.html shows everything, with the map in 3D, and
+/// needs no network. `manifactor plot` draws the pictures again.
 #[derive(Debug, Args)]
 pub(crate) struct Run {
     #[command(flatten)]
@@ -35,10 +35,10 @@ pub(crate) struct Run {
 pub(crate) struct RunOptions {
     #[command(flatten)]
     run: RunArguments,
-    /// The folder for the results. Default: the one that the document names.
+    /// The folder for the results. Default: the one in the document.
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Write into a folder that holds files of something else, over those of the same names.
+    /// Write into a folder that holds other files, and overwrite files with the same names.
     #[arg(long)]
     force: bool,
     /// Print JSON: the report that is also written.
@@ -61,8 +61,9 @@ impl Run {
 }
 
 impl RunOptions {
-    /// Estimates each variant until an interrupt, writes all results, and prints the table unless JSON is asked for. An interrupt
-    /// that comes after the solves ends the drawing of pictures, and the report says that the run is not complete.
+    /// Estimates each variant until an interrupt, writes all results, and prints the table unless JSON is
+    /// requested. An interrupt after the solves ends the drawing of pictures, and the report then marks the
+    /// run as incomplete.
     pub(super) fn run_as(
         &self,
         command: &str,
@@ -75,7 +76,7 @@ impl RunOptions {
             document.output.clone_from(out);
         }
         refuse_own_maps(&document)?;
-        // held to the end
+        // the claim lasts to the end
         let _claimed = OutputFolder::claim(&document.output, command, &self.run.config, self.force)?;
         let (mut records, mut configs) = (vec![], vec![]);
         let look = Look::default();
@@ -108,7 +109,7 @@ impl RunOptions {
             let folder = document.output.join(&variant.folder);
             write_whole(&folder.join("map.ply"), ply(&record, variant))?;
         }
-        // one that has ended a stream or a solve does not end the drawing as well
+        // a Ctrl-C that ended a stream or a solve must not end the drawing too
         if !report.complete {
             interrupt = Interrupt::default();
         }

@@ -1,4 +1,4 @@
-//! `manifactor simulate`: a sequence, as files.
+//! `manifactor simulate`: writes a sequence as files.
 use crate::failure::Failure;
 use crate::input::run_file::RunArguments;
 use crate::output;
@@ -12,9 +12,9 @@ use manifactor::slam::run::Run as Running;
 use manifactor::slam::source::line;
 use std::path::PathBuf;
 
-/// Write the sequence of a run's source as files, which the source `recorded` reads, or as lines.
+/// Write the sequence of a run's source as files for the source `recorded`, or as lines of JSON.
 ///
-/// They are odometry.txt and groundtruth.txt (TUM's format), detections.csv and objects.json.
+/// The files are odometry.txt and groundtruth.txt (TUM format), detections.csv and objects.json.
 #[derive(Debug, Args)]
 pub(crate) struct Simulate {
     #[command(flatten)]
@@ -22,10 +22,10 @@ pub(crate) struct Simulate {
     /// The folder for the files.
     #[arg(long, short, value_name = "DIR", required_unless_present = "lines")]
     out: Option<PathBuf>,
-    /// Print the frames instead, as lines of JSON, which the source `json_lines` reads.
+    /// Print the frames as lines of JSON instead, for the source `json_lines`.
     #[arg(long, conflicts_with_all = ["out", "force"])]
     lines: bool,
-    /// Write into a folder that holds files of something else, over those of the same names.
+    /// Write into a folder that holds other files, and overwrite files with the same names.
     #[arg(long)]
     force: bool,
 }
@@ -43,7 +43,7 @@ impl Simulate {
             sequence()?.observations().for_each(|frame| output::print(&(line(&frame) + "\n")));
             return Ok(Status::Done);
         };
-        // held to the end
+        // the claim lasts to the end
         let _claimed = OutputFolder::claim(out, "simulate", &self.run.config, self.force)?;
         let sequence = sequence()?;
         recording::write(&sequence, out)?;

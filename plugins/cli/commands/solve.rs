@@ -1,4 +1,4 @@
-//! `manifactor solve`: a graph from a file.
+//! `manifactor solve`: solves a graph from a file.
 use crate::failure::Failure;
 use crate::input::destination::Destination;
 use crate::input::graph_file::{self, GraphFile};
@@ -27,16 +27,16 @@ pub(crate) struct Solve {
     reading: graph_file::Reading,
     #[command(flatten)]
     what_if: WhatIf,
-    /// Certify the minimum of a pose graph: whether it is the global one, as far as that can be known.
+    /// Try to prove that the minimum of a pose graph is the global one.
     #[arg(long)]
     certify: bool,
-    /// Marginal covariances at the estimate: of all variables, or of those named, separated by commas. Standard
-    /// deviations as a table; matrices with --json.
+    /// Marginal covariances at the estimate, of all variables or of these (separated by commas): standard
+    /// deviations in a table, matrices with --json.
     #[arg(long, value_name = "KEYS", num_args = 0.., require_equals = true, value_delimiter = ',', default_missing_value = "")]
     covariances: Option<Vec<String>>,
     #[command(flatten)]
     destination: Destination,
-    /// Print JSON: costs, iterations, termination, seconds by stage; with -v a record for each step.
+    /// Print JSON: costs, iterations, termination and seconds by stage; with -v a record for each step.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -69,7 +69,7 @@ impl Solve {
         let marginals = marginals.transpose().map_err(Failure::input)?;
         if self.json {
             let mut json = self.as_json(&input, &solution, start);
-            // a solve without a step does not look for it
+            // a solve without a step does not compute it
             if json["undetermined"].is_null() {
                 json["undetermined"] = json!(diagnosis.undetermined);
             }

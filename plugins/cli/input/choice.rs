@@ -1,9 +1,10 @@
-//! A registered type that the document names, or the command line does.
+//! A registered type, chosen by the document or by the command line.
 use manifactor::config::{Field, Node, Section, SourceText, Table, Value};
 use serde::de::DeserializeOwned;
 
-/// Takes `field` out of a document's table: what `argument` names, such as `--solver`, with the document's
-/// settings; else what the document names; else `default`.
+/// Reads `field` from a document's table. The type named by the command line's `argument`, such as
+/// `--solver`, has priority and uses the document's settings for that type. Next come the type in the
+/// document, and `default`.
 pub(crate) fn choose<K: ?Sized>(
     section: &mut Section<'_>,
     field: &str,
@@ -30,7 +31,8 @@ fn has_type(node: &Node) -> bool {
     !matches!(&node.value, Value::Table(table) if !table.contains_key("type"))
 }
 
-/// The same settings for the type `name`. Those of another type, in the document, are left behind.
+/// Returns the settings for the type `name`. The document's settings are dropped if they belong to a
+/// different type.
 pub(crate) fn named(argument: &str, name: &str, mut node: Node, document: &SourceText) -> Node {
     let Value::Table(table) = &mut node.value else { return node };
     let is = |field: &Field| matches!(&field.node.value, Value::String(text) if text == name);

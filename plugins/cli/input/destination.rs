@@ -1,4 +1,4 @@
-//! Where a graph is written, and what is not written over.
+//! The output file of a graph, and protection against overwriting.
 use crate::failure::Failure;
 use crate::output;
 use clap::Args;
@@ -11,16 +11,16 @@ use std::path::{Path, PathBuf};
 /// `--out` and `--force`.
 #[derive(Debug, Args)]
 pub(crate) struct Destination {
-    /// Write the graph with the estimate here; the extension tells the format.
+    /// Write the graph with the estimate to this file; the extension selects the format.
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write over a file that is there already.
+    /// Overwrite an existing file.
     #[arg(long, requires = "out")]
     force: bool,
 }
 
 impl Destination {
-    /// Returns whether the graph of `input` can be written there, and over what is there: asked before it is solved.
+    /// Returns an error if the graph of `input` cannot be written to this file. Called before the solve.
     pub(crate) fn check(&self, input: &Path) -> Result<(), Failure> {
         let Some(path) = &self.out else { return Ok(()) };
         if Format::of_path(path).is_none() && writer(path).is_none() {
@@ -37,7 +37,8 @@ impl Destination {
         self.out.is_some()
     }
 
-    /// Writes a graph with these values, if that was asked for, and tells what the format cannot express.
+    /// Writes a graph with these values if an output file is given, and reports everything that the format
+    /// cannot express.
     pub(crate) fn write(&self, graph: &Graph, values: &Values) -> Result<(), Failure> {
         let Some(path) = &self.out else { return Ok(()) };
         let (text, notes) = match (Format::of_path(path), writer(path)) {
@@ -51,10 +52,10 @@ impl Destination {
     }
 }
 
-/// An error where a file would be lost.
+/// Returns an error if a file would be lost.
 fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
     let is_stream = path.metadata().is_ok_and(|at| !at.is_file() && !at.is_dir());
-    // a link that leads nowhere is something too
+    // a dangling symbolic link counts as existing too
     if is_stream || path.symlink_metadata().is_err() {
         return Ok(());
     }
@@ -68,7 +69,7 @@ fn refuse_to_replace(path: &Path, input: &Path) -> Result<(), Failure> {
     ))
 }
 
-/// What writes a graph that is no document, by the extension.
+/// The writer for the extension of `path`, if its format is not a document.
 fn writer(path: &Path) -> Option<GraphWriter> {
     GraphFormat::of_path(path)?.format
 }

@@ -4,7 +4,7 @@ use manifactor::config::{Document, Format};
 use manifactor::formats::{GraphFormat, STDIN, read_text};
 use std::path::Path;
 
-/// What a file has.
+/// Content of a file.
 pub(crate) enum Content {
     /// A document in TOML, JSON or YAML.
     Document(Document),
@@ -13,12 +13,12 @@ pub(crate) enum Content {
 }
 
 impl Content {
-    /// Reads a file; its extension tells what it is, or else how it begins.
+    /// Reads a file. Its format follows from the extension, or else from the first characters.
     pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
         if Format::of_path(path).is_some() {
             return Ok(Self::Document(Document::open(path)?));
         }
-        // a pipe can be read once
+        // a pipe can be read only once
         let text = read_text(path)?;
         match GraphFormat::of(path, &text) {
             Some(format) => Ok(Self::Graph(text, format)),
@@ -28,12 +28,12 @@ impl Content {
     }
 }
 
-/// Reads a document, where nothing else will do.
+/// Reads a file that has to be a document.
 pub(crate) fn open(path: &Path) -> Result<Document, Failure> {
     if path == Path::new(STDIN) { parse(read_text(path)?) } else { Ok(Document::open(path)?) }
 }
 
-/// A document without a name: JSON begins with a brace, all else is TOML.
+/// Parses a document without a file name: JSON begins with a brace, everything else is TOML.
 fn parse(text: String) -> Result<Document, Failure> {
     let format = if text.trim_start().starts_with('{') { Format::Json } else { Format::Toml };
     Ok(Document::parse("standard input", text, format)?)

@@ -13,44 +13,44 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// How a graph that is no document is read.
+/// Options for reading a graph that is not a document.
 #[derive(Debug, Args)]
 pub(crate) struct Reading {
-    /// What to do with information matrices of a pose graph that are not positive definite.
+    /// Treatment of edges in a pose graph whose information matrix is not positive definite.
     #[arg(long, value_enum, default_value = "error")]
     repair: RepairChoice,
-    /// Do not hold the first pose where nothing in a pose graph fixes it; nor a scale, where images alone are seen.
+    /// Do not fix a free gauge: neither the first pose, nor the scale if only images constrain it.
     #[arg(long)]
     no_anchor: bool,
-    /// Leave out lines with unknown tags, and report them; otherwise they are an error.
+    /// Skip lines with unknown tags and report them; by default they are an error.
     #[arg(long)]
     lenient: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum RepairChoice {
-    /// Say so, with the line, and stop.
+    /// Stop, and report the line.
     Error,
-    /// Leave the edge out.
+    /// Skip the edge.
     Reject,
-    /// Raise its eigenvalues to 1e-9 of the largest.
+    /// Raise the eigenvalues to 1e-9 of the largest one.
     Clamp,
 }
 
-/// What a file says.
+/// Content of a graph's file.
 pub(crate) struct GraphFile {
     pub graph: Graph,
     pub values: Values,
     pub optimizer: Box<dyn Optimizer>,
     pub start: Box<dyn Start>,
-    /// How `replay` trades time for accuracy.
+    /// Settings of the smoother for `replay`.
     pub online: Online,
-    /// What the reader had to decide.
+    /// Decisions of the reader, for the user.
     pub notes: Vec<String>,
 }
 
 impl Reading {
-    /// Reads a graph, and the solver and start that file and command line ask for.
+    /// Reads a graph, and the solver and start that the file and the command line choose.
     pub(crate) fn open(&self, path: &Path, solver: &SolverArguments) -> Result<GraphFile, Failure> {
         check_memory(path)?;
         match Content::open(path)? {
@@ -59,7 +59,7 @@ impl Reading {
         }
     }
 
-    /// A file in a registered format: solver, start and `online` are all that `--set` can set.
+    /// Reads a file in a registered format. `--set` can only set its solver, its start and `online`.
     pub(crate) fn plain(
         &self,
         path: &Path,
@@ -92,7 +92,7 @@ impl Reading {
     }
 }
 
-/// The schema of a graph's document: of the graph, and of what the commands read beside it.
+/// The schema of a graph's document: the graph, and the further fields that the commands read.
 pub(crate) fn root(definitions: &mut Definitions) -> Value {
     let mut root = graph_root(definitions);
     let online = definitions.of::<Online>();
@@ -102,7 +102,7 @@ pub(crate) fn root(definitions: &mut Definitions) -> Value {
     root
 }
 
-/// A literal graph, which may name its solver and its start, and how it is replayed.
+/// Reads a literal graph, with its solver, its start and its settings for `replay`.
 pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Result<GraphFile, Failure> {
     solver.apply(&mut document)?;
     let errors = Errors::new();
@@ -117,13 +117,13 @@ pub(crate) fn literal(mut document: Document, solver: &SolverArguments) -> Resul
     Ok(errors.finish(read.flatten())?)
 }
 
-/// Refuses a file that is too large to be read, before it is.
+/// Returns an error, before reading, if a file is too large for the memory.
 fn check_memory(path: &Path) -> Result<(), Failure> {
-    /// Bytes of a graph for each byte of its text: at least.
+    /// Lower bound for the bytes of a graph per byte of its text.
     const GROWTH: u64 = 8;
-    // what cannot be read is told by who reads it
+    // a file that cannot be read is reported by its reader
     let needed = std::fs::metadata(path).map_or(0, |file| file.len()).saturating_mul(GROWTH);
-    // what is read in no time is not worth asking the system
+    // a small file does not justify a system call
     const SMALL: u64 = 64 << 20;
     if needed < SMALL && memory_limit().is_none() {
         return Ok(());
@@ -142,7 +142,7 @@ fn check_memory(path: &Path) -> Result<(), Failure> {
     ))
 }
 
-/// What is in a graph, in a few lines.
+/// A summary of a graph, in a few lines.
 pub(crate) fn summary(input: &GraphFile) -> String {
     let variables = by_name(input.values.iter().map(|(_, v)| v.typetag_name()));
     let factors = by_name(input.graph.factors().iter().map(|f| f.factor.typetag_name()));

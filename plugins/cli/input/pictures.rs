@@ -1,4 +1,4 @@
-//! Pictures, which go to files.
+//! Options for pictures, and the writing of their files.
 use crate::failure::Failure;
 use crate::output::text::on_one_line;
 use crate::output::watch::Watch;
@@ -10,18 +10,18 @@ use manifactor::viz::{Picture, Theme, run_pictures};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// How pictures look.
+/// Style of the pictures.
 #[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct Look {
-    /// The width of pictures, in pixels of the SVG; a PNG has two for each.
+    /// Width of the pictures in pixels of the SVG; a PNG has twice as many.
     #[arg(long, value_name = "PIXELS", default_value_t = Look::default().size, value_parser = clap::value_parser!(u16).range(300..=4000))]
     size: u16,
-    /// The theme of pictures.
+    /// Colour theme of the pictures.
     #[arg(long, value_enum, default_value_t = Look::default().theme)]
     theme: Shade,
 }
 
-/// The theme of a picture.
+/// A colour theme.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Shade {
     /// Dark lines on white.
@@ -37,13 +37,14 @@ impl Default for Look {
 }
 
 impl Look {
-    /// Pixels of the SVG.
+    /// The width, in pixels of the SVG.
     pub(crate) fn width(self) -> f64 {
         self.size.into()
     }
 
-    /// Writes pictures into a folder, each as SVG and as PNG. `goes_on` gets the name of each file before it is drawn, and
-    /// `Break` ends the drawing there: the files before it stay. Returns whether all files are written.
+    /// Writes pictures into a folder, each as SVG and as PNG. `goes_on` is called with the name of each
+    /// file before it is drawn; `Break` ends the drawing and keeps the earlier files. Returns whether all
+    /// files are written.
     pub(crate) fn write(
         self,
         folder: &Path,
@@ -69,7 +70,8 @@ impl Look {
         Ok(true)
     }
 
-    /// Draws the pictures of all variants of a run into their folders in `out`, until an interrupt. `watch` shows the files.
+    /// Draws the pictures of all variants of a run into their folders in `out`, until an interrupt. `watch`
+    /// shows the current file.
     pub(crate) fn draw_run(
         self,
         out: &Path,
@@ -98,16 +100,17 @@ impl Look {
     }
 }
 
-/// The pictures of a run, as far as they were drawn.
+/// Progress of the pictures of a run.
 pub(crate) struct Drawn {
-    /// Number of pictures, if none is missing.
+    /// Number of pictures. Valid only if none is missing.
     pub(crate) pictures: usize,
-    /// Variants of which an interrupt left out a picture.
+    /// Variants whose pictures are incomplete because of an interrupt.
     pub(crate) missing: Vec<String>,
 }
 
 impl Drawn {
-    /// Returns the missing pictures in a sentence, and the command that draws them; `None` if there are all.
+    /// Returns a sentence with the incomplete variants and the command that draws them; `None` if nothing
+    /// is missing.
     pub(crate) fn message(&self, out: &Path) -> Option<String> {
         let variants: Vec<_> = self.missing.iter().map(|name| on_one_line(name)).collect();
         let out = out.display();
@@ -133,7 +136,7 @@ mod tests {
         other.name = "other".to_owned();
         let mut interrupt = Interrupt::default();
         let flag = interrupt.0.clone();
-        // raised while the first picture is drawn
+        // set while the first picture is drawn
         let goes_on = |file: &str| {
             let flow = interrupt.poll();
             flag.store(file == "latency.png", std::sync::atomic::Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! The documents that describe runs.
+//! Arguments for the document of a run.
 use crate::failure::Failure;
 use crate::input::document;
 use clap::Args;
@@ -6,15 +6,15 @@ use manifactor::config::Document;
 use manifactor::slam::run_document::RunDocument;
 use std::path::{Path, PathBuf};
 
-/// What all commands on a run's document take.
+/// Arguments of all commands that read a run's document.
 #[derive(Debug, Args)]
 pub(crate) struct RunArguments {
-    /// The document that describes the run; `-` is standard input, TOML or JSON.
+    /// The document that describes the run; `-` reads TOML or JSON from standard input.
     pub(crate) config: PathBuf,
     /// Set a value of the document, such as `solver.stop.max_iterations=50` or `source.seed=2`.
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
-    /// The folder where public data sets lie.
+    /// The folder of the public data sets.
     #[arg(long, value_name = "DIR", env = "MANIFACTOR_DATA")]
     data: Option<PathBuf>,
 }
@@ -25,13 +25,13 @@ impl RunArguments {
         self.read(document::open(&self.config)?)
     }
 
-    /// A document that was opened already.
+    /// Reads a document that is already open.
     pub(crate) fn read(&self, mut document: Document) -> Result<RunDocument, Failure> {
         document.set(&self.set)?;
         Ok(RunDocument::read(&document)?)
     }
 
-    /// Where data sets lie.
+    /// The folder of the data sets.
     pub(crate) fn data(&self) -> Option<PathBuf> {
         self.data.as_deref().map(Path::to_owned)
     }

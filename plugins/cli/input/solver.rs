@@ -1,4 +1,4 @@
-//! Which solver and which start, with which settings: `--solver`, `--start`, `--set` and the document together.
+//! The solver, the start and their settings, from `--solver`, `--start`, `--set` and the document.
 use crate::failure::Failure;
 use crate::input::choice::choose;
 use clap::Args;
@@ -8,13 +8,14 @@ use manifactor::solve::{Optimizer, Start};
 /// `--solver`, `--start` and `--set`.
 #[derive(Debug, Args)]
 pub(crate) struct SolverArguments {
-    /// The solver, one of `manifactor list solvers`, with its defaults; what `--set` says still holds.
+    /// The solver, one of `manifactor list solvers`, with its default settings; `--set` still applies.
     #[arg(long, value_name = "NAME")]
     solver: Option<String>,
-    /// Where to begin, one of `manifactor list starts`; the values that came with the graph, if not given.
+    /// The initial values, one of `manifactor list starts`. Default: the values in the graph.
     #[arg(long, value_name = "NAME")]
     start: Option<String>,
-    /// Set a value of the document, such as `solver.stop.max_iterations=50` or `factors[2].noise.sigma=0.1`.
+    /// Set a value of the document, such as `solver.stop.max_iterations=50` or
+    /// `factors[2].noise.sigma=0.1`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -25,17 +26,17 @@ impl SolverArguments {
         self.start.is_some()
     }
 
-    /// `--set` alone.
+    /// Creates arguments with `--set` alone.
     pub(crate) fn set_only(set: &[String]) -> Self {
         Self { solver: None, start: None, set: set.to_vec() }
     }
 
-    /// Puts what `--set` says into the document.
+    /// Applies `--set` to the document.
     pub(crate) fn apply(&self, document: &mut Document) -> Result<(), Failure> {
         Ok(document.set(&self.set)?)
     }
 
-    /// Takes the field `solver` out of a document's table: default: `auto`.
+    /// Reads the field `solver` of a document's table. Default: `auto`.
     pub(crate) fn take(
         &self,
         section: &mut Section<'_>,
@@ -45,7 +46,7 @@ impl SolverArguments {
         choose(section, "solver", argument, "auto", document)
     }
 
-    /// Takes the field `start`. Default: the values as they are.
+    /// Reads the field `start` of a document's table. Default: the values in the graph.
     pub(crate) fn take_start(
         &self,
         section: &mut Section<'_>,

@@ -1,4 +1,4 @@
-//! What if: variables that are held, and factors that are left out.
+//! Variations of a graph: fixed variables and omitted factors.
 use crate::failure::Failure;
 use clap::Args;
 use manifactor::config::nearest;
@@ -7,16 +7,17 @@ use manifactor::graph::{Graph, Values};
 /// `--freeze` and `--drop`.
 #[derive(Debug, Args)]
 pub(crate) struct WhatIf {
-    /// Hold a variable where it is: `x0`, or directions of it: `q0.log_a`. May be given again.
+    /// Fix a variable, such as `x0`, or one direction of it, such as `q0.log_a`; may be repeated.
     #[arg(long, value_name = "KEY")]
     freeze: Vec<String>,
-    /// Leave factors out: by number, as reports have it, or all of a type: `bounding_box`. May be given again.
+    /// Omit a factor by the number in reports, or all factors of a type, such as `bounding_box`; may be
+    /// repeated.
     #[arg(long, value_name = "FACTOR")]
     drop: Vec<String>,
 }
 
 impl WhatIf {
-    /// Changes the graph, and says how.
+    /// Changes the graph, and returns a description of each change.
     pub(crate) fn apply(&self, graph: &mut Graph, values: &Values) -> Result<Vec<String>, Failure> {
         let mut notes = vec![];
         for key in &self.freeze {

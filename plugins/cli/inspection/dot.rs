@@ -1,14 +1,14 @@
-//! The language of Graphviz.
+//! The graph as Graphviz.
 use super::Inspection;
 use crate::output::text::printable;
 use std::fmt::Write;
 
-/// Variables as ellipses, factors as boxes; the more a factor costs, the wider its lines.
+/// Variables are ellipses, factors are boxes; the lines of expensive factors are wider.
 pub(super) fn write(inspection: &Inspection) -> String {
     let mut out = String::from("graph factors {\n  layout = neato; overlap = false; splines = true;\n");
     for row in &inspection.variables {
         let style = if row.fixed.is_some() { ", style = filled" } else { "" };
-        // writing to a text cannot fail
+        // writing to a String cannot fail
         let _ = writeln!(
             out,
             "  {} [label = {}{style}];",

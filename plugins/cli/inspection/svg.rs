@@ -1,17 +1,18 @@
-//! A picture of a graph, seen from above: variables where they are, factors between them.
+//! The graph as a picture from above: variables at their positions, factors between them.
 use super::{Inspection, VariableRow};
 use manifactor::viz::escape;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// Width and height of the picture, and its margin, in pixels.
+/// Width and height of the picture, and its margin. Unit: pixels.
 const SIZE: f64 = 900.0;
 const MARGIN: f64 = 60.0;
 
 type Places<'a> = BTreeMap<&'a str, [f64; 2]>;
 
-/// Variables as dots with their names, factors as lines to their middle: the redder, the more they cost.
+/// Variables are dots with their names, factors are lines to the middle of their variables; expensive
+/// factors are redder.
 pub(super) fn write(inspection: &Inspection) -> String {
     let places = scaled(places(inspection));
     let place = |key: &str| places.get(key).copied().unwrap_or([SIZE / 2.0; 2]);
@@ -34,7 +35,7 @@ pub(super) fn write(inspection: &Inspection) -> String {
         );
         let ends: Vec<[f64; 2]> = row.keys.iter().map(|key| place(key)).collect();
         let [x, y] = middle(&ends);
-        // writing to a text cannot fail
+        // writing to a String cannot fail
         let _ = writeln!(
             out,
             "<g stroke=\"{color}\" fill=\"{color}\"><title>{}</title>",
@@ -68,7 +69,8 @@ fn title(inspection: &Inspection, factor: usize) -> String {
     format!("{} {} ({}): {:.4}{after}", row.number, row.label(), row.keys.join(", "), row.before.cost)
 }
 
-/// Where variables are that have a position; the others beside those that they share a factor with.
+/// Positions of the variables. A variable without a position is drawn next to the variables that share its
+/// factors.
 fn places(inspection: &Inspection) -> Places<'_> {
     let known = |row: &VariableRow| {
         let value = row.after.as_ref().unwrap_or(&row.before);
@@ -98,7 +100,7 @@ fn middle(points: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n)
 }
 
-/// Into the picture, the second coordinate upwards, both at one scale.
+/// Maps positions into the picture, with the second coordinate upwards and one scale for both.
 fn scaled(places: Places<'_>) -> Places<'_> {
     let bounds = |i: usize| {
         let all = places.values().map(|p| p[i]);

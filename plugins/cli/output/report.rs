@@ -1,8 +1,8 @@
-//! What a solve has to tell, for people.
+//! The result of a solve as text.
 use crate::output::text::{self, Table, count, list, seconds};
 use manifactor::solve::{AtStart, Diagnosis, FactorCost, InactiveFactor, Marginal, Outcome, Weak};
 
-/// A few lines: how it ended, what it cost, where the time went.
+/// The outcome in a few lines: termination, cost and times.
 pub(crate) fn outcome(outcome: &Outcome) -> String {
     let times = &outcome.times;
     let mut out = format!("{}\n", outcome.termination);
@@ -40,7 +40,7 @@ pub(crate) fn outcome(outcome: &Outcome) -> String {
     out
 }
 
-/// Factors that are not defined, the first of them by name.
+/// Undefined factors, the first of them with their names.
 fn inactive(inactive: usize, factors: usize, first: &[InactiveFactor]) -> String {
     let named: Vec<_> = first.iter().map(factor).collect();
     let more = if inactive > named.len() { ", …" } else { "" };
@@ -48,12 +48,12 @@ fn inactive(inactive: usize, factors: usize, first: &[InactiveFactor]) -> String
     format!("{inactive} of {all} are not defined at these values and take no part: {named}{more}")
 }
 
-/// `3 between_se2 (x0, x1)`: its place, its type and its variables.
+/// `3 between_se2 (x0, x1)`: index, type and variables of a factor.
 fn factor(factor: &InactiveFactor) -> String {
     format!("{} {} ({})", factor.factor, factor.name, text::keys(&factor.keys))
 }
 
-/// What stands out at the values that a solve is to begin with, a line each.
+/// Findings at the initial values, one per line.
 pub(crate) fn at_start(found: &AtStart, factors: usize) -> Vec<String> {
     let mut lines = vec![];
     if let Some(bad) = &found.not_finite {
@@ -73,7 +73,7 @@ pub(crate) fn at_start(found: &AtStart, factors: usize) -> Vec<String> {
     lines
 }
 
-/// The factors that cost the most, and the condition of the linear system.
+/// The factors with the largest cost, and the condition of the linear system.
 pub(crate) fn diagnosis(diagnosis: &Diagnosis) -> String {
     let condition = match diagnosis.condition {
         Some(condition) => format!("condition {condition:.1e}"),

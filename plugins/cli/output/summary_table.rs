@@ -2,7 +2,7 @@
 use crate::output::text::{Table, on_one_line, wrap};
 use manifactor::slam::experiment::Summary;
 
-/// Means group by group, and under each that is compared, how far it is from the baseline.
+/// Means of each group, and below each compared group its difference from the baseline.
 pub(crate) fn of(summary: &Summary) -> String {
     let header: Vec<&str> = summary
         .columns

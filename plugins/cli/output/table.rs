@@ -5,7 +5,7 @@ use manifactor::slam::report::{Mean, Prediction, RunReport, TrajectoryReport, Va
 use manifactor::slam::sequence::ObjectId;
 use manifactor::slam::variance::{BoxComponent, MotionComponent, Score};
 
-/// What a run came to, in a table and a few lines.
+/// The result of a run, as a table and a few lines.
 pub(crate) fn of_run(report: &RunReport) -> String {
     let header =
         ["", "ATE (m)", "position (m)", "shape", "quality", "objects", "boxes", "cost", "iterations", "time"];
@@ -56,7 +56,7 @@ pub(crate) fn of_run(report: &RunReport) -> String {
     out
 }
 
-/// The poses that the trajectory errors cover: once if all variants agree, else by variant.
+/// The poses covered by the trajectory errors: once if all variants agree, else by variant.
 fn poses_covered(variants: &[VariantReport]) -> String {
     let covered = |v: &VariantReport| Some((on_one_line(&v.name).into_owned(), over(v.trajectory.first()?)));
     let covered: Vec<(String, String)> = variants.iter().filter_map(covered).collect();
@@ -66,20 +66,20 @@ fn poses_covered(variants: &[VariantReport]) -> String {
     }
 }
 
-/// The poses that one trajectory error covers.
+/// The poses covered by one trajectory error.
 fn over(trajectory: &TrajectoryReport) -> String {
     let [covered, poses] = trajectory.covered;
     format!("{covered} of {} (truth: {})", text::count(poses, "pose"), trajectory.truth_poses)
 }
 
-/// The columns about objects.
+/// Explanation of the columns about objects.
 const LANDMARKS: &str = "Position, shape, quality of the objects against the truth: RMSE of the centres; mean Jaccard distance \
                          of the boxes around them, centred and where they stand: 0 is perfect, 1 is no overlap.";
 
-/// Columns that a narrow terminal keeps, before all others.
+/// Columns that a narrow terminal shows first.
 const KEPT: [&str; 7] = ["ATE (m)", "position (m)", "shape", "quality", "cost", "iterations", "objects"];
 
-/// Where frames came one by one: how long they took, and what the map was after the last.
+/// For a run frame by frame: the latencies, and the map after the last frame.
 fn stream(variant: &VariantReport) -> String {
     let Some(online) = &variant.online else { return String::new() };
     let name = on_one_line(&variant.name);
@@ -101,7 +101,7 @@ fn stream(variant: &VariantReport) -> String {
     text::wrap(&text) + "\n"
 }
 
-/// Where boxes were put to objects: how well, as far as it is known.
+/// The quality of the data association, as far as it is known.
 fn association(variant: &VariantReport) -> String {
     let Some(association) = &variant.association else { return String::new() };
     let merged = text::count(association.merged, "object");
@@ -125,7 +125,7 @@ fn association(variant: &VariantReport) -> String {
     text::wrap(&line) + "\n"
 }
 
-/// The noise that was estimated, and why the odometry was kept, if it was.
+/// The estimated noise, and the reason if the odometry was kept.
 fn noise(variant: &VariantReport) -> String {
     let Some(found) = variant.variance_components.last() else { return String::new() };
     let mut parts = vec![];
@@ -148,7 +148,7 @@ fn noise(variant: &VariantReport) -> String {
     text::wrap(&format!("{}: {}", on_one_line(&variant.name), parts.join("; "))) + "\n"
 }
 
-/// How well boxes are predicted that were held out.
+/// The prediction of held-out boxes.
 fn held_out(variant: &VariantReport) -> String {
     let Some(held_out) = &variant.held_out else { return String::new() };
     let Prediction { boxes, objects, out_of_view, iou, pixels } = held_out.all;
@@ -172,7 +172,7 @@ fn keys(objects: &[ObjectId]) -> String {
     objects.iter().map(|id| object_key(*id).to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// What the run has mapped itself, and is not there any more at its end.
+/// Objects that the run itself added and later found removed.
 fn gone(variant: &VariantReport) -> String {
     let of_prior = variant.prior_map.as_ref().map_or(&[][..], |prior| &prior.gone);
     let own: Vec<ObjectId> = variant.gone.iter().copied().filter(|id| !of_prior.contains(id)).collect();
@@ -182,7 +182,7 @@ fn gone(variant: &VariantReport) -> String {
     text::wrap(&format!("{}: seen, and gone at the end: {}", on_one_line(&variant.name), keys(&own))) + "\n"
 }
 
-/// What was seen again of a map that was made before, what is gone, and what is new.
+/// Objects of the prior map: seen again, removed, and newly added.
 fn prior_map(variant: &VariantReport) -> String {
     let Some(prior) = variant.prior_map.as_ref().filter(|prior| prior.is_located) else {
         return String::new();
@@ -207,7 +207,8 @@ fn prior_map(variant: &VariantReport) -> String {
     text::wrap(&line) + "\n"
 }
 
-/// A line: the condition, what is rejected, and the factor that costs the most. The report has the whole table.
+/// One line: the condition, the rejected factors, and the factor with the largest cost. The report has the
+/// whole table.
 fn diagnosis(variant: &VariantReport) -> String {
     let Some(diagnosis) = &variant.solve.diagnosis else { return String::new() };
     let name = on_one_line(&variant.name);
@@ -225,7 +226,7 @@ fn diagnosis(variant: &VariantReport) -> String {
     text::wrap(&line) + "\n"
 }
 
-/// What came in: odometry, and objects as they were initialised.
+/// The row of the input: odometry, and objects as they were initialized.
 fn before(variant: &VariantReport) -> Vec<String> {
     let landmarks = variant.landmarks.as_ref().map(|l| &l.initial);
     let cells = [

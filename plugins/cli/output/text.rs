@@ -1,4 +1,4 @@
-//! Numbers and words for people.
+//! Numbers and words as readable text.
 use manifactor::graph::Key;
 
 mod printable;
@@ -11,12 +11,12 @@ pub(crate) use table::Table;
 use unicode_width::UnicodeWidthStr;
 pub(crate) use width::width;
 
-/// A paragraph, broken into lines as wide as the terminal is.
+/// Wraps a paragraph at the width of the terminal.
 pub(crate) fn wrap(paragraph: &str) -> String {
     wrapped(paragraph, width()).join("\n")
 }
 
-/// Lines of at most this width, broken between words; a word that is longer has a line of its own.
+/// Wraps a paragraph between words into lines of at most `width`; a longer word gets a separate line.
 pub(crate) fn wrapped(paragraph: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in paragraph.split_whitespace() {
@@ -32,12 +32,12 @@ pub(crate) fn wrapped(paragraph: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// `x0, x1`.
+/// Formats keys as `x0, x1`.
 pub(crate) fn keys(keys: &[Key]) -> String {
     keys.iter().map(|key| on_one_line(key.as_str())).collect::<Vec<_>>().join(", ")
 }
 
-/// Seconds, with three digits that say something.
+/// Formats a duration with three significant digits.
 pub(crate) fn seconds(s: f64) -> String {
     match s {
         s if s < 0.9995e-3 => format!("{:.0} µs", s * 1e6),

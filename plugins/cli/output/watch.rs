@@ -1,4 +1,4 @@
-//! Watching a program at work, on stderr: a progress bar, a line for each step, or the log of all parts.
+//! Progress on stderr: a progress bar, a line for each step, or the full log.
 use crate::output;
 use crate::output::text::{on_one_line, seconds};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -10,9 +10,9 @@ use tracing::Level;
 use tracing_subscriber::field::MakeExt;
 use tracing_subscriber::fmt::{format::debug_fn, time::uptime};
 
-/// What `-v` and a terminal ask for. All of it goes to stderr.
+/// The form of the progress, chosen by `-v` and by the kind of stderr.
 pub(crate) enum Watch {
-    /// Nobody looks.
+    /// No progress.
     Nothing,
     /// One line that changes.
     Bar(ProgressBar),
@@ -21,7 +21,8 @@ pub(crate) enum Watch {
 }
 
 impl Watch {
-    /// Lines with `-v`, the log's own with more; else a bar, where stderr is a terminal.
+    /// Creates lines for `-v`, nothing for `-vv` (the log has the steps), and otherwise a bar if stderr is
+    /// a terminal.
     pub(crate) fn new(verbose: u8, title: &str) -> Self {
         match verbose {
             0 if std::io::stderr().is_terminal() => {}
@@ -29,7 +30,7 @@ impl Watch {
             _ => return Self::Nothing,
         }
         let bar = ProgressBar::new_spinner().with_prefix(on_one_line(title).into_owned());
-        // the template is a literal: without it the default style is as good
+        // if the literal template is invalid, the default style is good enough
         if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix} {elapsed} {msg}") {
             bar.set_style(style);
         }
@@ -45,7 +46,7 @@ impl Watch {
     }
 }
 
-/// Shows what all parts log: nothing but warnings, without `-v`; what was done with one; how, with two.
+/// Starts the log on stderr: warnings by default, completed work with `-v`, details with `-vv`.
 pub(crate) fn log(verbose: u8) {
     let level = match verbose {
         0 => Level::WARN,
@@ -60,9 +61,10 @@ pub(crate) fn log(verbose: u8) {
         let value = on_one_line(&value);
         if field.name() == "message" { write!(out, "{value}") } else { write!(out, "{field}={value}") }
     });
-    // a line that cannot be written is left out: an error of the log's own would go the same way, by `eprintln!`
+    // a line that cannot be written is dropped: the logger would report its error with `eprintln!`, which
+    // fails too
     let log = log.fmt_fields(fields.delimited(" ")).log_internal_errors(false);
-    // a program that brings a log of its own keeps it
+    // a host program with its own logger keeps it
     let _ = log.with_writer(std::io::stderr).try_init();
 }
 

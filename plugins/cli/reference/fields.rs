@@ -1,11 +1,11 @@
-//! The fields of a registered type, out of its JSON Schema.
+//! The fields of a registered type, from its JSON Schema.
 use manifactor::graph::catalogue;
 use serde_json::Value;
 
-/// A field, in words.
+/// A field, described in words.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Field {
-    /// Its name; `stop.step` within another, `variables[].key` within the items of a list.
+    /// Name of the field; `stop.step` inside a table, `variables[].key` inside the items of a list.
     pub name: String,
     pub kind: String,
     pub default: Option<String>,
@@ -13,7 +13,7 @@ pub(crate) struct Field {
     pub docs: String,
 }
 
-/// The fields of an object, those of objects within it included.
+/// The fields of an object, including those of nested objects.
 pub(crate) fn fields(schema: &Value) -> Vec<Field> {
     let mut out = Vec::new();
     collect(schema, schema, "", &mut out);
@@ -45,8 +45,8 @@ fn collect(root: &Value, schema: &Value, prefix: &str, out: &mut Vec<Field>) {
     }
 }
 
-/// The tables that a field is, or a list of, with what their fields' names have before them. What is described elsewhere has
-/// none: registered types, and noise.
+/// The tables in a field or in its list, each with the suffix for the names of its fields. Empty for
+/// registered types and for noise, which have their own sections.
 fn within<'a>(root: &'a Value, schema: &'a Value) -> Vec<(&'a Value, &'static str)> {
     if registered(schema).is_some() {
         return Vec::new();
@@ -68,13 +68,14 @@ fn registered(schema: &Value) -> Option<&'static str> {
     catalogue::all().iter().map(|entry| entry.kind).find(|kind| *kind == name)
 }
 
-/// Returns whether it is the noise, by itself or as the definition that others refer to.
+/// Returns whether a schema is the noise, either inline or as the shared definition.
 fn is_noise(root: &Value, schema: &Value) -> bool {
     let defined = || root.pointer("/$defs/Noise").is_some_and(|noise| noise == schema);
     schema.get("title").is_some_and(|title| title == "Noise") || defined()
 }
 
-/// A default as people write it: `1e15`, not a one and fifteen zeros; of a registered type its name.
+/// A default in its usual notation: `1e15` and not a one with fifteen zeros, and only the name of a
+/// registered type.
 fn value(default: &Value) -> String {
     if let Some(Value::String(name)) = default.get("type") {
         return name.clone();

@@ -1,25 +1,25 @@
-//! Who may look.
+//! Access control.
 use hyper::{Request, header};
 use std::fmt::Write as _;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
 use subtle::ConstantTimeEq;
 
-/// What a request has to show.
+/// The condition that a request has to meet.
 #[derive(Debug, Clone)]
 pub(super) enum Access {
-    /// Programs of this machine alone reach the address. The request has to name it as such: a page of somebody else's whose
-    /// name was made to lead here (DNS rebinding) would name its own host.
+    /// Only programs on this machine reach the address. The request has to name it as the host: a foreign
+    /// page whose name was made to resolve to it (DNS rebinding) would name its own host.
     Local,
-    /// Others reach it as well: they have to know this.
+    /// Other machines reach the address too, so a request has to contain this token.
     Token(String),
 }
 
-/// Bytes of a token: as many as cannot be guessed.
+/// Length of a token, long enough that it cannot be guessed. Unit: bytes.
 const TOKEN: usize = 16;
 
 impl Access {
-    /// That to an address; a new token for one that others reach.
+    /// Returns the access to an address, with a new token if other machines reach it.
     ///
     /// # Errors
     /// If the system has no random numbers.
@@ -30,13 +30,13 @@ impl Access {
         let mut bytes = [0; TOKEN];
         getrandom::fill(&mut bytes).map_err(io::Error::other)?;
         Ok(Self::Token(bytes.iter().fold(String::new(), |mut text, byte| {
-            // writing to a String does not fail
+            // writing to a String cannot fail
             let _ = write!(text, "{byte:02x}");
             text
         })))
     }
 
-    /// What to open in a browser of this machine.
+    /// The URL for a browser on this machine.
     pub(super) fn url(&self, address: SocketAddr) -> String {
         let ip = match address.ip() {
             IpAddr::V4(ip) if ip.is_unspecified() => std::net::Ipv4Addr::LOCALHOST.into(),
@@ -57,14 +57,14 @@ impl Access {
             Self::Token(token) => {
                 let query = request.uri().query().unwrap_or_default();
                 let given = query.split('&').find_map(|pair| pair.strip_prefix("token=")).unwrap_or_default();
-                // in a time that tells nothing of how much of it is right
+                // in constant time, so that the duration does not reveal a partial match
                 given.as_bytes().ct_eq(token.as_bytes()).into()
             }
         }
     }
 }
 
-/// The host that a request names; `None` for none or several.
+/// The host of a request; `None` if it has none or several.
 fn host<T>(request: &Request<T>) -> Option<&str> {
     if let Some(authority) = request.uri().authority() {
         return Some(authority.as_str());
@@ -73,7 +73,7 @@ fn host<T>(request: &Request<T>) -> Option<&str> {
     hosts.next().filter(|_| hosts.next().is_none())?.to_str().ok()
 }
 
-/// Returns whether a host, with its port or without, is this machine by its nature: no name server is asked about these.
+/// Returns whether a host, with or without a port, always means this machine, without a name server.
 fn is_local(host: &str) -> bool {
     let port = |rest: &str| {
         // RFC 3986: a port is digits, and there may be none after the colon
@@ -139,7 +139,7 @@ mod tests {
         };
         assert!(admitted("/", &["localhost:80"]) && admitted("http://localhost/", &[]));
         assert!(!admitted("/", &[]) && !admitted("/", &["localhost", "localhost"]));
-        // what is asked for says more than the header
+        // the host in the request line has priority over the header
         assert!(!admitted("http://example.org/", &["localhost"]));
     }
 

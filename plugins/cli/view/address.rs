@@ -1,11 +1,11 @@
-//! Where to listen, as somebody writes it.
+//! The address to listen at, from text.
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
-/// `HOST:PORT`, a host or a port alone. The host is an address, or `localhost`: 127.0.0.1, which is also the default. Port 0, the
-/// default, is one that is free.
+/// Parses `HOST:PORT`, a host or a port. The host is an IP address or `localhost`, which is 127.0.0.1.
+/// Default: 127.0.0.1 and port 0, which selects a free port.
 ///
 /// # Errors
-/// If the text is no such address, with examples of the expected form.
+/// If the text is not such an address; the error shows examples of the expected form.
 pub fn address(text: &str) -> Result<SocketAddr, String> {
     const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let named = match text.strip_prefix("localhost").filter(|rest| rest.is_empty() || rest.starts_with(':')) {

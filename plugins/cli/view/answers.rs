@@ -1,4 +1,4 @@
-//! What is answered: the page, and its events.
+//! The responses: the page and its events.
 use super::access::Access;
 use futures_util::stream::{Stream, unfold};
 use http_body_util::combinators::UnsyncBoxBody;
@@ -13,11 +13,12 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::{sleep, timeout};
 
-/// From one state to the next at least; where there is no other, something is sent now and then to find out who has gone.
+/// Shortest time between two states, and longest silence. After it, a comment is sent to detect closed
+/// connections.
 const PACE: Duration = Duration::from_millis(100);
 const SILENCE: Duration = Duration::from_secs(15);
-/// With every answer: it is kept nowhere, taken for what it says it is, and shown in no other page; the address, which may have
-/// a token, is told nobody.
+/// Headers of every response. It is not cached, its content type is not guessed, and no foreign page can
+/// embed it. The address, which may have a token, is not sent as a referrer.
 const HEADERS: [(&str, &str); 5] = [
     ("cache-control", "no-store"),
     ("x-content-type-options", "nosniff"),
@@ -26,7 +27,7 @@ const HEADERS: [(&str, &str); 5] = [
     ("content-security-policy", "frame-ancestors 'none'"),
 ];
 
-/// The newest state of the map, and when there is a newer one.
+/// The newest state of the map, and the notice of a newer one.
 pub(super) type States = watch::Receiver<Arc<LiveMap>>;
 type Body = UnsyncBoxBody<Bytes, Infallible>;
 
@@ -37,12 +38,12 @@ pub(super) struct Answers {
 }
 
 impl Answers {
-    /// To those whom this admits, of these states.
+    /// Creates the responses for requests that `access` admits, from these states.
     pub(super) fn new(access: Access, states: States) -> Self {
         Self { access, states, page: live_page().into() }
     }
 
-    /// That to a request, whose body is nobody's concern.
+    /// Returns the response to a request. Its body is ignored.
     pub(super) fn to<T>(&self, request: &Request<T>) -> Response<Body> {
         if !self.access.admits(request) {
             return words(StatusCode::FORBIDDEN, "open the address as it was told");
@@ -66,7 +67,8 @@ impl Answers {
     }
 }
 
-/// The newest state whenever the browser has taken the one before, from that of now to the last.
+/// Streams the states, from the current one to the last. A state is encoded after the browser has taken the
+/// previous one.
 fn events(mut states: States) -> impl Stream<Item = Result<Frame<Bytes>, Infallible>> {
     states.mark_changed();
     unfold((states, Duration::ZERO), |(mut states, pause)| async move {

@@ -15,11 +15,12 @@ use std::task::{Context, Poll};
 use tokio::runtime;
 use tokio::sync::watch;
 
-/// How often the connection is polled. One poll answers a complete request.
+/// Number of polls of the connection. One poll answers a complete request.
 const POLLS: usize = 8;
 
-/// Returns the bytes that the server sends at once to a connection with these bytes. With a token, every request needs it; without a token,
-/// every request has to name this machine. An incomplete request has no answer yet, and an answer with events has no end.
+/// Returns the bytes that the server sends immediately on a connection with these bytes. With a token,
+/// every request needs it; without one, every request has to name this machine as the host. An incomplete
+/// request has no response yet, and a response with events has no end.
 ///
 /// # Errors
 /// If the system has no timer.
@@ -43,7 +44,7 @@ pub fn answer(request: &[u8], token: Option<&str>) -> io::Result<Vec<u8>> {
     Ok(sent.into_inner())
 }
 
-/// A connection whose other side has sent all of its bytes and waits.
+/// A connection whose peer has sent all of its bytes and waits.
 struct Memory<'a> {
     request: &'a [u8],
     sent: &'a RefCell<Vec<u8>>,

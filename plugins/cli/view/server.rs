@@ -1,4 +1,4 @@
-//! The server: connections, and their limits. Each is for one request.
+//! The server: connections and their limits. Each connection carries one request.
 use super::access::Access;
 use super::answers::{Answers, States};
 use futures_util::future::select;
@@ -20,23 +20,25 @@ use tokio::sync::{Semaphore, watch};
 use tokio::time::{sleep, timeout};
 use tokio_io_timeout::TimeoutStream;
 
-/// Connections at once; more wait. A page takes two.
+/// Largest number of connections at once; further ones wait. A page takes two.
 const MOST: usize = 32;
-/// Of the files that may be open, connections take one in so many: the rest is for the results.
+/// Connections may use one in four of the files that may be open; the rest is for the results.
 const SHARE: u64 = 4;
-/// Bytes of a request's head at most, and about as many as wait for a browser before its next state is made.
+/// Largest head of a request, and roughly the data buffered for a browser before its next state is encoded.
+/// Unit: bytes.
 const LONGEST: usize = 16 * 1024;
-/// How long a head may take to come; a browser that takes nothing for so long has gone.
+/// Longest time for the head of a request, and for a browser that takes no data before it counts as gone.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Before the next connection is tried where one could not be.
+/// Pause after a connection that could not be accepted.
 const PAUSE: Duration = Duration::from_millis(100);
-/// How long the end waits for browsers that have not been told of it yet.
+/// Longest wait at the end for browsers that have not received the last state.
 const FAREWELL: Duration = Duration::from_secs(5);
 
-/// Serves from now on, in a thread that ends when nobody can change the state any more and browsers know.
+/// Serves in a new thread, which ends when the state can no longer change and the browsers have its last
+/// version.
 ///
 /// # Errors
-/// If the system has no thread for it.
+/// If the system cannot create the thread.
 pub(super) fn begin(
     listener: std::net::TcpListener,
     access: Access,
@@ -52,9 +54,9 @@ pub(super) fn begin(
     thread::Builder::new().name("view".into()).spawn(serve)
 }
 
-/// How many get events from these states.
+/// Number of browsers that receive these states.
 pub(super) fn watchers(states: &watch::Sender<Arc<LiveMap>>) -> usize {
-    // the server has one that it copies, and one that waits for the end
+    // the server itself holds two receivers: one that it copies, and one that waits for the end
     states.receiver_count().saturating_sub(2)
 }
 
@@ -63,30 +65,30 @@ async fn serve(listener: TcpListener, access: Access, mut states: States) {
     let connections = GracefulShutdown::new();
     let ended = async { while states.changed().await.is_ok() {} };
     select(pin!(accept(&listener, &answers, &connections)), pin!(ended)).await;
-    // who has not been told by then goes without
+    // browsers that have not received the last state by then miss it
     let _ = timeout(FAREWELL, connections.shutdown()).await;
 }
 
-/// One request for each connection, with limits on its head.
+/// HTTP with one request per connection and limits on its head.
 pub(super) fn http() -> http1::Builder {
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(PATIENCE).max_buf_size(LONGEST).keep_alive(false);
     http
 }
 
-/// How many connections leave enough files for the rest of the program, if this many may be open.
+/// Number of connections that leave enough files for the rest of the program.
 fn most_connections(open_files: Option<u64>) -> usize {
     let share = open_files.map_or(u64::MAX, |files| files / SHARE);
     usize::try_from(share).unwrap_or(MOST).clamp(1, MOST)
 }
 
-/// How many files may be open (`ulimit -n`); `None` if there is no limit.
+/// Number of files that may be open (`ulimit -n`); `None` if there is no limit.
 #[cfg(unix)]
 fn open_files() -> Option<u64> {
     rustix::process::getrlimit(rustix::process::Resource::Nofile).current
 }
 
-/// No limit is known on this system.
+/// Returns `None`: this system has no known limit.
 #[cfg(not(unix))]
 fn open_files() -> Option<u64> {
     None
@@ -96,14 +98,14 @@ async fn accept(listener: &TcpListener, answers: &Arc<Answers>, connections: &Gr
     let http = http();
     let places = Arc::new(Semaphore::new(most_connections(open_files())));
     loop {
-        // before the connection, which would take a file even if it is closed at once
+        // acquired before the connection, which takes a file even if it is closed at once
         let Ok(place) = places.clone().acquire_owned().await else { return };
         let Ok((stream, _)) = listener.accept().await else {
-            // too many files are open, say: that may pass
+            // for example, too many files are open, which may pass
             sleep(PAUSE).await;
             continue;
         };
-        // without it, small answers come later
+        // Nagle's algorithm would delay small responses
         let _ = stream.set_nodelay(true);
         let mut stream = TimeoutStream::new(stream);
         stream.set_write_timeout(Some(PATIENCE));
@@ -111,7 +113,7 @@ async fn accept(listener: &TcpListener, answers: &Arc<Answers>, connections: &Gr
         let answer = service_fn(move |request| ready(Ok::<_, Infallible>(answers.to(&request))));
         let connection = connections.watch(http.serve_connection(TokioIo::new(Box::pin(stream)), answer));
         tokio::spawn(async move {
-            // what goes wrong is the browser's affair: it has gone, or asks again
+            // an error concerns only the browser: it has gone, or it asks again
             let _ = connection.await;
             drop(place);
         });
@@ -149,7 +151,7 @@ mod tests {
         stream
     }
 
-    /// The status of an answer, and all of it.
+    /// The status of a response, and its whole text.
     fn answer(address: SocketAddr, line: &str, host: &str) -> (u16, String) {
         let mut text = String::new();
         asked(address, &format!("{line} HTTP/1.1\r\nHost: {host}\r\n\r\n"))
@@ -244,7 +246,7 @@ mod tests {
         assert_eq!(state().unwrap()["words"], "iteration 2");
         change(&feed, |map| map.enter(Phase::Ended("done".to_owned()), None));
         drop(feed);
-        // nobody has to read for it to end
+        // the server ends even if no browser reads
         server.join().unwrap();
         assert_eq!(state().unwrap()["words"], "done");
         assert!(state().is_none() && TcpStream::connect(address).is_err());
@@ -254,7 +256,7 @@ mod tests {
     fn who_takes_nothing_holds_up_nobody() {
         let (address, feed, _) = served(Access::Local);
         let deaf = asked(address, "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n");
-        // more than fits into any buffer on the way
+        // more than all buffers on the way can hold
         let long = "x".repeat(1 << 20);
         for i in 0..40 {
             change(&feed, |map| *map = LiveMap::new(&long, &i.to_string()));
@@ -263,7 +265,8 @@ mod tests {
         drop(deaf);
     }
 
-    /// One that asks for events and takes none; from then on, the clock goes on to what is due whenever nothing else happens.
+    /// A browser that requests events and reads none. After that, the paused clock jumps to the next timer
+    /// whenever the runtime is idle.
     async fn deaf(address: SocketAddr) -> tokio::net::TcpStream {
         tokio::time::resume();
         let stream = tokio::net::TcpStream::connect(address).await.unwrap();
@@ -321,7 +324,7 @@ mod tests {
         };
         let mut all: Vec<_> = (0..most_connections(open_files())).map(|_| heard(looks())).collect();
         assert!(all.iter().all(|(first, _)| first.contains("200")));
-        // one more waits until another has gone
+        // a further connection waits until one is closed
         let waiting = looks();
         waiting.set_read_timeout(Some(PAUSE)).unwrap();
         assert!((&waiting).read(&mut [0]).is_err());

@@ -1,4 +1,4 @@
-//! Formulas: their laws, and what each mistake says.
+//! Formulas: their laws, and the text of each error message.
 #![allow(
     missing_docs,
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! Formulas obey the laws of all factors, and every function that they can call agrees with its derivative.
+//! Formulas obey the laws of all factors, and every function agrees with its derivative.
 use manifactor_expression::{Constant, Expression};
 use manifactor_geometry::testing::{any_point3, any_se2, any_se3};
 use manifactor_geometry::{Between, Se3};
@@ -58,7 +58,7 @@ fn a_part_that_has_a_name_is_the_formula_that_it_stands_for() {
         "residual": ["inverse(x) * p / norm(inverse(x) * p) - up", "where(norm(inverse(x) * p) - 2, norm(inverse(x) * p), 2)"],
     }));
     check((any_se3(), any_point3()), |(x, p)| {
-        // no direction leads from the pose to a point in the same place
+        // No direction leads from the pose to a point at the same position.
         if parts.erased().is_defined(&[&x, &p]) == Some(true) {
             same(&parts, &long, &[&x, &p], 0.0);
         }
@@ -82,7 +82,7 @@ fn formulas_that_differ_in_constants_are_told_apart() {
     let residual = |factor: &Expression| factor.erased().residual(&[&p]).unwrap();
     assert_eq!(residual(&of(4.0, [0.0, 0.0, 1.0])), [2.0 - 48.0, 3.0 - 2.0]);
     assert_eq!(residual(&of(9.0, [0.0, 1.0, 0.0])), [2.0 - 243.0, 3.0 - 3.0]);
-    // what follows from one constant is no number, though it was for the others
+    // A value computed from this constant is not finite, although it was for the previous constants.
     let document = serde_json::json!({
         "variables": { "p": "point3" },
         "residual": ["dot(p, up) - offset ^ 2 * 3", "norm(p) - sqrt(offset)"],
@@ -101,7 +101,7 @@ fn formulas_that_differ_in_constants_are_told_apart() {
     assert_ne!(plane("point3"), plane("point2"));
 }
 
-/// Both say the same, and so do their derivatives.
+/// Checks that residuals and Jacobians of both factors are equal.
 fn same(
     formula: &Expression,
     factor: &dyn Factor,
@@ -166,7 +166,7 @@ fn outside_of_its_domain_a_formula_takes_no_part() {
     });
 }
 
-/// Over flat values: the derivatives by dual numbers against differences.
+/// Compares the derivatives from dual numbers with finite differences, over flat values.
 fn agrees(function: &Function, point: &[f64]) {
     let mut places = vec![0];
     for (_, shape) in function.arguments {
@@ -207,7 +207,8 @@ fn every_function_agrees_with_its_derivative() {
     let smooth = |f: &&Function| f.name != "^";
     let all: Vec<&Function> = functions().into_iter().filter(smooth).collect();
     assert!(all.len() > 80 && all.iter().any(|f| f.name == "extent"));
-    // where all of them are defined: roots, logarithms and the angles of sines among them
+    // A range in which all functions are defined, including roots, logarithms and inverse trigonometric
+    // functions.
     check(proptest::collection::vec(0.2..0.9f64, 32), |point| {
         all.iter().for_each(|function| agrees(function, &point));
         Ok(())

@@ -1,4 +1,4 @@
-//! Factors of more rows than loops are made for come to the same as several short ones.
+//! Factors with more rows than the specialized loops support give the results of several short factors.
 use manifactor_expression::Expression;
 use manifactor_geometry::{Point3, Prior, Se3};
 use manifactor_graph::loss::{Cauchy, RobustLoss};
@@ -42,7 +42,7 @@ fn eleven_rows_weigh_as_those_of_shorter_ones() {
     let sigmas: Vec<f64> = (0..11).map(|i| 0.1 + 0.05 * f64::from(i)).collect();
     let noise = |rows: std::ops::Range<usize>| Noise::sigmas(&sigmas[rows]).unwrap();
     let (long_graph, long) = solved(&[(residual(&SHORT), noise(0..11))], false);
-    // the first alone does not depend on p
+    // The first formula alone does not depend on p.
     let first =
         (residual(&[SHORT[0], SHORT[2]]), Noise::sigmas(&[&sigmas[..6], &sigmas[9..]].concat()).unwrap());
     let (_, short) = solved(&[first, (residual(&[SHORT[1]]), noise(6..9))], false);

@@ -1,9 +1,9 @@
-//! What each mistake says: the texts are reviewed here.
+//! Texts of the error messages, for review.
 use manifactor_expression::{Constant, Expression};
 use manifactor_geometry as _;
 use manifactor_quadric as _;
 
-/// The message of a formula over `q`, an object, and `x`, a pose.
+/// Error message of a formula over `q`, an object, and `x`, a pose.
 fn says(formula: &str) -> String {
     let variables = [("q", "dual_quadric"), ("x", "se3")];
     Expression::new(variables, [formula]).map(|_| "nothing".to_owned()).unwrap_or_else(|e| e.to_string())
@@ -194,7 +194,7 @@ fn constants_are_checked() {
     }
 }
 
-/// The message of a formula over `x`, a pose, with a part that has this name.
+/// Error message of a formula over `x`, a pose, with a named part.
 fn says_of_part(name: &str, part: &str, residual: &str) -> String {
     let define: std::collections::BTreeMap<_, _> = [(name, part)].into();
     let document =

@@ -1,10 +1,10 @@
-//! What has to be held so that a reconstruction from images stays where it is, and as large as it is.
+//! Variables to hold so that the position, orientation and scale of a reconstruction from images are fixed.
 use crate::pose_graph::anchor::Parts;
 use manifactor_geometry::{BalCamera, Se3};
 use manifactor_graph::{Fixed, Graph, Key, Manifold, Values};
 
-/// Holds, of each connected part, the pose of its first camera and one direction of the camera that is farthest
-/// from that: the axis of its own along which it would mostly move if the scale changed.
+/// Holds, in each connected part, the pose of the first camera and one direction of the camera farthest from
+/// it: the local axis along which that camera would move most if the scale changed.
 pub(super) fn hold(graph: &mut Graph, values: &Values) -> Vec<Key> {
     let mut parts = Parts::connected(graph, values);
     let is_free = |key: &Key| graph.fixed().get(key) != Some(&Fixed::Whole(true));

@@ -1,4 +1,4 @@
-//! Problems of bundle adjustment as BAL files.
+//! Writes bundle adjustment problems as BAL files.
 use crate::error::FormatError;
 use crate::text::write_text;
 use crate::words::omitted;
@@ -8,23 +8,23 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::path::Path;
 
-/// What BAL cannot express, and was left out.
+/// Parts of a graph that BAL cannot express and that were omitted.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Omitted {
-    /// Factors, by the name of their type: whatever is no observation of a point by a camera.
+    /// Factors that are not observations of a point by a camera, by type name.
     pub factors: BTreeMap<&'static str, usize>,
-    /// Variables, by the name of their type: what is neither a camera nor a point.
+    /// Variables that are neither cameras nor points, by type name.
     pub variables: BTreeMap<&'static str, usize>,
-    /// Robust losses; their observations are written without.
+    /// Robust losses; their observations are written without a loss.
     pub losses: usize,
-    /// Noise other than one pixel; its observations are written without.
+    /// Noise models other than one pixel; their observations are written without noise.
     pub noise: usize,
     /// Variables that are held, wholly or in part; they are written as free.
     pub held: usize,
 }
 
 impl Omitted {
-    /// In words, what was left out.
+    /// Returns the omitted parts as text.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = omitted("BAL", &self.variables, &self.factors);
         let others = [("robust losses", self.losses), ("noise", self.noise), ("what is held", self.held)];
@@ -35,9 +35,10 @@ impl Omitted {
     }
 }
 
-/// The BAL text of a graph, and what could not be written. Cameras and points are numbered in their order.
+/// Returns the BAL text of a graph, and the parts that could not be written. Cameras and points are numbered
+/// in their order.
 ///
-/// Numbers have all their digits; poses read back to rounding, as a file has their inverse.
+/// Numbers are written with all digits. Poses read back up to rounding, as the file contains their inverse.
 pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
     let cameras: Vec<_> = values.all::<BalCamera>().collect();
     let points: Vec<_> = values.all::<Point3>().collect();
@@ -65,13 +66,14 @@ pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
     text.extend(observations);
     let numbers = cameras.iter().flat_map(|(_, camera)| numbers(camera));
     for number in numbers.chain(points.iter().flat_map(|(_, p)| p.iter().copied())) {
-        // Debug has all digits, and exponents for what is very small or large; a String takes all
+        // Debug writes all digits, with exponents for very small or large numbers. Writing to a String cannot
+        // fail.
         let _ = writeln!(text, "{number:?}");
     }
     (text, omitted)
 }
 
-/// Writes a graph as BAL file, and returns what could not be written.
+/// Writes a graph as a BAL file, and returns the parts that could not be written.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -80,7 +82,7 @@ pub fn write(path: impl AsRef<Path>, graph: &Graph, values: &Values) -> Result<O
     write_text(path.as_ref(), &text).map(|()| omitted)
 }
 
-/// `None` where it is no observation.
+/// Formats an observation; `None` if the factor is not an observation.
 fn observation(
     entry: &FactorEntry,
     cameras: &HashMap<&Key, usize>,

@@ -1,8 +1,8 @@
-//! Which variables have to be held so that every connected part of a graph stays where it is.
+//! Variables to hold so that the gauge of every connected part of a graph is fixed.
 use manifactor_graph::{Fixed, Graph, Key, Values};
 
-/// The first pose of each connected part in which nothing is held, and nothing is measured in the frame of the world; of a
-/// part without a pose, its first variable.
+/// Returns the first pose of each connected part without a held variable or a measurement in the world frame.
+/// For a part without a pose, its first variable.
 pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> bool) -> Vec<Key> {
     let mut parts = Parts::connected(graph, values);
     let place = |key: &Key| values.position(key.as_str());
@@ -26,11 +26,11 @@ pub(crate) fn anchors(graph: &Graph, values: &Values, is_pose: impl Fn(&Key) -> 
     anchors
 }
 
-/// Disjoint sets, by the parent of each member.
+/// Disjoint sets, stored as the parent of each member.
 pub(crate) struct Parts(Vec<usize>);
 
 impl Parts {
-    /// The places of the variables that factors connect.
+    /// Returns the connected sets of variables, by their index.
     pub(crate) fn connected(graph: &Graph, values: &Values) -> Self {
         let mut parts = Self((0..values.len()).collect());
         for factor in graph.factors() {
@@ -42,7 +42,7 @@ impl Parts {
     }
     pub(crate) fn root(&mut self, mut i: usize) -> usize {
         while self.0[i] != i {
-            // halve the path on the way
+            // Path halving.
             self.0[i] = self.0[self.0[i]];
             i = self.0[i];
         }

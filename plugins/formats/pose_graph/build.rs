@@ -1,4 +1,4 @@
-//! From the lines of a file to a graph and its values.
+//! Builds a graph and its values from the records of a file.
 use super::anchor::anchors;
 use super::information::{Outcome, noise};
 use super::record::{Absolute, AbsoluteMeasurement, Edge, Measurement, Record, Vertex, VertexType};
@@ -17,14 +17,14 @@ use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-/// Notes all problems; there are none where there is a graph.
+/// Builds the graph, and records all problems. `None` if there is a problem.
 pub(crate) fn build(
     records: &[(usize, Record)],
     options: &Options,
     problems: &mut Problems<'_>,
 ) -> Option<PoseGraph> {
     let mut builder = Builder::new(options);
-    // vertices first: a file may use them before it defines them
+    // Vertices first: a file may use them before their definition.
     for (line, record) in records {
         let defined = match record {
             Record::Vertex { id, value } => builder.define(*line, *id, value),
@@ -58,18 +58,18 @@ pub(crate) fn build(
 struct Builder<'a> {
     options: &'a Options,
     graph: Graph,
-    /// All edges, those that were left out among them: what they measured still places vertices.
+    /// All edges, including omitted ones: their measurements still place vertices.
     measured: Graph,
-    /// Vertices with a line of their own.
+    /// Vertices with a line.
     values: Values,
     report: Report,
-    /// Type of each vertex, and the line that says so.
+    /// Type of each vertex, and the line that determined it.
     types: HashMap<u64, (usize, VertexType)>,
-    /// Vertices without a line of their own.
+    /// Vertices without a line.
     missing: BTreeMap<u64, VertexType>,
     /// Poses of sensors on the vehicle, each with its line.
     sensors: HashMap<u64, (usize, Se3)>,
-    /// Poses as absolute measurements have them, for those without a line of their own.
+    /// Poses from absolute measurements, for vertices without a line.
     located: Values,
     /// Pairs with an edge between them, the smaller number first.
     linked: HashSet<(u64, u64)>,
@@ -112,7 +112,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// The key of a vertex that this line takes for one of that type.
+    /// Returns the key of a vertex that this line uses with the expected type.
     fn use_as(&mut self, line: usize, id: u64, expected: VertexType) -> Result<Key, Mistake> {
         let (first, found) = *self.types.entry(id).or_insert_with(|| {
             self.missing.insert(id, expected);
@@ -158,13 +158,14 @@ impl<'a> Builder<'a> {
                 (Arc::new(Position { position, lever_arm: Coordinates::default() }), information.clone())
             }
             AbsoluteMeasurement::Se3 { pose, sensor } => {
-                // Log(z⁻¹ x o) = Ad(o⁻¹) Log((z o⁻¹)⁻¹ x), with the sensor at o on the vehicle and at z in the world
+                // Log(z⁻¹ x o) = Ad(o⁻¹) Log((z o⁻¹)⁻¹ x), with the sensor pose o on the vehicle and z in the
+                // world.
                 let offset = self.sensor_pose(sensor)?;
                 let value = pose.compose(&offset.inverse());
                 let adjoint = Se3::adjoint_of_inverse(&offset);
                 let adjoint = DMatrix::from_column_slice(6, 6, adjoint.as_slice());
                 let mut turned = adjoint.transpose() * information * &adjoint;
-                // symmetric up to rounding only
+                // The product is symmetric only up to rounding.
                 turned.fill_lower_triangle_with_upper_triangle();
                 self.located.insert(key.clone(), value);
                 (Arc::new(Prior { value }), turned)
@@ -194,7 +195,7 @@ impl<'a> Builder<'a> {
         self.with_noise(line, entry, information, if is_bearing { of_bearing } else { Ok })
     }
 
-    /// Adds a factor with the information of its line, or leaves it out.
+    /// Adds a factor with the information of its line, or omits it.
     fn with_noise(
         &mut self,
         line: usize,
@@ -218,7 +219,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// A point as the vehicle sees it: its error turns with the sensor, and so does the information.
+    /// Transforms a point to the vehicle frame. Its error, and so its information, rotates with the sensor.
     fn in_vehicle_frame(&self, edge: &Edge) -> Result<(Measurement, Option<DMatrix<f64>>), Mistake> {
         let Measurement::Point3 { position, sensor: Some(id) } = edge.measurement else {
             return Ok((edge.measurement, edge.information.clone()));
@@ -228,7 +229,7 @@ impl<'a> Builder<'a> {
         let r = sensor.rotation.matrix();
         let turned = |m: &DMatrix<f64>| {
             let mut m = r * m * r.transpose();
-            // symmetric up to rounding only
+            // The product is symmetric only up to rounding.
             m.fill_lower_triangle_with_upper_triangle();
             DMatrix::from_column_slice(3, 3, m.as_slice())
         };
@@ -268,7 +269,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Values of the missing vertices.
+    /// Computes initial values of the missing vertices.
     fn fill(&mut self) -> Result<(), ValueError> {
         if self.missing.is_empty() {
             return Ok(());
@@ -277,7 +278,7 @@ impl<'a> Builder<'a> {
         let poses = self.missing.iter().filter(|(_, t)| t.is_pose()).map(|(id, t)| (key(*id, *t), *t));
         let alone: Vec<_> = poses.filter(|(key, _)| !all.contains(key.as_str())).collect();
         if !alone.is_empty() {
-            // poses that only see points: nothing says where they are
+            // Poses that only measure points: no relative measurement places them.
             for (key, vertex_type) in alone {
                 if let Some(value) = self.located.variable(key.as_str()) {
                     all.insert_boxed(key, value.erased().clone_box());
@@ -314,7 +315,8 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The noise of a bearing for a factor that has a range as well, which was not measured.
+/// Returns the noise model of a bearing for a factor that also has a range; the range is masked, as it was
+/// not measured.
 #[allow(clippy::needless_pass_by_value, reason = "one of several functions of this type")]
 fn of_bearing(noise: Noise) -> Result<Noise, NoiseError> {
     let bearing = noise.information_matrix(1)?.trace();
@@ -322,7 +324,7 @@ fn of_bearing(noise: Noise) -> Result<Noise, NoiseError> {
     Ok(Noise::information(both)?.observing(&[true, false]))
 }
 
-/// Returns whether these are two poses, one right after the other.
+/// Returns whether the keys are two poses with consecutive numbers.
 fn are_consecutive(keys: &[Key]) -> bool {
     let number = |key: &Key| key.as_str().strip_prefix('x').and_then(|number| number.parse::<u64>().ok());
     match keys {

@@ -1,4 +1,4 @@
-//! g2o: pose graphs in the plane and in space, one vertex or edge a line.
+//! g2o files: pose graphs in the plane and in space, one vertex or edge per line.
 //!
 //! | line | fields |
 //! | --- | --- |
@@ -17,9 +17,9 @@
 //! | `PARAMS_SE3OFFSET` | sensor x y z qx qy qz qw |
 //! | `FIX` | id … |
 //!
-//! g2o's own residual of `EDGE_SE3:QUAT` is (translation, vector part of the quaternion); ours is the
-//! full logarithm, rotation first. The information is permuted and else used as it is written.
-//! Read with [`pose_graph::read`](crate::pose_graph::read), write with [`write()`].
+//! The residual of `EDGE_SE3:QUAT` in g2o is (translation, vector part of the quaternion); here it is the
+//! full logarithm, rotation first. The information is permuted and otherwise used as written. Read with
+//! [`pose_graph::read`](crate::pose_graph::read), write with [`write()`].
 use crate::error::Mistake;
 use crate::lines::{Fields, id};
 use crate::pose_graph::record::{
@@ -31,7 +31,7 @@ use manifactor_geometry::{Point2, Point3, Se2, So2};
 mod write;
 pub use write::{Omitted, format, write};
 
-/// The parser of a line with this tag.
+/// Returns the parser of a line with this tag.
 pub(crate) fn parser(tag: &str) -> Option<Parse> {
     Some(match tag {
         "VERTEX_SE2" => vertex_se2,
@@ -52,7 +52,7 @@ pub(crate) fn parser(tag: &str) -> Option<Parse> {
     })
 }
 
-/// `x y θ`
+/// Parses `x y θ`.
 pub(crate) fn se2(fields: &mut Fields<'_>) -> Result<Se2, Mistake> {
     let [x, y, theta] = fields.numbers()?;
     Ok(Se2::new(So2::exp(theta), [x, y].into()))

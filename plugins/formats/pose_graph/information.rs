@@ -1,15 +1,15 @@
-//! Information matrices as noise, and what to do with those that are none.
+//! Conversion of information matrices to noise models, with repair of invalid ones.
 use super::Repair;
 use crate::error::Mistake;
 use manifactor_graph::Noise;
 use manifactor_graph::noise::NoiseError;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Eigenvalues are raised to this share of the largest: far below what anyone measures, far enough
-/// above rounding for a Cholesky factorisation.
+/// Eigenvalues are raised to this share of the largest: far below any measured value, and far enough above
+/// rounding for a Cholesky factorization.
 const FLOOR: f64 = 1e-9;
 
-/// The noise of an edge, and what was done to have it.
+/// Noise model of an edge, and how it was obtained.
 pub(crate) enum Outcome {
     AsWritten(Noise),
     Clamped(Noise),
@@ -30,7 +30,7 @@ fn clamped(information: &DMatrix<f64>) -> Outcome {
     let floor = FLOOR * eigenvalues.max();
     eigenvalues.apply(|x| *x = x.max(floor));
     let m = &eigenvectors * DMatrix::from_diagonal(&eigenvalues) * eigenvectors.transpose();
-    // the product is symmetric up to rounding only
+    // The product is symmetric only up to rounding.
     match Noise::information((&m + m.transpose()) * 0.5) {
         Ok(noise) => Outcome::Clamped(noise),
         Err(_) => Outcome::Rejected,

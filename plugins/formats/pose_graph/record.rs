@@ -1,9 +1,9 @@
-//! What the lines of a pose graph say, whichever format they are in.
+//! Records of pose graph files, independent of the file format.
 use crate::error::Mistake;
 use manifactor_geometry::{Point2, Point3, Se2, Se3, So2};
 use nalgebra::DMatrix;
 
-/// One line.
+/// Content of one line.
 #[derive(Debug, Clone)]
 pub(crate) enum Record {
     Vertex {
@@ -11,11 +11,11 @@ pub(crate) enum Record {
         value: Vertex,
     },
     Edge(Edge),
-    /// A measurement of one vertex in the frame of the world.
+    /// A measurement of one vertex in the world frame.
     Absolute(Absolute),
-    /// These vertices are held at their values.
+    /// Vertices that are held at their values.
     Fix(Vec<u64>),
-    /// Two vertices are the same place.
+    /// Two vertices at one place.
     Equivalent(u64, u64),
     /// Pose of a sensor on the vehicle.
     Sensor {
@@ -37,7 +37,7 @@ pub(crate) struct Edge {
     pub(crate) from: u64,
     pub(crate) to: u64,
     pub(crate) measurement: Measurement,
-    /// In the tangent order of this framework; unit, where the file has none.
+    /// In the tangent order of this library; `None` if the file has none, which means unit information.
     pub(crate) information: Option<DMatrix<f64>>,
 }
 
@@ -45,32 +45,32 @@ pub(crate) struct Edge {
 pub(crate) struct Absolute {
     pub(crate) id: u64,
     pub(crate) measurement: AbsoluteMeasurement,
-    /// In the tangent order of this framework.
+    /// In the tangent order of this library.
     pub(crate) information: DMatrix<f64>,
 }
 
-/// Where a vertex is in the world.
+/// Measurement of a vertex in the world frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum AbsoluteMeasurement {
     Se2(Se2),
-    /// The position of a pose in the plane, along the axes of the world.
+    /// Position of a pose in the plane, along the world axes.
     Position2(Point2),
-    /// The pose of the sensor of that number.
+    /// Pose of the sensor with this number.
     Se3 {
         pose: Se3,
         sensor: u64,
     },
 }
 
-/// The second vertex, seen from the first.
+/// Measurement of the second vertex in the frame of the first.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Measurement {
     Se2(Se2),
     Se3(Se3),
     Point2(Point2),
-    /// The direction of a point in the plane, counter-clockwise from the pose's x axis.
+    /// Direction of a point in the plane, counter-clockwise from the pose's x axis.
     Bearing2(So2),
-    /// Seen by the sensor of that number, or from the vehicle's own frame.
+    /// Point in the frame of the sensor with this number, or in the vehicle frame.
     Point3 {
         position: Point3,
         sensor: Option<u64>,
@@ -111,7 +111,7 @@ impl Vertex {
 }
 
 impl Measurement {
-    /// Types of the vertices that it is between.
+    /// Returns the types of the two vertices.
     pub(crate) fn ends(&self) -> (VertexType, VertexType) {
         match self {
             Self::Se2(_) => (VertexType::Se2, VertexType::Se2),
@@ -122,10 +122,10 @@ impl Measurement {
     }
 }
 
-/// How a line is read once its tag is known.
+/// Parser of a line with a known tag.
 pub(crate) type Parse = fn(&str) -> Result<Record, Mistake>;
 
-/// The symmetric matrix of `n` rows whose upper triangle is given by rows.
+/// Returns the symmetric `n` × `n` matrix whose upper triangle is given by rows.
 pub(crate) fn upper_triangle(n: usize, numbers: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |r, c| {
         let (r, c) = (r.min(c), r.max(c));
@@ -133,7 +133,7 @@ pub(crate) fn upper_triangle(n: usize, numbers: &[f64]) -> DMatrix<f64> {
     })
 }
 
-/// Exchanges translation first and rotation first in a 6 × 6 matrix; its own inverse.
+/// Swaps translation-first and rotation-first order in a 6 × 6 matrix; it is its own inverse.
 pub(crate) fn exchange_halves(m: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(6, 6, |r, c| m[((r + 3) % 6, (c + 3) % 6)])
 }

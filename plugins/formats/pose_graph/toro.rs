@@ -1,9 +1,9 @@
-//! TORO's pose graphs, read by [`pose_graph::read`](crate::pose_graph::read) like g2o's.
+//! Pose graphs in TORO format, read by [`pose_graph::read`](crate::pose_graph::read) like g2o files.
 //!
 //! `VERTEX2` id x y θ · `EDGE2` from to x y θ I11 I12 I22 I33 I13 I23 (in that order) · `VERTEX3` id x y z
 //! roll pitch yaw · `EDGE3` from to x y z roll pitch yaw, upper triangle of the information, translation
-//! first · `EQUIV` a b. The rotation is Rz(yaw)·Ry(pitch)·Rx(roll). Edges may come without information.
-//! `VERTEX` and `EDGE` are TORO's older names for `VERTEX2` and `EDGE2`.
+//! first · `EQUIV` a b. The rotation is Rz(yaw)·Ry(pitch)·Rx(roll). Edges may omit the information. `VERTEX`
+//! and `EDGE` are older names for `VERTEX2` and `EDGE2`.
 use crate::error::Mistake;
 use crate::lines::Fields;
 use crate::pose_graph::g2o::{se2, vertex_se2};
@@ -11,7 +11,7 @@ use crate::pose_graph::record::{Edge, Measurement, Parse, Record, Vertex, exchan
 use manifactor_geometry::{Se3, So3};
 use nalgebra::Vector3;
 
-/// The parser of a line with this tag.
+/// Returns the parser of a line with this tag.
 pub(crate) fn parser(tag: &str) -> Option<Parse> {
     Some(match tag {
         "VERTEX2" | "VERTEX" => vertex_se2,
@@ -38,7 +38,7 @@ fn edge2(text: &str) -> Result<Record, Mistake> {
     Ok(Record::Edge(Edge { from, to, measurement, information }))
 }
 
-/// `x y z roll pitch yaw`
+/// Parses `x y z roll pitch yaw`.
 fn se3(f: &mut Fields<'_>) -> Result<Se3, Mistake> {
     let translation = f.numbers::<3>()?.into();
     let [roll, pitch, yaw] = f.numbers()?;
@@ -114,7 +114,7 @@ mod tests {
         else {
             panic!("expected a vertex")
         };
-        // roll takes y to z, where yaw leaves it; a yaw that came first would take y to -x
+        // Roll rotates y to z, which yaw then keeps; if yaw were applied first, it would rotate y to -x.
         assert!((pose.act(&Vector3::y()) - Vector3::z()).norm() < 1e-15);
         assert!((pose.act(&Vector3::x()) - Vector3::y()).norm() < 1e-15);
     }

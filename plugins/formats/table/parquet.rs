@@ -8,7 +8,7 @@ use ::parquet::file::writer::SerializedFileWriter;
 use ::parquet::schema::types::{Type, TypePtr};
 use std::sync::Arc;
 
-/// A table as the bytes of a Parquet file.
+/// Returns the table as the bytes of a Parquet file.
 ///
 /// # Errors
 /// If columns differ in length or share a name.
@@ -20,7 +20,7 @@ pub fn to_parquet(table: &Table) -> Result<Vec<u8>, TableError> {
 fn write(table: &Table) -> Result<Vec<u8>, ParquetError> {
     let fields = table.columns.iter().map(|(name, column)| field(name, column));
     let schema = Type::group_type_builder("table").with_fields(fields.collect::<Result<_, _>>()?).build()?;
-    // the library's version is no part of the data
+    // The version of the library is not part of the data.
     let properties = WriterProperties::builder().set_created_by("manifactor".to_owned()).build();
     let mut bytes = vec![];
     let mut file = SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties))?;

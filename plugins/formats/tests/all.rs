@@ -1,4 +1,4 @@
-//! Files, read, written and solved.
+//! Files are read, written and solved.
 #![allow(
     missing_docs,
     clippy::unwrap_used,

@@ -1,10 +1,10 @@
-//! The default solver on published pose graphs: no tuning, the best known minimum of each.
+//! The default solver reaches the best known minimum of published pose graphs, without tuning.
 use manifactor_formats::pose_graph::{Options, read};
 use manifactor_graph::Graph;
 use manifactor_solve::{Auto, GaussNewton, Silent, solve};
 use std::path::PathBuf;
 
-/// ½ Σ rᵀΩr at the best known minimum; that of MIT was found by this solver, and is certified.
+/// ½ Σ rᵀΩr at the best known minimum. The minimum of MIT was found by this solver and is certified.
 const BEST: [(&str, f64); 12] = [
     ("input_M3500_g2o.g2o", 68.957439123),
     ("intel.g2o", 22.50212),
@@ -31,7 +31,7 @@ fn auto_reaches_the_best_known_minimum_of_every_graph() {
         let graph = read(data.join("g2o").join(file), &Options::default()).unwrap();
         let outcome = solve(&graph.graph, &graph.values, &Auto::default(), &mut Silent).unwrap().outcome;
         println!("{file}: {} in {}, {}", outcome.final_cost, outcome.iterations, outcome.termination);
-        // as many digits as the best known cost is given with
+        // To the number of digits of the best known cost.
         if !outcome.termination.is_converged() || (outcome.final_cost - best).abs() > 2e-6 * best {
             missed
                 .push(format!("{file}: {}, best known {best}: {}", outcome.final_cost, outcome.termination));
@@ -40,7 +40,7 @@ fn auto_reaches_the_best_known_minimum_of_every_graph() {
     assert!(missed.is_empty(), "{missed:#?}");
 }
 
-/// The same graph with its information multiplied.
+/// Returns the graph with its information multiplied.
 fn scaled(graph: &Graph, times: f64) -> Graph {
     let mut graph = graph.clone();
     for entry in graph.factors_mut() {
@@ -52,7 +52,7 @@ fn scaled(graph: &Graph, times: f64) -> Graph {
 #[test]
 fn auto_takes_the_steps_of_gauss_newton_where_those_lead_to_the_best_minimum() {
     let Some(data) = std::env::var_os("MANIFACTOR_DATA").map(PathBuf::from) else { return };
-    // from the file's own values, Gauss-Newton takes other ways on the others
+    // On the remaining graphs, Gauss-Newton takes a different path from the file's values.
     let lead = BEST.iter().filter(|(file, _)| !["MIT.g2o", "torus3D.g2o"].contains(file));
     for (file, best) in lead {
         let loaded = read(data.join("g2o").join(file), &Options::default()).unwrap();

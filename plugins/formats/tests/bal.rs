@@ -1,4 +1,4 @@
-//! Bundle adjustment in BAL files: reading, writing, and solving what was read.
+//! BAL files: reading, writing, and solving.
 use manifactor_formats::{FormatError, bal};
 use manifactor_geometry::{BalCamera, Coordinates, Point3, ProjectionBal, Se3, So3};
 use manifactor_graph::loss::Huber;
@@ -8,7 +8,7 @@ use manifactor_solve::{
 };
 use nalgebra::{Vector2, Vector3};
 
-/// Two cameras that see one point; the second is a metre to the right of the first.
+/// Two cameras that observe one point; the second is one metre to the right of the first.
 const TWO: &str = "2 1 2\n0 0 10.0 -20.0\n1 0 -90.0 -20.0\n\
     0 0 0 0 0 0 100 0 0\n0 0 0\n-1 0 0 100 0.0 0.0\n0.1 -0.2 -1.0\n";
 
@@ -23,7 +23,7 @@ fn mistakes(text: &str) -> String {
     }
 }
 
-/// Six cameras on an arc that look at points on a bowl, from where they are off by some `error`.
+/// Six cameras on an arc that observe points on a bowl, with initial values perturbed by `error`.
 fn bundle(error: f64) -> (Graph, Values) {
     let wave = |i: usize, k: usize| ((i * 37 + k * 61) as f64).sin();
     let any = |i: usize| Vector3::new(wave(i, 1), wave(i, 2), wave(i, 3));
@@ -67,7 +67,7 @@ fn cameras_points_and_observations_are_read_whatever_the_line_breaks() {
     assert_eq!(second.world_from_camera.translation, Vector3::new(1.0, 0.0, 0.0));
     assert_eq!(second.focal_length, 100.0);
     assert_eq!(bundle.values.get::<Point3>("p0").unwrap().0, Vector3::new(0.1, -0.2, -1.0));
-    // the point is seen just where both cameras say
+    // Both observations match the point exactly.
     let problem = Problem::compile(&bundle.graph, &bundle.values).unwrap();
     assert!(problem.inspect().iter().all(|f| f.cost < 1e-20));
 }
@@ -106,7 +106,7 @@ fn mistakes_are_named_with_their_lines() {
     assert!(
         mistakes(&TWO.replace("100 0.0", "100 zero")).contains("b:6: expected a finite number, got `zero`")
     );
-    // counts that no memory could hold
+    // Counts that exceed any memory.
     assert!(mistakes("18446744073709551615 9223372036854775807 0\n1 2 3").contains("found 3"));
 }
 

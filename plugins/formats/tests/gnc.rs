@@ -1,4 +1,4 @@
-//! Graduated non-convexity on published pose graphs with false loop closures among the true ones.
+//! Graduated non-convexity on published pose graphs with added false loop closures.
 use manifactor_formats::pose_graph::{Options, PoseGraph, read};
 use manifactor_geometry::{Between, Se2, Se3};
 use manifactor_graph::Key;
@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::path::PathBuf;
 
-/// A published graph; `None`, said aloud, where there are no data.
+/// A published graph; prints a note and returns `None` without data.
 fn published(file: &str) -> Option<PoseGraph> {
     let Some(root) = std::env::var_os("MANIFACTOR_DATA").map(PathBuf::from) else {
         eprintln!("skipped: MANIFACTOR_DATA does not name a folder with published data");
@@ -17,7 +17,8 @@ fn published(file: &str) -> Option<PoseGraph> {
     Some(read(root.join("g2o").join(file), &Options::default()).unwrap())
 }
 
-/// Adds loop closures between random poses, measured at random within metres; the number of factors before.
+/// Adds loop closures between random poses with random measurements of a few metres. Returns the original
+/// number of factors.
 fn mislead(loaded: &mut PoseGraph, n: usize, seed: u64) -> usize {
     let factors = loaded.graph.factors().len();
     let noise = loaded.graph.factors()[0].noise.clone();
@@ -41,13 +42,13 @@ fn mislead(loaded: &mut PoseGraph, n: usize, seed: u64) -> usize {
     factors
 }
 
-/// ½ Σ ‖r‖² of the first `factors`, whatever weight they have.
+/// ½ Σ ‖r‖² of the first `factors`, ignoring weights.
 fn cost(solution: &Solution, factors: usize) -> f64 {
     let one = |whitened: &Vec<f64>| 0.5 * whitened.iter().map(|x| x * x).sum::<f64>();
     solution.factors[..factors].iter().map(|f| one(&f.whitened)).sum()
 }
 
-/// What is rejected, and the cost of what is true; `None` where there are no data.
+/// Rejected factors, the original number of factors, and the cost of the true ones; `None` without data.
 fn solved(file: &str, outliers: usize, seed: u64, solver: &str) -> Option<(Vec<usize>, usize, f64)> {
     let mut loaded = published(file)?;
     let factors = mislead(&mut loaded, outliers, seed);
@@ -85,13 +86,13 @@ fn geman_mcclure_ends_close_to_the_optimum_too() {
     let solver = r#"{"type": "gnc", "cost": "geman_mcclure"}"#;
     let Some((rejected, factors, cost)) = solved("input_M3500_g2o.g2o", 99, 2, solver) else { return };
     assert!(rejected.into_iter().eq(factors..factors + 99));
-    // at the best known minimum of this cost itself others report 69.21
+    // Other implementations report 69.21 at the best known minimum of this cost.
     assert!(cost < 69.0, "{cost}");
 }
 
 #[test]
 fn a_3d_graph_with_more_false_than_a_third_is_solved() {
-    // with one inlier in ten thousand above the threshold, all of the true ones are below it
+    // With a threshold that one inlier in ten thousand exceeds, all true closures are below it.
     let solver = r#"{"type": "gnc", "probability": 0.9999}"#;
     let Some((rejected, factors, cost)) = solved("smallGrid3D.g2o", 120, 1, solver) else { return };
     assert!(rejected.into_iter().eq(factors..factors + 120));

@@ -1,4 +1,4 @@
-//! Published pose graphs through a session, pose by pose, beside batch solves.
+//! Published pose graphs through the smoother, pose by pose, compared with batch solves.
 use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use manifactor_formats::replay::Replay;
 use manifactor_geometry::{Between, Point2, Range, Se2, Se3};
@@ -20,7 +20,7 @@ fn data(path: &str) -> Option<PathBuf> {
     file
 }
 
-/// All steps, and the report of the last.
+/// Runs at most this number of steps, and returns the smoother and its last report.
 fn replay(graph: &Graph, most: usize) -> (Session, Report) {
     let mut session = Session::new(Settings::default());
     let (mut steps, mut report) = (Replay::of(graph, &Values::new()), Report::default());
@@ -34,7 +34,7 @@ fn replay(graph: &Graph, most: usize) -> (Session, Report) {
 
 #[test]
 fn the_estimate_is_close_to_the_optimum_and_finish_is_there() {
-    // share of the optimum that the running estimate may be above it
+    // Largest relative excess of the running estimate over the optimum.
     for (name, most, above) in
         [("intel", 600, 1e-3), ("parking-garage", 700, 0.05), ("input_M3500_g2o", 600, 2e-3)]
     {
@@ -59,7 +59,7 @@ fn a_covariance_from_the_fronts_is_that_of_a_batch() {
     let keys = ["x299", "x17"];
     let mut problem = Problem::compile(&session.graph().0, &session.estimates()).unwrap();
     let expected = problem.joint_covariance(&keys).unwrap();
-    // linearization points are not quite the estimate
+    // Linearization points differ slightly from the estimate.
     let found = session.covariance(&keys).unwrap();
     assert!((&found - &expected).norm() < 1e-2 * expected.norm(), "{found} {expected}");
 }
@@ -124,7 +124,7 @@ fn a_budget_bounds_what_an_update_takes_and_the_estimate_gets_there_later() {
     let budget = 2e4;
     let (mut bounded, of_bounded) = run(Some(budget));
     let most = |reports: &[Report]| {
-        // what new factors need is not bounded, nor are steps that had to be shortened
+        // The budget covers neither the work for new factors nor steps that had to be shortened.
         let relinearizing = reports.iter().filter(|r| r.relinearized > 0 && r.halved + r.damped == 0);
         relinearizing.map(|r| r.operations).fold(0.0, f64::max)
     };
@@ -172,7 +172,7 @@ fn a_window_that_holds_all_closures_is_as_good_as_all() {
     println!("{apart} {bytes:?} {}", all.bytes());
 }
 
-/// The rows of a table of numbers, without comments.
+/// Rows of a table of numbers, without comments.
 fn rows(path: PathBuf) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(path).unwrap();
     let lines = text.lines().filter(|line| !line.starts_with('#'));
@@ -210,7 +210,7 @@ fn antennas_wait_for_a_second_range() {
             .add([Key::indexed("x", i), here.clone()], Between { relative })
             .noise(Noise::sigmas(&[0.05, 0.01, 0.02]).unwrap());
         if session.estimate(antenna.as_str()).is_none() {
-            // somewhere ahead: a range says no more
+            // Somewhere ahead, as a single range determines no more.
             values.insert(antenna.clone(), Point2::new(pose.act(&Vector2::new(row[3], 1.0))));
         }
         let range = Range::<Se2, Point2>::new(Positive::new(row[3]).unwrap());

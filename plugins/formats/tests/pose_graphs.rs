@@ -1,4 +1,4 @@
-//! What the pose-graph reader makes of good and of bad lines.
+//! Pose-graph reader: valid and malformed lines.
 use manifactor_formats::pose_graph::{Options, PoseGraph, Repair, parse};
 use manifactor_geometry::{Between, Landmark, Point2, Point3, Se2, Se3, Tree};
 use manifactor_graph::{Factor, Fixed, Key};
@@ -60,7 +60,7 @@ fn a_point_seen_by_a_turned_sensor_is_read_in_the_frame_of_the_pose() {
     );
     let seen = factor::<Landmark<3>>(&loaded, 0).position.vector();
     assert!((seen - Vector3::new(1.0, 2.0, 0.0)).norm() < 1e-15);
-    // the sensor is sure along its own x, which is the vehicle's y
+    // The sensor is certain along its x axis, which is the vehicle's y axis.
     let expected = DMatrix::from_diagonal(&Vector3::new(1.0, 9.0, 1.0).as_slice().to_vec().into());
     assert!((information(&loaded, 0, 3) - expected).norm() < 1e-14);
     assert_eq!(loaded.values.get::<Point3>("l1").unwrap().y, 2.0);
@@ -122,7 +122,7 @@ fn many_unknown_tags_are_counted_and_ten_are_named() {
     assert!(notes.iter().any(|note| note == "490 more unknown tags: 490 lines left out"), "{notes:?}");
 }
 
-/// The cost of a graph at its initial values.
+/// Cost of a graph at its initial values.
 fn cost(text: &str) -> f64 {
     let loaded = read(text);
     Problem::compile(&loaded.graph, &loaded.values).unwrap().cost().cost
@@ -135,7 +135,7 @@ fn absolute_measurements_are_read_and_hold_the_graph() {
     let text = "VERTEX_SE2 0 1 2 0.5\nEDGE_PRIOR_SE2_XY 0 1.5 2 4 0 9\n";
     assert!((cost(text) - 0.5).abs() < 1e-12);
     assert!(read(text).report.anchored.is_empty());
-    // the point is at 45 degrees, measured at 0.1 rad more
+    // The point is at 45 degrees, with a measurement error of 0.1 rad.
     let angle = std::f64::consts::FRAC_PI_4 + 0.1;
     let text = format!("VERTEX_SE2 0 0 0 0\nVERTEX_XY 1 3 3\nFIX 0\nEDGE_BEARING_SE2_XY 0 1 {angle} 100\n");
     assert!((cost(&text) - 0.5).abs() < 1e-9, "{}", cost(&text));
@@ -163,7 +163,7 @@ fn the_prior_of_a_pose_is_that_of_its_sensor() {
     };
     let exp = |w: [f64; 6]| Se3::exp(&Vector6::from(w));
     let (x, offset) = (exp([0.3, -0.2, 0.5, 1.0, 2.0, 3.0]), exp([1.0, 0.4, -0.3, 0.2, -0.1, 0.4]));
-    // ours is rotation first, the file's information translation first
+    // Tangents here are rotation first, the information in the file translation first.
     let error = [0.01, -0.02, 0.03, 0.1, 0.2, -0.1];
     let measured = x.compose(&offset).compose(&exp(error));
     let information = [1.0, 2.0, 3.0, 10.0, 20.0, 30.0];
@@ -205,7 +205,7 @@ fn what_is_not_positive_definite_is_repaired_by_policy_and_counted() {
     let clamped = repair(Repair::Clamp).unwrap();
     assert_eq!((clamped.report.clamped, clamped.report.rejected), (vec![2], vec![3]));
     assert_eq!(clamped.graph.factors().len(), 2);
-    // the vertex still gets its value along the edge that was left out, and is held: nothing else holds it
+    // The vertex is still placed along the omitted edge. It is held, as no other factor constrains it.
     assert_eq!(rejected.values.get::<Se2>("x2").unwrap().translation.x, 2.0);
     assert_eq!(rejected.report.anchored, keys(&["x0", "x2"]));
 }

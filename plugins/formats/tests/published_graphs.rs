@@ -1,8 +1,8 @@
-//! The published pose graphs of `MANIFACTOR_DATA/g2o`: how much each holds, and what it costs at its start.
+//! Published pose graphs in `MANIFACTOR_DATA/g2o`: their size, and their cost at the initial values.
 use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use std::path::PathBuf;
 
-/// The folder of pose graphs; `None`, said aloud, where the variable is not set.
+/// The folder of pose graphs; prints a note and returns `None` if the variable is not set.
 fn folder() -> Option<PathBuf> {
     let folder = std::env::var_os("MANIFACTOR_DATA").map(|root| PathBuf::from(root).join("g2o"));
     if folder.is_none() {
@@ -11,7 +11,7 @@ fn folder() -> Option<PathBuf> {
     folder
 }
 
-/// F = ½ Σ rᵀΩr
+/// Cost F = ½ Σ rᵀΩr.
 fn cost(PoseGraph { graph, values, .. }: &PoseGraph) -> f64 {
     let one = |entry: &manifactor_graph::FactorEntry| {
         let variables: Vec<_> = entry.keys.iter().map(|key| values.variable(key.as_str()).unwrap()).collect();
@@ -22,8 +22,8 @@ fn cost(PoseGraph { graph, values, .. }: &PoseGraph) -> f64 {
     graph.factors().iter().map(one).sum()
 }
 
-/// File, vertices with a line, edges, variables in all, cost at the start as others compute it, from
-/// the file's initial values or, where there are none, along the odometry.
+/// File, number of vertex lines, edges and variables, and the initial cost that other programs compute.
+/// Initial values come from the file or, if it has none, from the odometry.
 const GRAPHS: [(&str, usize, usize, usize, Option<f64>); 17] = [
     ("CSAIL.g2o", 0, 1172, 1045, Some(1_072_150.125)),
     ("Klaus3.g2o", 3, 3, 3, None),

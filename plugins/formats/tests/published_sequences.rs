@@ -1,4 +1,4 @@
-//! The published sequences of `MANIFACTOR_DATA/tum`: every file loads whole.
+//! Published sequences in `MANIFACTOR_DATA/tum`: every file loads completely.
 use manifactor_formats::{accelerometer, detections, timestamps, tum};
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ fn folder() -> Option<PathBuf> {
 #[test]
 fn detections_load_with_the_published_counts() {
     let Some(folder) = folder() else { return };
-    // sequence, boxes, objects
+    // Sequence, number of boxes, number of objects.
     for (sequence, boxes, objects) in [
         ("freiburg1_desk", 2348, 26),
         ("freiburg1_desk2", 2109, 38),
@@ -32,7 +32,7 @@ fn detections_load_with_the_published_counts() {
 #[test]
 fn trajectories_load_and_their_irregular_lines_are_reported() {
     let Some(folder) = folder() else { return };
-    // file, poses, lines that were moved, lines that were dropped
+    // File, number of poses, moved lines, dropped lines.
     let cases: [(&str, usize, &[usize], &[usize]); 5] = [
         ("freiburg1_desk/groundtruth.txt", 2335, &[], &[]),
         ("freiburg2_desk/groundtruth.txt", 20956, &[], &[10863]),

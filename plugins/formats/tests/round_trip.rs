@@ -1,4 +1,4 @@
-//! A graph that is written as g2o file reads back as it was.
+//! A graph written as a g2o file reads back unchanged.
 use manifactor_formats::{g2o, pose_graph};
 use manifactor_geometry::{Between, Landmark, Point2, Point3, Prior, Se2, Se3, So3};
 use manifactor_graph::loss::Huber;
@@ -11,7 +11,7 @@ fn parse(text: &str) -> pose_graph::PoseGraph {
     pose_graph::parse(text, "g", &Options { anchor: false, ..Options::default() }).unwrap()
 }
 
-/// A positive definite matrix of `n` rows from any numbers.
+/// A positive definite matrix of `n` rows from arbitrary numbers.
 fn information(n: usize, numbers: &[f64]) -> Noise {
     let root = DMatrix::from_fn(n, n, |r, c| numbers[(r * n + c) % numbers.len()]);
     let m = &root * root.transpose() + DMatrix::identity(n, n);
@@ -23,7 +23,7 @@ fn se3(xi: [f64; 6]) -> Se3 {
 }
 
 fn json(graph: &Graph, values: &Values) -> String {
-    // through a value: numbers compare, not their spelling
+    // Through a JSON value, so that numbers are compared rather than their spelling.
     serde_json::to_value((graph, values)).unwrap().to_string()
 }
 

@@ -1,10 +1,10 @@
-//! The published pose graphs of `MANIFACTOR_DATA/g2o` from a chordal start: to the best known cost, all of them.
+//! Published pose graphs in `MANIFACTOR_DATA/g2o` reach the best known cost from a chordal start.
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_geometry::{Chordal, SpanningTree, Tree, certify};
 use manifactor_graph::Graph;
 use manifactor_solve::{GaussNewton, Given, LevenbergMarquardt, Optimizer, Silent, Solution, Start, solve};
 
-/// Graph and solution; `None`, said aloud, where there are no data.
+/// Graph and solution; prints a note and returns `None` without data.
 fn solved(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(Graph, Solution)> {
     let Some(root) = std::env::var_os("MANIFACTOR_DATA") else {
         eprintln!("skipped: MANIFACTOR_DATA does not name a folder with published data");
@@ -22,13 +22,13 @@ fn solved(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(G
     Some((loaded.graph, solution))
 }
 
-/// The cost at the start and at the end.
+/// Initial and final cost.
 fn costs(file: &str, start: &dyn Start, optimizer: &dyn Optimizer) -> Option<(f64, f64)> {
     let outcome = solved(file, start, optimizer)?.1.outcome;
     Some((outcome.initial_cost, outcome.final_cost))
 }
 
-/// File, best known cost, and how many times as much the chordal start may cost.
+/// File, best known cost, and the largest ratio of the chordal start's cost to it.
 const GRAPHS: [(&str, f64, f64); 11] = [
     ("torus3D.g2o", 12_117.636_879, 1.02),
     ("MIT.g2o", 20.603_473_521, 2.0),
@@ -72,7 +72,7 @@ fn a_shallow_spanning_tree_is_a_start_that_torus3d_is_solved_from() {
 
 #[test]
 fn the_best_known_costs_are_certified_and_where_noise_is_isotropic_bounded() {
-    // how far the bound on the graph's own cost is below what was reached
+    // Largest gap between the bound on the graph's cost and the reached cost.
     let graphs = [
         ("MIT.g2o", None),
         ("intel.g2o", None),
@@ -94,7 +94,7 @@ fn the_best_known_costs_are_certified_and_where_noise_is_isotropic_bounded() {
 
 #[test]
 fn a_minimum_that_is_not_the_best_is_not_certified() {
-    // from the file's own values others end at 385.12
+    // From the values in the file, other programs end at 385.12.
     let Some((graph, solution)) = solved("MIT.g2o", &Given {}, &GaussNewton::default()) else {
         return;
     };
@@ -102,6 +102,6 @@ fn a_minimum_that_is_not_the_best_is_not_certified() {
     let certificate = certify(&graph, &solution.values).unwrap();
     println!("{certificate}");
     assert_eq!(certificate.certified, reached < 1.0001 * best, "{reached}: {certificate:?}");
-    // the bound holds wherever it is taken
+    // The bound holds at any values.
     assert!(certificate.lower_bound < 20.120_366);
 }

@@ -1,18 +1,18 @@
-//! Signs of other units, or of another order of numbers, than a file is read in: what no robot does.
+//! Plausibility checks: signs that a file uses different units or a different order of numbers.
 use manifactor_geometry::Se3;
 
-/// Steps between poses from which on a median says something.
+/// Minimum number of steps between poses for a meaningful median.
 const ENOUGH: usize = 3;
-/// Metres from one pose to the next.
+/// Largest plausible distance between poses, in metres.
 const FAR: f64 = 100.0;
-/// Metres a second.
+/// Largest plausible speed, in metres per second.
 const FAST: f64 = 50.0;
-/// Seconds from one frame to the next.
+/// Largest plausible time between frames, in seconds.
 const SLOW: f64 = 10.0;
-/// The first entry of a quaternion that turns by nearly half a turn about x.
+/// Smallest x entry of a quaternion that counts as nearly half a turn about x.
 const HALF_TURN: f64 = 0.9;
 
-/// What is doubtful of poses relative to the one before each, in words.
+/// Returns doubts about poses that are relative to the previous one, as text.
 pub fn relative_poses<'a>(relative: impl Iterator<Item = &'a Se3>) -> Vec<String> {
     let (lengths, turned): (Vec<f64>, Vec<bool>) =
         relative.map(|step| (step.translation.norm(), is_turned(step))).unzip();
@@ -36,14 +36,14 @@ pub fn relative_poses<'a>(relative: impl Iterator<Item = &'a Se3>) -> Vec<String
     doubts
 }
 
-/// What is doubtful of a trajectory by time, in seconds, in words.
+/// Returns doubts about a trajectory with times in seconds, as text.
 pub fn trajectory(poses: impl Iterator<Item = (f64, Se3)>) -> Vec<String> {
     let poses: Vec<(f64, Se3)> = poses.collect();
     let mut doubts = vec![];
     if poses.len() <= ENOUGH {
         return doubts;
     }
-    // odometry begins at its origin, as a rule, with a quaternion of no rotation
+    // Odometry usually begins at its origin, with the identity quaternion.
     if poses.first().is_some_and(|(_, pose)| pose.rotation.quaternion_xyzw()[0].abs() == 1.0) {
         doubts.push(
             "the first pose is turned by half a turn about x, as 1 0 0 0 reads: quaternions are x y z w here; are these \
@@ -75,7 +75,7 @@ fn is_turned(step: &Se3) -> bool {
     step.rotation.quaternion_xyzw()[0].abs() > HALF_TURN
 }
 
-/// The middle of a list; 0 of none.
+/// Returns the median; 0 for an empty list.
 fn median(mut list: Vec<f64>) -> f64 {
     list.sort_unstable_by(f64::total_cmp);
     list.get(list.len() / 2).copied().unwrap_or_default()

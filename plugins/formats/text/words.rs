@@ -1,13 +1,13 @@
-//! Numbers and lists in words.
+//! Numbers and lists as text.
 use std::collections::BTreeMap;
 
-/// `1 edge`, `2 edges`, `2 boxes`.
+/// Returns `1 edge`, `2 edges`, `2 boxes`.
 pub fn count(n: usize, noun: &str) -> String {
     let plural = if noun.ends_with(['x', 's']) || noun.ends_with("ch") { "es" } else { "s" };
     format!("{n} {noun}{}", if n == 1 { "" } else { plural })
 }
 
-/// The first few of a list, and how many more there are.
+/// Returns the first few items of a list, and the number of further ones.
 pub fn list(items: impl ExactSizeIterator<Item = impl ToString>) -> String {
     const SHOWN: usize = 8;
     let more = items.len().saturating_sub(SHOWN);
@@ -15,7 +15,7 @@ pub fn list(items: impl ExactSizeIterator<Item = impl ToString>) -> String {
     if more > 0 { format!("{text} and {more} more") } else { text }
 }
 
-/// What a format cannot express, by the names of types.
+/// Returns notes about variables and factors that a format cannot express, by type name.
 pub(crate) fn omitted(format: &str, variables: &ByName, factors: &ByName) -> Vec<String> {
     let counts = variables.iter().map(|c| (c, "variable")).chain(factors.iter().map(|c| (c, "factor")));
     let note = |((name, n), what): ((&&str, &usize), &str)| {
@@ -24,5 +24,5 @@ pub(crate) fn omitted(format: &str, variables: &ByName, factors: &ByName) -> Vec
     counts.map(note).collect()
 }
 
-/// How many there are of each type.
+/// Counts by type name.
 pub(crate) type ByName = BTreeMap<&'static str, usize>;

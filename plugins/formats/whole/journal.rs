@@ -1,83 +1,85 @@
 //! Append-only files of records, one JSON object with its checksum per line.
 //!
-//! A program that is killed leaves at most one line without an end, the last: it is dropped when the file is opened again. A file
-//! that is no journal of these records, that of another key, or has a damaged line is refused and not touched.
+//! A killed program leaves at most one incomplete line, the last; it is dropped when the file is opened
+//! again. A file that is not a journal of these records, has a different key or has a damaged line is refused
+//! and not modified.
 use super::{CHECKED, checked_line, open_regular, read_checked_line, read_regular};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Write};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-/// A record of a journal.
+/// A record type of a journal.
 pub trait Record: Sized {
-    /// Its name in messages.
+    /// Name of the records in messages.
     const NAME: &'static str;
-    /// Beginnings of a first line that has the journal's key: today's, then those of earlier versions. A journal without a key has none.
+    /// Beginnings of a header line with the journal's key: the current one, then earlier versions. Empty for
+    /// journals without a key.
     const BEGINNINGS: &'static [&'static str] = &[];
 
-    /// The record as a JSON object on one line, without its end.
+    /// Formats the record as a JSON object on one line, without the line break.
     ///
     /// # Errors
-    /// A record that cannot be written.
+    /// If the record cannot be written.
     fn write(&self) -> io::Result<String>;
 
-    /// The record of such a line.
+    /// Parses the record from such a line.
     ///
     /// # Errors
-    /// A line that is no record, in words.
+    /// If the line is not a record, with the reason as text.
     fn read(line: &[u8]) -> Result<Self, String>;
 }
 
-/// Why a journal cannot be read or written.
+/// The reason why a journal cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JournalError {
-    /// A file that cannot be read or written.
+    /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The system's reason.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// A journal that another program has open.
+    /// Another program has the journal open.
     #[error("{}: another program writes to this journal", path.display())]
     InUse {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A file of something else.
+    /// The file is not a journal of these records.
     #[error("{} is no journal of {record}s: name another file", path.display())]
     NoJournal {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Name of the expected records.
         record: &'static str,
     },
-    /// A journal with another key.
+    /// The journal has a different key.
     #[error("{} is the journal of other settings, or of another version: name another file to begin anew", path.display())]
     OtherKey {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A whole line that is no record.
+    /// A complete line is not a valid record.
     #[error(
         "{}:{line} is no {record}: {message}; move the file away to begin anew, or keep its lines before {line} to go on from there",
         path.display()
     )]
     Line {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// From 1.
+        /// Line number, from 1.
         line: usize,
         /// Name of the expected record.
         record: &'static str,
-        /// The reason.
+        /// Reason as text.
         message: String,
     },
 }
 
-/// A journal that is open for writing at its end.
+/// A journal that is open for appending.
 #[derive(Debug)]
 pub struct Journal<R> {
     path: PathBuf,
@@ -86,11 +88,11 @@ pub struct Journal<R> {
 }
 
 impl<R: Record> Journal<R> {
-    /// Opens a journal, or begins one; returns its records as well. The key is checked if these records have one.
+    /// Opens or creates a journal, and returns its records. If the record type has a key, it is checked.
     ///
     /// # Errors
-    /// A file that cannot be read or written, is a link, or is no such journal; it is unchanged then. A journal with a key that another
-    /// program has open.
+    /// If the file cannot be read or written, is a link, or is not such a journal; it is then unchanged. If
+    /// the journal has a key and another program has it open.
     pub fn open(path: &Path, key: &str) -> Result<(Self, Vec<R>), JournalError> {
         let io = |source| JournalError::Io { path: path.to_owned(), source };
         let mut file = open_regular(path).map_err(io)?;
@@ -122,41 +124,41 @@ impl<R: Record> Journal<R> {
         Ok((Self { path: path.to_owned(), file, records: PhantomData }, records))
     }
 
-    /// Adds a record, and returns it as it will be read. The file is as before if it cannot be written.
+    /// Appends a record, and returns it as it will be read back. If writing fails, the file is unchanged.
     ///
     /// # Errors
-    /// A record that cannot be written, or not be read again; the system's reason.
+    /// If the record cannot be written or read back, or if the operating system reports an error.
     pub fn append(&mut self, record: &R) -> io::Result<R> {
         let line = record.write()?;
-        // a line that cannot be read again is not written
+        // Only lines that can be read back are written.
         let read = R::read(line.as_bytes()).map_err(io::Error::other)?;
         let length = self.file.metadata()?.len();
         if let Err(error) = self.file.write_all(checked_line(&line).as_bytes()) {
-            // half a line would end the journal
+            // An incomplete line would end the journal, so it is removed.
             self.file.set_len(length)?;
             return Err(error);
         }
         Ok(read)
     }
 
-    /// Brings all records to the disk.
+    /// Syncs all records to the disk.
     ///
     /// # Errors
-    /// The system's reason.
+    /// If the operating system reports an error.
     pub fn sync(&self) -> io::Result<()> {
         self.file.sync_data()
     }
 
-    /// The file.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 }
 
-/// The records of a journal without a key, which a program may be writing. A file that is not there has none.
+/// Reads a journal without a key, even while a program is writing to it. A missing file has no records.
 ///
 /// # Errors
-/// A file that cannot be read, or is no such journal.
+/// If the file cannot be read or is not such a journal.
 pub fn read<R: Record>(path: &Path) -> Result<Vec<R>, JournalError> {
     match read_regular(path) {
         Ok(bytes) => Ok(records(&bytes, false, path)?.0),
@@ -165,7 +167,8 @@ pub fn read<R: Record>(path: &Path) -> Result<Vec<R>, JournalError> {
     }
 }
 
-/// The records on lines, and the number of bytes of whole lines. A header proves that a last line without an end is a torn record.
+/// Returns the records, and the number of bytes of complete lines. With a header, an incomplete last line is
+/// a torn record.
 fn records<R: Record>(lines: &[u8], has_header: bool, path: &Path) -> Result<(Vec<R>, usize), JournalError> {
     let mut records = vec![];
     let mut whole = 0;
@@ -189,7 +192,7 @@ fn records<R: Record>(lines: &[u8], has_header: bool, path: &Path) -> Result<(Ve
     Ok((records, whole))
 }
 
-/// True if a line is the beginning of a record.
+/// Returns whether a line is the beginning of a record.
 fn is_torn(line: &[u8]) -> bool {
     let begins = line.starts_with(CHECKED.as_bytes()) || CHECKED.as_bytes().starts_with(line);
     begins && serde_json::from_slice::<serde_json::Value>(line).err().is_none_or(|error| error.is_eof())

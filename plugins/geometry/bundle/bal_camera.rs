@@ -1,5 +1,5 @@
-//! Cameras as problems of bundle adjustment in the large (BAL) have them: a pose, a focal length, two terms of
-//! radial distortion.
+//! Camera of bundle adjustment in the large (BAL): a pose, a focal length and two coefficients of radial
+//! distortion.
 use crate::groups::Coordinates;
 use crate::groups::Se3;
 use crate::groups::Xyzw;
@@ -8,13 +8,14 @@ use nalgebra::SVector;
 
 /// A camera of unknown pose, focal length and radial distortion, as in bundle adjustment in the large (BAL).
 ///
-/// It looks along its own -z; x is right and y up in the image, and the origin is the image's centre. A point P
-/// of its frame is seen at f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p, p = -(Px, Py) / Pz, in pixels (Agarwal et al., Bundle
-/// Adjustment in the Large, ECCV 2010). The pose takes points from the camera's frame to the world's, as all
-/// poses here do; files have its inverse.
+/// The camera looks along the negative z axis of its frame; x is right and y up in the image, with the origin
+/// at the image centre. A point P in the camera's frame projects to f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p with
+/// p = -(Px, Py) / Pz, in pixels (Agarwal et al., Bundle Adjustment in the Large, ECCV 2010). The pose maps
+/// points from the camera's frame to the world frame, as all poses in this library do; BAL files store its
+/// inverse.
 ///
-/// Tangent (rx, ry, rz, x, y, z, f, k1, k2): the pose steps by X·Exp(δ), in the camera's own frame, so that it turns
-/// about its own centre; the others add.
+/// Tangent (rx, ry, rz, x, y, z, f, k1, k2). The pose steps by X·Exp(δ) in the camera's frame, so a rotation
+/// turns the camera about its own centre; f, k1 and k2 are additive.
 ///
 /// ```toml
 /// [values]
@@ -25,30 +26,31 @@ use nalgebra::SVector;
 #[serde(bound(serialize = "Self: Into<Document>", deserialize = "Self: From<Document>"))]
 #[schemars(with = "Document", bound = "")]
 pub struct BalCamera<T: Scalar = f64> {
-    /// Takes points from the camera's frame to the world's.
+    /// Maps points from the camera's frame to the world frame.
     pub world_from_camera: Se3<T>,
     /// Focal length, in pixels.
     pub focal_length: T,
-    /// Radial distortion by the second and by the fourth power of the distance from the centre.
+    /// Radial distortion: the coefficients of the second and the fourth power of the distance from the
+    /// centre.
     pub distortion: Vector2<T>,
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    /// Its centre, in the world's frame; in the unit of the points.
+    /// Camera centre in the world frame, in the unit of the points.
     translation: Coordinates<3>,
-    /// Unit quaternion (x, y, z, w); turns directions of the camera's frame into those of the world's.
+    /// Unit quaternion (x, y, z, w) that rotates directions from the camera's frame to the world frame.
     rotation: Xyzw,
     /// Focal length, in pixels.
     focal_length: f64,
-    /// Radial distortion by the second power of the distance from the centre.
+    /// Radial distortion: the coefficient of the second power of the distance from the centre.
     k1: f64,
-    /// Radial distortion by the fourth power of the distance from the centre.
+    /// Radial distortion: the coefficient of the fourth power of the distance from the centre.
     k2: f64,
 }
 
-/// A point's depth has to be more than this share of its distance.
+/// Smallest depth of a point in front of the camera, as a share of its distance.
 const MARGIN: f64 = 1e-6;
 
 impl<T: Scalar> BalCamera<T> {
@@ -57,7 +59,8 @@ impl<T: Scalar> BalCamera<T> {
     pub(crate) fn radial(&self, rho: T) -> T {
         T::one() + rho * (self.distortion.x + rho * self.distortion.y)
     }
-    /// Where a point of the camera's frame is seen, in pixels; it means something for one in front.
+    /// Projects a point in the camera's frame, in pixels. The result is meaningful only for a point in front
+    /// of the camera.
     #[inline(always)]
     pub fn project(&self, point: &Vector3<T>) -> Vector2<T> {
         let p = point.xy() / -point.z;
@@ -66,7 +69,8 @@ impl<T: Scalar> BalCamera<T> {
 }
 
 impl BalCamera {
-    /// Returns whether a point of the camera's frame is in front of it, by a millionth of its distance.
+    /// Returns whether a point in the camera's frame is in front of it: its depth is more than a millionth of
+    /// its distance.
     #[inline(always)]
     pub fn is_in_front(point: &Vector3<f64>) -> bool {
         point.z < 0.0 && point.z * point.z > MARGIN * MARGIN * point.norm_squared()

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// A pinhole camera: u = fx x/z + skew y/z + cx, v = fy y/z + cy. x is right, y down, z forward.
 ///
-/// Pixels are counted from the corner of the image: it covers 0 to `width` and 0 to `height`.
+/// Pixel coordinates count from the corner of the image, which covers 0 to `width` and 0 to `height`.
 ///
 /// ```toml
 /// [source]
@@ -27,7 +27,7 @@ pub struct Camera {
     pub cx: f64,
     /// Principal point, in pixels.
     pub cy: f64,
-    /// How much y/z adds to u, in pixels; 0 for nearly all cameras.
+    /// Contribution of y/z to u, in pixels; 0 for nearly all cameras.
     pub skew: f64,
     /// Size of the image, in pixels.
     pub width: u32,
@@ -47,7 +47,7 @@ struct Document {
     cx: f64,
     /// Principal point, in pixels.
     cy: f64,
-    /// How much y/z adds to u, in pixels.
+    /// Contribution of y/z to u, in pixels.
     #[serde(default, skip_serializing_if = "is_zero")]
     skew: f64,
     /// Size of the image, in pixels.
@@ -56,25 +56,25 @@ struct Document {
     height: u32,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // serde asks for a reference
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
 fn is_zero(x: &f64) -> bool {
     *x == 0.0
 }
 
-/// Numbers that no camera has.
+/// An invalid camera parameter.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("camera: expected {field} to be {expected}, got {found}")]
 pub struct NotACamera {
     /// The parameter.
     pub field: &'static str,
-    /// What it should be.
+    /// The allowed values.
     pub expected: &'static str,
-    /// What it is.
+    /// The value given.
     pub found: f64,
 }
 
 impl Camera {
-    /// A camera without skew.
+    /// Creates a camera without skew.
     ///
     /// # Errors
     /// If a focal length or a size is not positive, or a number not finite.
@@ -97,27 +97,27 @@ impl Camera {
         Ok(self)
     }
 
-    /// K = [fx skew cx; 0 fy cy; 0 0 1]
+    /// Returns the calibration matrix K = [fx skew cx; 0 fy cy; 0 0 1].
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(self.fx, self.skew, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
     }
-    /// P = K [Rᵀ | -Rᵀc] of a camera at (R, c).
+    /// Returns the projection matrix P = K [Rᵀ | -Rᵀc] of a camera with the pose (R, c).
     pub fn projection(&self, world_from_camera: &Se3) -> Matrix3x4<f64> {
         let camera_from_world = world_from_camera.inverse().matrix();
         self.matrix() * camera_from_world.fixed_view::<3, 4>(0, 0)
     }
-    /// The direction, in the camera's frame, of what is seen at a pixel; its z is 1.
+    /// Returns the viewing direction of a pixel in the camera's frame, with z = 1.
     pub fn ray(&self, pixel: Vector2<f64>) -> Vector3<f64> {
         let y = (pixel.y - self.cy) / self.fy;
         Vector3::new((pixel.x - self.cx - self.skew * y) / self.fx, y, 1.0)
     }
-    /// Width and height of the image, in pixels.
+    /// Returns width and height of the image, in pixels.
     pub fn size(&self) -> Vector2<f64> {
         Vector2::new(f64::from(self.width), f64::from(self.height))
     }
 }
 
-/// The depth of a point has to be more than this share of its distance.
+/// Smallest depth of a point in front of the camera, as a share of its distance.
 const MARGIN: f64 = 1e-6;
 
 impl CameraModel for Camera {

@@ -1,4 +1,5 @@
-//! The seam of camera models: a model is one file that implements [`CameraModel`] and ends with `register_camera!`.
+//! Interface of camera models: a model is one file that implements [`CameraModel`] and ends with
+//! `register_camera!`.
 use crate::{Camera, Point3};
 use manifactor_graph::{Jet, JetOf, Manifold, Scalar};
 use nalgebra::{Matrix2x3, U3, Vector2, Vector3};
@@ -7,28 +8,31 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fmt::Debug;
 
-/// A calibrated camera: the pixel of a point, and the direction of a pixel. Points are in the camera's frame: x right, y down, z forward.
+/// A calibrated camera: maps points to pixels and pixels to directions.
+///
+/// Points are in the camera's frame: x right, y down, z forward.
 pub trait CameraModel:
     Clone + Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'static
 {
-    /// Name in documents of the [`Projection`](crate::Projection) of this model.
+    /// Name of this model's [`Projection`](crate::Projection) factor in documents.
     const PROJECTION: &'static str;
-    /// A camera, as TOML writes it inside of a factor; for the catalogue.
+    /// A camera in the inline TOML form used inside a factor; an example for the catalogue.
     const EXAMPLE: &'static str;
 
-    /// Pixel of a point that the camera [sees](Self::sees).
+    /// Returns the pixel of a point that the camera [sees](Self::sees).
     fn project<T: Scalar>(&self, point: &Vector3<T>) -> Vector2<T>;
 
-    /// A direction that is seen at a pixel, of any length; `None` if the model has none there.
+    /// Returns a direction that projects to the pixel, of any length, or `None` if the model has none.
     fn unproject(&self, pixel: &Vector2<f64>) -> Option<Vector3<f64>>;
 
-    /// Returns whether a point is in the domain of [`project`](Self::project), in the image or beside it.
+    /// Returns whether a point is in the domain of [`project`](Self::project), inside the image or outside.
     fn sees(&self, point: &Vector3<f64>) -> bool;
 
-    /// The pinhole camera of the rectified image: same focal lengths, principal point and size.
+    /// Returns the pinhole camera of the rectified image: same focal lengths, principal point and size.
     fn pinhole(&self) -> Camera;
 
-    /// Derivative of [`project`](Self::project) by the point; by dual numbers, unless a model knows better.
+    /// Returns the derivative of [`project`](Self::project) with respect to the point. The default uses dual
+    /// numbers; a model can override it.
     #[inline]
     fn derivative(&self, point: &Vector3<f64>) -> Matrix2x3<f64> {
         let pixel = self.project(&Point3::new(*point).seed());
@@ -42,27 +46,28 @@ pub trait CameraModel:
     }
 }
 
-/// A [`CameraModel`] that a document names by its `type`. Written by [`register_camera!`](crate::register_camera).
+/// A [`CameraModel`] that a document selects by its `type`. Implemented by
+/// [`register_camera!`](crate::register_camera).
 #[typetag::serialize(tag = "type")]
 pub trait AnyCamera: Debug + Send + Sync {
-    /// The pinhole camera of the rectified image.
+    /// Returns the pinhole camera of the rectified image.
     fn pinhole(&self) -> Camera;
 
-    /// Pixel of the rectified image for a pixel of the camera's own; `None` if there is none.
+    /// Maps a pixel of the original image to the rectified image; `None` if there is no such pixel.
     fn rectify(&self, pixel: &Vector2<f64>) -> Option<Vector2<f64>>;
 }
 
 manifactor_graph::kind!(dyn AnyCamera, "camera");
 
-/// The pixel in the rectified image of a pixel of a camera; `None` for a direction that no pinhole sees.
+/// Maps a pixel of a camera to the rectified image; `None` for a direction that no pinhole camera can see.
 #[doc(hidden)]
 pub fn rectify<M: CameraModel>(camera: &M, pixel: &Vector2<f64>) -> Option<Vector2<f64>> {
     let direction = camera.unproject(pixel)?;
     (direction.z > 0.0).then(|| camera.pinhole().project(&direction))
 }
 
-/// Registers a [`CameraModel`](crate::CameraModel) for sources, and its projection of a point as a factor:
-/// `register_camera!("radial_tangential", "projection_radial_tangential", RadialTangential);`
+/// Registers a [`CameraModel`](crate::CameraModel) as a camera for sources, and its point projection as a
+/// factor: `register_camera!("radial_tangential", "projection_radial_tangential", RadialTangential);`
 #[macro_export]
 macro_rules! register_camera {
     ($name:literal, $projection:literal, $type:ty) => {

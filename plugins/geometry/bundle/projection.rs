@@ -1,15 +1,15 @@
-//! A point in a calibrated camera.
+//! Projection of a point into a calibrated camera.
 use crate::{Camera, CameraModel, Coordinates, Point3, Se3};
 use manifactor_graph::prelude::*;
 
-/// The point is seen at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
+/// A camera measures a point at `pixel`: r = π(Rᵀ(X - t)) - z, in pixels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, bound = "M: CameraModel")]
 #[schemars(bound = "M: CameraModel", description = description::<M>())]
 pub struct Projection<M = Camera> {
-    /// Pixel of the point, x right and y down.
+    /// Measured pixel, x right and y down.
     pub pixel: Coordinates<2>,
-    /// The camera that saw it.
+    /// The calibrated camera.
     pub camera: M,
 }
 

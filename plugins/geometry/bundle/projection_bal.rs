@@ -1,13 +1,15 @@
-//! A point is seen by a camera whose focal length and distortion are estimated too: bundle adjustment.
+//! Projection of a point into a camera whose focal length and distortion are estimated too: bundle
+//! adjustment.
 use crate::{BalCamera, Coordinates, Point3};
 use manifactor_graph::prelude::*;
 use nalgebra::Matrix2x3;
 
-/// The point is seen at `pixel` by a camera with radial distortion: r = f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p - z, in pixels.
+/// A camera with radial distortion measures a point at `pixel`: r = f (1 + k1 ‖p‖² + k2 ‖p‖⁴) p - z, in
+/// pixels.
 ///
-/// With p = -(Px, Py) / Pz and P = Rᵀ(X - t) the point in the camera's frame, which looks along -z. Rows: x to the
-/// right and y up, from the image's centre. Not defined where the point is not in front of the camera by a
-/// millionth of its distance; the factor is inactive there.
+/// Here p = -(Px, Py) / Pz, and P = Rᵀ(X - t) is the point in the camera's frame; the camera looks along -z.
+/// Rows: x to the right and y up, from the image centre. Not defined unless the point is in front of the
+/// camera, with a depth of more than a millionth of its distance; otherwise the factor is inactive.
 ///
 /// ```toml
 /// [[factors]]
@@ -18,7 +20,7 @@ use nalgebra::Matrix2x3;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProjectionBal {
-    /// Where the point was seen, in pixels from the image's centre, x right and y up.
+    /// Measured pixel, from the image centre, x right and y up.
     pub pixel: Coordinates<2>,
 }
 

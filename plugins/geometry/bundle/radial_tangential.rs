@@ -1,15 +1,16 @@
-//! Lenses that bend the image along and across the radius.
+//! Camera with radial and tangential lens distortion.
 use crate::{Camera, CameraModel, Coordinates, NotACamera, register_camera};
 use manifactor_graph::Scalar;
 use nalgebra::{Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A camera whose lens bends the image along and across the radius, with five coefficients.
+/// A camera with radial and tangential lens distortion, with five coefficients.
 ///
-/// A point x/z, y/z at the radius r is seen by the pinhole at (x/z, y/z) · (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) plus the tangential part
-/// (2 p₁ xy/z² + p₂ (r² + 2 x²/z²), p₁ (r² + 2 y²/z²) + 2 p₂ xy/z²); Brown, *Close-range camera calibration*, 1971. Points beyond the radius
-/// at which the image would fold back are not seen.
+/// A point at (x/z, y/z), with radius r, projects through the pinhole at (x/z, y/z) · (1 + k₁ r² + k₂ r⁴ + k₃
+/// r⁶) plus the tangential part (2 p₁ xy/z² + p₂ (r² + 2 x²/z²), p₁ (r² + 2 y²/z²) + 2 p₂ xy/z²); Brown,
+/// *Close-range camera calibration*, 1971. The model folds back beyond some radius; points beyond that radius
+/// are not seen.
 ///
 /// ```toml
 /// [source]
@@ -22,9 +23,9 @@ use serde::{Deserialize, Serialize};
 #[schemars(with = "Document")]
 pub struct RadialTangential {
     pinhole: Camera,
-    /// k₁, k₂, p₁, p₂, k₃, in the order of OpenCV.
+    /// k₁, k₂, p₁, p₂, k₃, in OpenCV's order.
     distortion: [f64; 5],
-    /// Square of the radius x²/z² + y²/z² up to which the image does not fold.
+    /// Largest squared radius x²/z² + y²/z² at which the model does not fold back.
     limit: f64,
 }
 
@@ -44,21 +45,21 @@ struct Document {
     width: u32,
     /// Size of the image, in pixels.
     height: u32,
-    /// Coefficients k₁, k₂, p₁, p₂, k₃, in the order of OpenCV.
+    /// Coefficients k₁, k₂, p₁, p₂, k₃, in OpenCV's order.
     distortion: Coordinates<5>,
 }
 
-/// Steps until a direction is found, and its largest error, in units of the focal length.
+/// Maximum number of fixed-point iterations of `unproject`, and its tolerance in units of the focal length.
 const STEPS: usize = 100;
 const NEAR: f64 = 1e-9;
 
 impl RadialTangential {
-    /// A camera with the coefficients k₁, k₂, p₁, p₂, k₃ in the order of OpenCV.
+    /// Creates a camera with the coefficients k₁, k₂, p₁, p₂, k₃ in OpenCV's order.
     pub fn new(pinhole: Camera, distortion: [f64; 5]) -> Self {
         Self { pinhole, distortion, limit: limit(distortion) }
     }
 
-    /// Image of a point at x/z, y/z; both in units of the focal length, from the principal point.
+    /// Applies the distortion to the point (x/z, y/z), in units of the focal length from the principal point.
     fn bent<T: Scalar>(&self, [x, y]: [T; 2]) -> [T; 2] {
         let [k1, k2, p1, p2, k3] = self.distortion.map(T::from);
         let [one, two] = [T::from(1.0), T::from(2.0)];
@@ -70,13 +71,15 @@ impl RadialTangential {
     }
 }
 
-/// Steps in which the fold of the image is looked for, and halvings of the one that has it.
+/// Number of samples of the search for the fold, and bisections of the interval that contains it.
 const SCANNED: u32 = 10_000;
 const HALVINGS: usize = 60;
 
-/// Smallest s > 0 at which r (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) stops growing with r, s = r²; infinite if it never does.
+/// Returns the smallest s = r² > 0 at which r (1 + k₁ r² + k₂ r⁴ + k₃ r⁶) stops growing with r; infinite if
+/// it never does.
 fn limit([k1, k2, _, _, k3]: [f64; 5]) -> f64 {
-    // in t = 1/s the derivative is t³ + 3 k₁ t² + 5 k₂ t + 7 k₃: its largest root is below `bound`, where it is positive
+    // With t = 1/s the derivative is t³ + 3 k₁ t² + 5 k₂ t + 7 k₃, and positive at `bound`, above its largest
+    // root.
     let grows = |t: f64| t * (t * (t + 3.0 * k1) + 5.0 * k2) + 7.0 * k3 > 0.0;
     let bound = 1.0 + (3.0 * k1).abs().max((5.0 * k2).abs()).max((7.0 * k3).abs());
     let at = |i: u32| bound * f64::from(i) / f64::from(SCANNED);
@@ -154,13 +157,13 @@ mod tests {
     use manifactor_testing::strategies::vector;
     use proptest::prelude::*;
 
-    /// The calibration of freiburg1, as the benchmark publishes it.
+    /// Calibration of freiburg1, as published by the benchmark.
     fn freiburg1() -> RadialTangential {
         let pinhole = Camera::new([517.3, 516.5, 318.6, 255.3], 640, 480).unwrap();
         RadialTangential::new(pinhole, [0.2624, -0.9531, -0.0054, 0.0026, 1.1633])
     }
 
-    /// Points that it sees in its image, or a little beside it.
+    /// Points that the camera sees inside its image or slightly outside.
     fn seen() -> impl Strategy<Value = Vector3<f64>> {
         ([-0.65..0.65f64, -0.5..0.5], 0.5..10.0f64).prop_map(|([x, y], z)| Vector3::new(x, y, 1.0) * z)
     }

@@ -1,40 +1,42 @@
-//! The dual certificate matrix of a pose graph, with the translations kept: sparse, by poses.
+//! The dual certificate matrix of a pose graph. It keeps the translations and so stays sparse, with one block
+//! per pose.
 //!
-//! With X = Rᵀ and y = tᵀ stacked to V, the chordal cost is ½ tr(VᵀMV), M the data matrix. Λ, a block for each
-//! pose, is the dual variable of XXᵀ = I. For every Λ and every other V', tr(V'ᵀMV') ≥ tr Λ + Σ λ d_i D where
-//! λ d_i bounds M - Λ from below: the bound needs no minimum, but is tight only there.
-//! M - Λ, with one translation of each part held, is positive definite just if its Schur complement on the
-//! rotations is: SE-Sync's S = Q - Λ. And the inverse of S is the rotations' block of its inverse.
+//! With X = Rᵀ and y = tᵀ stacked to V, the chordal cost is ½ tr(VᵀMV), M the data matrix. Λ, with one block
+//! per pose, is the dual variable of XXᵀ = I. For every Λ and every V', tr(V'ᵀMV') ≥ tr Λ + Σ λ d_i D if λ
+//! d_i bounds M - Λ from below. The bound holds at any values, but is tight only at a minimum. With one
+//! translation of each part held, M - Λ is positive definite if and only if its Schur complement on the
+//! rotations is: SE-Sync's S = Q - Λ. The inverse of S is the block of the rotations in the inverse of M - Λ.
 use super::lanczos;
 use crate::initialise::network::Edge;
 use manifactor_solve::{BlockSystem, BlockSystemError};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
-/// An edge's weights: κ ‖R_b - R_a Z‖² + τ ‖t_b - t_a - R_a z‖².
+/// Weights of an edge: κ ‖R_b - R_a Z‖² + τ ‖t_b - t_a - R_a z‖².
 #[derive(Clone, Copy)]
 pub(super) struct Weights {
     pub kappa: f64,
     pub tau: f64,
 }
 
-/// M - Λ, to be shifted and factorized.
+/// The matrix M - Λ, to be shifted and factorized.
 pub(super) struct Dual<const D: usize> {
     system: BlockSystem,
     /// (row, column, block) of M - Λ.
     blocks: Vec<(usize, usize, DMatrix<f64>)>,
-    /// Dimension of each node's block: one less where its translation is held; and where it begins.
+    /// Dimension of each node's block, one less if its translation is held, and the index at which the block
+    /// begins.
     dims: Vec<(usize, usize)>,
-    /// Mean of the diagonal of each pose's rotational block of M: what shifts are measured by.
+    /// Mean diagonal entry of each pose's rotational block of M. Shifts are in units of it.
     scale: Vec<f64>,
-    /// ½ tr(VᵀMV)
+    /// Chordal cost ½ tr(VᵀMV).
     pub cost: f64,
-    /// tr Λ
+    /// Trace of Λ.
     trace: f64,
 }
 
 impl<const D: usize> Dual<D> {
-    /// At these rotations and translations. Of the nodes that are `grounded`, one for each part, the
-    /// translation is held.
+    /// Builds the matrix at these rotations and translations. The translation of every `grounded` node is
+    /// held, one per connected part.
     pub(super) fn new(
         edges: &[(&Edge<D>, Weights)],
         rotations: &[SMatrix<f64, D, D>],
@@ -47,7 +49,7 @@ impl<const D: usize> Dual<D> {
         let (mut blocks, mut cost) = (vec![], 0.0);
         for (edge, Weights { kappa, tau }) in edges.iter().copied() {
             let (a, b, turn, shift) = (edge.a, edge.b, &edge.rotation, &edge.translation);
-            // in terms of X and y, the transposed
+            // In terms of X and y, which are transposed.
             let chord = rotations[b].transpose() - turn.tr_mul(&rotations[a].transpose());
             let way = translations[b] - translations[a] - rotations[a] * shift;
             cost += 0.5 * (kappa * chord.norm_squared() + tau * way.norm_squared());
@@ -67,7 +69,7 @@ impl<const D: usize> Dual<D> {
             let mut view = m.view_mut((0, 0), (D, D));
             view -= (lambda + lambda.transpose()) * 0.5;
             if scale[i] == 0.0 {
-                // nothing was measured of it: out of the way
+                // No measurement involves this node: an identity block decouples it.
                 m.fill_with_identity();
             }
             blocks.push((i, i, m));
@@ -84,7 +86,8 @@ impl<const D: usize> Dual<D> {
         Ok(Self { system, blocks, dims, scale, cost, trace })
     }
 
-    /// Returns whether S + shift·diag(d) is positive definite, d the scale of each pose. Leaves its factor behind.
+    /// Returns whether S + shift·diag(d) is positive definite, with d the scale of each pose. Keeps the
+    /// factorization.
     fn is_positive(&mut self, shift: f64) -> bool {
         self.system.clear();
         for (a, b, block) in &self.blocks {
@@ -98,8 +101,8 @@ impl<const D: usize> Dual<D> {
         self.system.factorize().is_ok()
     }
 
-    /// The smallest eigenvalue of S, scaled to diag(d)^-½ S diag(d)^-½; and a shift at which S was seen to be
-    /// positive definite, as small as may be. `None` where no shift does it.
+    /// Returns the smallest eigenvalue of S, scaled to diag(d)^-½ S diag(d)^-½, and a small shift at which S
+    /// was found positive definite. `None` if no shift makes it positive definite.
     pub(super) fn smallest_eigenvalue(&mut self) -> Option<(f64, f64)> {
         let mut shift = (0..14).map(|k| 1e-13 * 10_f64.powi(k)).find(|shift| self.is_positive(*shift))?;
         let n = self.scale.len() * D;
@@ -125,13 +128,14 @@ impl<const D: usize> Dual<D> {
         Some((smallest, shift))
     }
 
-    /// No values have a chordal cost below this, as S + shift·diag(d) is positive definite.
+    /// Returns a lower bound on the chordal cost over all values; valid as S + shift·diag(d) is positive
+    /// definite.
     pub(super) fn lower_bound(&self, shift: f64) -> f64 {
         0.5 * (self.trace - shift * D as f64 * self.scale.iter().sum::<f64>())
     }
 }
 
-/// [m, right; belowᵀ, corner]
+/// Returns the block matrix [m, right; belowᵀ, corner].
 fn stacked<const D: usize>(
     m: &SMatrix<f64, D, D>,
     right: &SVector<f64, D>,

@@ -1,10 +1,11 @@
 //! The largest eigenvalue of a symmetric operator, by Lanczos' method.
 use nalgebra::{DMatrix, DVector};
 
-/// The largest eigenvalue of the operator x ← A x on `n` numbers, from a start that is the same each time.
+/// Returns the largest eigenvalue of the operator x ← A x on `n` numbers, from a fixed initial vector.
 ///
-/// Every new direction is made orthogonal to all before it. Ends once the eigenvalue is known to `tolerance` of
-/// itself, or after `steps` steps; never above the true value, but for rounding.
+/// Every new direction is orthogonalized against all previous ones. Stops when the eigenvalue has the
+/// relative accuracy `tolerance`, or after `steps` steps. The result never exceeds the true value, except by
+/// rounding.
 pub(super) fn largest(n: usize, steps: usize, tolerance: f64, mut apply: impl FnMut(&mut [f64])) -> f64 {
     let mut basis: Vec<DVector<f64>> = vec![start(n)];
     let (mut diagonal, mut beside) = (vec![], vec![]);
@@ -13,7 +14,7 @@ pub(super) fn largest(n: usize, steps: usize, tolerance: f64, mut apply: impl Fn
         let mut next = last.clone();
         apply(next.as_mut_slice());
         diagonal.push(last.dot(&next));
-        // twice: once leaves rounding of the largest direction behind
+        // Twice: a single pass leaves rounding errors along the largest direction.
         for _ in 0..2 {
             for q in &basis {
                 next.axpy(-q.dot(&next), q, 1.0);
@@ -30,7 +31,7 @@ pub(super) fn largest(n: usize, steps: usize, tolerance: f64, mut apply: impl Fn
         value = eigen.eigenvalues[top];
         let norm = next.norm();
         let known = norm * eigen.eigenvectors[(k - 1, top)].abs() <= tolerance * value.abs();
-        // the first Ritz values may sit on another eigenvalue
+        // The first Ritz values may have converged to a smaller eigenvalue.
         if (known && k > 5) || k == steps.min(n) || norm <= f64::EPSILON * value.abs() {
             break;
         }
@@ -40,7 +41,7 @@ pub(super) fn largest(n: usize, steps: usize, tolerance: f64, mut apply: impl Fn
     value
 }
 
-/// A unit vector without any pattern that a graph could have: a linear congruential generator's.
+/// A pseudo-random unit vector from a linear congruential generator, so it matches no pattern of a graph.
 fn start(n: usize) -> DVector<f64> {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     let mut draw = |_: usize, _: usize| {

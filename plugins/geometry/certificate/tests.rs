@@ -5,8 +5,8 @@ use manifactor_solve::Start;
 use nalgebra::{DMatrix, Vector2, Vector3, Vector6};
 use std::f64::consts::TAU;
 
-/// A regular ring of `n` poses that turn once on their way, each measured from the one before, the closing
-/// measurement too; and values that turn `turns` times.
+/// A regular ring of `n` poses that turn once, with a measurement from each pose to the next, including the
+/// loop closure; the values turn `turns` times.
 fn ring(n: usize, turns: f64) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let step = |turns: f64| Se2::exp(&Vector3::new(1.0, 0.0, TAU * turns / n as f64));
@@ -38,7 +38,7 @@ fn a_ring_that_is_wrapped_around_is_a_local_minimum_and_not_certified() {
         assert!(!certificate.certified, "{certificate:?}");
         assert!(certificate.chordal_cost > 1.0, "stays in its basin: {certificate:?}");
         assert!(certificate.smallest_eigenvalue < -1e-4);
-        // zero is the global minimum, and no bound may be above it
+        // The global minimum is zero, so the bound must not be above zero.
         assert_eq!(certificate.lower_bound, 0.0);
         assert!(certificate.suboptimality >= certificate.chordal_cost);
         let found = certify(&graph, &Chordal {}.start(&graph, &values).unwrap()).unwrap();
@@ -46,7 +46,7 @@ fn a_ring_that_is_wrapped_around_is_a_local_minimum_and_not_certified() {
     }
 }
 
-/// Poses in space with chords and noise of its own kind in every measurement.
+/// Poses in space with chords, and different noise in every measurement.
 fn noisy(information: &DMatrix<f64>) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let pose = |i: usize| {
@@ -76,7 +76,7 @@ fn with_noise_the_bound_is_tight_and_below_the_cost_of_the_graph() {
     assert!(certificate.suboptimality < 1e-6 * certificate.chordal_cost, "{certificate:?}");
     let solved = solve(&graph, &values, &GaussNewton::default(), &mut Silent).unwrap().outcome;
     let bound = certificate.cost_bound.unwrap();
-    // the two costs differ by the curvature of rotations
+    // The two costs differ by the curvature of rotations.
     assert!(bound <= solved.final_cost && bound > 0.99 * solved.final_cost, "{bound} {}", solved.final_cost);
     assert!(certificate.to_string().contains("certified: this is the basin of the global minimum"));
 }
@@ -123,7 +123,7 @@ fn weights_are_inverses_of_mean_variances() {
     information.shift[(1, 1)] = 1.0;
     assert!(information.is_isotropic());
     information.cross[(0, 2)] = 2.0;
-    // of the joint covariance: (8 - 4)⁻¹ for the angle, (1 - 4/8)⁻¹ and 1 along x and y
+    // From the joint covariance: (8 - 4)⁻¹ for the angle, (1 - 4/8)⁻¹ and 1 along x and y.
     assert!(
         (information.chordal_weight() - 2.0).abs() + (information.shift_weight() - 2.0 / 3.0).abs() < 1e-12
     );

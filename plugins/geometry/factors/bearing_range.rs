@@ -1,19 +1,18 @@
-//! In which direction and how far away a pose in the plane sees a point:
-//! r = (atan2(q) - β, ‖q‖ - d), q = Rᵀ(p - t).
+//! Bearing and range from a planar pose to a point: r = (atan2(q) - β, ‖q‖ - d), q = Rᵀ(p - t).
 //!
-//! The bearing jumps where the point is opposite to where it was measured, and there is none at
-//! distance zero: within a nanometre the factor is not defined.
+//! The bearing residual jumps if the point is opposite to the measured direction. A point within a nanometre
+//! of the pose has no bearing, so the factor is not defined there.
 use crate::factors::range::NEAREST;
 use crate::groups::{Angle, atan2};
 use crate::{Point2, Se2, So2, wrap};
 use manifactor_graph::prelude::*;
 
-/// The point is `range` away in the direction `bearing`, seen from the pose: r = (atan2(q) - β, ‖q‖ - d),
-/// q = Rᵀ(p - t).
+/// A pose in the plane measures a point at the distance `range` in the direction `bearing`: r = (atan2(q) -
+/// β, ‖q‖ - d), q = Rᵀ(p - t).
 ///
-/// Two rows: the error of the bearing, wrapped to -π..π, in radians; that of the distance, in metres.
-/// The bearing jumps where the point is opposite to where it was measured. Within a nanometre of the
-/// pose there is no bearing: there the factor is not defined, and takes no part.
+/// Two rows: the bearing residual in radians, wrapped to -π..π, and the range residual in metres. The bearing
+/// residual jumps if the point is opposite to the measured direction. Not defined within a nanometre of the
+/// pose, as there is no bearing; the factor is inactive there.
 ///
 /// ```toml
 /// [[factors]]
@@ -30,11 +29,12 @@ pub struct BearingRange2 {
 }
 
 impl BearingRange2 {
-    /// Measured bearing in radians, counter-clockwise from the pose's x axis, and distance in metres.
+    /// Creates the factor from the measured bearing, in radians counter-clockwise from the pose's x axis, and
+    /// the distance in metres.
     pub fn new(bearing: So2, range: Positive) -> Self {
         Self { bearing: Angle(bearing), range }
     }
-    /// Where the point was measured, in the frame of the pose.
+    /// Returns the measured position of the point in the frame of the pose.
     pub fn measured(&self) -> Vector2<f64> {
         self.bearing.0.act(&Vector2::new(self.range.get(), 0.0))
     }
@@ -73,7 +73,8 @@ mod tests {
         check((any_measurement(), any_se2(), any_point2()), |(factor, x, p)| {
             let distance = (*p - x.translation).norm();
             let law = JacobianLaw { step: 1e-2 * distance.min(1.0), ..JacobianLaw::default() };
-            // next to distance zero, far from the origin, the differences have no digits left
+            // Close to distance zero and far from the origin, the finite differences have no accurate digits
+            // left.
             if (NEAREST..1e-3).contains(&distance) { Ok(()) } else { law.check(&factor, &[&x, &p]) }
         });
     }

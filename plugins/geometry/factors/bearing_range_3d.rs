@@ -1,4 +1,4 @@
-//! In which direction and how far away a pose in space sees a point.
+//! Direction and range from a pose in space to a point.
 //!
 //! With u = q/‖q‖, q = Rᵀ(p - t), and b₁, b₂ perpendicular to the measured direction z, the error of
 //! direction is the arc from z to u: (b₁·u, b₂·u) θ/sin θ, θ the angle between z and u.
@@ -7,13 +7,13 @@ use crate::groups::atan2;
 use crate::{Point3, Se3};
 use manifactor_graph::prelude::*;
 
-/// The point is `range` away in the direction `direction`, seen from the pose.
+/// A pose in space measures a point at the distance `range` in the direction `direction`.
 ///
-/// Three rows: the arc from the measured direction to where the point is, in radians, along two axes
-/// perpendicular to it; the error of the distance, in metres. With one σ for both rows of the arc it
-/// does not matter which axes: the first is the one nearest to the pose's axis that is farthest from
-/// the measured direction. Not defined within a nanometre of the pose, and where the point is exactly
-/// opposite to where it was measured, within 1e-6 radians: there the arc has no direction.
+/// Three rows: the arc from the measured direction to the direction of the point, in radians along two axes
+/// perpendicular to the measured direction, and the range residual in metres. If both rows of the arc have an
+/// equal σ, the choice of the axes does not matter. The first axis is as close as possible to the
+/// coordinate axis of the pose that is farthest from the measured direction. Not defined within a nanometre of the pose, and
+/// within 1e-6 radians of the opposite direction, as the arc has no direction there.
 ///
 /// ```toml
 /// [[factors]]
@@ -24,18 +24,18 @@ use manifactor_graph::prelude::*;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BearingRange3 {
-    /// Where the point was seen, in the frame of the pose; of any length but zero.
+    /// Measured direction in the frame of the pose, of any length but zero.
     pub direction: Direction,
-    /// How far away, in metres.
+    /// Measured distance, in metres.
     pub range: Positive,
 }
 
 impl BearingRange3 {
-    /// Where the point was measured, in the frame of the pose.
+    /// Returns the measured position of the point in the frame of the pose.
     pub fn measured(&self) -> Vector3<f64> {
         *self.direction * self.range.get()
     }
-    /// Two axes perpendicular to the measured direction and to each other.
+    /// Returns two axes perpendicular to the measured direction and to each other.
     fn basis(&self) -> [Vector3<f64>; 2] {
         let z = *self.direction;
         let first = z.cross(&Vector3::ith(z.iamin(), 1.0)).cross(&z).normalize();
@@ -53,7 +53,7 @@ impl Residual for BearingRange3 {
         let [a, b] = self.basis().map(|axis| axis.lift::<T>().dot(&seen) / distance);
         let cos = self.direction.lift::<T>().dot(&seen) / distance;
         let sin2 = a * a + b * b;
-        // θ/sin θ; at zero, where the sine has no derivative, by its series
+        // θ/sin θ. At zero, where the sine has no derivative, its series.
         let scale = if sin2 < T::from(1e-8) && cos > T::zero() {
             T::one() + sin2 / 6.0 + sin2 * sin2 * 0.075
         } else {
@@ -87,7 +87,7 @@ mod tests {
         BearingRange3 { direction: Direction::new(z).unwrap(), range: Positive::literal(range) }
     }
 
-    // the point is drawn by the arc from where it was measured: none, tiny, any, nearly opposite
+    // The point is drawn by its arc from the measured direction: zero, tiny, any, nearly opposite.
     jacobian_laws! {
         jacobians_agree: (any_measurement(), any_se3(), rotation_vector()).prop_map(|(factor, x, arc)| {
             let seen = crate::So3::exp(&arc).act(&factor.direction) * factor.range.get();

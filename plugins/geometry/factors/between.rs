@@ -1,11 +1,11 @@
-//! One variable seen from another, as odometry or a loop closure measures it: r = Log(Z⁻¹ Xᵢ⁻¹ Xⱼ).
+//! A relative measurement between two variables, such as odometry or a loop closure: r = Log(Z⁻¹ Xᵢ⁻¹ Xⱼ).
 //!
-//! The logarithm jumps where measurement and estimate differ by a rotation of π.
+//! The logarithm jumps if measurement and estimate differ by a rotation of π.
 use crate::groups::LieGroup;
 use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3};
 use manifactor_graph::prelude::*;
 
-/// The second variable is at `relative`, seen from the first.
+/// A measurement of the second variable in the frame of the first: `relative`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(bound = "G: LieGroup + JsonSchema", description = description::<G>())]
@@ -70,8 +70,8 @@ mod tests {
     use nalgebra::{Vector3, Vector6};
     use proptest::prelude::*;
 
-    // the second variable is drawn by its difference from the measurement: that is where singular
-    // points are
+    // The second variable is drawn by its difference from the measurement, as the singular points depend on
+    // that difference.
     macro_rules! cases {
         ($any:expr, $tangent:expr) => {
             ($any, $any, $tangent)
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn moving_both_poses_changes_nothing() {
         check((any_se3(), any_se3(), any_se3(), any_se3()), |(relative, x, y, m)| {
-            // away from the jump at half a turn, where rounding alone would change the residual
+            // Away from the jump at half a turn, as rounding alone would change the residual there.
             let y = if relative.local(&x.between(&y)).fixed_rows::<3>(0).norm() > 3.1 { x } else { y };
             invariance_law(&Between { relative }, &[&x, &y], &[&m.compose(&x), &m.compose(&y)])
         });

@@ -1,11 +1,11 @@
-//! A relative pose, compared by chords instead of angles: ‖R_b - R_a Z‖ instead of |Log(Zᵀ R_aᵀ R_b)|.
+//! A relative pose with the chordal distance between rotations: ‖R_b - R_a Z‖ instead of |Log(Zᵀ R_aᵀ R_b)|.
 use crate::groups::LieGroup;
 use crate::{Se2, Se3};
 use manifactor_graph::prelude::*;
 use nalgebra::SVector;
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// The second pose is at `relative`, seen from the first, with the chordal distance between rotations.
+/// A measurement of the second pose in the frame of the first, with the chordal distance between rotations.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(bound = "G: LieGroup + JsonSchema", description = description::<G>())]

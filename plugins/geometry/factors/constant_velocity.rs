@@ -1,4 +1,4 @@
-//! A body that keeps its velocity but for white noise on its acceleration.
+//! Motion of a body with constant velocity and white noise on the acceleration.
 use crate::groups::LieGroup;
 use crate::{Se3, Twist};
 use manifactor_graph::Noise;
@@ -7,10 +7,11 @@ use manifactor_graph::noise::NoiseError;
 use manifactor_graph::prelude::*;
 use nalgebra::{DMatrix, SVector, U12};
 
-/// A body moves from one pose to the next with a velocity that stays the same: r = (Log(Xᵢ⁻¹ Xⱼ) − vᵢ Δt, vⱼ − vᵢ).
+/// A body moves between two poses with constant velocity: r = (Log(Xᵢ⁻¹ Xⱼ) − vᵢ Δt, vⱼ − vᵢ).
 ///
-/// Velocities are in the frame of the body. The noise of white noise on the acceleration grows with Δt; see Anderson and Barfoot,
-/// *Full STEAM Ahead*, 2015. Rows: the change of the pose (rad, m), then that of the velocity (rad/s, m/s).
+/// Velocities are in the frame of the body. For white noise on the acceleration, the covariance grows with
+/// Δt; see Anderson and Barfoot, *Full STEAM Ahead*, 2015. Rows: the residual of the pose (rad, m), then of
+/// the velocity (rad/s, m/s).
 ///
 /// ```toml
 /// [[factors]]
@@ -26,10 +27,12 @@ pub struct ConstantVelocity {
 }
 
 impl ConstantVelocity {
-    /// The noise of this factor for white noise on the acceleration, with the densities `angular` (rad/s²/√Hz) and `linear` (m/s²/√Hz).
+    /// Returns the noise model of this factor for white noise on the acceleration.
+    ///
+    /// The spectral densities are `angular` (rad/s²/√Hz) and `linear` (m/s²/√Hz).
     ///
     /// # Errors
-    /// If the covariance cannot be inverted, for a step that is too short or too long.
+    /// If the covariance cannot be inverted, because the time step is too short or too long.
     pub fn noise(&self, angular: Positive, linear: Positive) -> Result<Noise, NoiseError> {
         let dt = self.seconds.get();
         let mut covariance = DMatrix::zeros(12, 12);

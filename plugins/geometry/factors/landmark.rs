@@ -1,14 +1,14 @@
-//! A point seen from a pose, with its distance: r = Rᵀ(p - t) - z.
+//! Position of a point in the frame of a pose: r = Rᵀ(p - t) - z.
 use crate::groups::quarter;
 use crate::{Coordinates, Point2, Point3, Se2, Se3};
 use manifactor_graph::prelude::*;
 
-/// The point is at `position`, seen from the pose.
+/// A pose measures the position of a point in its frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(description = description(N))]
 pub struct Landmark<const N: usize> {
-    /// Where the point is, in metres, in the frame of the pose.
+    /// Measured position of the point in the frame of the pose, in metres.
     pub position: Coordinates<N>,
 }
 

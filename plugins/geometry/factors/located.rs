@@ -1,15 +1,15 @@
-//! Variables that are somewhere: points and poses.
+//! Variables that have a position: points and poses.
 use crate::{Point2, Point3, Se2, Se3};
 use manifactor_graph::{Dimension, Manifold, Scalar, Vector};
 use nalgebra::{U2, U3, Vector2, Vector3};
 
 /// A variable with a position in the plane or in space.
 pub trait Located: Manifold {
-    /// Number of its coordinates.
+    /// Number of coordinates.
     type Space: Dimension;
-    /// Its name in documents.
+    /// Name in documents.
     const NAME: &'static str;
-    /// Where it is.
+    /// Returns the position.
     fn position<T: Scalar>(x: &Self::Of<T>) -> Vector<Self::Space, T>;
 }
 

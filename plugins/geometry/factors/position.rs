@@ -1,16 +1,16 @@
-//! Where a pose is, as GPS or a total station measures it: r = R l + t - z.
+//! Position of a pose, as GPS or a total station measures it: r = R l + t - z.
 use crate::groups::quarter;
 use crate::{Coordinates, Se2, Se3};
 use manifactor_graph::prelude::*;
 
-/// The pose's antenna is at `position`.
+/// A measurement of the position of an antenna on the pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(description = description(N))]
 pub struct Position<const N: usize> {
-    /// Where the antenna is, in metres, in the outer frame.
+    /// Measured position of the antenna in the outer frame, in metres.
     pub position: Coordinates<N>,
-    /// Where the antenna is mounted, in metres, in the frame of the pose; its origin, if not given.
+    /// Position of the antenna in the frame of the pose, in metres. Default: the origin of that frame.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub lever_arm: Coordinates<N>,
 }

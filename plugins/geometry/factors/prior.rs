@@ -1,16 +1,16 @@
-//! What is known of a variable beforehand: r = Log(Z⁻¹X).
+//! Prior on a variable: r = Log(Z⁻¹X).
 //!
-//! The logarithm jumps where X differs from Z by a rotation of π.
+//! The logarithm jumps if X differs from Z by a rotation of π.
 use crate::groups::LieGroup;
 use crate::{Point1, Point2, Point3, Se2, Se3, So2, So3, Twist};
 use manifactor_graph::prelude::*;
 
-/// The variable is close to `value`.
+/// A prior: the variable is close to `value`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(bound = "G: LieGroup + JsonSchema", description = description::<G>())]
 pub struct Prior<G> {
-    /// Where the variable is expected.
+    /// Expected value of the variable.
     pub value: G,
 }
 
@@ -66,7 +66,8 @@ mod tests {
     use manifactor_testing::{jacobian_laws, strategies::rotation_vector};
     use proptest::prelude::*;
 
-    // the variable is drawn by its difference from the prior, which is what singular points are about
+    // The variable is drawn by its difference from the prior, as the singular points depend on that
+    // difference.
     jacobian_laws! {
         jacobians_agree_on_so2: (any_so2(), any_so2()).prop_map(|(value, x)| (Prior { value }, x));
         jacobians_agree_on_so3: (any_so3(), rotation_vector()).prop_map(|(value, d)| (Prior { value }, value.retract(&d)));

@@ -1,20 +1,20 @@
-//! How far two variables are apart: r = ‖t₂ - t₁‖ - z.
+//! Distance between two variables: r = ‖t₂ - t₁‖ - z.
 //!
-//! At distance zero there is no direction to move in: within a nanometre the factor is not defined.
+//! At distance zero the residual has no gradient, so the factor is not defined within a nanometre.
 use crate::factors::Located;
 use crate::{Point2, Point3, Se2, Se3};
 use manifactor_graph::prelude::*;
 use std::marker::PhantomData;
 
-/// Below this distance, in metres, the direction between two points means nothing.
+/// Distance, in metres, below which the direction between two points is meaningless.
 pub(crate) const NEAREST: f64 = 1e-9;
 
-/// Two variables, points or poses, are `range` apart.
+/// A measurement of the distance between two variables, points or poses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, bound = "")]
 #[schemars(bound = "A: Located, B: Located", description = description::<A, B>())]
 pub struct Range<A, B> {
-    /// Their distance, in metres.
+    /// Measured distance, in metres.
     pub range: Positive,
     #[serde(skip)]
     between: PhantomData<fn() -> (A, B)>,
@@ -33,7 +33,7 @@ fn description<A: Located, B: Located>() -> String {
 }
 
 impl<A: Located, B: Located<Space = A::Space>> Range<A, B> {
-    /// A measured distance, in metres.
+    /// Creates the factor from a measured distance, in metres.
     pub fn new(range: Positive) -> Self {
         Self { range, between: PhantomData }
     }
@@ -75,7 +75,7 @@ mod tests {
     fn any_range<A: Located, B: Located<Space = A::Space>>() -> impl Strategy<Value = Range<A, B>> {
         (0.01..10.0).prop_map(|range| Range::new(Positive::literal(range)))
     }
-    /// The law, with steps that are shorter than the distance. Very short ones have their own test.
+    /// Checks the law with steps shorter than the distance. Very short distances have a separate test.
     fn agrees<A, B>((factor, x, y): (Range<A, B>, A, B)) -> Result<(), LawError>
     where
         A: Located + Variable,

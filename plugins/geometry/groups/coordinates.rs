@@ -1,4 +1,4 @@
-//! Vectors of finite numbers, as documents write them.
+//! Vectors of finite numbers, as written in documents.
 use manifactor_graph::{Lift, Scalar};
 use nalgebra::SVector;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -6,34 +6,36 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Deref;
 
-/// `N` numbers, checked to be finite when they are read.
+/// `N` numbers that are checked to be finite when read.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Coordinates<const N: usize>(SVector<f64, N>);
 
-/// Coordinates that are none.
+/// An invalid vector of coordinates.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NoCoordinates {
-    /// Too few or too many of them.
+    /// The number of entries is wrong.
     #[error("expected {expected} numbers, got {found}")]
     Count {
-        /// How many there should be.
+        /// The expected number of entries.
         expected: usize,
-        /// How many there are.
+        /// The number of entries given.
         found: usize,
     },
-    /// One that is infinite or not a number.
+    /// An entry is infinite or not a number.
     #[error("expected finite numbers, got {value} at position {position}")]
     NotFinite {
-        /// Where, from 0.
+        /// Index of the entry, from 0.
         position: usize,
-        /// What is there.
+        /// Value of the entry.
         value: f64,
     },
 }
 
 impl<const N: usize> Coordinates<N> {
+    /// Creates the coordinates from a vector.
+    ///
     /// # Errors
     /// If an entry is not finite.
     pub fn new(vector: SVector<f64, N>) -> Result<Self, NoCoordinates> {
@@ -42,11 +44,11 @@ impl<const N: usize> Coordinates<N> {
             None => Ok(Self(vector)),
         }
     }
-    /// A vector on its way out, where nothing is checked.
+    /// Wraps a vector for writing, without a check.
     pub(crate) fn unchecked(vector: SVector<f64, N>) -> Self {
         Self(vector)
     }
-    /// The vector itself.
+    /// Returns the vector.
     pub fn vector(&self) -> SVector<f64, N> {
         self.0
     }

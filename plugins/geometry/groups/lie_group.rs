@@ -1,32 +1,33 @@
-//! What prior and between need of a manifold: that it is a Lie group with x ⊞ δ = x·Exp(δ).
+//! Lie groups with the chart x ⊞ δ = x·Exp(δ), as priors and between factors need them.
 use manifactor_graph::{Block, Dimension, Manifold, Matrix, Scalar, Tangent, Vector};
 
 /// A manifold that is a group, with the chart x ⊞ δ = x·Exp(δ), y ⊟ x = Log(x⁻¹y).
 pub trait LieGroup: Manifold {
-    /// Its name in documents.
+    /// Name in documents.
     const NAME: &'static str;
-    /// A point, as TOML writes it inside of a factor; for the catalogue.
+    /// A point in the inline TOML form used inside a factor; an example for the catalogue.
     const EXAMPLE: &'static str;
-    /// The first so many rows of its Jacobians depend on as many directions only, as rotations do not on translations: the
-    /// block beside is zero. None, where nothing is known.
+    /// Number of leading rows of the Jacobians that depend only on as many leading directions, so that the
+    /// block next to them is zero. For example, rotations do not depend on translations. Zero if there is no
+    /// such structure.
     const LEADING: usize = 0;
 
-    /// The element that changes nothing.
+    /// Returns the identity element.
     fn identity() -> Self;
-    /// x·y, normalised, so that long products stay in the group.
+    /// Returns x·y, normalized so that long products stay in the group.
     fn compose(x: &Self, y: &Self) -> Self;
-    /// x⁻¹
+    /// Returns x⁻¹.
     fn inverse(x: &Self) -> Self;
-    /// x⁻¹y: the second in the frame of the first.
+    /// Returns x⁻¹y, the second element in the frame of the first.
     fn between<T: Scalar>(x: &Self::Of<T>, y: &Self::Of<T>) -> Self::Of<T>;
-    /// The tangent vector at the identity that leads to `x`.
+    /// Returns the tangent vector at the identity that leads to `x`.
     fn log<T: Scalar>(x: &Self::Of<T>) -> Vector<Self::Dim, T>;
-    /// Jᵣ⁻¹(ξ): the derivative of Log(Exp(ξ)·Exp(δ)) by δ at zero.
+    /// Returns Jᵣ⁻¹(ξ), the derivative of Log(Exp(ξ)·Exp(δ)) with respect to δ at zero.
     fn inverse_right_jacobian(xi: &Tangent<Self>) -> Matrix<Self::Dim, Self::Dim>;
-    /// Ad(x⁻¹): x⁻¹·Exp(δ)·x = Exp(Ad(x⁻¹)δ).
+    /// Returns Ad(x⁻¹), with x⁻¹·Exp(δ)·x = Exp(Ad(x⁻¹)δ).
     fn adjoint_of_inverse(x: &Self::Of<f64>) -> Matrix<Self::Dim, Self::Dim>;
 
-    /// -AB of two Jacobians of this group, without what nalgebra would ask of a generic dimension.
+    /// Returns -AB for two Jacobians of this group, without nalgebra's trait bounds on generic dimensions.
     #[inline(always)]
     fn minus_product(
         a: &Matrix<Self::Dim, Self::Dim>,
@@ -35,7 +36,7 @@ pub trait LieGroup: Manifold {
         let n = <Self::Dim as Dimension>::N;
         let mut product = <Matrix<Self::Dim, Self::Dim> as Block>::zeros();
         let (a, b, sum) = (a.as_slice(), b.as_slice(), product.as_mut_slice());
-        // the first row that is not zero in a column
+        // Index of the first nonzero row in a column.
         let first = |column: usize| if column < Self::LEADING { 0 } else { Self::LEADING };
         for c in 0..n {
             for k in first(c)..n {

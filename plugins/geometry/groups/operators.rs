@@ -1,4 +1,4 @@
-//! `a * b` composes, `a * v` acts on a vector; and poses in words.
+//! Operators and text: `a * b` composes, `a * v` acts on a vector, and `Display` writes poses.
 use crate::{Se2, Se3, So2, So3};
 use manifactor_graph::Scalar;
 use nalgebra::{Vector2, Vector3};
@@ -7,7 +7,7 @@ use std::ops::Mul;
 
 macro_rules! operators {
     ($($group:ident on $vector:ident),+) => {$(
-        /// a·b: first `b`, then `self`.
+        /// Composes a·b; `b` is applied first.
         impl<T: Scalar> Mul for $group<T> {
             type Output = Self;
             fn mul(self, b: Self) -> Self {
@@ -15,7 +15,7 @@ macro_rules! operators {
             }
         }
 
-        /// What [`act`](Self::act) makes of the vector: a point, as poses take it to the outer frame.
+        /// Applies [`act`](Self::act) to the vector; a pose maps a point to the outer frame.
         impl<T: Scalar> Mul<$vector<T>> for $group<T> {
             type Output = $vector<T>;
             fn mul(self, v: $vector<T>) -> $vector<T> {
@@ -26,14 +26,14 @@ macro_rules! operators {
 }
 operators!(So2 on Vector2, Se2 on Vector2, So3 on Vector3, Se3 on Vector3);
 
-/// `(1.000, -2.000)`, with as many decimals as the format asks for, or three.
+/// Writes `(1.000, -2.000)` with the format's number of decimals, or three.
 fn list(f: &mut Formatter<'_>, numbers: &[f64]) -> fmt::Result {
     let decimals = f.precision().unwrap_or(3);
     let parts: Vec<String> = numbers.iter().map(|x| format!("{x:.decimals$}")).collect();
     write!(f, "({})", parts.join(", "))
 }
 
-/// `17.189°`.
+/// Writes `17.189°`.
 impl Display for So2 {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let decimals = f.precision().unwrap_or(3);
@@ -41,7 +41,7 @@ impl Display for So2 {
     }
 }
 
-/// `(1.000, 2.000) m, 17.189°`.
+/// Writes `(1.000, 2.000) m, 17.189°`.
 impl Display for Se2 {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         list(f, self.translation.as_slice())?;
@@ -50,7 +50,7 @@ impl Display for Se2 {
     }
 }
 
-/// `90.000° about (0.000, 0.000, 1.000)`.
+/// Writes `90.000° about (0.000, 0.000, 1.000)`.
 impl Display for So3 {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let (omega, decimals) = (self.log(), f.precision().unwrap_or(3));
@@ -65,7 +65,7 @@ impl Display for So3 {
     }
 }
 
-/// `(1.000, 0.000, 0.500) m, 90.000° about (0.000, 0.000, 1.000)`.
+/// Writes `(1.000, 0.000, 0.500) m, 90.000° about (0.000, 0.000, 1.000)`.
 impl Display for Se3 {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         list(f, self.translation.as_slice())?;

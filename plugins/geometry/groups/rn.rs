@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Deref;
 
-/// A point in n dimensions. Residuals get it as a plain vector.
+/// A point in n dimensions. Residual functions get it as a plain vector.
 ///
 /// In documents, for n = 3:
 /// ```toml
@@ -42,7 +42,7 @@ fn description(n: usize) -> String {
     )
 }
 
-/// The names of n directions.
+/// Names of the n tangent directions.
 const fn tangent(n: usize) -> &'static [&'static str] {
     if n <= AXES.len() { AXES.split_at(n).0 } else { NUMBERED.split_at(n).0 }
 }
@@ -55,7 +55,7 @@ const NUMBERED: [&str; 32] = [
 ];
 
 impl<const N: usize> Rn<N> {
-    /// The point with these coordinates.
+    /// Creates the point with these coordinates.
     pub fn new(position: impl Into<SVector<f64, N>>) -> Self {
         Self(position.into())
     }

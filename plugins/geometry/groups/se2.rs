@@ -9,10 +9,9 @@ use nalgebra::{Matrix3, U3, Vector2, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A pose in the plane, X·Exp(v, θ): tangent (x, y, theta), in metres and radians, in its own frame.
+/// A pose in the plane, X·Exp(v, θ): tangent (x, y, theta), in metres and radians, in the local frame.
 ///
-/// It takes points from its own (local) frame to the outer one: R p + t. The angle is in radians,
-/// counter-clockwise.
+/// It maps points from the local frame to the outer one: R p + t. The angle is in radians, counter-clockwise.
 ///
 /// ```toml
 /// [values]
@@ -23,78 +22,78 @@ use serde::{Deserialize, Serialize};
 #[serde(bound(serialize = "Self: Into<Document>", deserialize = "Self: From<Document>"))]
 #[schemars(with = "Document", bound = "")]
 pub struct Se2<T: Scalar = f64> {
-    /// Turns directions of the local frame into those of the outer one.
+    /// Rotates directions from the local frame to the outer one.
     pub rotation: So2<T>,
-    /// The local frame's origin, seen from the outer one.
+    /// Origin of the local frame in the outer one.
     pub translation: Vector2<T>,
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    /// Its position, in metres.
+    /// Position, in metres.
     translation: Coordinates<2>,
-    /// In radians, counter-clockwise.
+    /// Angle in radians, counter-clockwise.
     angle: Angle,
 }
 
-/// v, turned by a quarter.
+/// Returns v, rotated by a quarter turn counter-clockwise.
 pub(crate) fn quarter<T: Scalar>(v: &Vector2<T>) -> Vector2<T> {
     Vector2::new(-v.y, v.x)
 }
 
 impl<T: Scalar> Se2<T> {
-    /// The pose with this rotation and this position.
+    /// Creates the pose with this rotation and this position.
     pub fn new(rotation: So2<T>, translation: Vector2<T>) -> Self {
         Self { rotation, translation }
     }
-    /// The outer frame itself.
+    /// Returns the identity: the outer frame.
     pub fn identity() -> Self {
         Self::new(So2::identity(), Vector2::zeros())
     }
-    /// Where a frame gets that moves by v and turns by θ at constant speed, in its own frame: ξ = (v, θ).
+    /// Returns the pose after moving by v and turning by θ at constant speed in the local frame: ξ = (v, θ).
     pub fn exp(xi: &Vector3<T>) -> Self {
         Self::new(So2::exp(xi.z), Self::way(xi))
     }
-    /// The translation of Exp(v, θ): V v with V = sin θ/θ + (1 - cos θ)/θ · quarter turn.
+    /// Translation of Exp(v, θ): V v with V = sin θ/θ + (1 - cos θ)/θ · quarter turn.
     fn way(xi: &Vector3<T>) -> Vector2<T> {
         let (v, theta) = (xi.xy(), xi.z);
         let e = small_angle::exponential(theta * theta);
         v * (e.sin_half * e.cos_half * 2.0) + quarter(&v) * (e.a * theta)
     }
-    /// ξ = (v, θ), the inverse of [`Se2::exp`].
+    /// Returns ξ = (v, θ), the inverse of [`Se2::exp`].
     pub fn log(&self) -> Vector3<T> {
         let theta = self.rotation.angle();
         let (half, theta2) = (theta * 0.5, theta * theta);
         let (c, s) = self.rotation.cos_sin();
-        // half a turn has a sine of zero, none a cosine of one
+        // Avoids a zero denominator: sin θ is zero at half a turn, 1 - cos θ at θ = 0.
         let cot = || if c > T::zero() { (c + 1.0) / s } else { s / (T::one() - c) };
         let half_cot = T::one() - theta2 * small_angle::k(theta2, || half * cot());
         let v = self.translation * half_cot - quarter(&self.translation) * half;
         Vector3::new(v.x, v.y, theta)
     }
-    /// self · other
+    /// Returns self · other.
     pub fn compose(&self, other: &Self) -> Self {
         Self::new(self.rotation.compose(&other.rotation), self.act(&other.translation))
     }
-    /// self⁻¹
+    /// Returns self⁻¹.
     pub fn inverse(&self) -> Self {
         let inverse = self.rotation.inverse();
         Self::new(inverse, -inverse.act(&self.translation))
     }
-    /// self⁻¹ · other: the other pose, seen from this one.
+    /// Returns self⁻¹ · other, the pose `other` in the frame of `self`.
     pub fn between(&self, other: &Self) -> Self {
         Self::new(self.rotation.between(&other.rotation), self.inverse_act(&other.translation))
     }
-    /// A point of the local frame, seen from the outer one.
+    /// Maps a point from the local frame to the outer one.
     pub fn act(&self, point: &Vector2<T>) -> Vector2<T> {
         self.rotation.act(point) + self.translation
     }
-    /// A point of the outer frame, seen from the local one.
+    /// Maps a point from the outer frame to the local one.
     pub fn inverse_act(&self, point: &Vector2<T>) -> Vector2<T> {
         self.rotation.inverse().act(&(point - self.translation))
     }
-    /// [R t; 0 1]
+    /// Returns the homogeneous matrix [R t; 0 1].
     pub fn matrix(&self) -> Matrix3<T> {
         let mut m = Matrix3::identity();
         m.fixed_view_mut::<2, 2>(0, 0).copy_from(&self.rotation.matrix());
@@ -104,27 +103,27 @@ impl<T: Scalar> Se2<T> {
 }
 
 impl Se2 {
-    /// Ad(x): x·Exp(δ)·x⁻¹ = Exp(Ad(x)δ).
+    /// Returns the adjoint Ad(x), with x·Exp(δ)·x⁻¹ = Exp(Ad(x)δ).
     pub fn adjoint(&self) -> Matrix3<f64> {
         let mut m = Matrix3::identity();
         m.fixed_view_mut::<2, 2>(0, 0).copy_from(&self.rotation.matrix());
         m.fixed_view_mut::<2, 1>(0, 2).copy_from(&-quarter(&self.translation));
         m
     }
-    /// Jᵣ⁻¹(ξ): Log(Exp(ξ)·Exp(δ)) ≈ ξ + Jᵣ⁻¹(ξ)δ.
+    /// Returns Jᵣ⁻¹(ξ), with Log(Exp(ξ)·Exp(δ)) ≈ ξ + Jᵣ⁻¹(ξ)δ.
     pub fn inverse_right_jacobian(xi: &Vector3<f64>) -> Matrix3<f64> {
         let (theta, half) = (xi.z, 0.5 * xi.z);
         let (k, slope) = small_angle::k_and_slope(theta * theta);
         let half_cot = 1.0 - theta * theta * k;
         let half_cot_slope = -2.0 * theta * k - theta.powi(3) * slope;
-        // v = V⁻¹t changes with θ by (V⁻¹)' t, t = Vv
+        // Derivative of v = V⁻¹t with respect to θ: (V⁻¹)' t, with t = Vv.
         let t = Se2::way(xi);
         let d = t * half_cot_slope - quarter(&t) * 0.5;
         Matrix3::new(half_cot, -half, d.x, half, half_cot, d.y, 0.0, 0.0, 1.0)
     }
 }
 
-/// The rotation, then the translation.
+/// Storage order: the rotation, then the translation.
 impl Quantity for Se2 {
     const SHAPE: Shape = Shape { name: "se2", size: 5 };
     type Of<T: Scalar> = Se2<T>;
@@ -155,7 +154,7 @@ impl Manifold for Se2 {
         Se2::new(So2::exp(angle), translation)
     }
     fn retract(&self, delta: &Vector3<f64>) -> Self {
-        // the cosine of the sum, not of sums of sums: rounding does not add up
+        // The cosine is recomputed from the summed angle, so rounding does not accumulate.
         Se2::new(So2::exp(self.rotation.angle() + delta.z), self.act(&Se2::way(delta)))
     }
     fn local(&self, other: &Self) -> Vector3<f64> {
@@ -245,7 +244,7 @@ mod tests {
 
     #[test]
     fn a_turning_frame_moves_on_an_arc() {
-        // forward at 1 m/s, a quarter turn to the left in 1 s: radius 2/π
+        // Forward at 1 m/s, a quarter turn to the left in 1 s: radius 2/π.
         let pose = Se2::exp(&Vector3::new(1.0, 0.0, 1.0 / FRAC_2_PI));
         assert!((pose.translation - Vector2::new(FRAC_2_PI, FRAC_2_PI)).norm() < 1e-15);
     }

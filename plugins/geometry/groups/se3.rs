@@ -9,10 +9,10 @@ use nalgebra::{Matrix3, Matrix4, Matrix6, U6, Vector3, Vector6};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A pose in space, X·Exp(ω, v): tangent (rx, ry, rz, x, y, z), in radians and metres, in its own frame.
+/// A pose in space, X·Exp(ω, v): tangent (rx, ry, rz, x, y, z), in radians and metres, in the local frame.
 ///
-/// It takes points from its own (local) frame to the outer one: R p + t. The rotation is a unit
-/// quaternion (x, y, z, w).
+/// It maps points from the local frame to the outer one: R p + t. The rotation is a unit quaternion (x, y, z,
+/// w).
 ///
 /// ```toml
 /// [values]
@@ -23,16 +23,16 @@ use serde::{Deserialize, Serialize};
 #[serde(bound(serialize = "Self: Into<Document>", deserialize = "Self: From<Document>"))]
 #[schemars(with = "Document", bound = "")]
 pub struct Se3<T: Scalar = f64> {
-    /// Turns directions of the local frame into those of the outer one.
+    /// Rotates directions from the local frame to the outer one.
     pub rotation: So3<T>,
-    /// The local frame's origin, seen from the outer one.
+    /// Origin of the local frame in the outer one.
     pub translation: Vector3<T>,
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    /// Its position, in metres.
+    /// Position, in metres.
     translation: Coordinates<3>,
     /// Unit quaternion (x, y, z, w).
     rotation: Xyzw,
@@ -42,7 +42,7 @@ fn halves<T: Scalar>(xi: &Vector6<T>) -> (Vector3<T>, Vector3<T>) {
     (Vector3::new(xi[0], xi[1], xi[2]), Vector3::new(xi[3], xi[4], xi[5]))
 }
 
-/// [a 0; b c]
+/// Returns the block matrix [a 0; b c].
 fn lower(a: &Matrix3<f64>, b: &Matrix3<f64>, c: &Matrix3<f64>) -> Matrix6<f64> {
     let mut m = Matrix6::zeros();
     m.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
@@ -52,50 +52,50 @@ fn lower(a: &Matrix3<f64>, b: &Matrix3<f64>, c: &Matrix3<f64>) -> Matrix6<f64> {
 }
 
 impl<T: Scalar> Se3<T> {
-    /// The pose with this rotation and this position.
+    /// Creates the pose with this rotation and this position.
     pub fn new(rotation: So3<T>, translation: Vector3<T>) -> Self {
         Self { rotation, translation }
     }
-    /// The outer frame itself.
+    /// Returns the identity: the outer frame.
     pub fn identity() -> Self {
         Self::new(So3::identity(), Vector3::zeros())
     }
-    /// Where a frame gets that turns by ω and moves by v at constant speed, in its own frame: ξ = (ω, v).
+    /// Returns the pose after turning by ω and moving by v at constant speed in the local frame: ξ = (ω, v).
     pub fn exp(xi: &Vector6<T>) -> Self {
         let (w, v) = halves(xi);
         let e = small_angle::exponential(w.norm_squared());
         let wv = w.cross(&v);
         Self::new(So3::exp(&w), v + wv * e.a + w.cross(&wv) * e.b)
     }
-    /// ξ = (ω, v), the inverse of [`Se3::exp`].
+    /// Returns ξ = (ω, v), the inverse of [`Se3::exp`].
     pub fn log(&self) -> Vector6<T> {
         let (w, k) = self.rotation.log_and_k();
         let wt = w.cross(&self.translation);
         let v = self.translation - wt * T::from(0.5) + w.cross(&wt) * k;
         Vector6::new(w.x, w.y, w.z, v.x, v.y, v.z)
     }
-    /// self · other
+    /// Returns self · other.
     pub fn compose(&self, other: &Self) -> Self {
         Self::new(self.rotation.compose(&other.rotation), self.act(&other.translation))
     }
-    /// self⁻¹
+    /// Returns self⁻¹.
     pub fn inverse(&self) -> Self {
         let inverse = self.rotation.inverse();
         Self::new(inverse, -inverse.act(&self.translation))
     }
-    /// self⁻¹ · other: the other pose, seen from this one.
+    /// Returns self⁻¹ · other, the pose `other` in the frame of `self`.
     pub fn between(&self, other: &Self) -> Self {
         Self::new(self.rotation.between(&other.rotation), self.inverse_act(&other.translation))
     }
-    /// A point of the local frame, seen from the outer one.
+    /// Maps a point from the local frame to the outer one.
     pub fn act(&self, point: &Vector3<T>) -> Vector3<T> {
         self.rotation.act(point) + self.translation
     }
-    /// A point of the outer frame, seen from the local one.
+    /// Maps a point from the outer frame to the local one.
     pub fn inverse_act(&self, point: &Vector3<T>) -> Vector3<T> {
         self.rotation.inverse().act(&(point - self.translation))
     }
-    /// [R t; 0 1]
+    /// Returns the homogeneous matrix [R t; 0 1].
     pub fn matrix(&self) -> Matrix4<T> {
         let mut m = Matrix4::identity();
         m.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.rotation.matrix());
@@ -105,23 +105,23 @@ impl<T: Scalar> Se3<T> {
 }
 
 impl Se3 {
-    /// Ad(x): x·Exp(δ)·x⁻¹ = Exp(Ad(x)δ).
+    /// Returns the adjoint Ad(x), with x·Exp(δ)·x⁻¹ = Exp(Ad(x)δ).
     pub fn adjoint(&self) -> Matrix6<f64> {
         let r = self.rotation.matrix();
         lower(&r, &(self.translation.cross_matrix() * r), &r)
     }
-    /// Jᵣ⁻¹(ξ): Log(Exp(ξ)·Exp(δ)) ≈ ξ + Jᵣ⁻¹(ξ)δ.
+    /// Returns Jᵣ⁻¹(ξ), with Log(Exp(ξ)·Exp(δ)) ≈ ξ + Jᵣ⁻¹(ξ)δ.
     pub fn inverse_right_jacobian(xi: &Vector6<f64>) -> Matrix6<f64> {
         let (w, v) = halves(xi);
         let (wx, vx) = (w.cross_matrix(), v.cross_matrix());
         let (k, slope) = small_angle::k_and_slope(w.norm_squared());
         let r = Matrix3::identity() + wx * 0.5 + wx * wx * k;
-        // the derivative of r(ω) in the direction v
+        // Derivative of r(ω) in the direction v.
         let q = vx * 0.5 + (wx * vx + vx * wx) * k + wx * wx * (slope * w.dot(&v));
         lower(&r, &q, &r)
     }
-    /// The derivative of x·Exp(δ) by δ at δ = 0, in the slots `first..first + 6` of jets of `dim`
-    /// slots: for manifolds that contain a pose.
+    /// Returns x·Exp(δ) with its derivative with respect to δ at δ = 0, in the slots `first..first + 6` of
+    /// jets with `dim` slots. For manifolds that contain a pose.
     pub fn seed_in<J: Jet>(&self, dim: usize, first: usize) -> Se3<J> {
         let r = self.rotation.matrix();
         let translation = Vector3::from_fn(|i, _| {
@@ -131,7 +131,7 @@ impl Se3 {
     }
 }
 
-/// The rotation, then the translation.
+/// Storage order: the rotation, then the translation.
 impl Quantity for Se3 {
     const SHAPE: Shape = Shape { name: "se3", size: 7 };
     type Of<T: Scalar> = Se3<T>;
@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn a_turning_frame_moves_on_an_arc() {
-        // forward at 1 m/s, a quarter turn to the left in 1 s: radius 2/π
+        // Forward at 1 m/s, a quarter turn to the left in 1 s: radius 2/π.
         let radius = std::f64::consts::FRAC_2_PI;
         let pose = Se3::exp(&Vector6::new(0.0, 0.0, 1.0 / radius, 1.0, 0.0, 0.0));
         assert!((pose.translation - Vector3::new(radius, radius, 0.0)).norm() < 1e-15);

@@ -1,18 +1,19 @@
-//! Functions of θ² that the exponential and logarithmic maps are made of, right at and near zero.
+//! Functions of θ² from which the exponential and logarithmic maps are built, accurate at zero and close to
+//! it.
 //!
-//! As functions of θ² they are smooth at zero, where θ itself has no derivative.
+//! As functions of θ² they are smooth at zero; θ itself has no derivative there.
 use manifactor_graph::Scalar;
 
-/// Below this θ² the closed forms lose digits to cancellation, and five terms of the series leave
-/// out less than 1e-16.
+/// Threshold on θ² below which the series is used: the closed forms lose digits to cancellation there, and
+/// five terms of the series omit less than 1e-16.
 const SMALL: f64 = 1e-2;
 
-/// c₀ + c₁x + c₂x² + …
+/// Evaluates c₀ + c₁x + c₂x² + ….
 fn series<T: Scalar>(x: T, c: [f64; 5]) -> T {
     c.iter().rev().fold(T::zero(), |sum, c| sum * x + T::from(*c))
 }
 
-/// What exp needs.
+/// Coefficients of the exponential maps.
 pub(crate) struct Exponential<T> {
     /// cos(θ/2)
     pub(crate) cos_half: T,
@@ -39,7 +40,8 @@ pub(crate) fn exponential<T: Scalar>(theta2: T) -> Exponential<T> {
     Exponential { cos_half, sin_half, a: sin_half * sin_half * 2.0, b }
 }
 
-/// k = (1 - (θ/2) cot(θ/2)) / θ², what log needs; `half_cot` is (θ/2) cot(θ/2), asked for away from zero.
+/// Returns k = (1 - (θ/2) cot(θ/2)) / θ² for the logarithmic maps. `half_cot` computes (θ/2) cot(θ/2) and is
+/// called only away from zero.
 pub(crate) fn k<T: Scalar>(theta2: T, half_cot: impl FnOnce() -> T) -> T {
     if theta2 < T::from(SMALL) {
         series(theta2, [1.0 / 12.0, 1.0 / 720.0, 1.0 / 30240.0, 1.0 / 1209600.0, 1.0 / 47900160.0])
@@ -48,7 +50,7 @@ pub(crate) fn k<T: Scalar>(theta2: T, half_cot: impl FnOnce() -> T) -> T {
     }
 }
 
-/// k and k'(θ) / θ, what the inverse right Jacobians need.
+/// Returns k and k'(θ) / θ for the inverse right Jacobians.
 pub(crate) fn k_and_slope(theta2: f64) -> (f64, f64) {
     if theta2 < SMALL {
         let slope = [1.0 / 360.0, 1.0 / 7560.0, 1.0 / 201600.0, 1.0 / 5987520.0, 691.0 / 130767436800.0];
@@ -66,7 +68,7 @@ mod tests {
 
     #[test]
     fn series_and_closed_forms_meet() {
-        // on either side of the switch, and as far apart as the function itself goes there
+        // At both sides of the switch, up to the change of the function itself.
         let (below, above) = (SMALL * (1.0 - 1e-12), SMALL * (1.0 + 1e-12));
         let (x, y) = (exponential(below), exponential(above));
         for (x, y) in [(x.cos_half, y.cos_half), (x.sin_half, y.sin_half), (x.a, y.a), (x.b, y.b)] {

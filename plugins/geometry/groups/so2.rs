@@ -1,4 +1,4 @@
-//! SO(2): rotations in the plane, by their angle.
+//! SO(2): rotations in the plane, stored as an angle.
 use crate::groups::LieGroup;
 use manifactor_graph::prelude::*;
 use manifactor_graph::quantity::Shape;
@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// A rotation in the plane: tangent (theta), in radians, counter-clockwise.
 ///
-/// The angle is kept within -π..π. The logarithm is that angle: it jumps from one end to the other.
+/// The angle is in -π..π. The logarithm is this angle and jumps from one end to the other.
 ///
 /// ```toml
 /// [values]
@@ -19,7 +19,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 #[schemars(with = "Document", bound = "")]
 pub struct So2<T: Scalar = f64> {
     angle: T,
-    // of the angle: to turn a vector costs no trigonometric function
+    // Cached, so that rotating a vector needs no trigonometric function.
     cos: T,
     sin: T,
 }
@@ -27,11 +27,11 @@ pub struct So2<T: Scalar = f64> {
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    /// In radians, counter-clockwise.
+    /// Angle in radians, counter-clockwise.
     angle: Angle,
 }
 
-/// An angle in radians, finite and wrapped when it is read.
+/// An angle in radians, checked to be finite and wrapped when read.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "f64", into = "f64")]
 #[schemars(with = "f64")]
@@ -42,13 +42,13 @@ pub(crate) struct Angle(pub(crate) So2);
 #[error("expected a finite angle in radians, got {0}")]
 pub struct NotAnAngle(pub f64);
 
-/// More turns times 2π have lost digits of the angle within a turn.
+/// Number of turns above which subtracting turns · 2π loses digits of the angle.
 const MANY_TURNS: f64 = 1000.0;
 
-/// The same angle within -π..π; one that is there already stays as it is, bit for bit.
+/// Returns the angle wrapped to -π..π. An angle already in this range is returned unchanged, bit for bit.
 pub fn wrap<T: Scalar>(angle: T) -> T {
     let turns = (angle.re() / TAU).round();
-    // rounding puts an angle of exactly ±π on either side: leave what is in range
+    // An angle of exactly ±π could be rounded to either side, so angles within range are returned unchanged.
     if angle.re().abs() <= PI {
         return angle;
     }
@@ -57,13 +57,13 @@ pub fn wrap<T: Scalar>(angle: T) -> T {
         let is_out = wrapped.re().abs() > PI;
         return if is_out { wrapped - T::from(TAU.copysign(wrapped.re())) } else { wrapped };
     }
-    // sine and cosine reduce their argument exactly
+    // Sine and cosine reduce their argument exactly.
     let (sin, cos) = angle.re().sin_cos();
     angle - T::from(angle.re()) + T::from(sin.atan2(cos))
 }
 
-/// The angle of the vector (x, y) within -π..π, with a derivative at x = 0 too, where num-dual's
-/// `atan2` divides by zero.
+/// Returns the angle of the vector (x, y) within -π..π. The derivative exists at x = 0 too, at which
+/// num-dual's `atan2` divides by zero.
 pub fn atan2<T: Scalar>(y: T, x: T) -> T {
     let (re_y, re_x) = (y.re(), x.re());
     if re_x.abs() >= re_y.abs() {
@@ -75,30 +75,31 @@ pub fn atan2<T: Scalar>(y: T, x: T) -> T {
 }
 
 impl<T: Scalar> So2<T> {
-    /// The rotation by an angle in radians.
+    /// Creates the rotation by an angle in radians.
     pub fn exp(angle: T) -> Self {
-        // cosine and sine of the angle that is written: what is read again has the same bits
+        // Cosine and sine come from the wrapped angle, which is the one written, so reading it back gives
+        // identical bits.
         let angle = wrap(angle);
         let (sin, cos) = angle.sin_cos();
         Self { angle, cos, sin }
     }
-    /// No rotation.
+    /// Returns the identity rotation.
     pub fn identity() -> Self {
         Self { angle: T::zero(), cos: T::one(), sin: T::zero() }
     }
-    /// The angle in radians, within -π..π.
+    /// Returns the angle in radians, within -π..π.
     pub fn angle(&self) -> T {
         self.angle
     }
-    /// Cosine and sine of the angle.
+    /// Returns cosine and sine of the angle.
     pub fn cos_sin(&self) -> (T, T) {
         (self.cos, self.sin)
     }
-    /// The angle, as a tangent vector.
+    /// Returns the angle as a tangent vector.
     pub fn log(&self) -> Vector1<T> {
         Vector1::new(self.angle)
     }
-    /// self · other
+    /// Returns self · other.
     pub fn compose(&self, other: &Self) -> Self {
         Self {
             angle: wrap(self.angle + other.angle),
@@ -106,32 +107,32 @@ impl<T: Scalar> So2<T> {
             sin: self.sin * other.cos + self.cos * other.sin,
         }
     }
-    /// self⁻¹
+    /// Returns self⁻¹.
     pub fn inverse(&self) -> Self {
         Self { angle: -self.angle, cos: self.cos, sin: -self.sin }
     }
-    /// self⁻¹ · other
+    /// Returns self⁻¹ · other.
     pub fn between(&self, other: &Self) -> Self {
         self.inverse().compose(other)
     }
-    /// R v
+    /// Returns R v.
     pub fn act(&self, v: &Vector2<T>) -> Vector2<T> {
         self.matrix() * v
     }
-    /// R
+    /// Returns the rotation matrix R.
     pub fn matrix(&self) -> Matrix2<T> {
         Matrix2::new(self.cos, -self.sin, self.sin, self.cos)
     }
 }
 
-/// By the angle: cosine and sine follow from it.
+/// Compares angles only: cosine and sine follow from them.
 impl<T: Scalar> PartialEq for So2<T> {
     fn eq(&self, other: &Self) -> bool {
         self.angle == other.angle
     }
 }
 
-/// Angle, cosine and sine.
+/// Storage order: angle, cosine and sine.
 impl Quantity for So2 {
     const SHAPE: Shape = Shape { name: "so2", size: 3 };
     type Of<T: Scalar> = So2<T>;

@@ -1,4 +1,4 @@
-//! SO(3): rotations in space, by unit quaternions.
+//! SO(3): rotations in space, stored as unit quaternions.
 use crate::groups::LieGroup;
 use crate::groups::small_angle;
 use crate::groups::so2::atan2;
@@ -8,10 +8,10 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, U3, UnitQuaternion, Vector3, Vect
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A rotation in space, R·Exp(ω): tangent (rx, ry, rz), in radians, about its own axes.
+/// A rotation in space, R·Exp(ω): tangent (rx, ry, rz), in radians, about the axes of the rotated frame.
 ///
-/// Read from a quaternion (x, y, z, w) of length 1 to within 0.001, and normalised. The logarithm is
-/// the shortest rotation vector; at an angle of exactly π it has two, and a jump between them.
+/// Read from a quaternion (x, y, z, w) of length 1 to within 0.001, and normalized. The logarithm is the
+/// shortest rotation vector. At an angle of exactly π there are two of them, and the logarithm jumps.
 ///
 /// ```toml
 /// [values]
@@ -30,7 +30,7 @@ struct Document {
     rotation: Xyzw,
 }
 
-/// A unit quaternion, as documents write it.
+/// A unit quaternion, as written in documents.
 #[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "[f64; 4]", into = "[f64; 4]")]
 #[schemars(with = "[f64; 4]")]
@@ -42,13 +42,13 @@ pub(crate) struct Xyzw(pub(crate) So3);
     "expected a unit quaternion (x, y, z, w), got {xyzw:?} of length {length}; its length has to be 1 to within 0.001"
 )]
 pub struct NotARotation {
-    /// What was given.
+    /// The quaternion given.
     pub xyzw: [f64; 4],
     /// Its length.
     pub length: f64,
 }
 
-/// A quaternion of length 1, up to rounding. One that has it already stays as it is, bit for bit.
+/// Normalizes a quaternion. If its length is already 1 up to rounding, it is returned unchanged, bit for bit.
 fn renormalized(q: Quaternion<f64>) -> So3 {
     let n2 = q.norm_squared();
     let q = if (n2 - 1.0).abs() <= 4.0 * f64::EPSILON { q } else { q / n2.sqrt() };
@@ -56,27 +56,28 @@ fn renormalized(q: Quaternion<f64>) -> So3 {
 }
 
 impl<T: Scalar> So3<T> {
-    /// No rotation.
+    /// Returns the identity rotation.
     pub fn identity() -> Self {
         Self(UnitQuaternion::identity())
     }
-    /// The rotation about `omega` by its length, in radians.
+    /// Returns the rotation about `omega` by its length, in radians.
     pub fn exp(omega: &Vector3<T>) -> Self {
         let e = small_angle::exponential(omega.norm_squared());
         Self(UnitQuaternion::new_unchecked(Quaternion::from_parts(e.cos_half, omega * e.sin_half)))
     }
-    /// The shortest rotation vector, in radians.
+    /// Returns the shortest rotation vector, in radians.
     pub fn log(&self) -> Vector3<T> {
         self.log_and_k().0
     }
-    /// The logarithm ω, and k(|ω|²) of [`small_angle::k`], which needs no trigonometry of its own here.
+    /// Returns the logarithm ω and k(|ω|²) of [`small_angle::k`], which needs no further trigonometric
+    /// function here.
     pub(crate) fn log_and_k(&self) -> (Vector3<T>, T) {
         let q = *self.0.quaternion();
-        // q and -q are the same rotation: the one with w ≥ 0 has the shorter logarithm
+        // q and -q are one rotation; the quaternion with w ≥ 0 has the shorter logarithm.
         let q = if q.w < T::zero() { -q } else { q };
         let (v, w) = (q.imag(), q.w);
         let n2 = v.norm_squared();
-        // atan(n/w)/n by its series where n has no derivative
+        // atan(n/w)/n as a series close to n = 0, as n has no derivative there.
         let scale = if n2 < T::from(1e-8) {
             let x = n2 / (w * w);
             (T::one() - x / 3.0 + x * x / 5.0) * 2.0 / w
@@ -88,53 +89,55 @@ impl<T: Scalar> So3<T> {
         let theta2 = omega.norm_squared();
         (omega, small_angle::k(theta2, || theta2.sqrt() * 0.5 * w / n2.sqrt()))
     }
-    /// self · other
+    /// Returns self · other.
     pub fn compose(&self, other: &Self) -> Self {
         Self(self.0 * other.0)
     }
-    /// self⁻¹
+    /// Returns self⁻¹.
     pub fn inverse(&self) -> Self {
         Self(self.0.conjugate())
     }
-    /// self⁻¹ · other
+    /// Returns self⁻¹ · other.
     pub fn between(&self, other: &Self) -> Self {
         self.inverse().compose(other)
     }
-    /// R v
+    /// Returns R v.
     pub fn act(&self, v: &Vector3<T>) -> Vector3<T> {
         self.0 * v
     }
-    /// R
+    /// Returns the rotation matrix R.
     pub fn matrix(&self) -> Matrix3<T> {
         self.0.to_rotation_matrix().into_inner()
     }
-    /// The unit quaternion; q and -q are the same rotation.
+    /// Returns the unit quaternion; q and -q are one rotation.
     pub fn quaternion(&self) -> UnitQuaternion<T> {
         self.0
     }
 }
 
 impl So3 {
-    /// The rotation of a unit quaternion, given as x, y, z, w.
+    /// Creates the rotation from a unit quaternion, given as x, y, z, w.
     ///
     /// # Errors
-    /// If its length differs from 1 by more than 0.001; a smaller difference is normalised away.
+    /// If the length differs from 1 by more than 0.001. A smaller difference is removed by normalization.
     pub fn from_quaternion_xyzw(xyzw: [f64; 4]) -> Result<Self, NotARotation> {
         let q = Quaternion::from(Vector4::from(xyzw));
         let length = q.norm();
-        // so written that NaN is an error too
+        // This form also rejects NaN.
         if (length - 1.0).abs() <= 1e-3 { Ok(renormalized(q)) } else { Err(NotARotation { xyzw, length }) }
     }
-    /// x, y, z, w
+    /// Returns the unit quaternion as x, y, z, w.
     pub fn quaternion_xyzw(&self) -> [f64; 4] {
         self.0.coords.into()
     }
-    /// The rotation of an orthogonal matrix of determinant 1; rounding errors in it are evened out.
+    /// Creates the rotation from an orthogonal matrix of determinant 1. Rounding errors in the matrix are
+    /// removed.
     pub fn from_matrix(matrix: &Matrix3<f64>) -> Self {
         let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*matrix));
         renormalized(q.into_inner())
     }
-    /// The derivative of x·Exp(δ) by δ at δ = 0, in the slots `first..first + 3` of jets of `dim` slots.
+    /// Returns x·Exp(δ) with its derivative with respect to δ at δ = 0, in the slots `first..first + 3` of
+    /// jets with `dim` slots.
     pub fn seed_in<J: Jet>(&self, dim: usize, first: usize) -> So3<J> {
         let q = self.0.quaternion();
         // d(q·Exp(δ))/dδₖ = q·(eₖ/2)
@@ -143,23 +146,23 @@ impl So3 {
         let coords = Vector4::from_fn(|i, _| jet(q.coords[i], dim, first, dq.map(|d| d.coords[i])));
         So3(UnitQuaternion::new_unchecked(Quaternion::from(coords)))
     }
-    /// self · other, of length 1 again: for retract, which is applied over and over.
+    /// Returns self · other, normalized again, as repeated retractions would accumulate rounding errors.
     pub(crate) fn compose_renormalized(&self, other: &Self) -> Self {
         renormalized(self.compose(other).0.into_inner())
     }
-    /// Jᵣ(ω): Exp(ω + δ) ≈ Exp(ω)·Exp(Jᵣ(ω)δ).
+    /// Returns Jᵣ(ω), with Exp(ω + δ) ≈ Exp(ω)·Exp(Jᵣ(ω)δ).
     pub fn right_jacobian(omega: &Vector3<f64>) -> Matrix3<f64> {
         let (w, e) = (omega.cross_matrix(), small_angle::exponential(omega.norm_squared()));
         Matrix3::identity() - w * e.a + w * w * e.b
     }
-    /// Jᵣ⁻¹(ω): Log(Exp(ω)·Exp(δ)) ≈ ω + Jᵣ⁻¹(ω)δ.
+    /// Returns Jᵣ⁻¹(ω), with Log(Exp(ω)·Exp(δ)) ≈ ω + Jᵣ⁻¹(ω)δ.
     pub fn inverse_right_jacobian(omega: &Vector3<f64>) -> Matrix3<f64> {
         let (w, (k, _)) = (omega.cross_matrix(), small_angle::k_and_slope(omega.norm_squared()));
         Matrix3::identity() + w * 0.5 + w * w * k
     }
 }
 
-/// A value with three entries of its gradient.
+/// Returns a jet with three entries of its gradient set.
 #[inline(always)]
 pub(crate) fn jet<J: Jet>(value: f64, dim: usize, first: usize, derivatives: [f64; 3]) -> J {
     let mut gradient = [0.0; 32];
@@ -167,7 +170,7 @@ pub(crate) fn jet<J: Jet>(value: f64, dim: usize, first: usize, derivatives: [f6
     J::with_gradient(value, &gradient[..dim])
 }
 
-/// The quaternion: x, y, z, w.
+/// Storage order: the quaternion x, y, z, w.
 impl Quantity for So3 {
     const SHAPE: Shape = Shape { name: "so3", size: 4 };
     type Of<T: Scalar> = So3<T>;
@@ -307,7 +310,7 @@ mod tests {
             let log = So3::exp(&(axis * PI)).log();
             assert!((log.norm() - PI).abs() < 1e-12 && log.cross(&axis).norm() < 1e-12, "{log}");
             assert!(So3::inverse_right_jacobian(&log).iter().all(|x| x.is_finite()));
-            // w = 0, exactly
+            // w is exactly zero here.
             let half_turn = So3::from_quaternion_xyzw([axis.x, axis.y, axis.z, 0.0]).unwrap();
             let jets = half_turn.seed().log();
             assert!(jets.iter().all(|x| x.gradient().is_some_and(|g| g.iter().all(|x| x.is_finite()))));

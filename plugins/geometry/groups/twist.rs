@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Deref;
 
-/// The velocity of a rigid body in its own frame: angular in rad/s, then linear in m/s.
+/// The velocity of a rigid body in the body frame: angular in rad/s, then linear in m/s.
 ///
 /// Tangent (wx, wy, wz, vx, vy, vz); x ⊞ δ = x + δ.
 ///
@@ -19,7 +19,7 @@ use std::ops::Deref;
 #[schemars(with = "Document")]
 pub struct Twist(pub Vector6<f64>);
 
-/// The velocity of a rigid body in its own frame: angular in rad/s, then linear in m/s.
+/// The velocity of a rigid body in the body frame: angular in rad/s, then linear in m/s.
 ///
 /// Tangent (wx, wy, wz, vx, vy, vz); x ⊞ δ = x + δ.
 ///
@@ -38,7 +38,7 @@ struct Document {
 }
 
 impl Twist {
-    /// A body at rest.
+    /// Returns the twist of a body at rest.
     pub fn zero() -> Self {
         Self(Vector6::zeros())
     }

@@ -2,9 +2,9 @@
 //!
 //! 1. Rotations: min Σ κ ‖R_b - R_a Z‖² over all 3×3 (2×2) matrices. The rows of R are independent, so one
 //!    factorization of a sparse matrix with 3×3 blocks serves three right-hand sides.
-//! 2. Each is replaced by the closest rotation, by its singular value decomposition.
-//! 3. Positions: the whole cost ½ Σ rᵀΩr, rotations held; it is quadratic, as the logarithm of a pose is
-//!    linear in its translation. One more factorization.
+//! 2. Each matrix is replaced by the closest rotation, from its singular value decomposition.
+//! 3. Positions: the full cost ½ Σ rᵀΩr with the rotations held. It is quadratic, as the logarithm of a pose
+//!    is linear in the translation, and needs one more factorization.
 //!
 //! Martinec and Pajdla, *Robust rotation and translation estimation in multiview reconstruction*, CVPR 2007;
 //! Carlone, Tron, Daniilidis and Dellaert, *Initialization techniques for 3D SLAM*, ICRA 2015.
@@ -23,12 +23,14 @@ use serde::{Deserialize, Serialize};
 
 /// Rotations from a linear relaxation of all relative measurements at once, then positions.
 ///
-/// Takes between factors and priors of rotations and poses, with any noise; robust losses are not looked at.
-/// A measurement's rotation weighs by the mean variance of its three angles, whatever the translation; then
-/// positions minimise the full cost, rotations held. Held variables keep their values; a connected part
-/// without any, and without a prior, keeps its first pose. Points are placed from where they were first seen,
-/// anything else stays. Close to the best estimate where rotations are measured well, whatever the values
-/// that came with the graph. It doubts a minimum in which the rotations of some loop go around once too often.
+/// Uses between factors and priors of rotations and poses, with any noise; robust losses are ignored. The
+/// rotation of a measurement is weighted by the mean variance of its three angles, independent of the
+/// translation. The positions then minimize the full cost with the rotations held. Held variables keep their
+/// values. A connected part without a held variable or prior keeps its first pose. Points are placed from
+/// their first measurement; other variables keep their values.
+///
+/// The result is close to the optimum if rotations are measured well, independent of the given values. This
+/// start also marks a minimum as doubtful if the rotations along some loop add up to extra turns.
 ///
 /// ```toml
 /// start = { type = "chordal" }
@@ -43,7 +45,7 @@ const NAME: &str = "chordal";
 impl Start for Chordal {
     fn start(&self, graph: &Graph, values: &Values) -> Result<Values, StartError> {
         match relax_all(graph, values) {
-            // a graph without values: where relaxations have an anchor, the first of a tree does for it
+            // A graph without values: a spanning tree gives each part the anchor that the relaxation needs.
             Err(StartError::Value(ValueError::Missing { .. })) => {
                 relax_all(graph, &spanning_tree(graph, values, Tree::Shallow)?)
             }
@@ -78,10 +80,10 @@ fn relax_all(graph: &Graph, values: &Values) -> Result<Values, StartError> {
     Ok(started)
 }
 
-/// New values, by place among the values.
+/// New values, by index among the values.
 type Found = Vec<Option<Box<dyn Variable>>>;
 
-/// Finds the poses of one type from the measurements between them; false, where there are none.
+/// Computes the poses of one type from the measurements between them; false if there is none.
 fn relax<P: Pose<D>, const D: usize>(
     graph: &Graph,
     values: &Values,
@@ -125,21 +127,21 @@ fn rotations<P: Pose<D>, const D: usize>(
     net: &Network<P, D>,
     relaxation: &mut Relaxation<D>,
 ) -> Result<Vec<SMatrix<f64, D, D>>, BlockSystemError> {
-    // the rows of R are the columns of x
+    // The rows of R are the columns of x.
     let mut x: Vec<SMatrix<f64, D, D>> = net.poses.iter().map(|p| p.rotation().transpose()).collect();
     relaxation.minimize(&net.edges, &mut x, |e| {
         let kappa = e.information.chordal_weight();
         let w = SMatrix::identity() * kappa;
         (kappa > 0.0).then(|| Term { a: e.rotation, w, g: SMatrix::zeros() })
     })?;
-    // where measurements leave nothing of a rotation, it stays
+    // A rotation that the measurements leave fully undetermined keeps its value.
     let nearest =
         |(x, pose): (&SMatrix<f64, D, D>, &P)| P::nearest(&x.transpose()).unwrap_or_else(|| pose.rotation());
     Ok(x.iter().zip(&net.poses).map(nearest).collect())
 }
 
-/// ½ rᵀΩr as a function of positions: the translational rows of r are B (t_b - t_a - R_a z) with
-/// B = V⁻¹(ω) Zᵀ R_aᵀ, the rotational ones ω = Log(Zᵀ R_aᵀ R_b).
+/// ½ rᵀΩr as a function of positions: the translational rows of r are B (t_b - t_a - R_a z) with B = V⁻¹(ω)
+/// Zᵀ R_aᵀ, the rotational ones ω = Log(Zᵀ R_aᵀ R_b).
 fn position_term<P: Pose<D>, const D: usize>(
     edge: &Edge<D>,
     rotations: &[SMatrix<f64, D, D>],

@@ -6,7 +6,7 @@ use manifactor_graph::{Key, Manifold, Noise};
 use nalgebra::{DMatrix, DVector, Vector2, Vector3, Vector6};
 use proptest::prelude::*;
 
-/// A ring with chords, measured without noise, of poses that are given.
+/// A ring with chords through the given poses, measured without noise.
 fn ring<P: Pose<D>, const D: usize>(truth: &[P]) -> (Graph, Values)
 where
     Between<P>: Factor,
@@ -14,7 +14,7 @@ where
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let n = truth.len();
     for (i, pose) in truth.iter().enumerate() {
-        // far from the truth, but for the first
+        // All values but the first are far from the truth.
         values.insert(Key::indexed("x", i), if i == 0 { *pose } else { P::identity() });
         for step in [1, 2] {
             let k = (i + step) % n;
@@ -25,7 +25,7 @@ where
     (graph, values)
 }
 
-/// How far from the truth the start on its ring is, at most.
+/// Largest distance of an initial value on the ring from the truth.
 fn error<P: Pose<D>, const D: usize>(truth: &[P]) -> f64
 where
     Between<P>: Factor,
@@ -153,7 +153,7 @@ fn measurements_without_a_direction_leave_it_as_it_is() {
     assert!(
         (x1.rotation.angle() - 0.7).abs() < 1e-12 && (x1.translation - relative.translation).norm() < 1e-9
     );
-    // one coordinate alone does not say where x1 is
+    // One measured coordinate does not determine the position of x1.
     graph.factors_mut()[0].noise(only(&[true, false, true]));
     let error = Chordal {}.start(&graph, &values).unwrap_err();
     assert!(error.to_string().contains("leave the positions of some of the 2 variables"), "{error}");

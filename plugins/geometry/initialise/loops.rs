@@ -1,9 +1,9 @@
-//! Whether the rotations of a loop go around once too often: the mark of a wrong minimum of a pose graph.
+//! Detects loops whose rotations add up to extra turns: the sign of a wrong minimum of a pose graph.
 //!
-//! Along a loop, the residual rotations of its measurements add up to what the measurements are off by all together, and to
-//! as many whole turns as the estimate is wound around. No residual of such a loop need be large, and whether the cost is
-//! depends on the unit of the noise; the turns do not. Looked at are the loops that one more edge closes in a spanning tree
-//! that is as shallow as possible: one pass over the edges, without a linear system.
+//! Along a loop, the residual rotations add up to the total measurement error plus one full turn per winding
+//! of the estimate. No single residual of such a loop needs to be large, and the size of the cost depends on
+//! the unit of the noise; the number of turns does not. The check covers the loops that each remaining edge
+//! closes in a spanning tree of minimum depth: one pass over the edges, without a linear system.
 use super::as_factor;
 use super::pose::Pose;
 use crate::{Between, Prior, Se2, Se3, So2, So3};
@@ -11,8 +11,8 @@ use manifactor_graph::{Factor, FactorEntry, Graph, Key, Values};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
-/// Returns whether the residual rotations of some loop add up to more than half a turn. In space they are added up as vectors in
-/// the outer frame, which is exact where they turn about one axis.
+/// Returns whether the residual rotations of some loop add up to more than half a turn. In space they are
+/// summed as vectors in the outer frame, which is exact if they turn about one axis.
 pub(crate) fn is_wound(graph: &Graph, values: &Values) -> bool {
     is_wound_in::<Se2, 2>(graph, values)
         || is_wound_in::<Se3, 3>(graph, values)
@@ -20,7 +20,7 @@ pub(crate) fn is_wound(graph: &Graph, values: &Values) -> bool {
         || is_wound_in::<So3, 3>(graph, values)
 }
 
-/// A measured rotation from one node to another, and its residual in the outer frame.
+/// A measured rotation between two nodes, and its residual in the outer frame.
 struct Edge {
     a: usize,
     b: usize,
@@ -32,7 +32,7 @@ where
     Between<P>: Factor,
     Prior<P>: Factor,
 {
-    // priors are measured from the outer frame, a node of its own
+    // Priors are measured from the outer frame, an additional node.
     let outer = values.len();
     let pose = |key: &Key| {
         let (place, value) = values.find(key.as_str())?;
@@ -49,7 +49,7 @@ where
             };
         let measured = from * relative.rotation();
         let (omega, _) = P::logarithm(&measured.tr_mul(&to.rotation()));
-        // a plane turns about z alone, which is the same in all frames
+        // In the plane, rotations are about z only, which is identical in all frames.
         let residual = if D == 3 {
             Vector3::from_fn(|r, _| (0..D).map(|c| measured[(r, c)] * omega[c]).sum())
         } else {
@@ -61,9 +61,9 @@ where
     has_turn(outer + 1, &edges)
 }
 
-/// Returns whether a loop adds up to more than half a turn.
+/// Returns whether the residuals of a loop add up to more than half a turn.
 fn has_turn(nodes: usize, edges: &[Edge]) -> bool {
-    // by node: its edges
+    // Edges by node.
     let mut first = vec![0_u32; nodes + 1];
     edges.iter().flat_map(|e| [e.a, e.b]).for_each(|node| first[node + 1] += 1);
     (0..nodes).for_each(|node| first[node + 1] += first[node]);
@@ -74,7 +74,7 @@ fn has_turn(nodes: usize, edges: &[Edge]) -> bool {
             next[node] += 1;
         }
     }
-    // by node: the sum of the residuals from the root
+    // Sum of the residuals from the root, by node.
     let mut sums: Vec<Option<Vector3<f64>>> = vec![None; nodes];
     let mut queue = Vec::with_capacity(nodes);
     for root in 0..nodes {
@@ -111,8 +111,8 @@ mod tests {
     use nalgebra::Vector6;
     use std::f64::consts::TAU;
 
-    /// Poses on a circle, about an axis that is none of the coordinates', wound around so many times where the
-    /// measurements go around once.
+    /// Poses on a circle about an axis that is not a coordinate axis. The values go around `turns` times, the
+    /// measurements once.
     fn ring(n: usize, turns: f64) -> (Graph, Values) {
         let step = |turns: f64| {
             let turn = Vector3::new(2.0, -1.0, 2.0) / 3.0 * (TAU * turns / n as f64);

@@ -1,4 +1,4 @@
-//! Poses of one type and the relative measurements between them, as linear methods take them.
+//! Poses of one type and the relative measurements between them, in the form that linear methods need.
 use super::as_factor;
 use super::parts::Parts;
 use super::pose::Pose;
@@ -7,30 +7,31 @@ use manifactor_graph::{Factor, Fixed, Graph, Key, Values};
 use manifactor_solve::StartError;
 use nalgebra::{DMatrix, Matrix3, SMatrix, SVector};
 
-/// Nodes are poses by their place among the values of their type; the last is the outer frame, which priors
-/// are measured from. It is held, as are fixed poses, and one pose of each connected part without any of
-/// these.
+/// A graph whose nodes are the poses, indexed among the values of their type.
+///
+/// The last node is the outer frame, the reference of priors. It is held, as are fixed poses. A
+/// connected part without a held node is anchored at one pose.
 pub(crate) struct Network<P, const D: usize> {
     pub poses: Vec<P>,
-    /// Place of each node among the values; the outer frame has none.
+    /// Index of each node among the values; the outer frame has none.
     pub places: Vec<usize>,
-    /// Held by the graph, wholly or in part; and the outer frame.
+    /// Nodes held by the graph, wholly or in part, and the outer frame.
     pub held: Vec<bool>,
     pub edges: Vec<Edge<D>>,
 }
 
-/// Pose `b`, as it was seen from pose `a`.
+/// A measurement of pose `b` from pose `a`.
 pub(crate) struct Edge<const D: usize> {
     pub a: usize,
     pub b: usize,
-    /// Which factor of the graph it is.
+    /// Index of the factor in the graph.
     pub factor: usize,
     pub rotation: SMatrix<f64, D, D>,
     pub translation: SVector<f64, D>,
     pub information: Information<D>,
 }
 
-/// Blocks of Ω. Rotations are about x, y and z; in the plane, zero but for z.
+/// Blocks of the information matrix Ω. Rotations are about x, y and z; in the plane only z is nonzero.
 pub(crate) struct Information<const D: usize> {
     pub turn: Matrix3<f64>,
     pub cross: SMatrix<f64, D, 3>,
@@ -48,8 +49,8 @@ impl<const D: usize> Information<D> {
         }
     }
 
-    /// κ: half of the inverse of the mean variance about the axes, marginal over the translation; zero where
-    /// some axis is not measured. For a small angle θ, ‖R - I‖² is 2θ².
+    /// Returns κ: half the inverse of the mean variance about the axes, marginalized over the translation.
+    /// Zero if some axis is not measured. For a small angle θ, ‖R - I‖² is 2θ².
     pub(crate) fn chordal_weight(&self) -> f64 {
         let Self { turn, cross, shift } = self;
         let coupled = cross.iter().any(|x| *x != 0.0);
@@ -64,12 +65,12 @@ impl<const D: usize> Information<D> {
         above_zero(0.5 / variance)
     }
 
-    /// τ: the inverse of the mean variance along the axes, marginal over the rotation; zero where some axis is
-    /// not measured.
+    /// Returns τ: the inverse of the mean variance along the axes, marginalized over the rotation. Zero if
+    /// some axis is not measured.
     pub(crate) fn shift_weight(&self) -> f64 {
         let Self { turn, cross, shift } = self;
         let mut turn = *turn;
-        // axes that a plane does not have
+        // Rotation axes that do not exist in the plane.
         for i in 0..3 {
             if turn[(i, i)] == 0.0 {
                 turn[(i, i)] = 1.0;
@@ -80,7 +81,7 @@ impl<const D: usize> Information<D> {
         above_zero(marginal.try_inverse().map_or(0.0, |m| D as f64 / m.trace()))
     }
 
-    /// Returns whether rotation and translation are apart and each as uncertain along all axes.
+    /// Returns whether rotation and translation are uncorrelated and each equally uncertain along all axes.
     pub(crate) fn is_isotropic(&self) -> bool {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
         let turns = if D == 2 { 2..3 } else { 0..3 };
@@ -103,13 +104,13 @@ where
     Between<P>: Factor,
     Prior<P>: Factor,
 {
-    /// `None` where the graph has no between factor of this type.
+    /// Builds the network; `None` if the graph has no between factor of this type.
     pub(crate) fn of(graph: &Graph, values: &Values) -> Result<Option<Self>, StartError> {
         if !graph.factors().iter().any(|entry| as_factor::<Between<P>, 2>(entry).is_some()) {
             return Ok(None);
         }
         let mut net = Self { poses: vec![], places: vec![], held: vec![], edges: vec![] };
-        // node of each place in the values
+        // Node of each value, by its index.
         let mut nodes = vec![usize::MAX; values.len()];
         for (place, (_, value)) in values.iter().enumerate() {
             if let Some(pose) = value.erased().as_any().downcast_ref::<P>() {
@@ -124,7 +125,7 @@ where
         net.held[outer] = true;
         let node = |key: &Key| match values.position(key.as_str()).map(|place| nodes[place]) {
             Some(node) if node != usize::MAX => Ok(node),
-            // says what is wrong with it
+            // The lookup returns the error.
             _ => values.get::<P>(key).map(|_| usize::MAX).map_err(StartError::from),
         };
         for (key, fixed) in graph.fixed() {
@@ -155,8 +156,8 @@ where
         Ok(Some(net))
     }
 
-    /// Which nodes stay where they are, if only these edges count: the held ones, and the first of each
-    /// part without any.
+    /// Returns the nodes that stay fixed if only the selected edges count: the held nodes, and the first node
+    /// of each connected part without a held one.
     pub(crate) fn anchored(&self, counts: impl Fn(&Edge<D>) -> bool) -> Vec<bool> {
         let n = self.poses.len();
         let mut parts = Parts::new(n);
@@ -164,7 +165,7 @@ where
         let mut part_is_held = vec![false; n];
         (0..n).filter(|i| self.held[*i]).for_each(|i| part_is_held[parts.root(i)] = true);
         let mut anchored = self.held.clone();
-        // a root is the first of its part
+        // A root is the first node of its part.
         (0..n).filter(|i| parts.root(*i) == *i && !part_is_held[*i]).for_each(|i| anchored[i] = true);
         anchored
     }

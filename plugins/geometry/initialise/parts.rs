@@ -1,23 +1,23 @@
 //! Disjoint sets of numbers, to find the connected parts of a graph.
 
-/// By the parent of each member; a root is the smallest of its set.
+/// Parent of each member; the root of a set is its smallest member.
 pub(crate) struct Parts(Vec<usize>);
 
 impl Parts {
-    /// The numbers below `n`, each alone.
+    /// Creates sets of the numbers below `n`, each with one member.
     pub(crate) fn new(n: usize) -> Self {
         Self((0..n).collect())
     }
-    /// The smallest number that is joined with `i`.
+    /// Returns the smallest number in the set of `i`.
     pub(crate) fn root(&mut self, mut i: usize) -> usize {
         while self.0[i] != i {
-            // halve the path on the way
+            // Path halving.
             self.0[i] = self.0[self.0[i]];
             i = self.0[i];
         }
         i
     }
-    /// Makes two sets one.
+    /// Joins two sets.
     pub(crate) fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b)] = a.min(b);

@@ -1,4 +1,4 @@
-//! What linear methods need of rotations and poses, in the plane and in space alike.
+//! Interface of rotations and poses for linear methods, shared by the plane and space.
 use crate::groups::LieGroup;
 use crate::{Se2, Se3, So2, So3, atan2, nearest_rotation};
 use manifactor_graph::Variable;
@@ -6,18 +6,18 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 
 /// A rotation of `D` dimensions, with or without a position.
 pub(crate) trait Pose<const D: usize>: LieGroup + Variable + Copy {
-    /// Which tangent direction turns about x, y and z.
+    /// Index of the tangent direction that turns about x, y and z, if there is one.
     const TURN: [Option<usize>; 3];
-    /// The first of the tangent directions that move; `None` for rotations.
+    /// First of the translational tangent directions; `None` for rotations.
     const MOVE: Option<usize>;
     fn rotation(&self) -> SMatrix<f64, D, D>;
     fn translation(&self) -> SVector<f64, D>;
-    /// From an exact rotation.
+    /// Creates the pose from an exact rotation.
     fn assemble(rotation: &SMatrix<f64, D, D>, translation: &SVector<f64, D>) -> Self;
-    /// The rotation closest to a matrix by the Frobenius norm; `None` where there is no one such.
+    /// Returns the rotation closest to a matrix in the Frobenius norm; `None` if it is not unique.
     fn nearest(m: &SMatrix<f64, D, D>) -> Option<SMatrix<f64, D, D>>;
-    /// ω = Log(R), in the plane about z, and V⁻¹(ω), which takes a pose's translation to that of its
-    /// logarithm: Log(R, t) = (ω, V⁻¹t).
+    /// Returns ω = Log(R), in the plane about z, and V⁻¹(ω), which maps the translation of a pose to the
+    /// translation of its logarithm: Log(R, t) = (ω, V⁻¹t).
     fn logarithm(r: &SMatrix<f64, D, D>) -> (Vector3<f64>, SMatrix<f64, D, D>);
 }
 
@@ -33,7 +33,7 @@ fn log_in_plane(r: &Matrix2<f64>) -> (Vector3<f64>, Matrix2<f64>) {
     (Vector3::new(0.0, 0.0, theta), inverse.fixed_view::<2, 2>(0, 0).transpose())
 }
 
-/// The closest rotation, of determinant 1.
+/// Returns the closest rotation, of determinant 1.
 fn nearest_in_space(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let found = nearest_rotation(m);
     let is_finite = found.singular_values.iter().all(|value| value.is_finite());
@@ -42,7 +42,7 @@ fn nearest_in_space(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
 
 fn log_in_space(r: &Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
     let omega = So3::from_matrix(r).log();
-    // V is the left Jacobian, the transpose of the right one
+    // V is the left Jacobian, the transpose of the right one.
     (omega, So3::inverse_right_jacobian(&omega).transpose())
 }
 

@@ -1,29 +1,29 @@
-//! Linear least squares on the nodes of a network: a block for each free node, as many right-hand sides as needed.
+//! Linear least squares on the nodes of a network: one block per free node, any number of right-hand sides.
 use super::network::Edge;
 use manifactor_solve::{BlockSystem, BlockSystemError};
 use nalgebra::{SMatrix, SVector};
 
-/// What an edge weighs: ½ eᵀWe - gᵀe with e = x_b - Aᵀx_a, for each of `C` columns x.
+/// Cost term of an edge: ½ eᵀWe - gᵀe with e = x_b - Aᵀx_a, for each of `C` columns x.
 pub(crate) struct Term<const D: usize, const C: usize> {
     pub a: SMatrix<f64, D, D>,
     pub w: SMatrix<f64, D, D>,
     pub g: SMatrix<f64, D, C>,
 }
 
-/// A pivot that is a smaller share of its diagonal than this is rounding.
+/// Smallest share of its diagonal that a pivot may have; smaller pivots are rounding.
 const SINGULAR: f64 = 1e-14;
 
-/// The structure of a sum of such terms: a block for each node that may move.
+/// Structure of a sum of cost terms: one block per free node.
 pub(crate) struct Relaxation<const D: usize> {
     system: BlockSystem,
-    /// Unknown of each node; `None` for one that stays.
+    /// Block index of each node; `None` for a node that stays fixed.
     block: Vec<Option<usize>>,
-    /// What stays, and so its structure.
+    /// Nodes that stay fixed; they determine the structure.
     anchored: Vec<bool>,
 }
 
 impl<const D: usize> Relaxation<D> {
-    /// The structure; nodes that are `anchored` are constants.
+    /// Builds the structure; `anchored` nodes are constants.
     pub(crate) fn new(edges: &[Edge<D>], anchored: Vec<bool>) -> Result<Self, BlockSystemError> {
         let mut free = 0;
         let block: Vec<Option<usize>> = anchored
@@ -39,12 +39,13 @@ impl<const D: usize> Relaxation<D> {
         Ok(Self { system, block, anchored })
     }
 
-    /// Returns whether it has the structure that follows from these anchors.
+    /// Returns whether the structure matches these anchors.
     pub(crate) fn fits(&self, anchored: &[bool]) -> bool {
         self.anchored == anchored
     }
 
-    /// The minimum, in place of `x`, whose anchored entries are constants. Edges without a term take no part.
+    /// Minimizes the cost in place. Anchored entries of `x` are constants, and edges without a term are
+    /// skipped.
     pub(crate) fn minimize<const C: usize>(
         &mut self,
         edges: &[Edge<D>],

@@ -1,4 +1,4 @@
-//! Spanning trees as a start that is chosen by name.
+//! Spanning trees as a named start for solvers.
 use super::parts::Parts;
 use super::{Tree, as_factor, seen_point, spanning_tree};
 use crate::{Between, Point1, Point2, Point3, Prior, Se2, Se3, So2, So3};
@@ -8,10 +8,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 
-/// Variables placed one from the other along a spanning tree of the between factors.
+/// Variables placed one after another along a spanning tree of the between factors.
 ///
-/// Begins in each connected part at the held variables, else at a prior, else at its first variable, which
-/// keeps its value. Points are placed from where they were first seen; anything else stays.
+/// Each connected part begins at its held variables, otherwise at a prior, otherwise at its first variable,
+/// which keeps its value. Points are placed from their first measurement; other variables keep their values.
 ///
 /// ```toml
 /// start = { type = "spanning_tree", tree = "shallow" }
@@ -19,7 +19,7 @@ use std::collections::HashSet;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SpanningTree {
-    /// `chain`: along the odometry, where its factors come first. `shallow`: by as few factors as possible.
+    /// `chain` follows the odometry, if its factors come first. `shallow` uses as few factors as possible.
     pub tree: Tree,
 }
 
@@ -40,7 +40,7 @@ impl Start for SpanningTree {
 }
 register!(dyn Start, "spanning_tree", SpanningTree);
 
-/// Puts points that are not held, and that nothing but sightings places, to where they were first seen.
+/// Moves free points to their first measured position, unless a prior or between factor places them.
 pub(crate) fn reseat(graph: &Graph, values: &mut Values) {
     let seen: Vec<_> = graph.factors().iter().filter_map(|entry| seen_point(entry, values)).collect();
     if seen.is_empty() {
@@ -59,7 +59,7 @@ fn is_held(graph: &Graph, key: &Key) -> bool {
     graph.fixed().get(key).is_some_and(|fixed| *fixed != Fixed::Whole(false))
 }
 
-/// The variables that a between factor or a prior places.
+/// Returns the variables that a between factor or a prior places.
 fn placed(entry: &FactorEntry) -> Option<&[Key]> {
     joined(entry).map(<[Key; 2]>::as_slice).or_else(|| prior(entry).map(<[Key; 1]>::as_slice))
 }
@@ -74,8 +74,8 @@ macro_rules! of_any_type {
 of_any_type!(joined, Between, 2, Se3, Se2, So3, So2, Point3, Point2, Point1);
 of_any_type!(prior, Prior, 1, Se3, Se2, So3, So2, Point3, Point2, Point1);
 
-/// The values that variables are placed from: those held, and of each part that nothing holds and no prior
-/// is in, the first. `None` where there is no between factor.
+/// Returns the values from which variables are placed: the held ones, and the first of each part without a
+/// held variable or prior. `None` if there is no between factor.
 fn roots(graph: &Graph, values: &Values) -> Option<Values> {
     let mut parts = Parts::new(values.len());
     let mut found = false;

@@ -1,4 +1,4 @@
-//! The default solver leaves a minimum that is wrong, and no other, whatever the unit of the noise.
+//! The default solver leaves a wrong minimum, and no other, independent of the unit of the noise.
 use manifactor_geometry::{Between, Chordal, Se2, Se3};
 use manifactor_graph::{Graph, Key, Noise, Values, register};
 use manifactor_solve::{
@@ -13,13 +13,13 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 thread_local! {
-    /// How often starts were asked for values.
+    /// Number of calls to starts.
     static ASKED: Cell<usize> = const { Cell::new(0) };
-    /// What the test's own start has to offer; it doubts everything then.
+    /// Values that the test's start returns. If set, it doubts every minimum.
     static RIVAL: RefCell<Option<Values>> = const { RefCell::new(None) };
 }
 
-/// A start that does nothing unless a test says so.
+/// A start that does nothing unless a test sets its values.
 ///
 /// ```toml
 /// start = { type = "test_rival" }
@@ -40,7 +40,7 @@ impl Start for Rival {
 }
 register!(dyn Start, "test_rival", Rival);
 
-/// Poses on a circle, that begin where they go around `turns` times: a minimum of its own.
+/// Poses on a circle. The initial values go around `turns` times, which is a separate local minimum.
 fn ring(n: usize, turns: f64) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let step = |turns: f64| Se2::exp(&Vector3::new(1.0, 0.0, TAU * turns / n as f64));
@@ -83,13 +83,14 @@ fn who_watches_may_stop_it_at_any_step() {
         };
         let outcome = solve(&graph, &values, &Auto::default(), &mut observer).unwrap().outcome;
         assert!(seen == last && outcome.history.len() == last, "{seen} of {last}");
-        // unless the step that it was stopped at was the last
+        // Unless the step at which it was stopped was the last one.
         assert!(outcome.termination == Termination::Interrupted || outcome.termination.is_converged());
         assert!(outcome.final_cost <= outcome.initial_cost);
     }
 }
 
-/// Poses along rings on a sphere, each seen from the one before and the one below, with errors of so many radians.
+/// Poses along rings on a sphere, measured from the previous pose and the pose below, with errors of `error`
+/// radians.
 fn sphere(error: f64) -> (Graph, Values) {
     let (rings, each) = (8, 12);
     let turn = |by: Vector3<f64>| Se3::exp(&Vector6::new(by.x, by.y, by.z, 0.0, 0.0, 0.0));
@@ -117,7 +118,7 @@ fn sphere(error: f64) -> (Graph, Values) {
     (graph, values)
 }
 
-/// The same graph with its information multiplied.
+/// Returns the graph with its information multiplied.
 fn scaled(graph: &Graph, times: f64) -> Graph {
     let mut graph = graph.clone();
     for entry in graph.factors_mut() {
@@ -126,7 +127,7 @@ fn scaled(graph: &Graph, times: f64) -> Graph {
     graph
 }
 
-/// How a solve went, and how often other starts were asked.
+/// Solves and returns the outcome and the number of calls to starts.
 fn ran(solver: &dyn Optimizer, graph: &Graph, values: &Values) -> (Outcome, usize) {
     ASKED.set(0);
     let outcome = solve(graph, values, solver, &mut Silent).unwrap().outcome;
@@ -142,7 +143,7 @@ fn the_unit_of_the_noise_changes_nothing() {
         let (one, asked) = ran(&Auto::default(), &graph, &values);
         for times in [0.01, 2.0, 4.0, 100.0, 1e6] {
             let (other, again) = ran(&Auto::default(), &scaled(&graph, times), &values);
-            // whether a step of the size of rounding helps, rounding decides
+            // Rounding decides whether a step of the size of rounding errors helps.
             let tried = |outcome: &Outcome| -> Vec<bool> {
                 outcome.history.iter().filter(|h| h.step > 1e-6).map(|h| h.accepted).collect()
             };
@@ -183,7 +184,7 @@ fn a_rival_is_dropped_once_it_has_cost_more_than_the_minimum() {
     let (graph, values) = sphere(0.02);
     let stop = Stopping { max_iterations: 100, ..Stopping::default() };
     let (plain, _) = ran(&GaussNewton { stop: stop.clone(), ..GaussNewton::default() }, &graph, &values);
-    // a start that nothing leads on from for long
+    // A start from where the solver makes no progress for a long time.
     let mut rival = Values::new();
     for (i, (key, _)) in values.iter().enumerate() {
         let far = Vector6::from_fn(|r, _| 3.0 * ((i * (r + 2)) as f64).sin());

@@ -1,4 +1,4 @@
-//! Every type that the crate registers has docs, an example, and keeps the laws.
+//! Every type registered by the crate has docs and an example, and obeys the laws.
 use manifactor_geometry as _;
 use manifactor_graph::catalogue::{Entry, all};
 use manifactor_testing::catalogue::{documentation_law, factor_law, manifold_law};

@@ -1,4 +1,4 @@
-//! Every way to solve the linear system of a step leads to the same estimate.
+//! Every method for the linear system of a step leads to the same estimate.
 use manifactor_geometry::{Between, Coordinates, Landmark, Prior, Rn, Se3};
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
@@ -8,7 +8,7 @@ use manifactor_solve::{
 };
 use nalgebra::{Vector3, Vector6};
 
-/// A walk around a room: poses, points on the walls that each of them sees, all begun beside the truth.
+/// A walk around a room: poses and points on the walls that each of them sees, with perturbed initial values.
 fn room() -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let step = Se3::exp(&Vector6::new(0.3, 0.02, -0.01, 0.0, 0.03, 0.21));
@@ -112,7 +112,7 @@ fn what_does_not_fit_into_memory_says_how_much_it_takes() {
         "{error}"
     );
     assert!(error.to_string().contains("conjugate_gradients"), "{error}");
-    // and, left to itself, iterates
+    // Without a given method, the solver switches to an iterative one.
     agrees(&LinearSolver { memory_gib: Some(NotNegative::literal(1e-5)), ..Default::default() }, 1e-8);
 }
 

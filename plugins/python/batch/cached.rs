@@ -1,13 +1,13 @@
-//! Factors that read what was computed for all of them at once.
+//! Factors that read results computed for the whole batch.
 use super::evaluate::{Function, Linearized};
 use manifactor::graph::{DynamicBlocks, DynamicResidual};
 use std::any::{Any, TypeId};
 use std::sync::{Arc, RwLock};
 
-/// What a pass has computed, by number of the factor.
+/// Results of a pass, by number of the factor.
 pub(super) type Results = Arc<RwLock<Linearized>>;
 
-/// One factor of a batch: its number among the results.
+/// One factor of a batch, with its index in the results.
 #[derive(Debug, Clone)]
 pub(super) struct Cached {
     pub function: Arc<Function>,
@@ -16,7 +16,7 @@ pub(super) struct Cached {
 }
 
 impl Cached {
-    /// Copies the part of this factor; not a number where nothing was computed.
+    /// Copies this factor's part of the results, or NaN if there is none.
     fn copy(&self, from: &[f64], to: &mut [f64]) {
         let range = self.number * to.len()..(self.number + 1) * to.len();
         match from.get(range) {
@@ -36,7 +36,7 @@ impl DynamicResidual for Cached {
     fn dimensions(&self) -> &[usize] {
         &self.function.dimensions
     }
-    /// A residual that is not a number says that the factor means nothing there.
+    /// A NaN in the residual marks the factor as undefined at this point.
     fn is_defined(&self, variables: &[&dyn Any]) -> bool {
         let mut residual = vec![0.0; self.rows()];
         self.residual(variables, &mut residual);

@@ -1,4 +1,4 @@
-//! Calls of a function of Python, over many points at once.
+//! Calls of a Python function, for many points at once.
 use crate::errors;
 use crate::input::{numbers_or_nan, to_array};
 use crate::raised::keep;
@@ -10,12 +10,12 @@ use std::any::TypeId;
 use std::fmt;
 use std::sync::Arc;
 
-/// Half of what central differences are taken over: the cube root of the precision.
+/// Step of the central differences, about the cube root of the machine precision.
 const STEP: f64 = 6e-6;
-/// Points in one call, about: more take memory, and are no faster.
+/// Largest number of points in one call. More points need more memory and are not faster.
 const MOST: usize = 1 << 15;
 
-/// The residual of a factor as a function of Python.
+/// The residual of a factor as a Python function.
 pub(super) struct Function {
     pub name: String,
     quantities: Vec<&'static VariableQuantity>,
@@ -28,13 +28,13 @@ pub(super) struct Function {
     has_jacobian: bool,
 }
 
-/// Where a factor is evaluated.
+/// A point at which a factor is evaluated.
 pub(super) struct Point {
     pub variables: Vec<Box<dyn Variable>>,
     pub constants: Arc<[f64]>,
 }
 
-/// The residuals of points, and for each variable the Jacobians, by columns.
+/// The residuals of points, and for each variable the Jacobians in column-major order.
 pub(super) type Linearized = (Vec<f64>, Vec<Vec<f64>>);
 
 impl fmt::Debug for Function {
@@ -57,7 +57,7 @@ impl Function {
         Self { name, quantities, types, dimensions, rows, constants, evaluate, has_jacobian }
     }
 
-    /// The residuals of these points, one after the other; not a number where Python has raised something.
+    /// Returns the residuals of these points, concatenated; NaN if Python has raised an exception.
     pub(super) fn residuals(&self, points: &[Point]) -> Vec<f64> {
         let mut all = Vec::with_capacity(points.len() * self.rows);
         for points in points.chunks(MOST) {
@@ -72,7 +72,7 @@ impl Function {
         all
     }
 
-    /// The residuals, and the Jacobian blocks by each variable's tangent.
+    /// Returns the residuals, and the Jacobian blocks with respect to each variable's tangent space.
     pub(super) fn linearized(&self, points: &[Point]) -> Linearized {
         let sizes = self.dimensions.iter().map(|n| self.rows * n);
         let mut all: Linearized =
@@ -91,7 +91,8 @@ impl Function {
         all
     }
 
-    /// Python's Jacobians are by the numbers of the variables: those by the tangent follow by the chain rule.
+    /// Python's Jacobians are with respect to the numbers of the variables; the chain rule converts them to
+    /// the tangent space.
     fn by_python(&self, points: &[Point]) -> PyResult<Linearized> {
         let (residuals, jacobians) = self.call(Inputs::new(self, points), true)?;
         let mut blocks = vec![];
@@ -118,7 +119,7 @@ impl Function {
         Ok((residuals, blocks))
     }
 
-    /// One call for the points and for all that are a small step away from them.
+    /// Evaluates the points and their neighbours for the central differences in one call.
     fn by_differences(&self, points: &[Point]) -> PyResult<Linearized> {
         let mut around = Inputs::new(self, points);
         for (v, n) in self.dimensions.iter().enumerate() {
@@ -151,7 +152,8 @@ impl Function {
         Ok((residuals, blocks))
     }
 
-    /// One call: the residuals, and the Jacobians where they are asked for, as they lie in Python's arrays.
+    /// Calls the function once. Returns the residuals, and the Jacobians if requested, in the memory order
+    /// of Python's arrays.
     fn call(&self, inputs: Inputs, derivatives: bool) -> PyResult<(Vec<f64>, Vec<Vec<f64>>)> {
         let n = inputs.count;
         Python::attach(|py| {
@@ -185,13 +187,13 @@ impl Function {
     }
 }
 
-/// Numbers that a function has returned. Rows that are not numbers say that the factor means nothing there.
+/// Reads numbers that a function has returned. Rows of NaN mean that the factor is undefined there.
 fn read(what: &str, name: &str, value: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Vec<f64>> {
     let shape: Vec<_> = shape.iter().copied().map(Some).collect();
     Ok(numbers_or_nan(what, name, value, &shape)?.values)
 }
 
-/// What a call is given: by variable and by constant, the numbers of all points.
+/// Arguments of a call: the numbers of all points, by variable and by constant.
 struct Inputs {
     count: usize,
     variables: Vec<Vec<f64>>,
@@ -217,7 +219,7 @@ impl Inputs {
         inputs
     }
 
-    /// Adds the points that these inputs began with once more, with one of their variables moved: the rest of them is copied.
+    /// Appends a copy of the initial points in which one variable is moved by `delta`.
     fn extend_moved(&mut self, function: &Function, points: &[Point], moved: usize, delta: &[f64]) {
         for (v, to) in self.variables.iter_mut().enumerate() {
             if v == moved {
@@ -233,7 +235,7 @@ impl Inputs {
     }
 }
 
-/// Adds the numbers of one variable of all points, moved where that is said.
+/// Appends the numbers of one variable of all points, moved by `delta` if it is given.
 fn extend(function: &Function, points: &[Point], v: usize, delta: Option<&[f64]>, to: &mut Vec<f64>) {
     let Some(quantity) = function.quantities.get(v) else { return };
     for x in points.iter().filter_map(|point| point.variables.get(v)) {

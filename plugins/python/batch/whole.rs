@@ -11,18 +11,18 @@ use manifactor::graph::{Dynamic, ErasedResidual, as_variable};
 use std::any::Any;
 use std::sync::Arc;
 
-/// Asks the function for all that a pass needs, and lets the batch of the core do the pass.
+/// Calls the function for everything that a pass needs, and leaves the pass to the core's batch.
 pub(super) struct Whole {
     function: Arc<Function>,
-    /// Of [`Cached`] factors, in the order of `members`.
+    /// A batch of [`Cached`] factors, in the order of `members`.
     inner: Box<dyn Batch>,
     members: Vec<One>,
-    /// Numbers that were given to factors so far.
+    /// Number of indices assigned to factors so far.
     numbers: usize,
     results: Results,
 }
 
-/// A factor: its number among the results, its constants, and the places of its variables in their columns.
+/// A factor: its index in the results, its constants, and the positions of its variables in their columns.
 struct One {
     number: usize,
     constants: Arc<[f64]>,
@@ -30,7 +30,7 @@ struct One {
 }
 
 impl Whole {
-    /// For factors like this one.
+    /// Creates a batch of factors like this one.
     pub(super) fn new(like: &Dynamic<Cached>, noise: &Whitener, loss: Option<&dyn Loss>) -> Self {
         let (inner, function) = (like.new_batch(noise, loss), like.get().function.clone());
         Self { function, inner, members: vec![], numbers: 0, results: Results::default() }
@@ -45,7 +45,7 @@ impl Whole {
         Point { variables, constants: one.constants.clone() }
     }
 
-    /// Computes what a pass over these places needs; over all, where none are named.
+    /// Computes the results for a pass over the members `at`, or over all members if `at` is `None`.
     fn compute(&self, at: Option<&[u32]>, columns: &Columns, derivatives: bool) {
         let chosen: Vec<&One> = match at {
             Some(at) => at.iter().filter_map(|i| self.members.get(*i as usize)).collect(),

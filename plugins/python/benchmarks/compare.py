@@ -1,7 +1,8 @@
-"""What factors of Python cost, beside Rust's own and gtsam's: `python benchmarks/compare.py [SPHERE.g2o]`.
+"""Benchmark of factors in Python against Rust's own and GTSAM's: `python benchmarks/compare.py
+[SPHERE.g2o]`.
 
-One thread, and its processor's time, which others on the machine hardly change; the least of several runs, in one process.
-`linearized` is what a factor adds to the linearizations of a solve.
+It uses one thread in one process and reports the smallest of several CPU times, which depend little on
+other load. `linearized` is the cost per factor of the linearizations in a solve.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ except ImportError:
     jnp = None
 
 RUNS = 5
-#: Of what is timed by the solver's own clock: short, so that some of them are not disturbed.
+#: Number of runs timed by the solver's own clock. They are short, so some of them are undisturbed.
 SHORT_RUNS = 60
 
 
@@ -99,7 +100,7 @@ range_by_hand = mf.BatchFactor(range_differences.function, 1, by_hand)
 
 
 def linearizing(n: int = 5_000, points: int = 200) -> None:
-    """Ranges between poses and points, on top of priors of all."""
+    """Ranges between poses and points, with priors on all of them."""
     rng = np.random.default_rng(1)
     values, priors = mf.Values(), mf.Graph()
     identity = np.tile([0.0, 0, 0, 1], (points, 1))

@@ -1,4 +1,4 @@
-//! Graphs in files: documents, and the formats of others.
+//! Graphs in files: documents and other formats.
 use super::{Graph, Values};
 use crate::errors;
 use crate::threads::detach;
@@ -9,7 +9,7 @@ use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// A graph as a document.
+/// Returns a graph as a document.
 pub(crate) fn document(
     py: Python<'_>,
     graph: &InnerGraph,
@@ -25,7 +25,7 @@ pub(crate) fn document(
             return Err(errors::argument("to_document", "format", message));
         }
     };
-    // a document that no reader takes is of no use
+    // refuses a document that no reader accepts
     let (found, written) = detach(py, || (graph.check(values), write_graph(graph, values, format)))?;
     let text = written.map_err(|error| errors::argument("to_document", "graph", error))?;
     match found.is_empty() {
@@ -34,8 +34,8 @@ pub(crate) fn document(
     }
 }
 
-/// Reads a graph from a file: a literal graph in TOML, JSON or YAML, or one in another format that is linked. Returns the
-/// graph, its values, and notes of what the reader had to decide.
+/// Reads a graph from a file: a literal graph in TOML, JSON or YAML, or a graph in another linked format.
+/// Returns the graph, its values, and notes about the decisions of the reader.
 #[pyfunction]
 #[pyo3(signature = (path, *, repair = "error", anchor = true, lenient = false))]
 fn read(

@@ -1,4 +1,4 @@
-//! Noise, of one factor and of many.
+//! Noise of one factor and of many.
 use crate::errors;
 use crate::input::{Numbers, array, numbers, to_array, to_python};
 use manifactor::graph::Noise as Inner;
@@ -16,9 +16,9 @@ const FORMS: [&str; 4] = ["sigma", "sigmas", "covariance", "information"];
 
 #[pymethods]
 impl Noise {
-    /// One of `sigma` (a standard deviation for all rows), `sigmas` (one for each row, shape (m,)), `covariance` and
-    /// `information` (shape (m, m), symmetric and positive definite), in the units of the residual's rows. `observed` says
-    /// which rows were measured.
+    /// Takes one of `sigma` (a standard deviation for all rows), `sigmas` (one for each row, shape (m,)),
+    /// `covariance` and `information` (shape (m, m), symmetric and positive definite), in the units of the
+    /// residual's rows. `observed` marks the measured rows.
     #[new]
     #[pyo3(signature = (sigma = None, *, sigmas = None, covariance = None, information = None, observed = None))]
     fn new(
@@ -49,18 +49,18 @@ impl Noise {
             return Err(errors::argument("Noise", "observed", message));
         }
         let noise = noise.observing(&observed);
-        // its own size, if it has any, is that of `observed`
+        // the size of the noise, if it has one, must match `observed`
         noise.whitener(observed.len()).map_err(|error| errors::argument("Noise", "observed", error))?;
         Ok(Self(noise))
     }
 
-    /// The information matrix of a residual of so many rows, shape (rows, rows).
+    /// Returns the information matrix of a residual with this number of rows, shape (rows, rows).
     fn information_matrix<'py>(&self, py: Python<'py>, rows: usize) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let matrix = self.0.information_matrix(rows).map_err(errors::graph)?;
         to_array(py, &[rows, rows], matrix.as_slice().to_vec())
     }
 
-    /// As a document has it.
+    /// Returns the noise as in a document.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         to_python(py, &self.0)
     }
@@ -84,7 +84,7 @@ impl Noise {
         slf.clone()
     }
 
-    /// For `pickle`: its content, to the last bit.
+    /// For `pickle`: the content, without rounding.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         let text = serde_json::to_string(&slf.get().0).map_err(errors::internal)?;
         Ok((slf.get_type().getattr("_unpickle")?, (text,)))
@@ -101,7 +101,8 @@ impl Noise {
     }
 }
 
-/// The numbers of one of the forms, with a row for each factor where `rows` are given; `name` is what errors call them.
+/// Reads the numbers of one form, with one row for each factor if `rows` is given. Errors use the name
+/// `name`.
 fn read(
     what: &str,
     name: &str,
@@ -129,7 +130,7 @@ fn read(
     }
 }
 
-/// The noise of one factor.
+/// Returns the noise of one factor.
 fn made(what: &str, name: &str, form: &str, values: &[f64]) -> PyResult<Inner> {
     let size = (values.len() as f64).sqrt().round() as usize;
     let matrix = || DMatrix::from_row_slice(size, size, values);
@@ -142,7 +143,7 @@ fn made(what: &str, name: &str, form: &str, values: &[f64]) -> PyResult<Inner> {
     noise.map_err(|error| errors::argument(what, name, error))
 }
 
-/// The argument `noise` of one factor: a `Noise`, or a number, which is its sigma.
+/// Reads the argument `noise` of one factor: a `Noise`, or a number, which is a sigma.
 pub(super) fn one(what: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<Inner> {
     let Some(value) = value else { return Ok(Inner::unit()) };
     if let Ok(noise) = value.cast::<Noise>() {
@@ -162,7 +163,8 @@ pub(super) enum Rows {
 }
 
 impl Rows {
-    /// As [`one`]; or a dict of one form, whose array has a row for each factor.
+    /// Reads the argument `noise`: as in [`one`], or a dict of one form, whose array has a row for each
+    /// factor.
     pub(super) fn new(what: &str, rows: usize, value: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let Some(fields) = value.and_then(|value| value.cast::<PyDict>().ok()) else {
             return one(what, value).map(Self::Same);
@@ -173,7 +175,7 @@ impl Rows {
             return Err(errors::argument(what, "noise", message));
         };
         let name = format!("noise.{form}");
-        // its length is looked at before it is copied
+        // check the length before copying
         let found = array(what, &name, &value)?.shape().first().copied();
         if found != Some(rows) {
             let found = found.map_or("no axis".to_owned(), |n| format!("{n} rows"));

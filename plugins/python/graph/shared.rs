@@ -1,34 +1,34 @@
-//! Graphs and values that solutions share with the program, without a copy until one of them changes.
+//! Graphs and values that solutions share with the program, copied only when one of them changes.
 use crate::errors;
 use pyo3::prelude::*;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// A graph or values. A change copies what is shared; an estimate that was handed out does not change.
+/// A graph or values with copy on write. An estimate that was returned to the program never changes.
 #[derive(Default)]
 pub(crate) struct Shared<T> {
     inner: Arc<T>,
-    /// The object that it belongs to: "solution" or "session".
+    /// Owner of an immutable object: "solution" or "session".
     owner: Option<&'static str>,
 }
 
 impl<T: Clone> Shared<T> {
-    /// Belongs to a solution or a session, and does not change.
+    /// Creates an immutable object that belongs to a solution or a session.
     pub(crate) fn of(owner: &'static str, inner: impl Into<Arc<T>>) -> Self {
         Self { inner: inner.into(), owner: Some(owner) }
     }
 
-    /// The present content, which later changes leave alone.
+    /// Returns the current content; later changes do not affect it.
     pub(crate) fn snapshot(&self) -> Arc<T> {
         self.inner.clone()
     }
 
-    /// A copy that may be changed.
+    /// Returns a mutable copy.
     pub(crate) fn copy(&self) -> Self {
         Self { inner: self.inner.clone(), owner: None }
     }
 
-    /// The content, to be changed.
+    /// Returns the content for a change.
     ///
     /// # Errors
     /// If it belongs to a solution or a session.

@@ -12,14 +12,14 @@ use pyo3::types::{PyBytes, PyDict, PyList};
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
 
-/// A value for each variable, by its key, in the order in which they were put in.
+/// The values of the variables by key, in insertion order.
 #[pyclass(module = "manifactor", mapping)]
 #[derive(Default)]
 pub(crate) struct Values(pub Shared<Inner>);
 
 #[pymethods]
 impl Values {
-    /// None, or those of a dict, or a copy of others.
+    /// Creates empty values, or copies those of a dict or of another `Values`.
     #[new]
     #[pyo3(signature = (values = None))]
     fn new(values: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
@@ -66,12 +66,12 @@ impl Values {
         Ok(self.keys(py)?.try_iter()?.into_any())
     }
 
-    /// All keys, in order.
+    /// Returns all keys in insertion order.
     fn keys<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         PyList::new(py, self.0.iter().map(|(key, _)| key.as_str()))
     }
 
-    /// Puts in many values of one type.
+    /// Inserts many values of one type.
     #[pyo3(signature = (keys, r#type, fields, *, prefix = None))]
     fn insert_many(
         &mut self,
@@ -116,7 +116,7 @@ impl Values {
         )
     }
 
-    /// How many there are of each type.
+    /// Returns the number of values of each type.
     fn types(&self) -> BTreeMap<&'static str, usize> {
         let mut types = BTreeMap::new();
         for (_, value) in self.0.iter() {
@@ -125,7 +125,8 @@ impl Values {
         types
     }
 
-    /// Keys and fields of all values of one type: each field an array with a row for each.
+    /// Returns the keys and fields of all values of one type; each field is an array with one row per
+    /// value.
     fn columns<'py>(
         &self,
         py: Python<'py>,
@@ -145,7 +146,7 @@ impl Values {
         }
         let dict = PyDict::new(py);
         for (field, shape, numbers) in fields {
-            // a field that not all of them have is no column
+            // a field that some of the values lack is no column
             if numbers.len() == values.len() * shape.iter().product::<usize>() {
                 let shape: Vec<_> = std::iter::once(values.len()).chain(shape).collect();
                 dict.set_item(field, to_array(py, &shape, numbers)?)?;
@@ -162,7 +163,7 @@ impl Values {
         Self(self.0.copy())
     }
 
-    /// For `pickle`: its content as bytes.
+    /// For `pickle`: the content as bytes.
     fn __getstate__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         pickled(py, &*self.0)
     }
@@ -182,7 +183,7 @@ impl Values {
     }
 }
 
-/// Adds the numbers of a value to those of their fields: `translation`, `camera.fx`.
+/// Appends the numbers of a value to its fields, such as `translation` or `camera.fx`.
 fn gather(path: &str, json: &Json, place: &mut usize, fields: &mut Vec<(String, Vec<usize>, Vec<f64>)>) {
     if let Json::Object(inner) = json {
         for (name, value) in inner.iter().filter(|(name, _)| *name != "type") {
@@ -192,7 +193,7 @@ fn gather(path: &str, json: &Json, place: &mut usize, fields: &mut Vec<(String, 
         return;
     }
     let Some(shape) = shape(json) else { return };
-    // fields come in the same order in all values, as a rule
+    // fields usually have a constant order in all values
     let found = match fields.get(*place) {
         Some((name, ..)) if name == path => Some(*place),
         _ => fields.iter().position(|(name, ..)| name == path),
@@ -207,7 +208,7 @@ fn gather(path: &str, json: &Json, place: &mut usize, fields: &mut Vec<(String, 
     }
 }
 
-/// The axes of numbers in arrays; `None` for anything else.
+/// The shape of nested arrays of numbers; `None` for anything else.
 fn shape(json: &Json) -> Option<Vec<usize>> {
     match json {
         Json::Number(_) => Some(vec![]),

@@ -1,4 +1,4 @@
-//! Arrays of numbers, copied out of Python and into it.
+//! Arrays of numbers, copied from and to Python.
 use crate::errors;
 use numpy::ndarray::{ArrayD, IxDyn};
 use numpy::{
@@ -7,16 +7,16 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-/// Finite numbers by rows, as they lie in an array.
+/// Finite numbers of an array, in row-major order.
 pub(crate) struct Numbers {
     pub shape: Vec<usize>,
     pub values: Vec<f64>,
-    /// Whether all of them are whole by their type.
+    /// True if the array's type is an integer type.
     pub whole: bool,
 }
 
 impl Numbers {
-    /// Entries behind the first axis.
+    /// Number of entries per row.
     pub(crate) fn width(&self) -> usize {
         self.shape.iter().skip(1).product()
     }
@@ -27,13 +27,13 @@ impl Numbers {
     }
 }
 
-/// In words: `(100, 3)`.
+/// Formats a shape, such as `(100, 3)`.
 fn in_words(shape: &[usize]) -> String {
     let sizes: Vec<_> = shape.iter().map(ToString::to_string).collect();
     if sizes.len() == 1 { format!("({},)", sizes.concat()) } else { format!("({})", sizes.join(", ")) }
 }
 
-/// An argument as an array of numpy; an array that is one already is not copied.
+/// Converts an argument to a NumPy array; an existing array is not copied.
 pub(crate) fn array<'py>(
     what: &str,
     name: &str,
@@ -48,8 +48,8 @@ pub(crate) fn array<'py>(
     Ok(made.cast_into::<PyUntypedArray>()?)
 }
 
-/// An argument as finite numbers. `None` in a shape is any length; an array of other axes, of another type, or with what
-/// is not finite is refused.
+/// Reads an argument as finite numbers. `None` in `shape` accepts any length. An array with different axes,
+/// with an unsupported type or with non-finite numbers is an error.
 pub(crate) fn numbers(
     what: &str,
     name: &str,
@@ -60,7 +60,7 @@ pub(crate) fn numbers(
     any_numbers(what, name, &array)
 }
 
-/// An argument as an array of this shape.
+/// Reads an argument as an array of this shape.
 fn shaped<'py>(
     what: &str,
     name: &str,
@@ -83,7 +83,7 @@ fn shaped<'py>(
     Ok(array)
 }
 
-/// The same, of which some may be not finite.
+/// Reads an argument as numbers, some of which may be non-finite.
 pub(crate) fn numbers_or_nan(
     what: &str,
     name: &str,
@@ -94,7 +94,7 @@ pub(crate) fn numbers_or_nan(
     copied(what, name, &array)
 }
 
-/// The same for any shape.
+/// Reads finite numbers of any shape.
 pub(crate) fn any_numbers(what: &str, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<Numbers> {
     let numbers = copied(what, name, array)?;
     let Some(at) = numbers.values.iter().position(|x| !x.is_finite()) else { return Ok(numbers) };
@@ -103,10 +103,10 @@ pub(crate) fn any_numbers(what: &str, name: &str, array: &Bound<'_, PyUntypedArr
     Err(errors::argument(what, name, message))
 }
 
-/// Real numbers of an array, in its order.
+/// Copies the real numbers of an array, in its order.
 fn copied(what: &str, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<Numbers> {
     let py = array.py();
-    // the usual case asks nothing of numpy
+    // fast path without a call into NumPy
     if let Ok(plain) = array.cast::<PyArrayDyn<f64>>()
         && array.is_c_contiguous()
         && let Ok(plain) = plain.try_readonly()
@@ -123,12 +123,12 @@ fn copied(what: &str, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult
     let plain = py.import("numpy")?.call_method1("require", (array, "float64", ("C", "A")))?;
     let plain: PyReadonlyArrayDyn<'_, f64> = plain.extract().map_err(errors::internal)?;
     let values = plain.as_slice().map_err(errors::internal)?.to_vec();
-    // an array of no axes becomes one of one
+    // an array without axes gets one
     let shape = array.shape().to_vec();
     Ok(Numbers { shape, values, whole: kind != b'f' })
 }
 
-/// `[3, 1]`, by the place in an array of this shape.
+/// Formats the index of an entry in an array of this shape, such as `[3, 1]`.
 fn index(mut at: usize, shape: &[usize]) -> String {
     let mut indices: Vec<usize> = vec![];
     for n in shape.iter().rev() {
@@ -139,7 +139,7 @@ fn index(mut at: usize, shape: &[usize]) -> String {
     format!("{indices:?}")
 }
 
-/// Numbers by rows as an array.
+/// Converts numbers in row-major order to an array.
 pub(crate) fn to_array<'py>(
     py: Python<'py>,
     shape: &[usize],
@@ -149,7 +149,7 @@ pub(crate) fn to_array<'py>(
     Ok(PyArrayDyn::from_owned_array(py, array))
 }
 
-/// An array for reading only.
+/// Makes an array read-only.
 pub(crate) fn frozen<'py, T>(array: Bound<'py, T>) -> PyResult<Bound<'py, T>> {
     array.as_any().call_method1("setflags", (false,))?;
     Ok(array)

@@ -1,4 +1,4 @@
-//! Fields of many factors or values at once: arrays have a row for each, all else is the same for all.
+//! Fields of many factors or values at once: arrays have one row per item, everything else is shared.
 use super::arrays::{Numbers, any_numbers};
 use super::node::{array_node, node, number, within};
 use crate::errors::{self, Mistake};
@@ -7,36 +7,36 @@ use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// A document of one factor or value, of which some numbers are filled in row by row: nothing is made anew for a row but
-/// what is read out of it.
+/// A document of one factor or value, with numbers that are filled in row by row. Only the parsed object is
+/// created for each row.
 pub(crate) struct Columns {
     document: Node,
     columns: Vec<Column>,
 }
 
 struct Column {
-    /// The place among the fields of each table on the way to it.
+    /// Indices of the fields on the path to the number.
     path: Vec<usize>,
     numbers: Numbers,
 }
 
 impl Columns {
-    /// Takes apart fields of which each array has `rows` rows.
+    /// Splits fields into columns; each array has to have `rows` rows.
     ///
     /// # Errors
-    /// An array of another length, and values that no document can hold.
+    /// If an array has a different length, or if no document can hold a value.
     pub(crate) fn new(what: &str, rows: usize, fields: &Bound<'_, PyDict>) -> PyResult<Self> {
         let mut columns = vec![];
         let document = table(what, rows, "", fields, &mut vec![], &mut columns)?;
         Ok(Self { document, columns })
     }
 
-    /// Whether all rows are the same.
+    /// Returns true if all rows are equal.
     pub(crate) fn is_constant(&self) -> bool {
         self.columns.is_empty()
     }
 
-    /// The document of a row.
+    /// Returns the document of a row.
     pub(crate) fn row(&mut self, row: usize) -> &Node {
         for Column { path, numbers } in &self.columns {
             let target = path.iter().try_fold(&mut self.document, |node, step| match &mut node.value {
@@ -51,7 +51,7 @@ impl Columns {
     }
 }
 
-/// Puts numbers where numbers are.
+/// Replaces the numbers of a node.
 fn fill(node: &mut Node, numbers: &mut std::slice::Iter<'_, f64>, whole: bool) {
     match &mut node.value {
         Value::Array(items) => items.iter_mut().for_each(|item| fill(item, numbers, whole)),
@@ -99,7 +99,7 @@ fn table(
     Ok(Node::new(place(path), Value::Table(table)))
 }
 
-/// An array with a row for each. Its length is looked at before it is copied.
+/// Reads an array with one row per item. The length is checked before the copy.
 fn column(what: &str, rows: usize, name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<Numbers> {
     if array.shape().first() != Some(&rows) {
         let found = array.shape().first().map_or("no axis".to_owned(), |n| format!("{n} rows"));

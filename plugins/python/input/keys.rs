@@ -1,4 +1,4 @@
-//! Keys: texts, or whole numbers behind a prefix.
+//! Keys: texts, or integers with a prefix.
 use super::arrays::{any_numbers, array};
 use crate::errors;
 use manifactor::graph::Key;
@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 use std::collections::HashMap;
 
-/// A key, which has at least one character, as in documents.
+/// Returns a key, which has at least one character, as in documents.
 pub(crate) fn key(what: &str, text: &str) -> PyResult<Key> {
     match text.is_empty() {
         true => Err(errors::argument(what, "key", "a key needs at least one character, such as \"x0\"")),
@@ -15,7 +15,7 @@ pub(crate) fn key(what: &str, text: &str) -> PyResult<Key> {
     }
 }
 
-/// The keys of one factor: one text, or several.
+/// Reads the keys of one factor: one text or several.
 pub(crate) fn keys(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Key>> {
     if let Ok(key) = value.cast::<PyString>() {
         return Ok(vec![self::key(what, &key.to_cow()?)?]);
@@ -29,15 +29,16 @@ pub(crate) fn keys(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<Key>> {
     items.map(text).collect()
 }
 
-/// One text, or several, which may be empty: a number follows.
+/// Reads one prefix or several. A prefix may be empty, because a number follows.
 fn prefixes_of(value: &Bound<'_, PyAny>) -> PyResult<Vec<Key>> {
     let texts =
         value.extract::<String>().map(|text| vec![text]).or_else(|_| value.extract::<Vec<String>>())?;
     Ok(texts.iter().map(|text| text.as_str().into()).collect())
 }
 
-/// The keys of many factors or values, by rows, and how many each row has. Texts by rows, or whole numbers, of which the key
-/// is `prefix` and the number; a prefix for each column, where there are several.
+/// Reads the keys of many factors or values, and returns them by rows with the number of keys per row. The
+/// input is an array of texts, or of integers, whose keys are `prefix` plus the number. There may be one
+/// prefix per column.
 pub(crate) fn key_rows(
     what: &str,
     value: &Bound<'_, PyAny>,
@@ -99,7 +100,7 @@ pub(crate) fn key_rows(
             format!("expected a text, or {width}: one for each column of `keys`, got {}", prefixes.len());
         return Err(errors::argument(what, "prefix", message));
     }
-    // a variable is named by many factors: its key is made once
+    // many factors share a variable, so its key is created only once
     let mut made: HashMap<(usize, i64), Key> = HashMap::new();
     let all = numbers.values.iter().enumerate().map(|(i, number)| {
         let (column, number) = (i % width.max(1) % prefixes.len(), *number as i64);

@@ -1,4 +1,4 @@
-//! Values of Python as nodes of a document, and back.
+//! Conversion between Python values and nodes of a document.
 use super::arrays::{any_numbers, frozen};
 use crate::errors;
 use manifactor::config::{Field, MAX_DEPTH, Node, Place, SourceText, Value};
@@ -10,7 +10,7 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMappingProxy, PyStri
 use serde_json::Value as Json;
 use std::sync::Arc;
 
-/// The fields of a value, for a field that takes values of one type and so no name of it.
+/// The fields of a value without its type, for a field that accepts only one type.
 #[pyclass(module = "manifactor._native", frozen)]
 pub(crate) struct Untagged(pub Arc<dyn Variable>);
 
@@ -22,20 +22,20 @@ impl Untagged {
     }
 }
 
-/// A place that is an argument, `camera.fx`, of which errors can show the text.
+/// The place of an argument such as `camera.fx`, with a text that errors can show.
 fn place(path: &str, text: &str) -> Place {
     SourceText::new(path, text).place(0..text.len())
 }
 
-/// A field within an argument.
+/// The path of a field within an argument.
 pub(crate) fn within(path: &str, name: &str) -> String {
     if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") }
 }
 
-/// A value as it would be read from a document; `path` is what errors call it.
+/// Converts a value to a node, as if it had been read from a document. Errors use the name `path`.
 ///
 /// # Errors
-/// Values that no document can hold.
+/// If no document can hold a value.
 pub(crate) fn node(what: &str, path: &str, value: &Bound<'_, PyAny>) -> PyResult<Node> {
     nested(what, path, value, 0)
 }
@@ -62,7 +62,7 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
         let text = text.to_cow()?.into_owned();
         return Ok(Node::new(place(path, &text), Value::String(text)));
     } else if let Ok(fields) = value.cast::<PyMappingProxy>() {
-        // fields of an object that does not change
+        // fields of an immutable object
         return nested(what, path, &fields.call_method0("copy")?, depth);
     } else if let Ok(dict) = value.cast::<PyDict>() {
         let mut table = manifactor::config::Table::default();
@@ -97,7 +97,7 @@ fn nested(what: &str, path: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyR
     Ok(Node::new(place(path, ""), plain))
 }
 
-/// What serde writes as a node, all of it at one place.
+/// Converts JSON from serde to a node; all parts have one place.
 fn json_node(place: &Place, json: Json) -> Node {
     let value = match json {
         Json::Null => Value::Null,
@@ -115,7 +115,7 @@ fn json_node(place: &Place, json: Json) -> Node {
     Node::new(place.clone(), value)
 }
 
-/// Numbers as arrays within arrays.
+/// Converts numbers to nested arrays.
 pub(crate) fn array_node(place: &Place, shape: &[usize], values: &[f64], whole: bool) -> Node {
     let value = match shape.split_first() {
         None => number(values.first().copied().unwrap_or_default(), whole),
@@ -132,7 +132,7 @@ pub(crate) fn number(x: f64, whole: bool) -> Value {
     if whole { Value::Integer(x as i64) } else { Value::Float(x) }
 }
 
-/// A field of an object that does not change: a change would be lost, and is an error.
+/// Converts a field of an immutable object to a read-only value, so that a change is an error and not lost.
 pub(crate) fn unchangeable<'py>(py: Python<'py>, json: &Json) -> PyResult<Bound<'py, PyAny>> {
     match json {
         Json::Array(items) if is_numeric(items) => {
@@ -162,7 +162,7 @@ fn is_numeric(items: &[Json]) -> bool {
         })
 }
 
-/// What serde writes, as dicts, lists and numbers.
+/// Converts a serializable value to dicts, lists and numbers.
 pub(crate) fn to_python<'py>(
     py: Python<'py>,
     value: &(impl serde::Serialize + ?Sized),
@@ -170,7 +170,7 @@ pub(crate) fn to_python<'py>(
     json_to_python(py, &serde_json::to_value(value).map_err(errors::internal)?)
 }
 
-/// The same of JSON.
+/// Converts JSON to dicts, lists and numbers.
 pub(crate) fn json_to_python<'py>(py: Python<'py>, json: &Json) -> PyResult<Bound<'py, PyAny>> {
     match json {
         Json::Null => Ok(py.None().into_bound(py)),

@@ -95,18 +95,19 @@ def load(
 ) -> tuple[Graph, Values]:
     """Reads a graph and its values from a file: TOML, JSON, YAML, or g2o, TORO, BAL.
 
-    `repair` says what becomes of information matrices that are not positive definite: `"error"`, `"reject"` or `"clamp"`.
-    `anchor` holds the first pose where nothing in the file does. `lenient` leaves out lines with unknown tags, which are an
-    error otherwise.
+    `repair` selects the treatment of information matrices that are not positive definite: `"error"`,
+    `"reject"` or `"clamp"`. `anchor` fixes the first pose if nothing in the file fixes the gauge. `lenient`
+    skips lines with unknown tags, which are an error otherwise.
     """
     graph, values, _ = _read(path, repair=repair, anchor=anchor, lenient=lenient)
     return graph, values
 
 
 def save(path: str | os.PathLike[str], graph: Graph, values: Values, *, force: bool = False) -> None:
-    """Writes a graph and its values as a document, by the extension of the file; `load` and `manifactor solve` read it.
+    """Writes a graph and its values as a document, in the format of the file's extension; `load` and
+    `manifactor solve` read it.
 
-    A file that exists is replaced only with `force`. A graph that does not fit its values is refused.
+    An existing file is replaced only with `force`. A graph that does not fit its values is an error.
     """
     extension = os.path.splitext(os.fspath(path))[1].removeprefix(".")
     text = graph.to_document(values, {"yml": "yaml"}.get(extension, extension))

@@ -8,7 +8,7 @@ from . import _native
 
 
 def main() -> int:
-    """Does what the command line says, and returns the exit code."""
+    """Runs the command line, and returns the exit code."""
     return _native.main(["manifactor", *sys.argv[1:]])
 
 

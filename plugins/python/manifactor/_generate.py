@@ -1,6 +1,6 @@
-"""Writes the modules that have a constructor for each entry of the catalogue: `python -m manifactor._generate`.
+"""Writes the modules with a constructor for each entry of the catalogue: `python -m manifactor._generate`.
 
-A test holds that what is written is what the catalogue says.
+A test checks that the files match the catalogue.
 """
 
 from __future__ import annotations
@@ -30,15 +30,16 @@ def safe(name: str) -> str:
 
 
 class Types:
-    """Hints for schemas; tables of fields become `TypedDict`s of the module `types`."""
+    """Type hints for schemas; nested tables become `TypedDict`s of the module `types`."""
 
     def __init__(self) -> None:
         self.tables: dict[str, tuple[Schema, Schema]] = {}
-        #: Names of types that the module at hand uses.
+        #: Names of types that the current module uses.
         self.used: set[str] = set()
 
     def hint(self, schema: Schema, definitions: Schema, owner: str, within: bool = False) -> str:
-        """The hint of a field; `within` the module `types`, whose names need no prefix."""
+        """The type hint of a field. With `within`, the hint is for the module `types`, whose names need no
+        prefix."""
         schema = {key: value for key, value in schema.items() if key not in ("description", "default")}
         if "$ref" in schema:
             name = schema["$ref"].removeprefix("#/$defs/")
@@ -59,7 +60,7 @@ class Types:
                 return self.union(schema[of], definitions, owner, within)
         match schema.get("type"):
             case [of, "null"]:
-                # an optional field; its parameter may be None anyway
+                # an optional field, whose parameter accepts None in any case
                 return self.hint({**schema, "type": of}, definitions, owner, within)
             case "number":
                 return "float"
@@ -98,7 +99,7 @@ class Types:
             name = camel(owner) + name
         if name not in self.tables:
             self.tables[name] = (schema, definitions)
-            # those within it are tables, too
+            # nested tables become types too
             for field in schema["properties"].values():
                 self.hint(field, definitions, owner, True)
         return name if within else f"types.{name}"
@@ -115,7 +116,7 @@ def one_line(text: str) -> str:
 
 
 def explained(entry: Schema) -> str:
-    """The docs of an entry, and what its fields mean."""
+    """The docs of an entry, and the descriptions of its fields."""
     parts = [entry["docs"]]
     fields = entry["schema"].get("properties", {})
     if fields:
@@ -130,7 +131,7 @@ def explained(entry: Schema) -> str:
 
 
 def parameters(entry: Schema, types: Types, variables: dict[str, Schema]) -> list[tuple[str, str, str, bool]]:
-    """Name, hint, expression and whether it has to be there, of each field."""
+    """Name, hint, expression and required flag of each field."""
     schema = entry["schema"]
     definitions = schema.get("$defs", {})
     required = schema.get("required", [])
@@ -308,13 +309,13 @@ def module_of_functions(functions: list[Schema]) -> str:
 
 
 def whole(schema: Schema) -> Schema:
-    """The same, with the fields of the type that it stands for, where it is but another name of that."""
+    """Resolves a schema that is only a reference to another type, and adds that type's fields."""
     name = schema.get("$ref", "").removeprefix("#/$defs/")
     return {**schema["$defs"][name], **{key: value for key, value in schema.items() if key != "$ref"}} if name else schema
 
 
 def modules() -> dict[str, str]:
-    """The text of each module, by its name."""
+    """The text of each module by name."""
     entries: list[Schema] = json.loads(_native.catalogue())
     for entry in entries:
         entry["schema"] = whole(entry["schema"])

@@ -1,4 +1,4 @@
-"""The half of the package that is written in Rust. `manifactor` has what is meant for use."""
+"""The part of the package that is written in Rust. `manifactor` has the public names."""
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,19 +18,19 @@ _Keys = str | Sequence[str]
 _KeyRows = Sequence[str] | Sequence[Sequence[str]] | NDArray[Any]
 
 class Chosen:
-    """Something that is chosen by name: an object that does not change."""
+    """An immutable object of a registered type."""
 
     def __new__(cls, kind: str | Chosen, name: str | None = None, fields: Mapping[str, Any] | None = None) -> Self: ...
     @property
     def kind(self) -> str:
-        """What it is: `"factor"`, `"loss"`, `"solver"`, `"start"` or `"variable"`."""
+        """Kind of the object: `"factor"`, `"loss"`, `"solver"`, `"start"` or `"variable"`."""
     @property
     def type(self) -> str:
-        """Its name in documents."""
+        """Name of the type in documents."""
     def to_dict(self) -> dict[str, Any]:
-        """Its fields with its `type`, as a document has them."""
+        """Returns the fields and the `type`, as in a document."""
     def __getattr__(self, name: str) -> Any:
-        """A field, which does not change: numbers as an array for reading, fields within it as a mapping."""
+        """A field, read-only: numbers as an array, nested fields as a mapping."""
     def __copy__(self) -> Self: ...
     def __deepcopy__(self, memo: Any) -> Self: ...
 
@@ -47,17 +47,17 @@ class Noise:
         information: ArrayLike | None = None,
         observed: Sequence[bool] | None = None,
     ) -> Self:
-        """One of `sigma` (a standard deviation for all rows), `sigmas` (one for each row, shape (m,)), `covariance` and
-        `information` (shape (m, m), symmetric and positive definite), in the units of the residual's rows. `observed` says
-        which rows were measured."""
+        """Takes one of `sigma` (a standard deviation for all rows), `sigmas` (one for each row, shape
+        (m,)), `covariance` and `information` (shape (m, m), symmetric and positive definite), in the units
+        of the residual's rows. `observed` marks the measured rows."""
     def information_matrix(self, rows: int) -> _Array:
-        """The information matrix of a residual of so many rows, shape (rows, rows)."""
+        """Returns the information matrix of a residual with this number of rows, shape (rows, rows)."""
     def to_dict(self) -> dict[str, Any]:
-        """As a document has it."""
+        """Returns the noise as in a document."""
 
 @final
 class Graph:
-    """Factors between named variables, and which variables are held."""
+    """Factors between named variables, and the variables that are fixed."""
 
     def __new__(cls) -> Self: ...
     def add(
@@ -69,11 +69,12 @@ class Graph:
         loss: Loss | None = None,
         name: str | None = None,
     ) -> int:
-        """Adds a factor between variables, and returns its place in the graph, from 0.
+        """Adds a factor between variables, and returns its index in the graph, from 0.
 
-        `keys` are the names of its variables, in the order of the residual's. `noise` defaults to a standard deviation of 1
-        in every row (a number is a sigma for all rows), `loss` to none, `name`, which reports use, to that of the factor's
-        type. A number of keys that is not the factor's, a key twice, and a noise of another size are a `GraphError`."""
+        `keys` are the names of its variables, in the order of the residual's arguments. `noise` may be a
+        number, which is a sigma for all rows. `noise` defaults to a standard deviation of 1 in every row,
+        `loss` to none, and `name`, which reports use, to the name of the factor's type. A wrong number of
+        keys, a repeated key and noise of a wrong size raise a `GraphError`."""
     def add_many(
         self,
         factor: str | Factor | Callable[..., Factor],
@@ -84,30 +85,35 @@ class Graph:
         noise: Noise | float | Mapping[str, ArrayLike] | None = None,
         loss: Loss | None = None,
     ) -> tuple[int, int]:
-        """Adds many factors of one type, and returns the range of their places.
+        """Adds many factors of one type, and returns the range of their indices.
 
-        `factor` is a type, `mf.between_se3` or its name, with its `fields`: an array has a row for each factor, anything else
-        is the same for all; fields within fields are dicts. A factor that is made already is the same for all. `keys` has a row
-        for each factor: texts, or an array of whole numbers, shape (n, k), of which the keys are `prefix` and the number; a
-        prefix for each column, where there are several. `noise` is the same for all, or a dict of one of its forms with an
-        array: `{"sigmas": array}`, shape (n, m). Where something is wrong, nothing is added."""
+        `factor` is a type, such as `mf.between_se3` or its name, with its `fields`: an array has one row
+        per factor, everything else is shared by all, and nested fields are dicts. A `Factor` object is used
+        for all rows. `keys` has one row per factor: texts, or an integer array, shape (n, k), whose keys
+        are `prefix` plus the number; there may be one prefix per column. `noise` is shared by all, or a
+        dict of one of its forms with an array: `{"sigmas": array}`, shape (n, m). After an error, nothing
+        is added."""
     def fix(self, key: str, directions: Sequence[str] | None = None) -> None:
-        """Holds a variable at its initial value: all of it, or the directions of its tangent space that are named."""
+        """Fixes a variable at its initial value, either entirely or only in the given directions of its
+        tangent space."""
     def free(self, key: str) -> None:
-        """Lets a variable move again."""
+        """Removes the constraint of `fix` from a variable."""
     @property
     def fixed(self) -> Mapping[str, bool | list[str]]:
-        """The variables that are held: `True`, or names of directions, by key. `fix` and `free` change them."""
+        """The fixed variables by key: `True`, or the names of the fixed directions. `fix` and `free` change
+        them."""
     def check(self, values: Values) -> list[str]:
-        """Everything that is wrong between the graph and these values; empty where it can be solved."""
+        """Returns all errors of the graph with these values; empty if it can be solved."""
     def factor(self, at: int) -> Factor:
-        """The factor at a place, from 0, as an object."""
+        """Returns the factor at an index, from 0, as an object."""
     def types(self) -> dict[str, int]:
-        """How many factors there are of each type."""
+        """Returns the number of factors of each type."""
     def to_document(self, values: Values, format: str = "toml") -> str:
-        """The graph and its values as a document, in `toml`, `json` or `yaml`; `manifactor solve` reads it."""
+        """Returns the graph and its values as a document in `toml`, `json` or `yaml`, which `manifactor
+        solve` reads."""
     def __getitem__(self, at: int) -> dict[str, Any]:
-        """A copy of the factor at a place, from 0, as it stands in documents: `keys`, `factor`, `noise`, `loss`, `name`."""
+        """A copy of the factor at an index, from 0, as in documents: `keys`, `factor`, `noise`, `loss`,
+        `name`."""
     def __len__(self) -> int: ...
     def __copy__(self) -> Graph: ...
     def __deepcopy__(self, memo: Any) -> Graph: ...
@@ -115,10 +121,10 @@ class Graph:
 
 @final
 class Values:
-    """A value for each variable, by its key, in the order in which they were put in."""
+    """The values of the variables by key, in insertion order."""
 
     def __new__(cls, values: Mapping[str, Variable] | Values | None = None) -> Self:
-        """None, or those of a dict, or a copy of others."""
+        """Creates empty values, or copies those of a dict or of another `Values`."""
     def __getitem__(self, key: str) -> Variable: ...
     def __setitem__(self, key: str, value: Variable) -> None: ...
     def __delitem__(self, key: str) -> None: ...
@@ -126,7 +132,7 @@ class Values:
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[str]: ...
     def keys(self) -> list[str]:
-        """All keys, in order."""
+        """Returns all keys in insertion order."""
     def insert_many(
         self,
         keys: _KeyRows,
@@ -135,117 +141,123 @@ class Values:
         *,
         prefix: str | None = None,
     ) -> None:
-        """Puts in many values of one type: arrays among the fields have a row for each. `keys` as for `Graph.add_many`, each
-        once. Values of the same keys from before are replaced."""
+        """Inserts many values of one type: arrays among the fields have one row per value. `keys` are as
+        for `Graph.add_many`, without repetitions. Existing values of these keys are replaced."""
     def columns(self, type: str | type[Variable]) -> tuple[list[str], dict[str, _Array]]:
-        """Keys and fields of all values of one type: each field an array with a row for each."""
+        """Returns the keys and fields of all values of one type; each field is an array with one row per
+        value."""
     def types(self) -> dict[str, int]:
-        """How many there are of each type."""
+        """Returns the number of values of each type."""
     def __copy__(self) -> Values: ...
     def __deepcopy__(self, memo: Any) -> Values: ...
     def _repr_html_(self) -> str: ...
 
 @final
 class Solution:
-    """An estimate, and how it came about."""
+    """An estimate and the report of its solve."""
 
     @property
     def values(self) -> Values:
-        """The estimate: the best values found, however the solve ended. They do not change; `copy.copy` makes some that can be
-        changed."""
+        """The best values found, independent of the termination. They are immutable; `copy.copy` returns a
+        mutable copy."""
     @property
     def graph(self) -> Graph:
-        """The graph that was solved, as it was then. It does not change; `copy.copy` makes one that can be changed."""
+        """The graph that was solved, without later changes. It is immutable; `copy.copy` returns a mutable
+        copy."""
     @property
     def converged(self) -> bool:
-        """Whether the values are a minimum, to a tolerance."""
+        """True if the values are a minimum within the tolerances."""
     @property
     def termination(self) -> str:
-        """How the solve ended, in words."""
+        """The termination in words."""
     @property
     def cost(self) -> float:
         """½ Σ ρ(‖r‖²) at the estimate."""
     @property
     def initial_cost(self) -> float:
-        """The same at the values that the solve began with."""
+        """½ Σ ρ(‖r‖²) at the initial values."""
     @property
     def iterations(self) -> int:
-        """Linearizations that were followed by a step."""
+        """Number of linearizations that were followed by a step."""
     @property
     def seconds(self) -> dict[str, float]:
         """Seconds by stage."""
     @property
     def outcome(self) -> dict[str, Any]:
-        """All that the solver has to tell: `termination`, `undetermined`, `rejected`, `history` and so on."""
+        """The full report of the solver: `termination`, `undetermined`, `rejected`, `history` and so on."""
     @property
     def costs(self) -> _Array:
-        """What each factor costs at the estimate, in the order of the graph, shape (factors,)."""
+        """Cost of each factor at the estimate, in the order of the graph, shape (factors,)."""
     @property
     def weights(self) -> _Array:
-        """How much each factor counts, by its loss, shape (factors,); 1 without a loss."""
+        """Weight of each factor from its loss, shape (factors,); 1 without a loss."""
     def residual(self, factor: int) -> _Array:
-        """The residual of a factor at the estimate, not whitened, shape (rows,)."""
+        """Returns the residual of a factor at the estimate, not whitened, shape (rows,)."""
     def covariances(self, keys: _Keys | None = None) -> dict[str, _Array]:
-        """Marginal covariances at the estimate, by key: of the variables that are named, or of all. Rows and columns are the
-        tangent directions of the variable, in their order and units."""
+        """Returns marginal covariances at the estimate by key, of the given variables or of all. Rows and
+        columns are the tangent directions of the variable, in their order and units."""
     def joint_covariance(self, keys: _Keys) -> _Array:
-        """The joint covariance of a few variables at the estimate, in the order of `keys` and of their tangent directions."""
+        """Returns the joint covariance of a few variables at the estimate, in the order of `keys` and of
+        their tangent directions."""
     def diagnosis(self) -> dict[str, Any]:
-        """What is worth a look: the factors that cost the most, the condition of the linear system, what nothing
-        constrains."""
+        """Returns the factors with the largest cost, the condition of the linear system, and the
+        unconstrained directions."""
     def _repr_html_(self) -> str: ...
 
 @final
 class FactorId:
-    """A factor of a session."""
+    """The id of a factor in a session."""
 
 @final
 class Session:
-    """An incremental smoother: variables and factors come and go, and `update` keeps the estimate up to date."""
+    """An incremental smoother: variables and factors are added and removed, and `update` recomputes the
+    estimate."""
 
     def __new__(cls, **settings: Any) -> Self:
-        """An empty session. `settings` are those of the table `online` of a document: `relinearize_every`, `bend`, …"""
+        """Creates an empty session. `settings` are the fields of the table `online` of a document:
+        `relinearize_every`, `bend`, …"""
     def push(self, graph: Graph, values: Values) -> list[FactorId]:
-        """Adds variables with their first values, and factors between any variables, new or not; what the graph holds is
-        held. Takes effect at the next update. Returns the factors' ids, in order. Where something is wrong, nothing is
-        added."""
+        """Adds variables with their initial values, and factors between new or existing variables;
+        variables that the graph fixes are fixed. Takes effect at the next update. Returns the ids of the
+        factors, in order. After an error, nothing is added."""
     def remove(self, factors: Sequence[FactorId]) -> None:
-        """Takes factors away, with the next update."""
+        """Removes factors at the next update."""
     def marginalize(self, keys: _Keys) -> None:
-        """Lets variables leave: what is known by them stays as a linear prior. With the next update."""
+        """Marginalizes variables at the next update: their information stays as a linear prior."""
     def set_time(self, seconds: float) -> None:
-        """Sets the time of what comes next, in seconds; for a window by time."""
+        """Sets the time of the next factors and variables, for a window by time. Unit: seconds."""
     def update(self) -> dict[str, Any]:
-        """Makes the changes, and brings the estimate up to date. Returns the account of it: `redone`, `relinearized`,
-        `parked`, `undetermined` and so on. Where it fails, the session is as it was."""
+        """Applies the changes, and updates the estimate. Returns a report: `redone`, `relinearized`,
+        `parked`, `undetermined` and so on. After an error, the session is unchanged."""
     def __getitem__(self, key: str) -> Variable:
-        """The estimate of a variable, as of the last update."""
+        """The estimate of a variable after the last update."""
     def __contains__(self, key: object) -> bool: ...
     def __len__(self) -> int: ...
     @property
     def values(self) -> Values:
-        """All estimates, in the order in which the variables came. They do not change; `copy.copy` makes some that can be
-        changed."""
+        """All estimates, in the order of insertion. They are immutable; `copy.copy` returns a mutable
+        copy."""
     def cost(self) -> float:
-        """½ Σ ρ at the estimate. It looks at every factor."""
+        """Returns ½ Σ ρ at the estimate. The time is linear in the number of factors."""
     def covariance(self, keys: _Keys) -> _Array:
-        """The joint covariance of a few variables, in the order of `keys` and of their tangent directions."""
+        """Returns the joint covariance of a few variables, in the order of `keys` and of their tangent
+        directions."""
     def rejections(self) -> list[dict[str, Any]]:
-        """Factors that are rejected as outliers, with the update that rejected them and what they cost."""
+        """Returns the factors rejected as outliers, each with its cost and the update that rejected it."""
     def graph(self) -> Graph:
-        """The factors that count, as a graph with what is held."""
+        """Returns the active factors as a graph, with its fixed variables."""
     def finish(self, solver: Solver | None = None) -> tuple[Values, dict[str, Any]]:
-        """Solves all that is there as one batch, from the estimate, and returns the values and the account of the solver. The
-        session stays as it is."""
+        """Solves the whole graph as one batch from the estimate, and returns the values and the report of
+        the solver. The session does not change."""
     def save(self) -> str:
-        """The session as a text, from which `Session.load` goes on, bit for bit."""
+        """Returns the session as a text. `Session.load` restores it bit for bit."""
     def to_rerun(self, path: str | os.PathLike[str] | None = None, *, name: str = "session", every: int = 1) -> Live:
-        """Logs the session in the viewer rerun, or to a `.rrd` file, update by update: what is returned has the `push` and the
-        `update` to call from there on. `every` is the number of updates from one drawing of the map and its cost to the
-        next, which take as long as the map is large. Needs `manifactor[rerun]`."""
+        """Logs the session in the rerun viewer, or to a `.rrd` file, update by update. Call `push` and
+        `update` of the returned object instead of the session's. The map and its cost are drawn every
+        `every` updates, in a time that grows with the size of the map. Needs `manifactor[rerun]`."""
     @staticmethod
     def load(text: str) -> Session:
-        """A session that was saved."""
+        """Restores a saved session."""
 
 @final
 class BatchFunction:
@@ -268,11 +280,13 @@ def solve(
     start: Start | None = None,
     observer: Callable[[dict[str, Any]], bool | None] | None = None,
 ) -> Solution:
-    """Solves a graph from these values. Returns a solution however the solve ends: `solution.converged` tells.
+    """Solves a graph from these values. Always returns a solution; `solution.converged` is true if the
+    solve reached a minimum.
 
-    `solver` defaults to `auto`, `start` to the values as they are. `observer` is called with a dict after each step that was
-    tried, and ends the solve where it returns `False`. Other threads of Python run meanwhile, and Ctrl-C interrupts. A process
-    that was forked after a solve of its parent solves on one thread, with the same results, and warns of it once."""
+    `solver` defaults to `auto`, and `start` to the given values. `observer` is called with a dict
+    after each attempted step, and ends the solve by returning `False`. Other Python threads run meanwhile,
+    and Ctrl-C interrupts the solve. A process that was forked after a solve of its parent solves on one
+    thread, with identical results, and warns about it once."""
 
 def read(
     path: str | os.PathLike[str], *, repair: str = "error", anchor: bool = True, lenient: bool = False

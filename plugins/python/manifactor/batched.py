@@ -1,4 +1,4 @@
-"""Factors of which Python evaluates a whole batch in one call: `@batch`, for what cannot be written as a formula."""
+"""Factors that Python evaluates in whole batches, for residuals that are no formula: `@batch`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class BatchFactor:
-    """A factor as a function of arrays. Called with its constants, it is a `Factor`."""
+    """A factor as a function of arrays. A call with its constants returns a `Factor`."""
 
     def __init__(self, function: Callable[..., Any], rows: int, jacobian: Callable[..., Any] | str | None) -> None:
         if isinstance(jacobian, str) and jacobian not in ("jax", "differences"):
@@ -36,7 +36,7 @@ class BatchFactor:
             self.jacobian: Callable[..., Any] | None = by_jax(function, len(self.variables), len(self.constants))
         else:
             self.jacobian = jacobian if callable(jacobian) else None
-        #: By the shapes of the constants.
+        #: Native functions by the shapes of the constants.
         self._functions: dict[tuple[tuple[int, ...], ...], Any] = {}
 
     def __repr__(self) -> str:
@@ -44,7 +44,7 @@ class BatchFactor:
         return f"<batch factor {self.__name__}({', '.join([*variables, *self.constants])}), {self.rows} rows>"
 
     def __call__(self, **constants: Any) -> Factor:
-        """The factor with these constants: numbers or arrays."""
+        """Returns the factor with these constants: numbers or arrays."""
         arrays = [np.asarray(value, dtype=float) for value in self._given(constants).values()]
         row = np.concatenate([np.ravel(array) for array in arrays]) if arrays else np.empty(0)
         made = self._function(tuple(array.shape for array in arrays)).factor(row)
@@ -52,7 +52,8 @@ class BatchFactor:
         return made
 
     def __manifactor_rows__(self, rows: int, columns: Mapping[str, Any]) -> tuple[Any, Array]:
-        """The function for `Graph.add_many`, and the constants of each factor: arrays have a row for each."""
+        """The function for `Graph.add_many`, and the constants of the factors: each array has one row per
+        factor."""
         arrays = []
         for name, value in self._given(dict(columns)).items():
             array = np.asarray(value, dtype=float)
@@ -102,12 +103,12 @@ class BatchFactor:
 
     def _as_rows(self, returned: Any) -> Array:
         residual = np.asarray(returned, dtype=float)
-        # a residual of one row may come without its axis
+        # a residual with one row may lack the second axis
         return residual[:, None] if residual.ndim == 1 and self.rows == 1 else residual
 
 
 def uses_jax(function: Callable[..., Any]) -> bool:
-    """Whether a function names a module of JAX's."""
+    """Returns True if a function refers to a JAX module."""
     if "jax" not in sys.modules:
         return False
     named = inspect.getclosurevars(function)
@@ -116,7 +117,7 @@ def uses_jax(function: Callable[..., Any]) -> bool:
 
 
 def by_jax(function: Callable[..., Any], variables: int, constants: int) -> Callable[..., Any]:
-    """The Jacobians by JAX: by forward differentiation, point by point, compiled once for each shape."""
+    """Jacobians from JAX: forward mode, point by point, compiled once for each shape."""
     import jax
     import jax.numpy as jnp
 
@@ -134,12 +135,12 @@ def by_jax(function: Callable[..., Any], variables: int, constants: int) -> Call
 def batch(
     *, rows: int, jacobian: Callable[..., Any] | str | None = None
 ) -> Callable[[Callable[..., Any]], BatchFactor]:
-    """Makes a function of arrays the residual of many factors: it is called once for all of them.
+    """Makes a function of arrays the residual of many factors. It is called once for all of them.
 
-    Arguments that are annotated with a type of variables get the numbers of these, shape (n, size), where n is the number of
-    factors: `Se3` as rotation (x, y, z, w) and translation, `DualQuadric` as its pose and its semi-axes, points as they are. The
-    others are constants, with a row for each factor. It returns the residuals, shape (n, rows); a row that is not a number says
-    that the factor means nothing there::
+    An argument that is annotated with a type of variables receives their numbers, shape (n, size), where n
+    is the number of factors: `Se3` as rotation (x, y, z, w) and translation, `DualQuadric` as its pose and
+    its semi-axes, points unchanged. All remaining arguments are constants, with one row per factor. The
+    function returns the residuals, shape (n, rows). A NaN in a row marks the factor as undefined::
 
         @mf.batch(rows=1)
         def ranges(x: mf.Se3, p: mf.Point3, measured):
@@ -147,9 +148,10 @@ def batch(
 
         graph.add_many(ranges, keys, {"measured": distances}, prefix=["x", "p"], noise=0.1)
 
-    `jacobian`, called with the same arguments, gives an array for each variable, shape (n, rows, size), by its numbers. Without,
-    derivatives are JAX's, where the function uses JAX or `jacobian="jax"`; else central differences in the tangent space.
-    Such a factor cannot be saved: `@mf.factor` can.
+    `jacobian` is called with the same arguments, and returns an array for each variable, shape (n, rows,
+    size), with respect to its numbers. Without it, JAX computes the derivatives if the function uses JAX or
+    with `jacobian="jax"`; otherwise they are central differences in the tangent space. Such a factor cannot
+    be saved, unlike one with `@mf.factor`.
     """
     return lambda function: BatchFactor(function, rows, jacobian)
 

@@ -1,4 +1,4 @@
-"""What is chosen by name: factors, losses, solvers, starts and values of variables. One class for each kind."""
+"""Classes of the registered types: factors, losses, solvers, starts and values of variables."""
 
 from __future__ import annotations
 
@@ -12,64 +12,66 @@ from . import _native
 from ._native import Chosen
 from .errors import Mistake, TraceError
 
-#: Numbers in a row: a list, a tuple, an array of one axis.
+#: A sequence of numbers: a list, a tuple, or an array with one axis.
 Numbers = Sequence[float] | NDArray[Any]
-#: Fields by name, as a document has them.
+#: Fields by name, as in a document.
 Fields = Mapping[str, Any]
 
 
 class Factor(Chosen):
-    """A residual with its parameters; keys, noise and loss are given to `Graph.add`."""
+    """A residual with its parameters; keys, noise and loss are arguments of `Graph.add`."""
 
     def __new__(cls, name: str, fields: Fields | None = None) -> Self:
         return super().__new__(cls, "factor", name, None if fields is None else dict(fields))
 
     def linearize(self, *variables: Variable) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-        """The residual, shape (rows,), and its Jacobian by each variable, shape (rows, tangent); not whitened."""
+        """Returns the residual, shape (rows,), and its Jacobian for each variable, shape (rows, tangent);
+        not whitened."""
         return _native.linearize(self, variables)
 
     def residual(self, *variables: Variable) -> NDArray[np.float64]:
-        """The residual, shape (rows,), not whitened."""
+        """Returns the residual, shape (rows,), not whitened."""
         return _native.linearize(self, variables)[0]
 
 
 class Loss(Chosen):
-    """A robust loss ρ: a factor with the squared whitened norm s costs ½ρ(s)."""
+    """A robust loss ρ: the cost of a factor with squared whitened norm s is ½ρ(s)."""
 
     def __new__(cls, name: str, fields: Fields | None = None) -> Self:
         return super().__new__(cls, "loss", name, None if fields is None else dict(fields))
 
     def rho(self, squared: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """ρ and its derivative, the weight, at squared norms; of the shape of these."""
+        """Returns ρ and its derivative, the weight, at squared norms, in arrays of equal shape."""
         return _native.rho(self, squared)
 
 
 class Solver(Chosen):
-    """What moves an estimate to a minimum."""
+    """An optimizer, which moves an estimate to a minimum."""
 
     def __new__(cls, name: str, fields: Fields | None = None) -> Self:
         return super().__new__(cls, "solver", name, None if fields is None else dict(fields))
 
 
 class Start(Chosen):
-    """Where a solve begins."""
+    """A method for the initial values of a solve."""
 
     def __new__(cls, name: str, fields: Fields | None = None) -> Self:
         return super().__new__(cls, "start", name, None if fields is None else dict(fields))
 
 
 class Variable(Chosen):
-    """A value of a variable: a point of a manifold. It does not change."""
+    """An immutable value of a variable: a point on a manifold."""
 
-    #: The name of the type in documents.
+    #: Name of the type in documents.
     TYPE: ClassVar[str] = ""
-    #: What formulas take it for.
+    #: Type of the value in formulas.
     SHAPE: ClassVar[str] = ""
-    #: Names of its tangent directions, in their order.
+    #: Names of the tangent directions, in order.
     TANGENT: ClassVar[tuple[str, ...]] = ()
 
     if TYPE_CHECKING:
-        # what an argument of a traced factor or of a batch is good for, for checkers of types: a value has none of it
+        # for type checkers: operations on an argument of a traced factor or of a batch, which a value does
+        # not support
         def __add__(self, other: Any) -> Any: ...
         def __radd__(self, other: Any) -> Any: ...
         def __sub__(self, other: Any) -> Any: ...
@@ -90,11 +92,11 @@ class Variable(Chosen):
         def __len__(self) -> int: ...
 
     def retract(self, delta: ArrayLike) -> Self:
-        """The point that a tangent vector, shape (dim,), leads to."""
+        """Returns the point reached along a tangent vector, shape (dim,)."""
         return _native.retract(self, delta)
 
     def local(self, to: Self) -> NDArray[np.float64]:
-        """The tangent vector, shape (dim,), that leads to another point of the same type."""
+        """Returns the tangent vector, shape (dim,), that leads to another point of this type."""
         return _native.local(self, to)
 
 
@@ -102,7 +104,7 @@ _CLASSES: dict[str, type[Chosen]] = {"factor": Factor, "loss": Loss, "solver": S
 
 
 def class_of(kind: str, name: str) -> type[Chosen]:
-    """The class of objects of a kind and name."""
+    """Returns the class of objects of this kind and name."""
     if kind != "variable":
         return _CLASSES[kind]
     from . import variables
@@ -111,6 +113,6 @@ def class_of(kind: str, name: str) -> type[Chosen]:
 
 
 def in_formulas(value: Variable, name: str) -> Any:
-    """For attributes that a value has in traced factors only."""
+    """Raises the error for attributes that a value has only in traced factors."""
     help = "it is there in a factor that is written in Python"
     raise TraceError("", [Mistake("", f"`{name}` is a function of formulas, and this is a value of {value.type}", help)])

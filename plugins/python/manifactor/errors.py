@@ -1,4 +1,5 @@
-"""What can go wrong. Each error says what, where, what was expected and what to do, in its text and in `mistakes`."""
+"""Exceptions. Each describes the mistake, its place, the expected input and a remedy, in its text and in
+`mistakes`."""
 
 from __future__ import annotations
 
@@ -8,16 +9,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Mistake:
-    """One thing that is wrong."""
+    """One mistake in the input."""
 
     #: The argument, such as `camera.fx`, or the file.
     place: str
     message: str
-    #: What to do about it.
+    #: A remedy.
     help: str | None = None
-    #: Line and column, from 1, of what was read from a file.
+    #: Line and column in the file, from 1.
     line: tuple[int, int] | None = None
-    #: A text that it is within, with the first of the characters that are meant, and their number.
+    #: The surrounding text, the position of the first wrong character, and the number of wrong characters.
     within: tuple[str, int, int] | None = None
 
     def __str__(self) -> str:
@@ -30,7 +31,7 @@ class Mistake:
 
 
 class ManifactorError(Exception):
-    """The base of all of them."""
+    """Base class of all exceptions of this package."""
 
     def __init__(self, what: str = "", mistakes: Sequence[Mistake] = ()) -> None:
         self.what = what
@@ -40,11 +41,11 @@ class ManifactorError(Exception):
 
 
 class ArgumentError(ManifactorError, ValueError):
-    """An argument that is not as it should be; `mistakes` name it."""
+    """An invalid argument, which `mistakes` names."""
 
 
 class GraphError(ManifactorError, ValueError):
-    """A graph, values and a solver that do not fit each other."""
+    """A graph, values and a solver that do not fit together."""
 
 
 class DocumentError(ManifactorError, ValueError):
@@ -52,15 +53,15 @@ class DocumentError(ManifactorError, ValueError):
 
 
 class UnreadableError(DocumentError, OSError):
-    """A file that is not there, or cannot be read."""
+    """A file that does not exist or cannot be read."""
 
 
 class ExistsError(ManifactorError, FileExistsError):
-    """A file that exists, and is replaced only with `force=True`."""
+    """A file that already exists; it is replaced only with `force=True`."""
 
 
 class SolveError(ManifactorError, RuntimeError):
-    """What could not be done with input that is right: a covariance of what nothing constrains, data that are not there."""
+    """A failure with valid input, such as the covariance of an undetermined variable, or missing data."""
 
 
 class FileError(SolveError, OSError):
@@ -68,4 +69,4 @@ class FileError(SolveError, OSError):
 
 
 class TraceError(ManifactorError, TypeError):
-    """A factor of Python that cannot be written as a formula; the traceback ends at the line."""
+    """A factor in Python that cannot be converted to a formula; the traceback ends at its line."""

@@ -1,7 +1,8 @@
-"""Formulas as values of Python: what a traced factor computes with.
+"""Formulas as Python values, with which a traced factor computes.
 
-An `Expr` stands for a number, a vector, a rotation or a variable in a formula. Operators and functions on it are resolved by
-type at once, so that an error is raised where the operation is written; nothing is computed.
+An `Expr` stands for a number, a vector, a rotation or a variable in a formula. Its operators and functions
+are resolved by type immediately, so an error is raised at the line of the operation. They compute no
+numbers.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from .errors import Mistake, TraceError
 
 
 class Function:
-    """A function of formulas, for one list of types of arguments."""
+    """A function of formulas, for one list of argument types."""
 
     __slots__ = ("arguments", "name", "result", "size")
 
@@ -43,7 +44,7 @@ def _functions() -> dict[str, dict[tuple[str, ...], Function]]:
 FUNCTIONS = _functions()
 VECTORS = {2: "vector2", 3: "vector3", 6: "vector6"}
 LENGTHS = {shape: length for length, shape in VECTORS.items()}
-#: Above these, a part of a formula gets a name of its own.
+#: Longest text and deepest nesting of a part of a formula; a larger part gets a separate name.
 LONGEST, DEEPEST = 200, 12
 
 
@@ -52,7 +53,7 @@ def wrong(message: str, help: str | None = None) -> NoReturn:
 
 
 class Trace:
-    """What one function computes, while it is traced."""
+    """The operations of one function while it is traced."""
 
     def __init__(self) -> None:
         self.calls: dict[tuple[Any, ...], Expr] = {}
@@ -61,7 +62,7 @@ class Trace:
         self.domain: list[Expr] = []
 
     def call(self, function: Function, arguments: Sequence[Expr]) -> Expr:
-        """The same object for the same call of the same arguments."""
+        """Returns an existing object if this function was called with these arguments before."""
         key = (id(function), *(argument.key for argument in arguments))
         found = self.calls.get(key)
         if found is None:
@@ -70,7 +71,7 @@ class Trace:
         return found
 
     def lift(self, value: Any) -> Expr:
-        """A constant, or what is an expression already."""
+        """Converts a constant to an expression; an expression is returned unchanged."""
         if isinstance(value, Expr):
             if value.trace is not self:
                 wrong("a value of another trace", "a traced factor computes with its own arguments only")
@@ -108,7 +109,8 @@ class Trace:
 
 
 class Expr:
-    """A value in a formula. Its attributes are the functions of formulas whose first argument it is."""
+    """A value in a formula. Its attributes are the functions of formulas that take it as the first
+    argument."""
 
     __slots__ = ("arguments", "key", "name", "shape", "trace")
     __hash__ = None  # type: ignore[assignment]
@@ -231,7 +233,7 @@ class Expr:
 
 
 class Condition:
-    """Whether something holds, for `where`."""
+    """A condition for `where`."""
 
     __slots__ = ("select",)
 
@@ -252,14 +254,15 @@ class Condition:
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:
-    """`a` where the condition holds, and `b` elsewhere: a branch of a factor. Its derivative is that of the branch."""
+    """Returns `a` if the condition holds, else `b`: a branch of a factor, with the derivative of that
+    branch."""
     if isinstance(condition, Condition):
         return condition.select(a, b)
     return a if condition else b
 
 
 def require(condition: Any) -> None:
-    """Says that a factor means something only where a condition holds; elsewhere it takes no part."""
+    """Declares that a factor is defined only if a condition holds; otherwise it is inactive."""
     if isinstance(condition, Condition):
         inside = condition.select(1.0, -1.0)
         inside.trace.domain.append(inside)
@@ -268,7 +271,8 @@ def require(condition: Any) -> None:
 
 
 def call(name: str, *arguments: Any) -> Expr:
-    """A function of formulas, by the types of its arguments; numbers where none of them is a variable's."""
+    """Calls a function of formulas, chosen by the types of its arguments. Plain numbers alone are an
+    error."""
     trace = next((argument.trace for argument in arguments if isinstance(argument, Expr)), None)
     if trace is None:
         wrong(f"`{name}` is a function of formulas, and none of its arguments is of a variable", "use numpy's")
@@ -288,7 +292,8 @@ def call(name: str, *arguments: Any) -> Expr:
 
 
 def product(a: Expr, b: Expr) -> Expr:
-    """`a @ b`: the scalar product of vectors, one rotation or pose after the other, or applied to a point."""
+    """`a @ b`: the scalar product of vectors, the composition of rotations or poses, or the action on a
+    point."""
     return call("dot" if a.shape in LENGTHS else "*", a, b)
 
 
@@ -322,7 +327,7 @@ ARRAY_FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 
 class Writer:
-    """Expressions as texts. What is used twice, or is long, gets a name of its own."""
+    """Writes expressions as text. A part that is long or used twice gets a separate name."""
 
     def __init__(self) -> None:
         self.defined: dict[str, str] = {}
@@ -330,7 +335,7 @@ class Writer:
         self.uses: dict[Any, int] = {}
 
     def count(self, expr: Expr) -> None:
-        """Counts how often each part is used."""
+        """Counts the uses of each part."""
         waiting = [expr]
         while waiting:
             part = waiting.pop()
@@ -339,7 +344,8 @@ class Writer:
                 waiting.extend(part.arguments or ())
 
     def text(self, expr: Expr) -> str:
-        """The formula. Parts are written before what they are part of, without recursion: a loop may nest them deeply."""
+        """Returns the formula. Arguments are written first and without recursion, because a loop may nest
+        them deeply."""
         waiting = [expr]
         while waiting:
             part = waiting[-1]
@@ -374,7 +380,7 @@ class Writer:
 
 
 def bare(text: str) -> bool:
-    """Whether the first parenthesis closes at the end."""
+    """Returns True if the first parenthesis closes at the end."""
     depth = 0
     for i, c in enumerate(text):
         depth += (c == "(") - (c == ")")

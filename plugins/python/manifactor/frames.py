@@ -27,9 +27,10 @@ def rotations(quaternions: Array) -> Array:
 
 
 def poses(values: Values, type: str | type[Variable] = "se3") -> tuple[list[str], Array]:
-    """Keys and homogeneous matrices of all poses: shape (n, 4, 4) for `se3` and objects, (n, 3, 3) for `se2`.
+    """Keys and homogeneous matrices of all poses: shape (n, 4, 4) for `se3` and objects, (n, 3, 3) for
+    `se2`.
 
-    Both are empty if there are no values of the type. A type that is no pose is an `ArgumentError`.
+    Both are empty if there are no values of the type. A type that is not a pose is an `ArgumentError`.
     """
     keys, fields = values.columns(type)
     name = type if isinstance(type, str) else type.TYPE
@@ -53,7 +54,7 @@ def poses(values: Values, type: str | type[Variable] = "se3") -> tuple[list[str]
 
 
 def to_pandas(values: Values, type: str | type[Variable]) -> Any:
-    """All values of one type as a `pandas.DataFrame`: a row for each key, a column for each number."""
+    """Returns all values of one type as a `pandas.DataFrame`: one row per key, one column per number."""
     import pandas
 
     keys, fields = values.columns(type)

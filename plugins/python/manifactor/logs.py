@@ -1,4 +1,4 @@
-"""The log of all parts, as a logger of Python's."""
+"""The log of Manifactor as a Python logger."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from . import _native
 
 
 def enable_logging(level: int = logging.INFO) -> None:
-    """Hands what is logged from a level on to the loggers below `manifactor`; once for a process."""
+    """Forwards log messages from `level` on to the loggers below `manifactor`; works once per process."""
 
     def forward(level: int, target: str, message: str) -> None:
         name = target.replace("::", ".").replace("manifactor_", "manifactor.")

@@ -1,8 +1,9 @@
 """An experiment over Ray: `python -m manifactor.ray SWEEP`. Needs `manifactor[ray]`.
 
-The driver has the journal, and the workers run the trials, each on one processor. A trial is tried again if its worker dies. If the
-driver dies, the same command goes on with the remaining trials. The files are those of `manifactor experiment`, and the tables are the
-same byte for byte. Each worker reads the documents and data from the same paths.
+The driver owns the journal, and the workers run the trials, each on one processor. If a worker dies, its
+trial is repeated. If the driver dies, the same command continues with the remaining trials. The files are
+those of `manifactor experiment`, and the tables are byte for byte equal. Each worker reads the documents
+and data from the same paths.
 """
 
 from __future__ import annotations
@@ -20,16 +21,17 @@ from . import _native
 from .errors import ManifactorError
 from .report import Config, Summary, data_folder, opened, overrides
 
-#: How often a trial is begun again whose worker has died.
+#: Number of repetitions of a trial after the death of its worker.
 RETRIES = 5
 
-#: What a worker opens the experiment by: its path, its text where it has no file, overrides, and the folder of data.
+#: Arguments with which a worker opens the experiment: path, text (if there is no file), overrides, and the
+#: folder of data.
 Opened = tuple[str, str | None, tuple[str, ...], str | None]
 
 
 @functools.lru_cache(maxsize=4)
 def _sweep(of: Opened) -> Any:
-    """The experiment in a worker: read once, and not for each trial."""
+    """Returns the experiment in a worker, which reads it only once."""
     path, text, set, data = of
     return _native.Sweep(path, text, list(set), data, None, False, False)
 
@@ -52,24 +54,25 @@ def experiment(
     workers: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Summary:
-    """Runs the trials of an experiment that are not done yet, on the workers of a cluster, and writes its tables, pictures and
-    page.
+    """Runs the unfinished trials of an experiment on the workers of a cluster, and writes its tables,
+    pictures and page.
 
-    `address` is that of a cluster; without it, a cluster with this number of `workers` is started on this machine. A connection
-    of Ray that exists is used. `progress` is called with the trials that are done in this call, and all that it has to do.
+    `address` is the address of a cluster. Without it, a local cluster with `workers` workers is started. An
+    existing connection of Ray is reused. `progress` is called with the number of trials finished in this
+    call and their total.
     """
     import ray
 
     path, text = opened(config, "experiment")
     if text is None:
         path = os.path.abspath(path)
-    # a worker has a working directory of its own
+    # a worker may have a different working directory
     folder = data_folder(data)
     of = (path, text, tuple(overrides(set)), None if folder is None else os.path.abspath(folder))
     sweep = _native.Sweep(path, text, list(of[2]), of[3], None if out is None else os.fspath(out), force, True)
     own = not ray.is_initialized()
     if own and address is None:
-        # a cluster of this machine alone is not seen by others
+        # a local cluster is not visible to other machines
         ray.init(num_cpus=workers, include_dashboard=False, log_to_driver=False, _node_ip_address="127.0.0.1")
     elif own:
         ray.init(address=address, log_to_driver=False)
@@ -88,7 +91,7 @@ def experiment(
                 progress(total - len(running), total)
         summary, folder = sweep.write()
     finally:
-        # a traceback would keep it, and with it the lock of the folder
+        # a traceback would keep it alive, and with it the lock of the folder
         del sweep
         if own:
             ray.shutdown()
@@ -96,7 +99,7 @@ def experiment(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line."""
+    """Runs the command line."""
     parser = argparse.ArgumentParser("python -m manifactor.ray", description="Run an experiment on the workers of Ray.")
     parser.add_argument("config", help="the document that describes the experiment")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="set a value of the document")
@@ -125,7 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    # workers import this module by its name, and find nothing of it in their own `__main__`
+    # workers import this module by name, and their own `__main__` lacks its definitions
     from manifactor.ray import main as command
 
     sys.exit(command())

@@ -1,4 +1,4 @@
-"""Runs and experiments, and what they tell."""
+"""Runs and experiments, and their results."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from numpy.typing import NDArray
 from . import _native
 from .errors import ExistsError, Mistake
 
-#: A file, or what would stand in one.
+#: A file, or the content of one.
 Config = str | os.PathLike[str] | Mapping[str, Any]
 Array = NDArray[np.float64]
 
 
 class Trajectory:
-    """Poses by time: from the camera's frame (z forward) to that of the truth, or of the map where there is no truth."""
+    """Poses by time: from the camera's frame (z forward) to the frame of the truth, or of the map if there
+    is no truth."""
 
     def __init__(self, seconds: Array, translation: Array, rotation: Array) -> None:
-        #: Shape (n,), in seconds.
+        #: Timestamps, shape (n,). Unit: seconds.
         self.seconds = seconds
-        #: Shape (n, 3), in metres.
+        #: Positions, shape (n, 3). Unit: metres.
         self.translation = translation
         #: Unit quaternions (x, y, z, w), shape (n, 4).
         self.rotation = rotation
@@ -36,11 +37,11 @@ class Trajectory:
 
 
 class Variant:
-    """One variant of a run: `report` has its figures, `record` all that there is to draw; both as their files have it."""
+    """One variant of a run, as in its files: `report` has the figures, `record` everything for drawing."""
 
     def __init__(self, report: dict[str, Any], row: dict[str, Any], record: dict[str, Any]) -> None:
         self.report, self.record = report, record
-        #: Its line in the table of the run: costs, errors at the estimate where there is a truth, seconds.
+        #: Row in the table of the run: costs, errors of the estimate if there is a truth, seconds.
         self.row = row
         self.name: str = report["name"]
 
@@ -49,11 +50,11 @@ class Variant:
 
     @property
     def converged(self) -> bool:
-        """Whether its solve has ended at a minimum."""
+        """True if the solve reached a minimum."""
         return bool(self.report["solve"]["termination"]["status"] == "converged")
 
     def trajectory(self, which: str = "estimate") -> Trajectory:
-        """The poses: of the `estimate`, of `odometry`, or of the `truth`."""
+        """Returns the poses of the `estimate`, of the `odometry`, or of the `truth`."""
         frames = [frame for frame in self.record["frames"] if frame.get(which) is not None]
         poses = [frame[which].get("pose", frame[which]) for frame in frames]
         return Trajectory(
@@ -64,12 +65,12 @@ class Variant:
 
     @property
     def objects(self) -> list[dict[str, Any]]:
-        """Each object that was detected, by number: its class, what became of it, its estimate and its error."""
+        """Returns the detected objects by number: class, status, estimate and error."""
         return list(self.report["objects"])
 
 
 class Report:
-    """What a run has to tell."""
+    """Result of a run."""
 
     def __init__(
         self, report: dict[str, Any], table: list[dict[str, Any]], record: dict[str, Any], page: str
@@ -102,24 +103,24 @@ class Report:
         return f'<iframe srcdoc="{html.escape(self.html)}" style="width: 100%; height: 720px; border: 0"></iframe>'
 
     def save_html(self, path: str | os.PathLike[str], *, force: bool = False) -> None:
-        """Writes the page. A file that exists is replaced only with `force`."""
+        """Writes the page. An existing file is replaced only with `force`."""
         written(path, self.html, force)
 
     def to_pandas(self) -> Any:
-        """The table of the run as a `pandas.DataFrame`, a row for each variant."""
+        """Returns the table of the run as a `pandas.DataFrame`, with one row per variant."""
         import pandas
 
         return pandas.DataFrame([variant.row for variant in self]).set_index("variant")
 
     def to_rerun(self, path: str | os.PathLike[str] | None = None, *, name: str = "manifactor") -> None:
-        """Shows the run in the viewer rerun, or writes it to a `.rrd` file; needs `manifactor[rerun]`."""
+        """Shows the run in the rerun viewer, or writes it to a `.rrd` file; needs `manifactor[rerun]`."""
         from .rerun import show
 
         show(self, path, name)
 
 
 def written(path: str | os.PathLike[str], text: str, force: bool) -> None:
-    """Writes a file, or replaces one with `force`."""
+    """Writes a new file, or replaces an existing one with `force`."""
     try:
         with open(path, "w" if force else "x", encoding="utf-8") as file:
             file.write(text)
@@ -129,14 +130,14 @@ def written(path: str | os.PathLike[str], text: str, force: bool) -> None:
 
 
 def overrides(values: Mapping[str, Any] | Sequence[str]) -> list[str]:
-    """`key=value` as the command line takes it."""
+    """Formats overrides as `key=value`, as on the command line."""
     if isinstance(values, Mapping):
         return [f"{key}={toml(value)}" for key, value in values.items()]
     return list(values)
 
 
 def toml(value: Any) -> str:
-    """A value as TOML."""
+    """Formats a value as TOML."""
     match value:
         case bool():
             return "true" if value else "false"
@@ -155,7 +156,7 @@ def toml(value: Any) -> str:
 
 
 def opened(config: Config, name: str) -> tuple[str, str | None]:
-    """A path, and what stands there where there is no file."""
+    """Returns the path of a document, and its text if there is no file."""
     if isinstance(config, Mapping):
         return name, json.dumps(config, default=lambda value: value.to_dict() if hasattr(value, "to_dict") else os.fspath(value))
     return os.fspath(config), None
@@ -172,11 +173,12 @@ def run(
     data: str | os.PathLike[str] | None = None,
     observer: Callable[[dict[str, Any]], bool | None] | None = None,
 ) -> Report:
-    """Builds, solves and evaluates what a document describes, in memory: nothing is written.
+    """Builds, solves and evaluates the run of a document in memory, and writes no files.
 
-    `config` is a file, or a dict with what would stand in it. `set` changes values of it by their path, as `--set` does:
-    `set={"source.seed": 2}`. `data` is the folder of public data sets; default: `MANIFACTOR_DATA`. `observer` is called with a
-    dict after each step of a solve, and ends it where it returns `False`. `manifactor run` writes a folder with pictures.
+    `config` is a file, or a dict with its content. `set` changes values by their path, like `--set`:
+    `set={"source.seed": 2}`. `data` is the folder of public data sets. Default: `MANIFACTOR_DATA`.
+    `observer` is called with a dict after each step of a solve, and ends it by returning `False`.
+    `manifactor run` writes a folder with pictures.
     """
     path, text = opened(config, "run")
     report, table, record, page = _native.run(path, text, overrides(set), data_folder(data), observer)
@@ -184,7 +186,8 @@ def run(
 
 
 class Summary:
-    """What an experiment came to: `summary` as `summary.json` has it, empty for a part, and the folder of the tables."""
+    """Result of an experiment: `summary` as in `summary.json` (empty for a shard), and the folder of the
+    tables."""
 
     def __init__(self, summary: dict[str, Any], folder: Path) -> None:
         self.summary, self.folder = summary, folder
@@ -193,7 +196,7 @@ class Summary:
         return f"Summary({self.folder}, {self.summary.get('open', 0)} trials open)"
 
     def trials(self) -> Any:
-        """A row for each trial, as a `pandas.DataFrame`."""
+        """Returns the trials as a `pandas.DataFrame`, with one row per trial."""
         import pandas
 
         return pandas.read_csv(self.folder / "trials.csv")
@@ -211,11 +214,12 @@ def experiment(
     shard: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Summary:
-    """Runs the trials of an experiment that are not done yet, and writes its tables, pictures and page.
+    """Runs the unfinished trials of an experiment, and writes its tables, pictures and page.
 
-    Trials that are done are kept in `trials.jsonl` of its folder: after Ctrl-C, or a kill, the same call goes on. `progress`
-    is called with the trials that are done, and all. `shard="2/8"` runs the second of eight parts, which has a folder of its own
-    and no tables; the same call without it takes over what all parts have done. `manifactor.ray` spreads trials over a cluster.
+    Finished trials are saved in `trials.jsonl` of its folder, so after Ctrl-C or a kill the same call
+    continues. `progress` is called with the number of finished trials and the total. `shard="2/8"` runs the
+    second of eight parts in a separate folder without tables; the same call without `shard` collects the
+    trials of all parts. `manifactor.ray` distributes trials over a cluster.
     """
     path, text = opened(config, "experiment")
     out = None if out is None else os.fspath(out)

@@ -1,4 +1,4 @@
-"""Factors that are written in Python, and run as formulas: `@factor`."""
+"""Factors that are written in Python and run as formulas: `@factor`."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from .chosen import Factor, Variable
 from .errors import ManifactorError, Mistake, TraceError
 from .formula import VECTORS, Expr, Trace, Writer, wrong
 
-#: The name of the world's up in formulas.
+#: Name of the world's up direction in formulas.
 UP = "up"
 
 
 def parameters(function: Callable[..., Any]) -> tuple[dict[str, type[Variable]], dict[str, Any]]:
-    """The variables of a factor's function, with their types; and its constants, with their defaults."""
+    """Returns the variables of a factor's function with their types, and its constants with their
+    defaults."""
     try:
         signature = inspect.signature(function, eval_str=True)
     except NameError as error:
@@ -40,7 +41,7 @@ def parameters(function: Callable[..., Any]) -> tuple[dict[str, type[Variable]],
 
 
 def shape_of(name: str, value: Any) -> str:
-    """What a constant is in formulas."""
+    """Returns the type of a constant in formulas."""
     if isinstance(value, Variable) and value.SHAPE:
         return value.SHAPE
     if isinstance(value, bool | str):
@@ -54,7 +55,8 @@ def shape_of(name: str, value: Any) -> str:
 
 
 class TracedFactor:
-    """A factor as a function of Python. Called with its constants, it is a `Factor`, whose document is its formula."""
+    """A factor as a Python function. A call with its constants returns a `Factor`, whose document is its
+    formula."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
@@ -63,7 +65,7 @@ class TracedFactor:
         self.__doc__ = function.__doc__
         self.__module__ = function.__module__
         self.__wrapped__ = function
-        #: By the shapes of the constants.
+        #: Fields of the formula by the shapes of the constants.
         self._traced: dict[tuple[str, ...], dict[str, Any]] = {}
 
     def __repr__(self) -> str:
@@ -71,7 +73,8 @@ class TracedFactor:
         return f"<factor {self.__name__}({', '.join([*variables, *self.constants])})>"
 
     def __call__(self, **constants: Any) -> Factor:
-        """The factor with these constants; those that have a default may be left out, and `up` is the world's then."""
+        """Returns the factor with these constants. Constants with a default are optional; the default of
+        `up` is the world's up."""
         given = self._given(constants)
         shapes = {name: shape_of(name, value) for name, value in given.items() if name != UP}
         fields = self._fields(given, shapes)
@@ -82,7 +85,7 @@ class TracedFactor:
             raise
 
     def __manifactor_fields__(self, columns: Mapping[str, Any]) -> dict[str, Any]:
-        """The fields of many factors: arrays among the constants have a row for each."""
+        """Returns the fields of many factors: arrays among the constants have one row per factor."""
         given = self._given(dict(columns))
         shapes = {}
         for name, value in given.items():
@@ -145,12 +148,12 @@ class TracedFactor:
 
 
 def plain(value: Any) -> Any:
-    """A constant as a document has it; an array with a row for each factor stays one."""
+    """Converts a constant as for a document; an array with one row per factor stays an array."""
     return value.to_dict() if isinstance(value, Variable) else value
 
 
 def rows_of(trace: Trace, returned: Any, function: Callable[..., Any]) -> list[Expr]:
-    """What a function has returned, as rows of a residual."""
+    """Converts the result of a function to the rows of a residual."""
     if isinstance(returned, np.ndarray):
         returned = list(returned.ravel())
     items = list(returned) if isinstance(returned, list | tuple) else [returned]
@@ -163,7 +166,7 @@ def rows_of(trace: Trace, returned: Any, function: Callable[..., Any]) -> list[E
 
 
 def where_of(function: Callable[..., Any]) -> str:
-    """`file:line` of a function."""
+    """Returns `file:line` of a function."""
     code = getattr(function, "__code__", None)
     return "" if code is None else f"{code.co_filename}:{code.co_firstlineno}"
 
@@ -171,10 +174,10 @@ def where_of(function: Callable[..., Any]) -> str:
 def factor(function: Callable[..., Any]) -> TracedFactor:
     """Makes a function the residual of a factor.
 
-    Arguments that are annotated with a type of variables are the factor's variables, in the order of its keys; the others are
-    constants, given when the factor is made. `up` is the world's up, unless it is given. The function is called once, with
-    values that stand for those of a formula, so that the factor runs at the speed of Rust, has exact derivatives, and is saved
-    as its formula::
+    Arguments that are annotated with a type of variables are the factor's variables, in the order of its
+    keys. All remaining arguments are constants, given when the factor is made. The default of `up` is the
+    world's up. The function is called once, with symbols of a formula as arguments. The factor therefore
+    runs at the speed of Rust, has exact derivatives, and is saved as its formula::
 
         @mf.factor
         def stands(q: mf.DualQuadric, up):
@@ -188,14 +191,14 @@ def factor(function: Callable[..., Any]) -> TracedFactor:
 
 
 class Check:
-    """The report of a factor's check."""
+    """The report of `check_factor`."""
 
     def __init__(self, holds: bool, text: str, report: dict[str, Any]) -> None:
-        #: Whether no law is broken.
+        #: True if all laws hold.
         self.holds = holds
-        #: The report in words.
+        #: The report as text.
         self.text = text
-        #: All that was found.
+        #: The report as a dict.
         self.report = report
 
     def __repr__(self) -> str:
@@ -206,11 +209,11 @@ class Check:
 
 
 def check_factor(of: Any, *around: Variable, points: int = 256, seed: int = 0, **constants: Any) -> Check:
-    """Checks a factor before a solver meets it, as `manifactor check-factor` does.
+    """Checks a factor before a solver uses it, like `manifactor check-factor`.
 
-    Its Jacobian against differences, what it leaves free, its kinks and jumps, at random points: around the values that are
-    given or the examples of their types, and wherever these draw. `of` is a `Factor`, or a function that makes one, with its
-    constants.
+    It compares the Jacobian with finite differences and searches for free directions, kinks and jumps. The
+    points are random: around the given values or the examples of their types, and from the sampling
+    strategies of the types. `of` is a `Factor`, or a function that makes one from its constants.
     """
     names: list[str] | None = None
     if not isinstance(of, Factor):

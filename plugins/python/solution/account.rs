@@ -1,4 +1,4 @@
-//! The account of a solve, which goes through `pickle` with its solution.
+//! The report of a solve, which is pickled with its solution.
 use crate::errors;
 use manifactor::graph::batch::FactorState;
 use manifactor::graph::{Graph, Values};
@@ -6,7 +6,7 @@ use manifactor::solve::{LevenbergMarquardt, Outcome, Silent, Solution, Stopping,
 use pyo3::prelude::*;
 use serde_json::Value as Json;
 
-/// The account of the solver, as Python sees it.
+/// The report of the solver for Python.
 #[derive(Clone, IntoPyObject, FromPyObject)]
 #[pyo3(from_item_all)]
 pub(super) struct Account {
@@ -15,7 +15,7 @@ pub(super) struct Account {
     pub initial_cost: f64,
     pub final_cost: f64,
     pub iterations: usize,
-    /// All of it, and the seconds by stage, as JSON.
+    /// The whole report, and the seconds by stage, as JSON.
     pub outcome: String,
     pub times: String,
 }
@@ -35,12 +35,12 @@ impl Account {
     }
 }
 
-/// A text that [`Account`] has as JSON.
+/// Parses a JSON text of [`Account`].
 pub(super) fn parsed(text: &str) -> PyResult<Json> {
     serde_json::from_str(text).map_err(errors::internal)
 }
 
-/// A factor at the estimate.
+/// State of a factor at the estimate.
 #[derive(IntoPyObject, FromPyObject)]
 #[pyo3(from_item_all)]
 pub(super) struct State {
@@ -66,7 +66,8 @@ impl From<State> for FactorState {
     }
 }
 
-/// The solution of a graph at these values, with the states and weights that the solver has left. It takes no step.
+/// Returns the solution of a graph at these values, with the states and weights of the original solve. It
+/// takes no step.
 pub(super) fn restored(
     graph: &Graph,
     values: &Values,

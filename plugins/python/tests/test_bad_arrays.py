@@ -1,4 +1,4 @@
-"""Whatever array comes in: an exception that names the argument, never a crash."""
+"""Any array gives an exception that names the argument, never a crash."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def add(relative: dict[str, Any] = GOOD, keys: Any = KEYS, **options: Any) -> mf
     try:
         graph.add_many(mf.between_se3, keys, {"relative": relative}, **options)
     finally:
-        # all or none
+        # all factors are added or none
         assert len(graph) in (0, N)
     return graph
 
@@ -67,7 +67,7 @@ COUNTED = np.arange(3.0 * N).reshape(N, 3)
         COUNTED.astype(">f8"),
         np.ma.masked_array(COUNTED, False),
         np.frombuffer(COUNTED.tobytes()).reshape(N, 3),
-        # behind one byte, so that no number lies where processors want it
+        # behind one byte, so that no number is aligned
         np.frombuffer(b"0" + COUNTED.tobytes(), offset=1).reshape(N, 3),
     ],
     ids=lambda array: f"{array.dtype} {array.strides} {array.flags.aligned}",

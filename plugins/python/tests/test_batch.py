@@ -1,4 +1,4 @@
-"""Factors of which Python evaluates a whole batch in one call."""
+"""Factors that Python evaluates for a whole batch in one call."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ RNG = np.random.default_rng(5)
 
 
 def numbers(of: str) -> Any:
-    """Ranges to points, with the derivatives that are asked for, and how often they are."""
+    """A range factor with the chosen kind of derivatives, and a record of its calls."""
     calls: list[int] = []
 
     def by_hand(x: Any, p: Any, measured: Any) -> Any:
@@ -66,7 +66,7 @@ def test_a_batch_is_solved_as_the_built_in_factor_is(of: str) -> None:
     np.testing.assert_allclose(found.costs, expected.costs, atol=1e-7)
     np.testing.assert_allclose(found.covariances(["p2"])["p2"], expected.covariances(["p2"])["p2"], rtol=1e-5, atol=1e-9)
     if of == "by hand":
-        # whole batches: once for each linearization and each cost
+        # whole batches: one call for each linearization and each cost
         assert set(calls) == {300} and len(calls) < 10 * found.iterations + 10
 
 
@@ -150,7 +150,7 @@ def test_what_a_function_raises_ends_the_solve() -> None:
         graph.add("a", factor())
         with pytest.raises(error, match=message):
             mf.solve(graph, values)
-    # nothing is left over
+    # no exception is left over
     graph = mf.Graph()
     graph.add("a", mf.prior_point1(value=mf.Point1(position=[1])))
     assert mf.solve(graph, values).converged

@@ -1,4 +1,4 @@
-"""The constructors are those of the catalogue."""
+"""The constructors match the catalogue."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The documented commands, as a user types them, in a folder of the user's."""
+"""The documented commands, run as a user would, in a temporary folder."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ by = ["frames"]
 metrics = ["ate_se3"]
 resamples = 50
 """
-#: Files with seconds in them.
+#: Files that contain durations.
 TIMES = ("times.csv", "trials.jsonl")
 
 
@@ -41,13 +41,13 @@ TIMES = ("times.csv", "trials.jsonl")
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "base.toml").write_text(BASE)
     (tmp_path / "sweep.toml").write_text(SWEEP)
-    # a window of the terminal does not matter, and neither does a folder of data
+    # neither the width of the terminal nor a folder of data matters
     monkeypatch.delenv("MANIFACTOR_DATA", raising=False)
     return tmp_path
 
 
 def typed(command: str, folder: Path, **options: str) -> subprocess.CompletedProcess[str]:
-    """Runs a command with this interpreter, whose scripts come first."""
+    """Runs a command with this interpreter, whose scripts come first in the path."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     command = re.sub(r"^python\b", sys.executable, command)
     environment = {**os.environ, "PATH": path, **options}
@@ -62,7 +62,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def documented(start: str) -> str:
-    """A command of the page on Python."""
+    """Returns a command from the page on Python."""
     page = " ".join((ROOT / "docs" / "python.md").read_text(encoding="utf-8").split())
     found: str
     (found,) = set(re.findall(rf"`({re.escape(start)}[^`]*)`", page))
@@ -84,7 +84,7 @@ def test_the_command_over_ray_leaves_the_files_of_a_local_one(folder: Path) -> N
 
 
 def workers(parent: int) -> list[int]:
-    """Processes of Ray below a driver that run a trial now."""
+    """Returns the Ray processes below a driver that run a trial now."""
     parents: dict[int, int] = {}
     running: list[int] = []
     for process in Path("/proc").iterdir():

@@ -1,4 +1,4 @@
-"""Copies are copies, and go through `pickle` to the last bit."""
+"""Copies are independent, and `pickle` preserves every bit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The examples of the book run as they stand."""
+"""The examples of the book run unchanged."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def everything(x: mf.Se3, p: mf.Point3, gain: Any, offset: Any, body: Any = (0.1
 
 
 def by_numpy(x: mf.Se3, p: mf.Point3, gain: float, offset: Sequence[float], body: Sequence[float]) -> Any:
-    """The same over numbers."""
+    """The camera factor in NumPy."""
     rotation = mf.rotations(x.rotation[None])[0]
     seen = rotation.T @ (p.position + body - x.translation)
     far = np.linalg.norm(seen)
@@ -189,7 +189,7 @@ def test_a_domain() -> None:
 
 
 def line_of(error: BaseException) -> str:
-    """The last line of this file in a traceback."""
+    """Returns the last line of this file in a traceback."""
     trace, line = error.__traceback__, 0
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == __file__:
@@ -288,7 +288,7 @@ def test_a_formula_is_a_factor_too() -> None:
 
 def test_the_command_line_runs_what_was_written_in_python(tmp_path: Path) -> None:
     graph, values = mf.Graph(), mf.Values({"q3": quadric()})
-    # the key of the examples, which reports name
+    # the key of the examples, which the report uses
     graph.add("q3", stands(up=[0, 0, 1]), noise=0.1)
     graph.add("q3", mf.prior_quadric(value=quadric()), noise=1.0)
     mf.save(tmp_path / "graph.toml", graph, values)

@@ -1,4 +1,4 @@
-"""A forked process computes, whatever its parent has computed before."""
+"""A forked process can compute, even if its parent has computed before."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_a_forked_process_gets_the_result_of_its_parent(work: Callable[[], float
     right = solved() if work is twice_forked else work()
     with concurrent.futures.ProcessPoolExecutor(2, multiprocessing.get_context("fork")) as pool:
         if work is twice_forked:
-            # a daemon may not have children: processes of an executor are none
+            # a daemon may not have children; processes of an executor are not daemons
             assert pool.submit(work).result(90) == right
         else:
             assert {future.result(90) for future in [pool.submit(work) for _ in range(3)]} == {right}

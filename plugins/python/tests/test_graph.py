@@ -1,4 +1,4 @@
-"""Graphs and values: one by one, and many at once."""
+"""Graphs and values, built one by one and in bulk."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ finite = st.floats(-100, 100, allow_subnormal=False)
 
 
 def square() -> tuple[mf.Graph, mf.Values]:
-    """Four poses in a square, with a closure."""
+    """Four poses in a square, with a loop closure."""
     graph, values = mf.Graph(), mf.Values()
     step = mf.Se2(translation=[1, 0], angle=np.pi / 2)
     for i, at in enumerate([(0, 0, 0.1), (1.1, 0, 1.5), (1, 1.2, 3.1), (-0.1, 1, -1.5)]):
@@ -36,7 +36,7 @@ def test_a_square_closes() -> None:
     assert isinstance(corner, mf.Se2)
     np.testing.assert_allclose(corner.translation, [1, 1], atol=1e-6)
     assert "converged" in repr(solution) and "<table>" in solution._repr_html_()
-    # the graph and its first values are as they were
+    # the graph and its initial values are unchanged
     assert values["x1"].angle == 1.5 and len(graph) == 5
 
 
@@ -96,7 +96,7 @@ def test_a_hundred_thousand_factors_take_no_time() -> None:
     begun = time.perf_counter()
     graph.add_many(mf.between_se3, keys, fields, noise=0.1)
     seconds = time.perf_counter() - begun
-    # 0.1 s where nothing else runs; a document for each would take some seconds
+    # 0.1 s on an idle machine; one document per factor would take several seconds
     assert len(graph) == n and seconds < 1.5
 
 

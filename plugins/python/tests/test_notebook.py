@@ -1,4 +1,4 @@
-"""The notebook of the examples runs from top to bottom, and is kept without what it prints."""
+"""The notebook of the examples runs from top to bottom, and is stored without output."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_a_change_of_a_solution_is_an_error_and_of_a_copy_is_none() -> None:
     changed = copy.copy(solution.values)
     changed["b"] = ZERO
     assert changed["b"] == ZERO and solution.values["b"] == estimate
-    # a start for the next solve
+    # the estimate as initial values of the next solve
     assert mf.solve(solution.graph, solution.values).converged
 
 
@@ -107,7 +107,7 @@ def test_fields_within_fields_are_for_reading() -> None:
     with pytest.raises(TypeError):
         graph.fixed["a"] = True  # type: ignore[index]
     assert graph.fixed == {"a": ["x"]}
-    # a method returns a copy
+    # the method returns a copy
     own = factor.to_dict()
     own["relative"]["angle"] = 5
 

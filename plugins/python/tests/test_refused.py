@@ -1,4 +1,4 @@
-"""The call that adds a factor or a noise refuses input that no solve accepts."""
+"""Adding a factor or a noise that no solve accepts is an error."""
 
 from __future__ import annotations
 

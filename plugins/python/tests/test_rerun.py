@@ -1,4 +1,4 @@
-"""Runs and sessions in the viewer: what is written reads back."""
+"""Runs and sessions in the viewer: a written recording reads back."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_a_recording_has_what_the_report_has(tmp_path: Path) -> None:
 
 
 def frame(number: int) -> tuple[mf.Graph, mf.Values]:
-    """A camera that moves along x past an object, and sees it in a box."""
+    """A camera that moves along x past an object, and detects it as a box."""
     pose = mf.Se3(translation=[0.1 * number, 0, 0], rotation=[0, 0, 0, 1])
     graph, values = mf.Graph(), mf.Values({f"x{number}": pose})
     if number == 0:
@@ -103,7 +103,7 @@ def test_a_viewer_that_is_not_there_is_named(tmp_path: Path, monkeypatch: pytest
 
 
 def logged(path: Path) -> list[tuple[str, dict[str, Any]]]:
-    """What a recording has, row by row, as rerun reads it: the entity, its components and its times."""
+    """Returns the rows of a recording as rerun reads them: the entity, its components and its times."""
     try:
         from rerun.chunk import RrdReader
     except ImportError:

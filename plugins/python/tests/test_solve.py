@@ -1,4 +1,4 @@
-"""Solving: what a solution tells, what ends a solve, and graphs that grow."""
+"""Solving: reports, the end of a solve, and graphs that grow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Experiments in parts and over Ray end with the tables of a single run."""
+"""Experiments in parts and over Ray give the tables of a single run."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_parts_are_merged(sweep: Path, tmp_path: Path) -> None:
 
 
 def workers() -> list[int]:
-    """Processes of Ray that run a trial now."""
+    """Returns the Ray processes that run a trial now."""
     found = []
     for process in Path("/proc").iterdir():
         try:

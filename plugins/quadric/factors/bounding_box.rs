@@ -1,4 +1,4 @@
-//! An object is seen where a detector drew a box.
+//! A detected bounding box of an object in an image.
 use crate::shapes::BoundingBox;
 use crate::shapes::DualQuadric;
 use crate::shapes::Ellipsoid;
@@ -8,29 +8,29 @@ use manifactor_geometry::{Camera, Se3};
 use manifactor_graph::prelude::*;
 use nalgebra::{Matrix4x6, SMatrix};
 
-/// What of a cut object has to be left in the image, in pixels: no detector draws boxes of less.
+/// Minimum visible extent of a cut object, in pixels: no detector draws a smaller box.
 const VISIBLE: f64 = 1.0;
 
-/// The box around an object's outline is the one that was drawn: r = β(x, q) - b, in pixels.
+/// A detector measures the box around an object's outline: r = β(x, q) - b, in pixels.
 ///
-/// Variables: the pose of the camera (from the camera's frame, z forward, to the world's) and the
-/// object. Rows: xmin, ymin, xmax, ymax. The sign is estimate minus measurement, as in all factors here;
-/// Jablonsky et al. write b - β, which has the same square.
+/// Variables: the pose of the camera (from the camera's frame, z forward, to the world frame) and the object.
+/// Rows: xmin, ymin, xmax, ymax. The sign is estimate minus measurement, as in all factors of this library;
+/// Jablonsky et al. use b - β, which gives an equal cost.
 ///
-/// `model` says what β is. *standard*: the bounds of the whole ellipse C* = P Q* Pᵀ. *truncated*: the
-/// bounds of what is inside of the image (Nicholson et al., QuadricSLAM), so that a box that the border
-/// cuts does not pull. With the standard model, mask such sides: `noise = { sigma = 20.0, observed =
-/// [false, true, true, true] }`.
+/// `model` selects β. *standard*: the bounds of the whole ellipse C* = P Q* Pᵀ. *truncated*: the bounds of
+/// the part inside the image (Nicholson et al., QuadricSLAM), so that a box cut by the border does not pull
+/// the object. With the standard model, mask such sides: `noise = { sigma = 20.0, observed = [false, true,
+/// true, true] }`.
 ///
-/// Where it means something: the whole object is in front of the camera, by a millionth of its distance.
-/// Behind the camera, around it (the camera inside) and across its plane the outline is no box, and the
-/// factor is inactive; so is a truncated one of which less than a pixel is left in the image. An
-/// inactive factor has residual zero.
+/// Defined only if the whole object is in front of the camera, by a millionth of its distance. If it is
+/// behind the camera, around it or across its plane, the outline is no box and the factor is inactive. With
+/// the truncated model the factor is also inactive if less than a pixel of the outline is left in the image.
+/// An inactive factor has residual zero.
 ///
-/// Kinks: the bounds are smooth where the object is in front. A truncated side stops at the border: from
-/// there on, the border included, its derivative is zero, so an object that fills the image is held by
-/// nothing. Where the border cuts off the end of the ellipse, the side moves to the point where they
-/// meet; its derivative has no jump there, but grows without limit as the last pixel leaves the image.
+/// Kinks: the bounds are smooth while the object is in front. With the truncated model a side stops at the
+/// border. From there on, including the border, its derivative is zero, so an object that fills the image is
+/// not constrained. If the border cuts off the end of the ellipse, the side moves to the intersection of the
+/// two. Its derivative does not jump there, but grows without limit as the last pixel leaves the image.
 ///
 /// ```toml
 /// [[factors]]
@@ -41,29 +41,29 @@ const VISIBLE: f64 = 1.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundingBoxFactor {
-    /// The box that was measured: xmin, ymin, xmax, ymax, in pixels.
+    /// Measured box: xmin, ymin, xmax, ymax, in pixels.
     #[serde(rename = "box")]
     pub bounding_box: BoundingBox,
-    /// The camera that saw it.
+    /// The calibrated camera.
     pub camera: Camera,
-    /// What of the object the box goes around.
+    /// Part of the object that the box encloses.
     #[serde(default)]
     pub model: BoxModel,
 }
 
-/// What of an object a box goes around.
+/// Part of an object that a box encloses.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BoxModel {
-    /// All of it, even outside of the image.
+    /// The whole object, including parts outside the image.
     #[default]
     Standard,
-    /// What is inside of the image.
+    /// The part inside the image.
     Truncated,
 }
 
 impl BoundingBoxFactor {
-    /// The sides of β; `None` where the factor is not defined.
+    /// Returns the sides of β; `None` if the factor is not defined.
     #[inline(always)]
     pub(super) fn sides<T: Scalar>(&self, ellipsoid: &Ellipsoid<T>) -> Option<[Side<T>; 4]> {
         if !ellipsoid.is_in_front() {
@@ -85,7 +85,7 @@ impl BoundingBoxFactor {
         (left(xmax - xmin, width) && left(ymax - ymin, height)).then_some(sides)
     }
 
-    /// The box that this object should have in that camera; `None` where it has none.
+    /// Returns the predicted box of the object in the camera's image; `None` if the factor is not defined.
     pub fn predict(&self, world_from_camera: &Se3, quadric: &DualQuadric) -> Option<BoundingBox> {
         let sides = self.sides(&Ellipsoid::seen(world_from_camera, quadric))?;
         Some(BoundingBox::from_bounds(sides.map(|s| s.bound())))
@@ -98,7 +98,7 @@ impl BoundingBoxFactor {
 }
 
 impl BoundingBoxFactor {
-    /// The residual and its derivatives; zeros and `None` where the factor is not defined.
+    /// Returns the residual and writes its derivatives. Zeros and `None` if the factor is not defined.
     pub(super) fn derive(
         &self,
         (camera, quadric): (&Se3, &DualQuadric),

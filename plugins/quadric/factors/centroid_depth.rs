@@ -1,12 +1,14 @@
-//! How far away an object is.
+//! Measured depth of an object.
 use crate::DualQuadric;
 use manifactor_geometry::Se3;
 use manifactor_graph::checked::Positive;
 use manifactor_graph::prelude::*;
 
-/// An object's centre is at this depth: r = (Rᵀ(c - t))ᶻ - depth, c the centroid, R and t the camera's pose.
+/// A camera measures the depth of an object's centre: r = (Rᵀ(c - t))ᶻ - depth, c the centroid, R and t the
+/// camera's pose.
 ///
-/// The depth is along the optical axis, as depth images have it, in metres. It says nothing of the object's size. Defined everywhere.
+/// The depth is along the optical axis, as in depth images, in metres. It does not constrain the object's
+/// size. Defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -17,7 +19,7 @@ use manifactor_graph::prelude::*;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CentroidDepth {
-    /// In metres.
+    /// Measured depth, in metres.
     pub depth: Positive,
 }
 

@@ -1,10 +1,10 @@
-//! An object stands, or lies.
+//! Orientation of an object: its major axis is vertical or horizontal.
 use crate::DualQuadric;
 use crate::shapes::turned;
 use manifactor_graph::prelude::*;
 
-/// A factor on the major semi-axis m of an object and the world's up: its docs, its name, its residual, and about which
-/// axis an object may turn without a change of it.
+/// Defines a factor of the major semi-axis m of an object and the world's up direction: its docs, name and
+/// residual, and the axis of rotations that leave it unchanged.
 macro_rules! orientation {
     ($(#[doc = $doc:literal])* $type:ident = $name:literal: $dim:ty = |$m:ident, $up:ident| $residual:expr;
      $free:literal: |$factor:ident, $quadric:ident| $axis:expr) => {
@@ -12,7 +12,7 @@ macro_rules! orientation {
         #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(deny_unknown_fields)]
         pub struct $type {
-            /// The world's up, of any length but zero. Default: z.
+            /// The world's up direction, of any length but zero. Default: z.
             #[serde(default)]
             pub up: Up,
         }
@@ -36,12 +36,12 @@ macro_rules! orientation {
 orientation! {
     /// The major semi-axis m of an object is vertical: r = 1 - |m · up|   (Jablonsky et al., eq. 7).
     ///
-    /// Turning about `up`, moving, growing and turning upside down leave it unchanged. Its derivative
-    /// vanishes where m is vertical, so the last digits come slowly there;
-    /// `vertical_orientation_smooth` has no such place. Where m is exactly horizontal, |·| has a kink;
-    /// the derivative is that of m · up > 0. m is the longest semi-axis at the current estimate, the first
-    /// of equals: where another becomes the longest, the residual jumps to the angle of that axis, and a
-    /// nearly round object is pulled by whichever axis leads. It is defined everywhere.
+    /// Invariant to rotation about `up`, to moving and scaling, and to turning the object upside down. Its
+    /// derivative vanishes if m is vertical, so convergence slows down close to it;
+    /// `vertical_orientation_smooth` avoids this. If m is exactly horizontal, |·| has a kink; the derivative
+    /// for m · up > 0 is used. m is the longest semi-axis at the current estimate, the first of equal ones.
+    /// If a different axis becomes the longest, the residual jumps to the angle of that axis, and a nearly
+    /// round object is pulled by whichever axis is longest. Defined everywhere.
     ///
     /// ```toml
     /// [[factors]]
@@ -56,10 +56,11 @@ orientation! {
 orientation! {
     /// The major semi-axis m of an object is vertical: r = m × up, of length sin(tilt).
     ///
-    /// The components of m perpendicular to `up`, turned by a quarter about it: `vertical_orientation`
-    /// without its kink and without its flat place, so that Gauss-Newton converges at its usual speed.
-    /// σ is in radians of tilt, near the vertical. The jump between axes of equal length is the same.
-    /// A horizontal m is a maximum, where the derivative of the cost vanishes.
+    /// The residual is the component of m perpendicular to `up`, turned by a quarter about it. Unlike
+    /// `vertical_orientation` it has no kink and no vanishing derivative at the solution, so Gauss-Newton
+    /// converges at its usual rate. σ is in radians of tilt, close to the vertical. The jump between axes of
+    /// equal length is as in `vertical_orientation`. A horizontal m is a maximum, at which the derivative of
+    /// the cost vanishes.
     ///
     /// ```toml
     /// [[factors]]
@@ -74,10 +75,10 @@ orientation! {
 orientation! {
     /// The major semi-axis m of an object is horizontal: r = 0 - |m · up|   (Jablonsky et al., eq. 7).
     ///
-    /// Turning about `up`, about m, moving and growing leave it unchanged. Where m is exactly horizontal,
-    /// |·| has a kink, its square has none: the derivative taken there is that of m · up > 0, and it is
-    /// not zero. Where m is vertical, the derivative vanishes. m is the longest semi-axis at the current
-    /// estimate, the first of equals: where another becomes the longest, the residual jumps. It is defined
+    /// Invariant to rotation about `up` and about m, to moving and to scaling. If m is exactly horizontal,
+    /// |·| has a kink, but its square has none. The derivative for m · up > 0 is used there, and it is not
+    /// zero. If m is vertical, the derivative vanishes. m is the longest semi-axis at the current estimate,
+    /// the first of equal ones. If a different axis becomes the longest, the residual jumps. Defined
     /// everywhere.
     ///
     /// ```toml
@@ -93,9 +94,9 @@ orientation! {
 orientation! {
     /// The major semi-axis m of an object is horizontal: r = m · up, the sine of its elevation.
     ///
-    /// `horizontal_orientation` without the absolute value: its square is the same, the sign of m does not
-    /// matter, and the residual has no kink. σ is in radians, near the horizontal. The jump between axes of
-    /// equal length is the same.
+    /// `horizontal_orientation` without the absolute value: the cost is equal, the sign of m does not matter,
+    /// and the residual has no kink. σ is in radians, close to the horizontal. The jump between axes of equal
+    /// length is as in `horizontal_orientation`.
     ///
     /// ```toml
     /// [[factors]]

@@ -1,14 +1,14 @@
-//! What is known of an object beforehand.
+//! Prior on the pose and size of an object.
 use crate::DualQuadric;
 use manifactor_graph::prelude::*;
 use nalgebra::{SMatrix, SVector};
 
-/// An object is close to `value`: r = (Log(Z⁻¹X), log(s/s₀)), pose first.
+/// A prior: the object is close to `value`: r = (Log(Z⁻¹X), log(s/s₀)), pose first.
 ///
-/// Rows: rotation in radians, translation in metres, both in the prior's frame, then the logarithms of
-/// the semi-axes, axis by axis: 0.1 is 10 % of size. To say something of the pose only, or of the size
-/// only, mask the other rows by `observed`. Two rotations half a turn apart have two shortest ways
-/// between them: there the residual jumps, though half a turn about an axis leaves the ellipsoid as it is.
+/// Rows: rotation in radians and translation in metres, both in the prior's frame, then the logarithms of the
+/// semi-axes, axis by axis: 0.1 is 10 % of size. To constrain only the pose or only the size, mask the
+/// remaining rows with `observed`. Two rotations half a turn apart have two shortest paths between them, so
+/// the residual jumps there, although half a turn about an axis leaves the ellipsoid unchanged.
 ///
 /// ```toml
 /// [[factors]]
@@ -19,7 +19,7 @@ use nalgebra::{SMatrix, SVector};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QuadricPrior {
-    /// What the object is expected to be.
+    /// Expected pose and semi-axes of the object.
     pub value: DualQuadric,
 }
 

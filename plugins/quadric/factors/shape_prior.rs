@@ -1,12 +1,12 @@
-//! Of what shape objects of a class are.
+//! Prior on the proportions of objects of a class.
 use crate::DualQuadric;
 use crate::shapes::{AxisOrder, SemiAxes};
 use manifactor_graph::prelude::*;
 
-/// An object has the proportions of those of its class, at any size: r = log(s/s₀) less its mean.
+/// An object has the proportions of its class, at any size: r = log(s/s₀) minus its mean.
 ///
-/// Three rows that add up to zero, so they constrain two directions and leave the size free. The order
-/// of the axes is as in `size_prior`, and so are its kinks and what equal lengths bring about. Defined everywhere.
+/// Three rows that sum to zero, so they constrain two directions and leave the size free. The order of the
+/// axes is as in `size_prior`, including its kinks and the effects of equal lengths. Defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -17,9 +17,9 @@ use manifactor_graph::prelude::*;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShapePrior {
-    /// The proportions: semi-axes at any scale.
+    /// Proportions of the class: semi-axes at any scale.
     pub semi_axes: SemiAxes,
-    /// Which is compared with which.
+    /// Order of the semi-axes in the comparison.
     #[serde(default)]
     pub order: AxisOrder,
 }

@@ -1,21 +1,21 @@
-//! How large objects of a class are.
+//! Prior on the size of objects of a class.
 use crate::DualQuadric;
 use crate::shapes::{AxisOrder, SemiAxes};
 use manifactor_graph::prelude::*;
 
-/// An object is as large as those of its class: r = log(s/s₀), the shortest semi-axis first.
+/// An object has the size of its class: r = log(s/s₀), the shortest semi-axis first.
 ///
-/// σ is relative: 0.2 is some 20 %. With `order = "sorted"`, semi-axes are compared by size, so that it
-/// does not matter how the object's axes are numbered; where two of them are equally long, the residual
-/// is continuous, its derivative jumps from the one axis to the other, the first as it stands being
-/// taken for the shorter. Where the two usual lengths are equal as well, the cost has no kink there. With `order = "as_given"`, x is compared with the first, and so on. Defined
-/// everywhere.
+/// σ is relative: 0.2 is about 20 %. With `order = "sorted"`, semi-axes are compared by size, so the
+/// numbering of the object's axes does not matter. If two semi-axes are equally long, the residual is
+/// continuous, but its derivative jumps between the two axes; the first in the current numbering counts as
+/// the shorter one. If the two usual lengths are equal as well, the cost has no kink there. With `order =
+/// "as_given"`, x is compared with the first usual length, and so on. Defined everywhere.
 ///
-/// Two equal lengths, as of a bottle, pull the object towards one that is round about its third axis. How it is
-/// turned about that axis is then open, or hard to find: near the round shape this angle is like the angle of polar
-/// coordinates near their origin. Where boxes from two places alone say how the object is turned, solvers may take
-/// hundreds of steps, in which the cost hardly falls. `prior_quadric`, or boxes from more sides, hold that angle.
-///
+/// Two equal usual lengths, as for a bottle, pull the object towards a shape that is round about its third
+/// axis. The rotation about that axis is then undetermined or poorly determined: close to the round shape it
+/// behaves like the angle of polar coordinates close to the origin. If only boxes from two places determine
+/// the rotation, solvers may take hundreds of steps during which the cost hardly falls. `prior_quadric`, or
+/// boxes from more sides, determine this rotation.
 /// ```toml
 /// [[factors]]
 /// keys   = ["q0"]
@@ -25,9 +25,9 @@ use manifactor_graph::prelude::*;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SizePrior {
-    /// The usual semi-axes, half the extents, in metres.
+    /// Usual semi-axes (half the extents), in metres.
     pub semi_axes: SemiAxes,
-    /// Which is compared with which.
+    /// Order of the semi-axes in the comparison.
     #[serde(default)]
     pub order: AxisOrder,
 }

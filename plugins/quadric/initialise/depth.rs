@@ -1,4 +1,4 @@
-//! A box and how far away its middle is: one view is enough.
+//! Initial estimate from a box and the depth at its centre; one view is enough.
 use super::{InitialiseError, Initialiser, View, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
 use manifactor_graph::checked::NotNegative;
@@ -7,14 +7,13 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An ellipsoid behind the surface that was measured in the middle of the box, with axes along the
-/// world's.
+/// An ellipsoid behind the surface measured at the centre of the box, with axes along the world axes.
 ///
-/// A depth is that of the surface; the centre lies deeper by `thickness` times the mean of half the
-/// width and half the height. Several views are averaged. The semi-axes follow from the sides of the
-/// boxes as for `rays`; a single view says nothing of the depth of the object, which becomes that of a
-/// ball. Views without a depth count for the sides only. It is rejected unless all of it is in front of
-/// every camera.
+/// The depth belongs to the surface; the centre is deeper by `thickness` times the mean of half the width and
+/// half the height. Several views are averaged. The semi-axes follow from the sides of the boxes as for
+/// `rays`. A single view does not determine the extent along the line of sight, so the extent of a ball is
+/// used. Views without a depth contribute only their sides. The result is rejected unless the whole object is
+/// in front of every camera.
 ///
 /// ```toml
 /// initialiser = { type = "depth", thickness = 1.0 }
@@ -22,8 +21,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Depth {
-    /// How deep objects are, relative to their width and height: 1 for a ball, 0 where the depth is
-    /// that of the centre.
+    /// Depth of objects relative to their width and height: 1 for a ball, 0 if the measured depth belongs to
+    /// the centre.
     pub thickness: NotNegative,
 }
 
@@ -34,11 +33,11 @@ impl Default for Depth {
 }
 
 impl Depth {
-    /// The centre, in the world's frame.
+    /// Returns the centre in the world frame.
     fn centroid(&self, view: &View) -> Option<Vector3<f64>> {
         let depth = view.depth.filter(|depth| *depth > 0.0)?;
         let (b, camera) = (&view.bounding_box, &view.camera);
-        // half the size at depth 1; the box may be so large that no such object is behind the surface
+        // Half the size at depth 1. The clamp handles boxes too large for an object behind the surface.
         let half = (b.width() / camera.fx + b.height() / camera.fy) / 4.0;
         let z = depth / (1.0 - (*self.thickness * half).clamp(0.0, 0.5));
         Some(view.world_from_camera.act(&(camera.ray(b.centre()) * z)))

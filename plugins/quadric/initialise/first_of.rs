@@ -1,4 +1,4 @@
-//! One way after the other.
+//! Initialisers tried one after another.
 use super::{InitialiseError, Initialiser, View};
 use crate::shapes::DualQuadric;
 use manifactor_graph::register;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// The first of several initialisers that succeeds.
 ///
-/// If none does, the error names what each of them ran into.
+/// If none succeeds, the error lists the error of each.
 ///
 /// ```toml
 /// initialiser = { type = "first_of", initialisers = [{ type = "svd" }, { type = "rays" }] }
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FirstOf {
-    /// What to try, in this order.
+    /// Initialisers to try, in this order.
     #[schemars(length(min = 1))]
     pub initialisers: Vec<Box<dyn Initialiser>>,
 }

@@ -1,4 +1,4 @@
-//! Where lines of sight meet, with a size from the boxes.
+//! Initial estimate from the intersection of lines of sight, with a size from the boxes.
 use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
 use manifactor_graph::checked::NotNegative;
@@ -6,12 +6,13 @@ use manifactor_graph::register;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An ellipsoid where the middles of the boxes meet, with axes along the world's.
+/// An ellipsoid at the intersection of the lines of sight, with axes along the world axes.
 ///
-/// The centre is nearest to all planes through a camera and the middle of its box; the semi-axes make
-/// the planes of the sides touch it best, drawn a little to a ball. Both are linear least squares: less
-/// exact than `svd`, and much harder to upset, as every result is an ellipsoid. Two views will do. It is
-/// rejected unless all of it is in front of every camera.
+/// The centre is the point closest to all planes through a camera and the centre of its box. The semi-axes
+/// make the ellipsoid touch the planes of the sides as closely as possible, with a weak pull towards a ball.
+/// Both are linear least-squares problems. The result is less accurate than with `svd` but much more robust,
+/// as it is always an ellipsoid. Two views are enough. The result is rejected unless the whole object is in
+/// front of every camera.
 ///
 /// ```toml
 /// initialiser = { type = "rays", min_views = 2, min_parallax = 1.0 }
@@ -19,9 +20,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rays {
-    /// The least number of views, 2 or more.
+    /// Minimum number of views, 2 or more.
     pub min_views: usize,
-    /// The least angle between the lines of sight of two views, in degrees.
+    /// Minimum angle between the lines of sight of two views, in degrees.
     pub min_parallax: NotNegative,
 }
 

@@ -5,15 +5,16 @@ use crate::shapes::SemiAxes;
 use manifactor_geometry::{Se3, So3};
 use nalgebra::{Matrix3, Vector3};
 
-/// How strongly an ellipsoid is drawn to a ball, relative to the planes: views from one side say
-/// nothing of its depth.
+/// Weight of the pull towards a ball, relative to the planes. Views from one side do not determine the extent
+/// along the line of sight.
 const TO_A_BALL: f64 = 0.01;
-/// The shortest semi-axis, relative to their mean.
+/// Minimum semi-axis, relative to the mean of the three.
 const THINNEST: f64 = 0.1;
 
-/// The point next to all planes through a camera and the middle of its box: n·(x - c) = 0.
+/// Returns the point closest to all planes through a camera and the centre of its box: n·(x - c) = 0.
 ///
-/// Middles, not sides: a box that is cut on one side still has the other middle.
+/// Centre lines are used instead of sides, because a box that is cut on one side still has the centre line of
+/// one axis.
 pub(super) fn centroid(views: &[View]) -> Result<Vector3<f64>, InitialiseError> {
     let (mut h, mut g, mut planes) = (Matrix3::zeros(), Vector3::zeros(), 0);
     for view in views {
@@ -35,9 +36,11 @@ pub(super) fn centroid(views: &[View]) -> Result<Vector3<f64>, InitialiseError> 
     x.filter(|x| x.iter().all(|x| x.is_finite())).ok_or(InitialiseError::Undetermined)
 }
 
-/// The ellipsoid at `centroid` with axes along the world's that touches the planes of all sides best.
+/// Returns the ellipsoid at `centroid`, with axes along the world axes, that best touches the planes of all
+/// sides.
 ///
-/// A plane with unit normal n at a distance h touches where nᵀAn = h²: linear in A = diag(a², b², c²).
+/// A plane with unit normal n at distance h touches the ellipsoid if nᵀAn = h², which is linear in A =
+/// diag(a², b², c²).
 pub(super) fn ellipsoid(views: &[View], centroid: Vector3<f64>) -> Result<DualQuadric, InitialiseError> {
     let mut planes = vec![];
     for view in views {

@@ -1,4 +1,4 @@
-//! The dual quadric that all sides of all boxes touch, by a singular value decomposition.
+//! The dual quadric that touches the planes of all box sides, from a singular value decomposition.
 use super::{InitialiseError, Initialiser, View, check_parallax, check_views, check_visible, shape};
 use crate::shapes::DualQuadric;
 use crate::shapes::OnHyperboloid;
@@ -8,21 +8,21 @@ use nalgebra::{DMatrix, Dyn, Matrix4, SVD, Vector3, Vector4};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Planes that determine the ten entries of Q* up to scale.
+/// Number of planes that determine the ten entries of Q* up to scale.
 const NEEDED: usize = 9;
 
-/// The surface that the planes of all sides touch: πᵀQ*π = 0, linear in Q*, by SVD.
+/// The surface that touches the planes of all box sides: πᵀQ*π = 0, linear in Q*, by SVD.
 ///
 /// Each side of each box gives a plane π = Pᵀl and a row (π₁², 2π₁π₂, …, π₄²) of equations for the ten
-/// entries of Q*. The surface is rejected where it is no ellipsoid, and where not all of it is in front
-/// of every camera (so that no camera is inside of it, and every outline is an ellipse). Seen from one
-/// side only, noise often makes it a hyperboloid: follow it by `rays`, see `first_of`.
+/// entries of Q*. The result is rejected unless it is an ellipsoid completely in front of every camera, so
+/// that no camera is inside and every outline is an ellipse. If all views are from one side, noise often
+/// makes it a hyperboloid; use `rays` as a fallback, see `first_of`.
 ///
-/// With `normalised`, planes have unit normals, lengths count from where the boxes' middles meet, in
-/// units of the object's size, and the equations are solved with Q*₄₄ = -1: it does not matter how far
-/// away the origin of the world is. Without, the rows are those of the pixels and Q* is the last right
-/// singular vector, as in the code of Nicholson et al., QuadricSLAM; with `on_hyperboloid = "absolute"`
-/// it is what that code does.
+/// With `normalised`, planes have unit normals, and lengths are relative to the intersection of the lines of
+/// sight and the size of the object. The equations are solved with Q*₄₄ = -1. The result then does not depend
+/// on the distance to the world origin. Without `normalised`, the rows are in pixels and Q* is the last right
+/// singular vector, as in the code of Nicholson et al., QuadricSLAM; `on_hyperboloid = "absolute"` reproduces
+/// that code.
 ///
 /// ```toml
 /// initialiser = { type = "svd", min_views = 3, normalised = true }
@@ -30,13 +30,13 @@ const NEEDED: usize = 9;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Svd {
-    /// The least number of views; 3 determine it, if they have all their sides.
+    /// Minimum number of views. 3 are sufficient if all their sides are observed.
     pub min_views: usize,
-    /// The least angle between the lines of sight of two views, in degrees.
+    /// Minimum angle between the lines of sight of two views, in degrees.
     pub min_parallax: NotNegative,
     /// Whether the system is scaled to be well conditioned.
     pub normalised: bool,
-    /// What to make of a surface that is no ellipsoid: `reject`, or the `absolute` values of its squared
+    /// Treatment of a surface that is not an ellipsoid: `reject`, or use the `absolute` values of its squared
     /// semi-axes.
     pub on_hyperboloid: OnHyperboloid,
 }
@@ -69,7 +69,7 @@ impl Initialiser for Svd {
 }
 register!(dyn Initialiser, "svd", Svd);
 
-/// π = Pᵀl
+/// Returns the planes π = Pᵀl of all observed sides.
 fn pixel_planes(views: &[View]) -> Vec<Vector4<f64>> {
     let mut planes = vec![];
     for view in views {
@@ -79,7 +79,7 @@ fn pixel_planes(views: &[View]) -> Vec<Vector4<f64>> {
     planes
 }
 
-/// Q* from planes with unit normals, in a frame at the object and of its size.
+/// Computes Q* from planes with unit normals, in a frame centred at the object and scaled by its size.
 fn normalised(views: &[View]) -> Result<Matrix4<f64>, InitialiseError> {
     let origin = shape::centroid(views)?;
     let mut planes: Vec<Vector4<f64>> = vec![];
@@ -97,14 +97,14 @@ fn normalised(views: &[View]) -> Result<Matrix4<f64>, InitialiseError> {
     for plane in &mut planes {
         plane.w /= size;
     }
-    // points x = size y + origin
+    // Transforms back: points x = size y + origin.
     let back = Matrix4::new_scaling(size).append_translation(&origin);
     Ok(back * with_unit_corner(&planes)? * back.transpose())
 }
 
-/// The matrix of the equations πᵀQπ = 0 in the ten entries of the upper triangle of Q, by rows.
+/// Returns the matrix of the equations πᵀQπ = 0 in the ten entries of the upper triangle of Q, by rows.
 fn system(planes: &[Vector4<f64>]) -> DMatrix<f64> {
-    // ten rows at least: a thin decomposition of fewer leaves the null space out
+    // At least ten rows: with fewer, a thin decomposition omits the null space.
     let mut system = DMatrix::zeros(planes.len().max(10), 10);
     for (i, p) in planes.iter().enumerate() {
         let mut column = 0;
@@ -118,7 +118,7 @@ fn system(planes: &[Vector4<f64>]) -> DMatrix<f64> {
     system
 }
 
-/// The symmetric matrix of an upper triangle, given by rows.
+/// Returns the symmetric matrix of an upper triangle, given by rows.
 fn symmetric(q: &[f64; 10]) -> Matrix4<f64> {
     Matrix4::new(
         q[0], q[1], q[2], q[3], //
@@ -132,17 +132,17 @@ fn decomposed(system: DMatrix<f64>, left: bool) -> Result<SVD<f64, Dyn, Dyn>, In
     SVD::try_new(system, left, true, f64::EPSILON, 1000).ok_or(InitialiseError::Undetermined)
 }
 
-/// The Q of norm 1 that makes Σ(πᵀQπ)² smallest: the last right singular vector.
+/// Returns the Q of norm 1 that minimizes Σ(πᵀQπ)²: the last right singular vector.
 fn null_space(planes: &[Vector4<f64>]) -> Result<Matrix4<f64>, InitialiseError> {
     let v_t = decomposed(system(planes), false)?.v_t.ok_or(InitialiseError::Undetermined)?;
     Ok(symmetric(&std::array::from_fn(|i| v_t[(9, i)])))
 }
 
-/// The Q with Q₄₄ = -1 that makes Σ(πᵀQπ)² smallest.
+/// Returns the Q with Q₄₄ = -1 that minimizes Σ(πᵀQπ)².
 ///
-/// Noise is in the offsets of the planes, so in the squares of lengths, which stand on the right-hand
-/// side. A vector of norm 1 would have to share it out among directions too, which are exact: that
-/// draws the surface to a hyperboloid.
+/// Noise affects the offsets of the planes and thus the squared lengths, which are on the right-hand side. A
+/// solution of norm 1 would also distribute the noise over the exact directions, which biases the surface
+/// towards a hyperboloid.
 fn with_unit_corner(planes: &[Vector4<f64>]) -> Result<Matrix4<f64>, InitialiseError> {
     let system = system(planes);
     let svd = decomposed(system.columns(0, 9).into_owned(), true)?;

@@ -10,14 +10,14 @@ fn camera() -> Camera {
     Camera::new([525.0, 520.0, 320.0, 240.0], 640, 480).unwrap()
 }
 
-/// A camera at `eye` that looks at the origin.
+/// A camera at `eye`, facing the origin.
 fn looking_from(eye: Vector3<f64>) -> Se3 {
     let z = -eye.normalize();
     let x = z.cross(&Vector3::z()).normalize();
     Se3::new(So3::from_matrix(&Matrix3::from_columns(&[x, z.cross(&x), z])), eye)
 }
 
-/// Eyes on an arc of so many radians at some distance, at changing heights.
+/// Eyes on an arc of `radians` at some distance, at varying heights.
 fn arc(count: usize, radians: f64, distance: f64) -> Vec<Se3> {
     let eye = |i: usize| {
         let a = radians * i as f64 / count as f64;
@@ -27,8 +27,8 @@ fn arc(count: usize, radians: f64, distance: f64) -> Vec<Se3> {
     (0..count).map(eye).collect()
 }
 
-/// The box that the truth has in each view, its sides off by up to `noise` pixels, and with the depth
-/// of the surface on the line through the middle of the box.
+/// Boxes of the true object in each view, with up to `noise` pixels of error on the sides, and the depth of
+/// the surface on the line through the box centre.
 fn views(truth: &DualQuadric, poses: &[Se3], noise: f64) -> Vec<View> {
     let blank = BoundingBoxFactor {
         bounding_box: BoundingBox::new([0.0; 4]).unwrap(),
@@ -46,7 +46,7 @@ fn views(truth: &DualQuadric, poses: &[Se3], noise: f64) -> Vec<View> {
     poses.iter().enumerate().map(one).collect()
 }
 
-/// Where the line through the middle of the box enters the truth.
+/// Depth at which the line through the box centre enters the true object.
 fn surface(truth: &DualQuadric, view: &View) -> Option<f64> {
     let ray = view.camera.ray(view.bounding_box.centre());
     let local = truth.pose.between(&view.world_from_camera);
@@ -86,7 +86,7 @@ fn svd_finds_the_object_from_exact_boxes() {
     }
 }
 
-/// Mean IoU over 40 objects so far from the origin of the world; 0 where none is found.
+/// Mean IoU over 40 objects at this distance from the world origin; a failed estimate counts as 0.
 fn mean_iou(svd: &Svd, distance: f64, noise: f64) -> f64 {
     let away = Se3::new(So3::identity(), Vector3::new(1.0, -0.7, 0.2) * distance);
     let poses: Vec<_> = arc(12, 1.5, 2.0).iter().map(|p| away.compose(p)).collect();
@@ -135,7 +135,7 @@ fn rays_meet_at_the_object_whatever_the_noise() {
         let (size, truth_norm) = (truth.semi_axes.max(), truth.semi_axes.norm());
         let off = (found.centroid() - truth.centroid()).norm();
         assert!(off < 0.1 * size + 0.02, "{off}");
-        // axes along the world's cannot follow a stick that leans, but they say how large it is
+        // Axes along the world axes cannot follow a leaning stick, but the size is right.
         let ratio = found.semi_axes.norm() / truth_norm;
         assert!((0.7..1.4).contains(&ratio), "{ratio}");
         Ok(())
@@ -189,7 +189,7 @@ fn what_cannot_be_initialised_says_why() {
         Err(InitialiseError::Undetermined)
     );
 
-    // cameras turned away from where their lines of sight meet
+    // Cameras that face away from the intersection of their lines of sight.
     let away = So3::exp(&(Vector3::y() * std::f64::consts::PI));
     let mut behind = good.clone();
     for view in &mut behind {

@@ -1,12 +1,12 @@
-//! How the semi-axes of two objects are compared.
+//! Matching of the semi-axes of two objects.
 use crate::shapes::SemiAxes;
 use manifactor_graph::prelude::*;
 
-/// Whether semi-axes are compared in the order that they have in the object.
+/// Order of an object's semi-axes in a comparison.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AxisOrder {
-    /// The longest with the longest, and so on: which axis is which does not matter.
+    /// By length: the longest with the longest, and so on. The numbering of the axes does not matter.
     #[default]
     Sorted,
     /// The object's x with the first, its y with the second, its z with the third.
@@ -14,7 +14,7 @@ pub enum AxisOrder {
 }
 
 impl AxisOrder {
-    /// log(s/s₀), both in this order, the shortest first if sorted.
+    /// Returns log(s/s₀) with both in this order; if sorted, the shortest first.
     pub(crate) fn log_ratio<T: Scalar>(self, s: &Vector3<T>, s0: &SemiAxes) -> Vector3<T> {
         let (mut s, mut s0) = (*s, s0.vector());
         if self == Self::Sorted {
@@ -25,7 +25,7 @@ impl AxisOrder {
     }
 }
 
-/// Three numbers by size; written out, as sorting a slice of jets wants a total order of them.
+/// Sorts three numbers. Written out, as sorting a slice of jets requires a total order.
 fn sort<T: Scalar>(s: &mut Vector3<T>) {
     for (a, b) in [(0, 1), (1, 2), (0, 1)] {
         if s[a] > s[b] {

@@ -1,10 +1,10 @@
-//! Boxes in an image, with sides along its axes.
+//! Axis-aligned boxes in an image.
 use nalgebra::{Vector2, Vector3};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// The names of the sides, in the order of documents and residuals.
+/// Names of the sides, in the order of documents and residuals.
 pub const SIDES: [&str; 4] = ["xmin", "ymin", "xmax", "ymax"];
 
 /// A box in an image, in pixels; in documents `[xmin, ymin, xmax, ymax]`. x is right, y down.
@@ -21,52 +21,52 @@ pub struct BoundingBox {
     pub ymax: f64,
 }
 
-/// Four numbers that are no box.
+/// Numbers that do not form a box.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected [xmin, ymin, xmax, ymax], finite, with xmin ≤ xmax and ymin ≤ ymax; got {0:?}")]
 pub struct NotABox(pub [f64; 4]);
 
 impl BoundingBox {
-    /// The box xmin, ymin, xmax, ymax.
+    /// Creates the box from xmin, ymin, xmax, ymax.
     ///
     /// # Errors
-    /// If a minimum is above its maximum, or a number not finite.
+    /// If a minimum is above its maximum, or a number is not finite.
     pub fn new(bounds: [f64; 4]) -> Result<Self, NotABox> {
         let [xmin, ymin, xmax, ymax] = bounds;
         let ordered = xmin <= xmax && ymin <= ymax && bounds.iter().all(|x| x.is_finite());
         if ordered { Ok(Self::from_bounds(bounds)) } else { Err(NotABox(bounds)) }
     }
-    /// Bounds that are known to be in order.
+    /// Creates a box from bounds known to be in order.
     pub(crate) fn from_bounds([xmin, ymin, xmax, ymax]: [f64; 4]) -> Self {
         Self { xmin, ymin, xmax, ymax }
     }
-    /// xmin, ymin, xmax, ymax
+    /// Returns xmin, ymin, xmax, ymax.
     pub fn bounds(&self) -> [f64; 4] {
         [self.xmin, self.ymin, self.xmax, self.ymax]
     }
-    /// xmax - xmin
+    /// Returns the width xmax - xmin.
     pub fn width(&self) -> f64 {
         self.xmax - self.xmin
     }
-    /// ymax - ymin
+    /// Returns the height ymax - ymin.
     pub fn height(&self) -> f64 {
         self.ymax - self.ymin
     }
-    /// Width times height, in square pixels.
+    /// Returns the area, in square pixels.
     pub fn area(&self) -> f64 {
         self.width() * self.height()
     }
-    /// Returns whether it is as wide and as high as the least that a detector resolves: a hundredth of a pixel. A box without width
-    /// shows nothing, and a map that took it for a measurement would make its object thin.
+    /// Returns whether width and height are at least a hundredth of a pixel, the resolution of detectors. A
+    /// box without width shows nothing, and as a measurement it would make the object thin.
     pub fn has_area(&self) -> bool {
         const LEAST: f64 = 0.01;
         self.width() >= LEAST && self.height() >= LEAST
     }
-    /// The middle.
+    /// Returns the centre.
     pub fn centre(&self) -> Vector2<f64> {
         Vector2::new(self.xmin + self.xmax, self.ymin + self.ymax) / 2.0
     }
-    /// The lines that its sides are on, as (a, b, c) with a x + b y + c = 0, in order of [`SIDES`].
+    /// Returns the lines of the sides as (a, b, c) with a x + b y + c = 0, in the order of [`SIDES`].
     pub fn lines(&self) -> [Vector3<f64>; 4] {
         [
             Vector3::new(1.0, 0.0, -self.xmin),
@@ -75,18 +75,18 @@ impl BoundingBox {
             Vector3::new(0.0, 1.0, -self.ymax),
         ]
     }
-    /// Returns whether all of `other` is in this box; sides may touch.
+    /// Returns whether `other` is completely inside this box; sides may touch.
     pub fn contains(&self, other: &Self) -> bool {
         self.xmin <= other.xmin
             && self.ymin <= other.ymin
             && other.xmax <= self.xmax
             && other.ymax <= self.ymax
     }
-    /// Returns whether the two have a point in common; one inside of the other counts, and so does a touch.
+    /// Returns whether the boxes have a point in common, including touching boxes and a box inside `other`.
     pub fn intersects(&self, other: &Self) -> bool {
         self.intersection(other).is_some()
     }
-    /// What the two have in common.
+    /// Returns the intersection of two boxes.
     pub fn intersection(&self, other: &Self) -> Option<Self> {
         Self::new([
             self.xmin.max(other.xmin),
@@ -96,15 +96,16 @@ impl BoundingBox {
         ])
         .ok()
     }
-    /// Area of the intersection over area of the union, 0 to 1; 0 for two boxes without area.
+    /// Returns the area of the intersection divided by the area of the union, 0 to 1; 0 for two boxes without
+    /// area.
     pub fn iou(&self, other: &Self) -> f64 {
         let common = self.intersection(other).map_or(0.0, |b| b.area());
         let union = self.area() + other.area() - common;
         if union > 0.0 { common / union } else { 0.0 }
     }
-    /// Which sides are more than `margin` pixels away from the border of an image of that size, in
-    /// order of [`SIDES`]. The others may be the border's instead of the object's: mask their rows with
-    /// [`Noise::observing`](manifactor_graph::Noise::observing).
+    /// Returns which sides are more than `margin` pixels inside the border of an image of this size, in the
+    /// order of [`SIDES`]. The remaining sides may belong to the border instead of the object: mask their
+    /// rows with [`Noise::observing`](manifactor_graph::Noise::observing).
     pub fn sides_inside(&self, width: u32, height: u32, margin: f64) -> [bool; 4] {
         [
             self.xmin > margin,

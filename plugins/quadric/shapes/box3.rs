@@ -1,10 +1,10 @@
-//! Boxes in space, with sides along its axes.
+//! Axis-aligned boxes in space.
 use manifactor_geometry::Coordinates;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A box in space with sides along its axes, in metres; in documents `{ min = [..], max = [..] }`.
+/// An axis-aligned box in space, in metres; in documents `{ min = [..], max = [..] }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Document", into = "Document")]
 #[schemars(with = "Document")]
@@ -25,21 +25,21 @@ struct Document {
     max: [f64; 3],
 }
 
-/// Two corners that are no box.
+/// Corners that do not form a box.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected two corners of finite numbers with min ≤ max, got min = {min:?}, max = {max:?}")]
 pub struct NotABox3 {
-    /// What was given as the smallest.
+    /// The corner given as minimum.
     pub min: [f64; 3],
-    /// What was given as the largest.
+    /// The corner given as maximum.
     pub max: [f64; 3],
 }
 
 impl Box3 {
-    /// The box between two corners.
+    /// Creates the box between two corners.
     ///
     /// # Errors
-    /// If a coordinate of `min` is above that of `max`, or not finite.
+    /// If a coordinate of `min` is above the corresponding one of `max`, or not finite.
     pub fn new(min: Vector3<f64>, max: Vector3<f64>) -> Result<Self, NotABox3> {
         let finite = Coordinates::new(min).is_ok() && Coordinates::new(max).is_ok();
         if finite && min <= max {
@@ -48,37 +48,38 @@ impl Box3 {
             Err(NotABox3 { min: min.into(), max: max.into() })
         }
     }
-    /// The box of these extents around a point.
+    /// Creates the box with these dimensions around a point.
     pub fn around(centroid: Vector3<f64>, dimensions: Vector3<f64>) -> Self {
         Self { min: centroid - dimensions / 2.0, max: centroid + dimensions / 2.0 }
     }
-    /// The smallest box around points; `None` where there is none.
+    /// Returns the smallest box around points; `None` if there are no points.
     pub fn enclosing(points: impl IntoIterator<Item = Vector3<f64>>) -> Option<Self> {
         let grow = |b: Self, p: Self| Self { min: b.min.inf(&p.min), max: b.max.sup(&p.max) };
         points.into_iter().map(|p| Self { min: p, max: p }).reduce(grow)
     }
-    /// Its extents along x, y and z.
+    /// Returns the extents along x, y and z.
     pub fn dimensions(&self) -> Vector3<f64> {
         self.max - self.min
     }
-    /// Its middle.
+    /// Returns the centre.
     pub fn centroid(&self) -> Vector3<f64> {
         (self.min + self.max) / 2.0
     }
-    /// In cubic metres.
+    /// Returns the volume, in cubic metres.
     pub fn volume(&self) -> f64 {
         self.dimensions().product()
     }
-    /// The same box around the origin.
+    /// Returns the box moved to the origin.
     #[must_use]
     pub fn centred(&self) -> Self {
         Self::around(Vector3::zeros(), self.dimensions())
     }
-    /// What the two have in common.
+    /// Returns the intersection of two boxes.
     pub fn intersection(&self, other: &Self) -> Option<Self> {
         Self::new(self.min.sup(&other.min), self.max.inf(&other.max)).ok()
     }
-    /// Volume of the intersection over volume of the union, 0 to 1; 0 for two boxes without volume.
+    /// Returns the volume of the intersection divided by the volume of the union, 0 to 1; 0 for two boxes
+    /// without volume.
     pub fn iou(&self, other: &Self) -> f64 {
         let common = self.intersection(other).map_or(0.0, |b| b.volume());
         let union = self.volume() + other.volume() - common;

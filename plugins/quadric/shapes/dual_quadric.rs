@@ -13,10 +13,10 @@ use std::fmt;
 
 /// An object as an ellipsoid: Q* = Z diag(a², b², c², -1) Zᵀ with the pose Z.
 ///
-/// Tangent (rx, ry, rz, x, y, z, log_a, log_b, log_c): the pose steps by Z·Exp(δ), in its own frame,
-/// the semi-axes by s·exp(δ). So they stay positive, whatever step a solver takes; a step that would
-/// leave 1e-9 to 1e9 metres stops there. Turning the ellipsoid about its own axis by half a turn, or
-/// permuting its axes, describes the same body by another point of the manifold.
+/// Tangent (rx, ry, rz, x, y, z, log_a, log_b, log_c): the pose steps by Z·Exp(δ) in the local frame, the
+/// semi-axes by s·exp(δ). The semi-axes therefore stay positive for any step; they are clamped to 1e-9 to 1e9
+/// metres. Rotating the ellipsoid about a principal axis by half a turn, or permuting its axes, describes one
+/// body by different points of the manifold.
 ///
 /// ```toml
 /// [values]
@@ -27,20 +27,20 @@ use std::fmt;
 #[serde(bound(serialize = "Self: Into<Document>", deserialize = "Self: From<Document>"))]
 #[schemars(with = "Document", bound = "")]
 pub struct DualQuadric<T: Scalar = f64> {
-    /// Centre and axes: takes points from the ellipsoid's own frame to the outer one.
+    /// Centre and axes: maps points from the ellipsoid's local frame to the outer one.
     pub pose: Se3<T>,
-    /// Half the extents along its own x, y and z, in metres; from 1e-9 to 1e9.
+    /// Half the extents along the local x, y and z axes, in metres; from 1e-9 to 1e9.
     pub semi_axes: Vector3<T>,
 }
 
 #[derive(Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    /// Its centre, in metres.
+    /// Centre, in metres.
     translation: Centre,
     /// Unit quaternion (x, y, z, w).
     rotation: Xyzw,
-    /// Half the extents along its own axes, in metres: three numbers from 1e-9 to 1e9.
+    /// Half the extents along the local axes, in metres: three numbers from 1e-9 to 1e9.
     semi_axes: SemiAxes,
 }
 
@@ -57,20 +57,20 @@ struct Centre(Vector3<f64>);
 struct Xyzw(So3);
 
 impl<T: Scalar> DualQuadric<T> {
-    /// Q* = Z diag(a², b², c², -1) Zᵀ; its planes π with πᵀQ*π = 0 touch the ellipsoid.
+    /// Returns Q* = Z diag(a², b², c², -1) Zᵀ. Planes π with πᵀQ*π = 0 touch the ellipsoid.
     pub fn matrix(&self) -> Matrix4<T> {
         let z = self.pose.matrix();
         let s = self.semi_axes.component_mul(&self.semi_axes);
         z * Matrix4::from_diagonal(&s.push(-T::one())) * z.transpose()
     }
-    /// The centre.
+    /// Returns the centre.
     pub fn centroid(&self) -> Vector3<T> {
         self.pose.translation
     }
-    /// The direction of the longest semi-axis, the first of equals; a unit vector, its sign arbitrary.
+    /// Returns the unit direction of the longest semi-axis, the first of equal ones; its sign is arbitrary.
     ///
-    /// It is a column of the rotation: an eigendecomposition of Q* would lose its derivative where
-    /// axes are equally long. It jumps where another axis becomes the longest.
+    /// It is a column of the rotation, because an eigendecomposition of Q* has no derivative if axes are
+    /// equally long. It jumps if a different axis becomes the longest.
     pub fn major_axis(&self) -> Vector3<T> {
         let s = &self.semi_axes;
         let longer = if s[1] > s[0] { 1 } else { 0 };
@@ -80,28 +80,30 @@ impl<T: Scalar> DualQuadric<T> {
 }
 
 impl DualQuadric {
-    /// The smallest box around it with sides along the axes of the outer frame.
+    /// Returns the smallest axis-aligned box in the outer frame around the ellipsoid.
     pub fn axes_aligned_box(&self) -> Box3 {
         let axes = self.pose.rotation.matrix() * nalgebra::Matrix3::from_diagonal(&self.semi_axes);
         let half = Vector3::from_fn(|i, _| axes.row(i).norm());
         Box3 { min: self.centroid() - half, max: self.centroid() + half }
     }
-    /// Returns whether all of it is in front of a camera, see [`Ellipsoid::is_in_front`](crate::Ellipsoid::is_in_front).
+    /// Returns whether the whole ellipsoid is in front of a camera, see
+    /// [`Ellipsoid::is_in_front`](crate::Ellipsoid::is_in_front).
     #[inline]
     pub fn is_in_front_of(&self, world_from_camera: &Se3) -> bool {
-        // along the camera's axis alone, which is all that counts and half the work
+        // Only the extent along the optical axis matters, which halves the work.
         let forward = world_from_camera.rotation.act(&Vector3::z());
         let z = forward.dot(&(self.centroid() - world_from_camera.translation));
         let b = self.pose.rotation.inverse().act(&forward).component_mul(&self.semi_axes);
         ellipsoid::is_in_front(z, b.norm_squared())
     }
-    /// Returns whether a point of the outer frame is inside, or on the surface.
+    /// Returns whether a point of the outer frame is inside the ellipsoid or on its surface.
     pub fn contains(&self, point: &Vector3<f64>) -> bool {
         self.pose.inverse_act(point).component_div(&self.semi_axes).norm_squared() <= 1.0
     }
 }
 
-/// Turned about a direction, moved and grown, at random: what orientations do not see.
+/// Rotates about `up`, moves and scales the object at random: orientation factors are invariant to all of
+/// these.
 pub(crate) fn turned(quadric: &DualQuadric, up: &Vector3<f64>, random: Random<'_>) -> DualQuadric {
     let turn = So3::exp(&(up * random(3.0)));
     let moved = quadric.centroid() + Vector3::new(random(5.0), random(5.0), random(5.0));
@@ -109,7 +111,7 @@ pub(crate) fn turned(quadric: &DualQuadric, up: &Vector3<f64>, random: Random<'_
     DualQuadric { pose, semi_axes: quadric.semi_axes * random(2.0).exp() }
 }
 
-/// The pose, then the semi-axes.
+/// Storage order: the pose, then the semi-axes.
 impl Quantity for DualQuadric {
     const SHAPE: Shape = Shape { name: "dual_quadric", size: 10 };
     type Of<T: Scalar> = DualQuadric<T>;
@@ -124,7 +126,7 @@ impl Quantity for DualQuadric {
     }
 }
 
-/// `(1.000, 0.000, 0.500) m, 90.000° about (0.000, 0.000, 1.000), semi-axes (0.100, 0.200, 0.300) m`.
+/// Writes `(1.000, 0.000, 0.500) m, 90.000° about (0.000, 0.000, 1.000), semi-axes (0.100, 0.200, 0.300) m`.
 impl fmt::Display for DualQuadric {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ([a, b, c], decimals): ([f64; 3], usize) = (self.semi_axes.into(), f.precision().unwrap_or(3));
@@ -225,7 +227,7 @@ mod tests {
     #[test]
     fn planes_that_touch_are_on_the_dual_quadric() {
         check((any_quadric(), direction()), |(quadric, normal)| {
-            // the support point of the normal: centroid + B Bᵀ n / |Bᵀ n|
+            // Support point of the normal: centroid + B Bᵀ n / |Bᵀ n|.
             let b = quadric.pose.rotation.inverse().act(&normal).component_mul(&quadric.semi_axes);
             let reach = quadric.centroid().dot(&normal) + b.norm();
             let plane = normal.push(-reach);
@@ -243,7 +245,7 @@ mod tests {
             assert!(
                 (point - b.centroid()).abs() <= b.dimensions() / 2.0 * (1.0 + 1e-12) + Vector3::repeat(1e-12)
             );
-            // each side is touched: Q* of its plane is zero
+            // Q* of the plane of each side is zero, so each side is touched.
             for i in 0..3 {
                 let plane = Vector3::ith(i, 1.0).push(-b.max[i]);
                 assert!(plane.dot(&(quadric.matrix() * plane)).abs() < 1e-10 * (1.0 + b.max[i].powi(2)));

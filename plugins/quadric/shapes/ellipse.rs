@@ -1,29 +1,29 @@
-//! Ellipses in an image, and what an image leaves of them.
+//! Ellipses in an image, and their part inside the image.
 use manifactor_graph::Scalar;
 use nalgebra::Vector2;
 
-/// The points centre + x with xᵀΣ⁻¹x ≤ 1, Σ = [xx xy; xy yy] positive definite; in pixels.
+/// An ellipse in pixels: the points centre + x with xᵀΣ⁻¹x ≤ 1, Σ = [xx xy; xy yy] positive definite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ellipse<T: Scalar = f64> {
-    /// The centre.
+    /// Centre.
     pub centre: Vector2<T>,
-    /// The square of half its width.
+    /// Square of half the width.
     pub xx: T,
-    /// How it leans: 0 where its axes are those of the image.
+    /// Off-diagonal entry of Σ; 0 if the axes of the ellipse are parallel to the image axes.
     pub xy: T,
-    /// The square of half its height.
+    /// Square of half the height.
     pub yy: T,
-    /// xx yy - xy², kept because thin ellipses would lose it in that difference.
+    /// Determinant xx yy - xy². Stored, as the difference loses its digits for thin ellipses.
     pub determinant: T,
 }
 
-/// One side of a box around an ellipse: the line along the ellipse that holds the side in its place.
+/// One side of a box around an ellipse, with the line that determines its position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Side<T> {
-    /// The ellipse ends here: the line touches it at `at`, a coordinate on each image axis, and has
-    /// the normal (1, slope), the side's own axis first.
+    /// The end of the ellipse: the line touches the ellipse at `bound` and `across`, one coordinate per image
+    /// axis, and has the normal (1, slope), with the axis of the side first.
     Touched { bound: T, across: T, slope: T },
-    /// The image ends here.
+    /// The border of the image.
     Border(f64),
 }
 
@@ -36,11 +36,11 @@ impl<T: Scalar> Side<T> {
     }
 }
 
-/// An ellipse with one image axis singled out: its `bound`s are sought, between borders `across`.
+/// An ellipse with one image axis selected: its bounds along this axis, between borders across it.
 struct Along<T> {
     centre: T,
     across: T,
-    /// Σ: along, mixed, across.
+    /// Entries of Σ: along, mixed, across.
     aa: T,
     ab: T,
     bb: T,
@@ -48,16 +48,17 @@ struct Along<T> {
 }
 
 impl<T: Scalar> Along<T> {
-    /// Where the whole ellipse ends; `sign` is -1 for the lower end, 1 for the upper.
+    /// Returns the end of the whole ellipse; `sign` is -1 for the lower end, 1 for the upper.
     #[inline(always)]
     fn end(&self, sign: f64) -> Side<T> {
         let half = self.aa.sqrt() * sign;
         Side::Touched { bound: self.centre + half, across: self.across + self.ab / half, slope: T::zero() }
     }
-    /// Where its part ends that is within 0 and `limit` across; `None` where there is none.
+    /// Returns the end of the part within 0 and `limit` across; `None` if there is no such part.
     ///
-    /// The part is convex: it ends where the ellipse does, or where the ellipse meets the border that
-    /// cuts its end off. The bound has a derivative even where the one becomes the other.
+    /// The part is convex: it ends at the end of the ellipse, or at the intersection of the ellipse with the
+    /// border that cuts its end off. The bound is differentiable even at the transition between the two
+    /// cases.
     #[inline(always)]
     fn end_within(&self, sign: f64, limit: f64) -> Option<Side<T>> {
         let whole = self.end(sign);
@@ -79,14 +80,14 @@ impl<T: Scalar> Along<T> {
         let slope = self.determinant * off / (self.bb * self.bb * half) - lean;
         Some(Side::Touched { bound: self.centre + lean * off + half, across: border, slope })
     }
-    /// Both ends of what is inside of an image of that size.
+    /// Returns both ends of the part inside an image of this size.
     #[inline(always)]
     fn ends_inside(&self, length: f64, limit: f64) -> Option<[Side<T>; 2]> {
         let [low, high] = [self.end_within(-1.0, limit)?, self.end_within(1.0, limit)?];
         if low.bound() >= T::from(length) || high.bound() <= T::zero() {
             return None;
         }
-        // a bound on the border belongs to the border: its derivative is that of a constant
+        // A bound on the border counts as the border, with the derivative of a constant.
         Some([
             if low.bound() <= T::zero() { Side::Border(0.0) } else { low },
             if high.bound() >= T::from(length) { Side::Border(length) } else { high },
@@ -117,25 +118,25 @@ impl<T: Scalar> Ellipse<T> {
             determinant: self.determinant,
         }
     }
-    /// xmin, ymin, xmax, ymax of all of it.
+    /// Returns xmin, ymin, xmax, ymax of the whole ellipse.
     #[inline(always)]
     pub fn bounds(&self) -> [T; 4] {
         let (w, h) = (self.xx.sqrt(), self.yy.sqrt());
         let c = &self.centre;
         [c.x - w, c.y - h, c.x + w, c.y + h]
     }
-    /// xmin, ymin, xmax, ymax of what is inside of an image of that size, exactly; `None` where
-    /// nothing is.
+    /// Returns the exact xmin, ymin, xmax, ymax of the part inside an image of this size; `None` if no part
+    /// is inside.
     pub fn truncated_bounds(&self, size: Vector2<f64>) -> Option<[T; 4]> {
         self.truncated_sides(size).map(|sides| sides.map(|side| side.bound()))
     }
-    /// The sides of [`Ellipse::bounds`].
+    /// Returns the sides of [`Ellipse::bounds`].
     #[inline(always)]
     pub(crate) fn sides(&self) -> [Side<T>; 4] {
         let (x, y) = (self.along_x(), self.along_y());
         [x.end(-1.0), y.end(-1.0), x.end(1.0), y.end(1.0)]
     }
-    /// The sides of [`Ellipse::truncated_bounds`].
+    /// Returns the sides of [`Ellipse::truncated_bounds`].
     #[inline(always)]
     pub(crate) fn truncated_sides(&self, size: Vector2<f64>) -> Option<[Side<T>; 4]> {
         let [xmin, xmax] = self.along_x().ends_inside(size.x, size.y)?;

@@ -1,23 +1,23 @@
-//! The ellipsoid of a dual quadric that is given as a matrix.
+//! Conversion of a dual quadric, given as a matrix, to an ellipsoid.
 use crate::shapes::DualQuadric;
 use crate::shapes::{NotSemiAxes, SemiAxes};
 use manifactor_geometry::{Se3, So3};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
-/// Why a 4×4 matrix is not the dual quadric of an ellipsoid.
+/// The reason why a 4×4 matrix is not the dual quadric of an ellipsoid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotAnEllipsoid {
     /// An entry is not a number.
     #[error("the matrix has an entry that is not finite")]
     NotFinite,
-    /// The corner is zero, next to the other entries.
+    /// The corner entry is zero relative to the remaining entries.
     #[error("the centre is at infinity: the corner of the matrix is {corner:e}")]
     AtInfinity {
-        /// Q*₄₄
+        /// Corner entry Q*₄₄.
         corner: f64,
     },
-    /// A hyperboloid, or an ellipsoid without real points.
+    /// The surface is a hyperboloid, or an ellipsoid without real points.
     #[error(
         "the surface is a hyperboloid or has no points: the squares of its semi-axes are {squares:?}, \
          all of them should be positive"
@@ -26,38 +26,38 @@ pub enum NotAnEllipsoid {
         /// Squares of the semi-axes, in order of size.
         squares: [f64; 3],
     },
-    /// An ellipsoid that is flat, or endless.
+    /// The ellipsoid is flat or unbounded.
     #[error("the surface is degenerate: {0}")]
     Degenerate(#[from] NotSemiAxes),
 }
 
-/// What to make of a surface that is not an ellipsoid.
+/// Treatment of a surface that is not an ellipsoid.
 #[derive(
     Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum OnHyperboloid {
-    /// Nothing: it is an error.
+    /// Return an error.
     #[default]
     Reject,
-    /// The ellipsoid with the absolute values of its squared semi-axes, as other implementations do.
+    /// Use the absolute values of the squared semi-axes, as other implementations do.
     Absolute,
 }
 
 impl DualQuadric {
-    /// The ellipsoid with the dual quadric Q*, given up to scale; it is made symmetric first. Semi-axes
-    /// come longest first.
+    /// Creates the ellipsoid with the dual quadric Q*, given up to scale; the matrix is symmetrized first.
+    /// The semi-axes are sorted, longest first.
     ///
     /// # Errors
-    /// If it is none: a hyperboloid is not turned into an ellipsoid.
+    /// If the surface is not an ellipsoid; a hyperboloid is rejected.
     pub fn from_matrix(matrix: &Matrix4<f64>) -> Result<Self, NotAnEllipsoid> {
         Self::from_matrix_or(matrix, OnHyperboloid::Reject)
     }
 
-    /// As [`DualQuadric::from_matrix`], with a choice of what to make of a hyperboloid.
+    /// Works like [`DualQuadric::from_matrix`], with a choice for the treatment of a hyperboloid.
     ///
     /// # Errors
-    /// As there.
+    /// As for [`DualQuadric::from_matrix`].
     pub fn from_matrix_or(matrix: &Matrix4<f64>, policy: OnHyperboloid) -> Result<Self, NotAnEllipsoid> {
         if !matrix.iter().all(|x| x.is_finite()) {
             return Err(NotAnEllipsoid::NotFinite);

@@ -1,23 +1,23 @@
-//! How well an object was mapped: the landmark metrics of Jablonsky et al.
+//! Landmark metrics of Jablonsky et al.: the error of a mapped object.
 use crate::shapes::Box3;
 use crate::shapes::DualQuadric;
 use serde::{Deserialize, Serialize};
 
-/// How far an estimated object is from the true one, both in one frame.
+/// Error of an estimated object against the true one, both in one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LandmarkError {
-    /// Distance of the quadric's centroid from the true box's, in metres.
+    /// Distance between the centroids of the quadric and of the true box, in metres.
     pub position: f64,
-    /// Jaccard distance, 1 - IoU, of the quadric's axis-aligned box and the true one, both centred at the
-    /// origin: 0 to 1.
+    /// Jaccard distance, 1 - IoU, between the quadric's axis-aligned box and the true box, both centred at
+    /// the origin: 0 to 1.
     pub shape: f64,
-    /// Jaccard distance of the two boxes where they stand: 0 to 1.
+    /// Jaccard distance between the two boxes at their actual positions: 0 to 1.
     pub quality: f64,
 }
 
 impl LandmarkError {
-    /// The error of an estimate against the axis-aligned box of the truth.
+    /// Computes the error of an estimate against the axis-aligned box of the true object.
     pub fn of(estimate: &DualQuadric, truth: &Box3) -> Self {
         let estimated = estimate.axes_aligned_box();
         Self {

@@ -1,4 +1,4 @@
-//! Where the outline of an ellipsoid is in an image.
+//! Outline of an ellipsoid in an image.
 use crate::shapes::DualConic;
 use crate::shapes::Ellipse;
 use crate::shapes::Ellipsoid;
@@ -7,7 +7,7 @@ use manifactor_graph::Scalar;
 use nalgebra::{RowVector3, Vector2};
 
 impl Ellipsoid {
-    /// C* = P Q* Pᵀ, anywhere: in front of the camera, behind or around it.
+    /// Returns C* = P Q* Pᵀ for an ellipsoid anywhere: in front of the camera, behind or around it.
     pub fn dual_conic(&self, camera: &Camera) -> DualConic {
         let (b, p) = (camera.matrix() * self.axes, camera.matrix() * self.centroid);
         DualConic(b * b.transpose() - p * p.transpose())
@@ -15,12 +15,12 @@ impl Ellipsoid {
 }
 
 impl<T: Scalar> Ellipsoid<T> {
-    /// The outline of one that [is in front](Ellipsoid::is_in_front).
+    /// Returns the outline of an ellipsoid that [is in front](Ellipsoid::is_in_front).
     ///
     /// With A = BBᵀ the ellipsoid's shape, d = z² - A₃₃, and for each image axis k the row a of KB, the
-    /// coordinate x of Kp (both less the principal point), and w = z a - x b:
-    /// centre = (x z - a·b)/d, shape = (d wᵢ·wⱼ + (wᵢ·b)(wⱼ·b)) / (z d)². The usual C*₁₃² - C*₁₁C*₃₃
-    /// is a difference of nearly equal numbers for a far object; here all terms on the diagonal add up.
+    /// coordinate x of Kp (both relative to the principal point), and w = z a - x b: centre = (x z - a·b)/d,
+    /// shape = (d wᵢ·wⱼ + (wᵢ·b)(wⱼ·b)) / (z d)². The usual C*₁₃² - C*₁₁C*₃₃ is a difference of nearly equal
+    /// numbers for a distant object; here all terms on the diagonal are positive and are added.
     #[inline]
     pub fn outline(&self, camera: &Camera) -> Ellipse<T> {
         let (p, b): (_, RowVector3<T>) = (&self.centroid, self.axes.row(2).into_owned());

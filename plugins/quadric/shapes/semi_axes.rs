@@ -1,41 +1,44 @@
-//! Semi-axes of an ellipsoid: three lengths that are neither zero nor endless.
+//! Semi-axes of an ellipsoid: three positive, bounded lengths.
 use nalgebra::Vector3;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// The shortest semi-axis, in metres. Fourth powers of what lies between the bounds stay normal.
+/// Minimum semi-axis, in metres. Fourth powers of lengths within the bounds are normal floating-point
+/// numbers.
 pub const SHORTEST: f64 = 1e-9;
-/// The longest semi-axis, in metres.
+/// Maximum semi-axis, in metres.
 pub const LONGEST: f64 = 1e9;
 
-/// Three lengths from 1e-9 to 1e9 metres, checked when they are read.
+/// Three lengths from 1e-9 to 1e9 metres, checked when read.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "[f64; 3]", into = "[f64; 3]")]
 pub struct SemiAxes(Vector3<f64>);
 
-/// Lengths that no semi-axes have.
+/// Lengths that are not valid semi-axes.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected three semi-axes from 1e-9 to 1e9 metres, got {0:?}")]
 pub struct NotSemiAxes(pub [f64; 3]);
 
-/// s·exp(δ), within the bounds. NaN stays NaN.
+/// Returns s·exp(δ), clamped to the bounds. NaN stays NaN.
 pub(crate) fn step(s: f64, delta: f64) -> f64 {
     (s * delta.exp()).clamp(SHORTEST, LONGEST)
 }
 
 impl SemiAxes {
+    /// Creates the semi-axes from three lengths, in metres.
+    ///
     /// # Errors
     /// If one is not a number from 1e-9 to 1e9.
     pub fn new(s: Vector3<f64>) -> Result<Self, NotSemiAxes> {
         let fits = s.iter().all(|s| (SHORTEST..=LONGEST).contains(s));
         if fits { Ok(Self(s)) } else { Err(NotSemiAxes(s.into())) }
     }
-    /// On the way out, where nothing is checked.
+    /// Wraps lengths for writing, without a check.
     pub(crate) fn unchecked(s: Vector3<f64>) -> Self {
         Self(s)
     }
-    /// The lengths, in metres.
+    /// Returns the lengths, in metres.
     pub fn vector(&self) -> Vector3<f64> {
         self.0
     }

@@ -1,4 +1,4 @@
-//! Quadrics: against another implementation, in whole solves, and in the catalogue.
+//! Quadrics: comparison with another implementation, full solves, and the catalogue.
 #![allow(
     missing_docs,
     clippy::unwrap_used,

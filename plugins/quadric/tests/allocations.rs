@@ -1,4 +1,4 @@
-//! No iteration after the first takes memory from the system: a counting allocator counts none.
+//! Checks with a counting allocator that no iteration after the first allocates memory.
 #![allow(missing_docs, clippy::unwrap_used)]
 mod scene;
 use manifactor_graph::checked::NotNegative;
@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 #[global_allocator]
 static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Allocations between one step and the next, from the second step on.
+/// Number of allocations between consecutive steps, from the second step on.
 fn allocations((graph, values): &(Graph, Values), solver: &dyn Optimizer) -> Vec<usize> {
     let mut problem = Problem::compile(graph, values).unwrap();
     let mut counts = Vec::with_capacity(100);
@@ -28,7 +28,7 @@ fn allocations((graph, values): &(Graph, Values), solver: &dyn Optimizer) -> Vec
     counts.split_off(1)
 }
 
-// one test, as another on another thread would be counted with it
+// A single test, because a parallel test on another thread would be counted too.
 #[test]
 fn no_iteration_after_the_first_allocates() {
     let stop = Stopping { relative_cost: NotNegative::literal(1e-14), ..Stopping::default() };
@@ -36,7 +36,7 @@ fn no_iteration_after_the_first_allocates() {
         Box::new(GaussNewton { stop: stop.clone(), ..GaussNewton::default() }),
         Box::new(LevenbergMarquardt { stop, ..LevenbergMarquardt::default() }),
     ];
-    // threads hand out tasks by way of memory of their own
+    // A thread pool allocates memory to distribute tasks, so one thread is used.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for problem in [scene::sphere(20, 25), scene::desk(60, 12)] {
         for solver in &solvers {

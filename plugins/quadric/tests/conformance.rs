@@ -1,5 +1,5 @@
-//! Numeric cases of another implementation and of closed forms, from the file that the environment
-//! variable MANIFACTOR_CONFORMANCE names. Values to 1e-9 of the largest entry, Jacobians to 1e-8.
+//! Numeric cases from another implementation and from closed forms, read from the file in the environment
+//! variable MANIFACTOR_CONFORMANCE. Tolerances: values 1e-9 of the largest entry, Jacobians 1e-8.
 #![allow(clippy::print_stdout)]
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::{Direction, Factor, Manifold, Residual};
@@ -10,7 +10,7 @@ use serde_json::Value;
 const VALUES: f64 = 1e-9;
 const JACOBIANS: f64 = 1e-8;
 
-/// One case, or a part of it, with the path to it for messages.
+/// A case or a part of it, with its path for messages.
 struct Node<'a> {
     value: &'a Value,
     path: String,
@@ -78,7 +78,7 @@ impl<'a> Node<'a> {
                 let n = |key: &str| Ok::<_, String>(k.get(key)?.numbers()?[0]);
                 Matrix3::new(n("fx")?, n("skew")?, n("cx")?, 0.0, n("fy")?, n("cy")?, 0.0, 0.0, 1.0)
             }
-            // what the case asks for needs none
+            // The quantities of this case need no camera.
             (None, None) => Matrix3::identity(),
         };
         let size = self.find("image_wh").map_or(Ok(Vector2::repeat(1.0)), |size| size.vector())?;
@@ -86,7 +86,7 @@ impl<'a> Node<'a> {
         Ok(Camera { skew: k.m12, ..camera.map_err(|e| e.to_string())? })
     }
 
-    /// Checks against numbers of the same shape; a vector matches a row.
+    /// Compares with numbers of equal shape; a vector matches a row.
     fn is(&self, found: impl Into<DMatrix<f64>>, tolerance: f64) -> Checked {
         let (found, expected) = (found.into(), self.numbers()?);
         if found.len() != expected.len() {
@@ -95,7 +95,7 @@ impl<'a> Node<'a> {
         let found = if found.nrows() == expected.nrows() { found } else { found.transpose() };
         let scale = if expected.amax() > 0.0 { expected.amax() } else { 1.0 };
         let error = (&found - &expected).amax() / scale;
-        // so written that NaN is wrong
+        // This form also rejects NaN.
         if error <= tolerance {
             Ok(())
         } else {
@@ -116,7 +116,7 @@ impl<'a> Node<'a> {
             (_, Some(b)) => self.is(row(&b.bounds()), VALUES),
         }
     }
-    /// Runs a check for each entry; one that the check does not know is an error.
+    /// Runs a check for each entry; an unknown entry is an error.
     fn each(&self, mut check: impl FnMut(&str, &Node<'a>) -> Option<Checked>) -> Checked {
         let entries = self.value.as_object().ok_or_else(|| format!("{} is no table", self.path))?;
         for key in entries.keys() {
@@ -135,8 +135,8 @@ fn dense<const R: usize, const C: usize>(m: nalgebra::SMatrix<f64, R, C>) -> DMa
     DMatrix::from_column_slice(R, C, m.as_slice())
 }
 
-/// The reference finds an ellipse by the sign of a minor of C/C₃₃, C the inverse of C*. It takes an
-/// ellipse without real points for one, and none that passes through the image's origin, where C₃₃ = 0.
+/// The reference detects an ellipse by the sign of a minor of C/C₃₃, with C the inverse of C*. It accepts an
+/// ellipse without real points and rejects one through the image origin, at which C₃₃ = 0.
 fn is_ellipse(node: &Node<'_>, conic: &DualConic) -> Checked {
     let found = conic.is_ellipse();
     let primal = conic.0.try_inverse();
@@ -169,7 +169,7 @@ fn constrain(input: &Node<'_>, output: &Node<'_>, differs: bool) -> Checked {
         (Err(_), true) => Ok(()),
         (Ok(q), true) => Err(format!("{}: expected an error, found {q:?}", input.path)),
         (Err(error), false) => Err(format!("{}: {error}", input.path)),
-        // axes may be permuted: the matrix says it all
+        // Axes may be permuted, so the matrix is compared.
         (Ok(q), false) => {
             output.get("translation")?.is(dense(q.centroid()), VALUES)?;
             output.get("matrix_of_result_4x4")?.is(dense(q.matrix()), VALUES)
@@ -230,7 +230,7 @@ fn standard_factor(input: &Node<'_>, output: &Node<'_>) -> Checked {
                 "error" => node.is(row(&l.residual), VALUES),
                 "H_pose_4x6" => node.is(l.jacobians[0].clone(), JACOBIANS),
                 "H_quadric_4x9" => {
-                    // d/d(log s) = s d/ds
+                    // d/d(log s) = s d/ds.
                     let mut by_log = node.numbers().ok()?;
                     for i in 0..3 {
                         by_log.column_mut(6 + i).scale_mut(q.semi_axes[i]);
@@ -246,7 +246,7 @@ fn standard_factor(input: &Node<'_>, output: &Node<'_>) -> Checked {
     Ok(())
 }
 
-/// Nothing to be matched but that the factor says so.
+/// Only checks that the factor reports itself as undefined.
 fn failing_factor(input: &Node<'_>) -> Checked {
     for model in [BoxModel::Standard, BoxModel::Truncated] {
         let (factor, pose, q) = factor(input, model)?;
@@ -283,7 +283,7 @@ fn box2(input: &Node<'_>, output: &Node<'_>, differs: bool) -> Checked {
         Some(match key {
             "iou" => node.is(row(&[a.iou(&b)]), VALUES),
             "contains" => node.is_bool(a.contains(&b)),
-            // false in the reference for a box inside of another
+            // The reference returns false for a box inside another one.
             "intersects" if differs && (a.contains(&b) || b.contains(&a)) => match a.intersects(&b) {
                 true => Ok(()),
                 false => Err(format!("{}: a box inside of another intersects it", node.path)),
@@ -384,7 +384,7 @@ fn run(case: &Node<'_>) -> Checked {
     }
 }
 
-/// A case that is wrong in the reference, of a kind that has no right answer in the file.
+/// A case that is wrong in the reference and whose kind has no expected answer in the file.
 fn not_to_be_matched(case: &Node<'_>, kind: &str) -> Checked {
     let why = case.find("why").and_then(|why| why.text().ok()).unwrap_or("it does not say why");
     println!("{}: a {kind} that is not to be matched: {why}", case.path);

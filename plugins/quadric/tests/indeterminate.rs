@@ -1,4 +1,4 @@
-//! What nothing constrains is named, with its directions.
+//! Undetermined variables are reported by name, with their directions.
 use crate::scene::{camera, desk, jitter, looking, sphere};
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
@@ -11,7 +11,7 @@ use manifactor_solve::{
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
 
-/// What each solver finds open.
+/// Undetermined directions found by each solver.
 fn open(graph: &Graph, values: &Values) -> Vec<Undetermined> {
     let solvers: [Box<dyn Optimizer>; 4] = [
         Box::new(GaussNewton::default()),
@@ -33,7 +33,7 @@ fn open(graph: &Graph, values: &Values) -> Vec<Undetermined> {
     solvers.iter().map(|solver| find(&**solver)).collect()
 }
 
-/// Names of the directions in which a variable moves.
+/// Names of the directions along which a variable moves.
 fn directions<'a>(open: &'a Undetermined, key: &str) -> BTreeSet<&'a str> {
     open.direction.iter().filter(|(k, _, _)| k.as_str() == key).map(|(_, name, _)| *name).collect()
 }
@@ -42,7 +42,7 @@ fn thing(semi_axes: Vector3<f64>) -> DualQuadric {
     DualQuadric { pose: Se3::exp(&jitter(3, 0.2)), semi_axes }
 }
 
-/// Fixed cameras that see one quadric, which begins where it is.
+/// Fixed cameras that measure one quadric, with the initial value at the truth.
 fn seen(thing: &DualQuadric, eyes: &[Vector3<f64>]) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     for (i, eye) in eyes.iter().enumerate() {
@@ -102,7 +102,7 @@ fn the_rotation_of_a_ball_is_open_and_nothing_else() {
 fn a_quadric_that_is_seen_from_one_side_is_open() {
     let thing = thing(Vector3::new(0.1, 0.2, 0.3));
     for looks in [1, 5] {
-        // however often it is looked at from the same place
+        // The result does not depend on the number of views from one place.
         let (graph, mut values) = seen(&thing, &vec![Vector3::new(3.0, 0.0, 0.5); looks]);
         let diagnosis =
             solve(&graph, &values, &Auto::default(), &mut Silent).unwrap().diagnose(&graph).unwrap();
@@ -113,8 +113,8 @@ fn a_quadric_that_is_seen_from_one_side_is_open() {
     }
 }
 
-/// An object that two cameras see, with a prior of two equal lengths: round, as far as the prior goes. How it is turned
-/// about its long axis is hard to find.
+/// An object with two views and a prior of two equal lengths, so the prior favours a round shape. The
+/// rotation about its long axis is poorly determined.
 fn round() -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let camera = Camera::new([525.0, 525.0, 320.0, 240.0], 640, 480).unwrap();
@@ -149,7 +149,7 @@ fn what_still_moves_when_iterations_run_out_is_named() {
 
 #[test]
 fn damped_steps_at_a_minimum_have_converged() {
-    // damping is needed up to the minimum, so that it never falls; that is no reason to stall
+    // Damping is needed up to the minimum and so never decreases; this must not count as a stall.
     let (graph, values) = round();
     let outcome = solve(&graph, &values, &Auto::default(), &mut Silent).unwrap().outcome;
     println!("{} {} {}", outcome.termination, outcome.final_cost, outcome.iterations);

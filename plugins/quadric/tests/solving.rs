@@ -1,5 +1,4 @@
-//! Solves with quadrics: objects are found from their boxes, and places where a factor degenerates are
-//! survived.
+//! Solves with quadrics: objects are recovered from their boxes, and degenerate factors do no harm.
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::loss::Cauchy;
 use manifactor_graph::{Factor, Graph, Manifold, Noise, Values};
@@ -17,7 +16,7 @@ fn thing() -> DualQuadric {
     DualQuadric { pose, semi_axes: Vector3::new(0.12, 0.2, 0.33) }
 }
 
-/// Cameras on an arc around the origin, looking at it or a little past it.
+/// Cameras on an arc around the origin that face the origin or a point above it.
 fn cameras(count: usize, past: f64) -> Vec<Se3> {
     let one = |i: usize| {
         let a = i as f64 * 4.0 / count as f64;
@@ -29,7 +28,7 @@ fn cameras(count: usize, past: f64) -> Vec<Se3> {
     (0..count).map(one).collect()
 }
 
-/// Fixed cameras that see the object, with the boxes that they should see.
+/// Fixed cameras that measure the object with exact boxes.
 fn seen(truth: &DualQuadric, poses: &[Se3], model: BoxModel) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     for (i, pose) in poses.iter().enumerate() {
@@ -113,7 +112,7 @@ fn sides_that_were_not_observed_do_not_count() {
 
 #[test]
 fn no_step_pushes_an_object_behind_a_camera() {
-    // boxes that agree on nothing: the cost would be least without them
+    // Inconsistent boxes: the cost would be lowest if all factors were inactive.
     let poses = cameras(8, 0.0);
     let (mut graph, mut values) = seen(&thing(), &poses, BoxModel::Standard);
     for (i, entry) in graph.factors_mut().iter_mut().enumerate() {
@@ -132,7 +131,7 @@ fn no_step_pushes_an_object_behind_a_camera() {
 fn an_object_that_starts_behind_a_camera_is_reported() {
     let poses = cameras(6, 0.0);
     let (graph, mut values) = seen(&thing(), &poses, BoxModel::Standard);
-    // past the first camera
+    // Behind the first camera.
     let behind = poses[0].act(&Vector3::new(0.0, 0.0, -1.0));
     values.insert("q", DualQuadric { pose: Se3::new(So3::identity(), behind), ..thing() });
     let (solution, _) = run(&graph, &values);
@@ -141,7 +140,7 @@ fn an_object_that_starts_behind_a_camera_is_reported() {
     assert_eq!(solution.outcome.inactive, solution.factors.iter().filter(|f| !f.defined).count());
 }
 
-/// The object, held by a weak prior, and turned upright by a factor.
+/// Solves for an object with a weak prior and an orientation factor.
 fn turned(factor: impl Factor + 'static, start: DualQuadric) -> (Solution, DualQuadric) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     graph.add(["q"], QuadricPrior { value: start }).noise(Noise::sigma(10.0).unwrap());

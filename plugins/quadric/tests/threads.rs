@@ -1,9 +1,9 @@
-//! Whole solves give the same bits on one thread, two and four.
+//! Full solves give bit-identical results on one, two and four threads.
 use crate::scene;
 use manifactor_graph::{Graph, Values};
 use manifactor_solve::{Auto, Dogleg, GaussNewton, Gnc, LevenbergMarquardt, Optimizer, Silent, solve};
 
-/// Everything that a solve has to tell, and the whole of its estimate: digits enough to tell any two numbers apart.
+/// All results of a solve as text, with enough digits to distinguish any two numbers.
 fn everything(graph: &Graph, values: &Values, solver: &dyn Optimizer, threads: usize) -> String {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let solution = pool.install(|| solve(graph, values, solver, &mut Silent)).unwrap();

@@ -1,14 +1,14 @@
-//! An object stands beside another.
+//! Two objects side by side.
 use crate::directions::axis::extent;
 use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
 
-/// Two objects stand beside each other, so far apart: r = |h| - e₀ - e₁ - gap, in metres.
+/// Two objects stand side by side with a given gap: r = |h| - e₀ - e₁ - gap, in metres.
 ///
-/// h is the way from the one centroid to the other, less its part along `up`; u = h/|h|, and eᵢ half the extent of object i
-/// along u. It is unchanged where one goes round the other without turning relative to h, where either moves along `up`,
-/// and where the two change places. Objects at one place, seen from above, have no direction between them: within a
-/// micrometre of that it is not defined.
+/// h is the vector between the two centroids without its component along `up`; u = h/|h|, and eᵢ is half the
+/// extent of object i along u. Invariant to moving either object along `up`, to swapping the objects, and to
+/// moving one around the other without rotation relative to h. If the centroids coincide when seen from
+/// above, within a micrometre, there is no direction between them and the factor is not defined.
 ///
 /// ```toml
 /// [[factors]]
@@ -19,15 +19,15 @@ use manifactor_quadric::DualQuadric;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Beside {
-    /// How far they are apart, in metres. Default: 0, they touch.
+    /// Gap between the objects, in metres. Default: 0, the objects touch.
     #[serde(default)]
     pub gap: f64,
-    /// The world's up, of any length but zero. Default: z.
+    /// The world's up direction, of any length but zero. Default: z.
     #[serde(default)]
     pub up: Up,
 }
 
-/// Below this distance, in metres, there is no direction from the one to the other.
+/// Distance, in metres, below which the direction between two objects is undefined.
 const SAME_PLACE: f64 = 1e-6;
 
 impl Beside {

@@ -1,12 +1,14 @@
-//! Three objects stand in a row.
+//! Three objects in a row.
 use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
 
-/// The second of three objects is on the line through the other two: r = (c₁ - c₀) × u, u = (c₂ - c₀)/|c₂ - c₀|, in metres.
+/// The second of three objects is on the line through the other two: r = (c₁ - c₀) × u, u = (c₂ - c₀)/|c₂ -
+/// c₀|, in metres.
 ///
-/// Its length is the distance of the middle centroid from the line. Give the two that are furthest apart first and last. Moving
-/// the second along the line, turning and growing leave it unchanged. Smooth wherever the outer two are apart; within a
-/// micrometre they make no line, and it is not defined.
+/// The length of r is the distance of the middle centroid from the line. Use the two objects that are
+/// furthest apart as the first and the last key. Invariant to moving the second object along the line, and to
+/// rotating and scaling any object. Smooth if the outer objects are apart; within a micrometre they do not
+/// define a line, and the factor is not defined.
 ///
 /// ```toml
 /// [[factors]]
@@ -18,7 +20,7 @@ use manifactor_quadric::DualQuadric;
 #[serde(deny_unknown_fields)]
 pub struct Collinear {}
 
-/// Below this distance, in metres, two points make no line.
+/// Distance, in metres, below which two points do not define a line.
 const SAME_PLACE: f64 = 1e-6;
 
 impl Residual for Collinear {

@@ -1,14 +1,16 @@
-//! An object stands on another.
+//! An object on top of another.
 use crate::directions::axis::extent;
 use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
 
-/// The lowest point of an object is as high as the highest point of another: r = (c₁ - c₀) · up - e₁ - e₀, in metres.
+/// The lowest point of an object is as high as the highest point of another: r = (c₁ - c₀) · up - e₁ - e₀, in
+/// metres.
 ///
-/// Variables: the object on top (1), and the one that carries it (0). eᵢ is half the extent along `up`, as in
-/// `supporting_plane`. The two need not be above each other: that is for a box, or for a prior, to say. Moving either
-/// of them sideways and turning it about `up` leave it unchanged. The top of an ellipsoid is a point: right for what stands
-/// on a flat top only as far as the ellipsoid's height is that of the thing. Smooth and defined everywhere.
+/// Variables: the object on top (1), and the object that carries it (0). eᵢ is half the extent along `up`, as
+/// in `supporting_plane`. The two need not be above each other; a box or a prior has to constrain that.
+/// Invariant to moving either object sideways and to rotating it about `up`. The top of an ellipsoid is a
+/// point, so the model fits an object with a flat top only if the ellipsoid is as high as the object. Smooth
+/// and defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -19,7 +21,7 @@ use manifactor_quadric::DualQuadric;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OnObject {
-    /// The world's up, of any length but zero. Default: z.
+    /// The world's up direction, of any length but zero. Default: z.
     #[serde(default)]
     pub up: Up,
 }

@@ -4,8 +4,8 @@ use manifactor_graph::prelude::*;
 
 /// A plane in Hessian normal form, S² × R: the points x with n · x = offset.
 ///
-/// Tangent (a, b, offset): the normal n turns as an `s2` does, the offset adds. n points to the side where things stand;
-/// (n, offset) and (-n, -offset) are the same points, seen from the two sides.
+/// Tangent (a, b, offset): the normal n steps like an `s2`, the offset is additive. n points to the side on
+/// which objects stand; (n, offset) and (-n, -offset) contain the same points, with opposite sides.
 ///
 /// ```toml
 /// [values]
@@ -14,23 +14,23 @@ use manifactor_graph::prelude::*;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plane {
-    /// The side where things stand, of any length but zero.
+    /// Normal, pointing to the side on which objects stand; of any length but zero.
     pub normal: Direction,
-    /// How far it is from the origin along its normal, in metres.
+    /// Distance from the origin along the normal, in metres.
     pub offset: f64,
 }
 
-/// A plane over another scalar.
+/// A plane over a generic scalar.
 #[derive(Debug, Clone, Copy)]
 pub struct PlaneOf<T: Scalar> {
-    /// Unit vector.
+    /// Unit normal.
     pub normal: Vector3<T>,
-    /// Distance from the origin.
+    /// Distance from the origin along the normal.
     pub offset: T,
 }
 
 impl<T: Scalar> PlaneOf<T> {
-    /// How far a point is above it; negative below.
+    /// Returns the height of a point above the plane; negative below it.
     pub fn height(&self, point: &Vector3<T>) -> T {
         self.normal.dot(point) - self.offset
     }
@@ -63,10 +63,11 @@ impl Manifold for Plane {
 }
 register_manifold!("plane", Plane);
 
-/// A plane is known beforehand: r = (n - n₀, offset - offset₀), in radians and metres.
+/// A prior on a plane: r = (n - n₀, offset - offset₀), in radians and metres.
 ///
-/// Four rows: the difference of the unit normals, of length 2 sin(θ/2) for an angle θ, and the distance. The plane turned over
-/// is another plane: its cost is the maximum, and the derivative vanishes there. Smooth and defined everywhere.
+/// Four rows: the difference of the unit normals, of length 2 sin(θ/2) for an angle θ, and the difference of
+/// the offsets. A plane with the opposite normal is a different plane: the cost has its maximum there, and
+/// its derivative vanishes. Smooth and defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -77,7 +78,7 @@ register_manifold!("plane", Plane);
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanePrior {
-    /// The plane that is expected.
+    /// Expected plane.
     pub value: Plane,
 }
 
@@ -118,7 +119,7 @@ mod tests {
             PlanePrior { value }.residual::<f64>((plane.lift(),)).norm()
         };
         assert_eq!(prior(Vector3::z(), 0.7), 0.0);
-        // the same points, seen from below
+        // The plane through the same points, seen from below.
         assert!((prior(-Vector3::z(), -0.7) - 2.0_f64.hypot(1.4)).abs() < 1e-12);
         assert!((prior(-Vector3::z(), 0.7) - 2.0).abs() < 1e-12);
         assert!((prior(Vector3::x(), 0.7) - 2.0_f64.sqrt()).abs() < 1e-12);

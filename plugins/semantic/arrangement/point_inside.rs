@@ -1,15 +1,16 @@
-//! Points that were seen on an object are inside of it.
+//! A point measured on an object.
 use manifactor_geometry::{Coordinates, Se3};
 use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
 
-/// A measured point belongs to an object: r = max(0, ρ - 1), with ρ = ‖S⁻¹Rᵀ(X p - c)‖ its distance in semi-axes.
+/// A measured point belongs to an object: r = max(0, ρ - 1), with ρ = ‖S⁻¹Rᵀ(X p - c)‖ its distance in
+/// semi-axes.
 ///
-/// Variables: the pose X of the depth camera or lidar that measured the point p, and the object. Inside (ρ < 1) it costs nothing
-/// and pulls nothing; outside, σ = 0.1 allows for a tenth of the object's size. Points alone let an object grow without
-/// end: give it a size prior, or its boxes. With `surface = true` the point is on the surface, r = ρ - 1 on both sides.
-/// The hinge has a kink at the surface, its square has none. At the centre ρ has no derivative: with `surface`, it is not
-/// defined within 1e-6 of it.
+/// Variables: the pose X of the depth camera or lidar that measured the point p, and the object. Inside the
+/// object (ρ < 1) residual and derivative are zero. Outside it, σ = 0.1 allows for a tenth of the object's
+/// size. Points alone let an object grow without limit: add a size prior or boxes. With `surface = true` the
+/// point is on the surface, r = ρ - 1 on both sides. The hinge has a kink at the surface, but its square has
+/// none. At the centre ρ has no derivative: with `surface`, the factor is not defined for ρ below 1e-6.
 ///
 /// ```toml
 /// [[factors]]
@@ -28,7 +29,7 @@ pub struct PointInside {
 }
 
 impl PointInside {
-    /// ρ².
+    /// Returns ρ².
     fn squared<T: Scalar>(&self, pose: &Se3<T>, quadric: &DualQuadric<T>) -> T {
         let point: Vector3<T> = self.point.vector().map(T::from);
         let inside = quadric.pose.inverse_act(&pose.act(&point));
@@ -81,7 +82,7 @@ mod tests {
     #[test]
     fn the_surface_has_a_derivative_on_both_sides() {
         check((any_se3(), any_quadric(), vector::<3>(3.0)), |(pose, quadric, p)| {
-            // around the object, as far in and out as it is large
+            // Around the object, up to about its size inside and outside.
             let seen = pose.inverse_act(&quadric.pose.act(&p.component_mul(&quadric.semi_axes)));
             let point = Coordinates::new(seen).unwrap();
             jacobian_law(&PointInside { point, surface: true }, &[&pose, &quadric])

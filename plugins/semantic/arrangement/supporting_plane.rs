@@ -1,4 +1,4 @@
-//! An object rests on a plane.
+//! An object on a plane.
 use crate::Plane;
 use crate::directions::axis::extent;
 use manifactor_graph::prelude::*;
@@ -6,11 +6,12 @@ use manifactor_quadric::DualQuadric;
 
 /// The lowest point of an object is on a plane that is estimated too: r = n · c - offset - e, in metres.
 ///
-/// Variables: the object, with centroid c, and the plane, with normal n. e = √Σ (sₖ Rₖ · n)² is half the object's extent along
-/// n, over its semi-axes s and their directions R. r is the gap; an object that sinks into the plane has a negative one.
-/// Sliding along the plane and turning about its normal leave it unchanged. Smooth and defined everywhere. Three objects
-/// or more that do not stand in a line hold the plane; fewer need a `prior_plane`. Supporting planes of quadrics: Hosseinzadeh et
-/// al., *Structure Aware SLAM using Quadrics and Planes* (2018).
+/// Variables: the object, with centroid c, and the plane, with normal n. e = √Σ (sₖ Rₖ · n)² is half the
+/// object's extent along n, for semi-axes s with directions R. r is the gap; it is negative if the object
+/// sinks into the plane. Invariant to sliding along the plane and to rotating about its normal. Smooth and
+/// defined everywhere. Three or more objects that are not in a line determine the plane; with fewer, add a
+/// `prior_plane`. For supporting planes of quadrics see Hosseinzadeh et al., *Structure Aware SLAM using
+/// Quadrics and Planes* (2018).
 ///
 /// ```toml
 /// [[factors]]
@@ -60,7 +61,7 @@ mod tests {
         let pose = Se3::new(turned, Vector3::new(0.3, 0.1, 1.0));
         let quadric = DualQuadric { pose, semi_axes: Vector3::new(0.1, 0.2, 0.3) };
         let plane = Plane { normal: Direction::Z, offset: 0.7 };
-        // lying on its side: half its height is its own y
+        // The object lies on its side: half its height is its y semi-axis.
         let r = SupportingPlane {}.residual::<f64>((quadric, manifactor_graph::Manifold::lift(&plane)));
         assert!((r.x - 0.1).abs() < 1e-12);
     }

@@ -1,18 +1,18 @@
-//! An object's outline is the ellipse that a detector drew: Wasserstein's distance between conics.
+//! A measured ellipse of an object's outline, compared by the Wasserstein distance between conics.
 use manifactor_geometry::{Camera, Se3};
 use manifactor_graph::prelude::*;
 use manifactor_quadric::{DualQuadric, Ellipsoid};
 use nalgebra::SVector;
 
-/// The outline of an object is the ellipse that was measured: r = (μ - μ₀, A^½ U - A₀^½), in pixels.
+/// A detector measures the outline of an object as an ellipse: r = (μ - μ₀, A^½ U - A₀^½), in pixels.
 ///
-/// Variables: the pose of the camera and the object. μ and A are centre and shape of the outline (x is inside where
-/// (x - μ)ᵀA⁻¹(x - μ) ≤ 1), U the rotation that brings A^½ closest to A₀^½. So |r|² = |μ - μ₀|² + tr(A + A₀ - 2(A^½A₀A^½)^½): the square of
-/// the 2-Wasserstein distance between the normal distributions whose 1-σ ellipses the two are (Gelbrich 1990), a distance that
-/// changes smoothly as ellipses move, grow and turn, even where they do not overlap or are round. Rows: μ, then
-/// the four entries of the difference by columns.
+/// Variables: the pose of the camera and the object. μ and A are centre and shape of the outline (x is inside
+/// if (x - μ)ᵀA⁻¹(x - μ) ≤ 1), U the rotation that brings A^½ closest to A₀^½. Then |r|² = |μ - μ₀|² + tr(A +
+/// A₀ - 2(A^½A₀A^½)^½), the squared 2-Wasserstein distance between the normal distributions with these 1-σ
+/// ellipses (Gelbrich 1990). It changes smoothly as ellipses move, scale and rotate, even if they are round
+/// or do not overlap. Rows: μ, then the four entries of the difference by columns.
 ///
-/// As `bounding_box`, it is defined where the whole object is in front of the camera; there it is smooth.
+/// Like `bounding_box`, it is defined if the whole object is in front of the camera; there it is smooth.
 ///
 /// ```toml
 /// [[factors]]
@@ -23,19 +23,20 @@ use nalgebra::SVector;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConicDistance {
-    /// The centre of the measured ellipse: right and down, in pixels.
+    /// Centre of the measured ellipse, x right and y down, in pixels.
     pub centre: [f64; 2],
-    /// Half its extents along its own axes, in pixels.
+    /// Semi-axes of the measured ellipse, in pixels.
     pub semi_axes: [Positive; 2],
-    /// The angle from the image's x axis (right) to the first semi-axis, towards y (down), in radians. Default: 0.
+    /// Angle from the image's x axis (right) to the first semi-axis, towards y (down), in radians. Default:
+    /// 0.
     #[serde(default)]
     pub angle: f64,
-    /// The camera that saw it.
+    /// The calibrated camera.
     pub camera: Camera,
 }
 
 impl ConicDistance {
-    /// A₀^½.
+    /// Returns A₀^½.
     fn root(&self) -> Matrix2<f64> {
         let (sin, cos) = self.angle.sin_cos();
         let axes = Matrix2::new(cos, -sin, sin, cos);
@@ -53,12 +54,13 @@ impl Residual for ConicDistance {
             return SVector::zeros();
         }
         let outline = seen.outline(&self.camera);
-        // the square root of a 2 × 2 matrix that is positive definite
+        // Square root of a positive definite 2 × 2 matrix.
         let d = outline.determinant.sqrt();
         let scale = (outline.xx + outline.yy + d * 2.0).sqrt().recip();
         let a = Matrix2::new(outline.xx + d, outline.xy, outline.xy, outline.yy + d) * scale;
         let b: Matrix2<T> = self.root().map(T::from);
-        // of all A^½ U the closest: U from the polar decomposition of the product, of which the determinant is positive
+        // The closest A^½ U: U comes from the polar decomposition of the product, whose determinant is
+        // positive.
         let m = a * b;
         let (cos, sin) = (m.m11 + m.m22, m.m21 - m.m12);
         let length = (cos * cos + sin * sin).sqrt();

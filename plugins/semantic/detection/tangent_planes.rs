@@ -1,4 +1,4 @@
-//! A box whose sides bound an object, in space: from starts that have no box yet.
+//! A detected box, with the residual in space: for initial values that have no predicted box yet.
 use manifactor_geometry::{Camera, Se3};
 use manifactor_graph::prelude::*;
 use manifactor_quadric::{BoundingBox, DualQuadric, Ellipsoid};
@@ -6,16 +6,17 @@ use nalgebra::RowVector3;
 
 /// The planes through a camera and the sides of a box touch the object: rₖ = nₖ · c - eₖ, in metres.
 ///
-/// Variables: the pose of the camera and the object, with its centroid c in the camera's frame. nₖ is the unit normal of
-/// plane πₖ = Pᵀlₖ towards the inside of the box, eₖ half the object's extent along it. The algebraic form of the same
-/// constraint, πₖᵀ Q* πₖ = eₖ² - (nₖ · c)² = 0 (Rubino et al., *3D Object Localisation from Multi-View Object Detections*, 2018),
-/// is zero for an object on the wrong side too; this root of it is not. Rows: left, top, right, bottom.
+/// Variables: the pose of the camera and the object, with centroid c in the camera's frame. nₖ is the unit
+/// normal of plane πₖ = Pᵀlₖ, pointing to the inside of the box, and eₖ half the object's extent along it.
+/// The algebraic form of this constraint, πₖᵀ Q* πₖ = eₖ² - (nₖ · c)² = 0 (Rubino et al., *3D Object
+/// Localisation from Multi-View Object Detections*, 2018), is also zero for an object on the wrong side; this
+/// form is not. Rows: left, top, right, bottom.
 ///
-/// It is smooth and defined everywhere, where `bounding_box` is not: behind the camera, around it, across its plane. So it pulls an
-/// object into view from a bad start; then `bounding_box`, whose noise is that of a detector, should take over. An object as small
-/// as a point at the camera satisfies it exactly: two views or a size prior keep it from there. Begin large: a tiny object behind all
-/// cameras shrinks to a point. σ is in metres at the
-/// object: σ pixels at depth z are about σ z / f.
+/// Unlike `bounding_box` it is smooth and defined everywhere: also behind the camera, around it and across
+/// its plane. It therefore pulls an object into view from a bad initial value; then `bounding_box`, whose
+/// noise matches a detector, should take over. An object that shrinks to a point at the camera satisfies it
+/// exactly; two views or a size prior prevent this. Use a large initial size: a tiny object behind all
+/// cameras shrinks to a point. σ is in metres at the object: σ pixels at depth z are about σ z / f.
 ///
 /// ```toml
 /// [[factors]]
@@ -26,18 +27,19 @@ use nalgebra::RowVector3;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TangentPlanes {
-    /// The box that was measured: xmin, ymin, xmax, ymax, in pixels.
+    /// Measured box: xmin, ymin, xmax, ymax, in pixels.
     #[serde(rename = "box")]
     pub bounding_box: BoundingBox,
-    /// The camera that saw it.
+    /// The calibrated camera.
     pub camera: Camera,
 }
 
 impl TangentPlanes {
-    /// Unit normals of the planes through the sides, towards the inside, in the camera's frame.
+    /// Returns the unit normals of the planes through the sides, pointing inside, in the camera's frame.
     fn normals(&self) -> [Vector3<f64>; 4] {
         let [left, top, right, bottom] = self.bounding_box.lines();
-        // Kᵀl, the plane of a line in the image; right and bottom lie on the other side of it
+        // Kᵀl is the plane of an image line; the signs of the right and bottom sides are flipped to point
+        // inside.
         [left, top, -right, -bottom].map(|line| (self.camera.matrix().transpose() * line).normalize())
     }
 }
@@ -91,7 +93,7 @@ mod tests {
 
     const TRUTH: ([f64; 3], [f64; 3]) = ([0.1, -0.1, 3.0], [0.2, 0.3, 0.25]);
 
-    /// Five views of the true object, and a start; the rotation is held.
+    /// Five views of the true object, and an initial value; the rotation is held.
     fn views(start: DualQuadric) -> (Graph, Values) {
         let camera = Camera::new([525.0, 525.0, 320.0, 240.0], 640, 480).unwrap();
         let truth = object(TRUTH.0, TRUTH.1);
@@ -99,7 +101,7 @@ mod tests {
         for i in 0..5 {
             let angle = -0.5 + 0.25 * f64::from(i);
             let turn = So3::exp(&Vector3::new(0.2 * angle, angle, 0.0));
-            // around the object, looking at it
+            // Around the object, facing it.
             let pose = Se3::new(turn, truth.centroid() - turn.act(&Vector3::z()) * 3.0);
             let any = BoundingBox::new([0.0, 0.0, 1.0, 1.0]).unwrap();
             let bounding_box = factor(any, camera).predict(&pose, &truth).unwrap();

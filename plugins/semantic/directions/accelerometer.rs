@@ -1,14 +1,15 @@
-//! Gravity, as a variable that an accelerometer measures.
+//! Gravity as a variable, measured by an accelerometer.
 use crate::S2;
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::prelude::*;
 
-/// A body at rest feels up where it is: r = R⁻¹ g - a, of length 2 sin(angle / 2).
+/// An accelerometer at rest measures the up direction: r = R⁻¹ g - a, of length 2 sin(angle / 2).
 ///
-/// Variables: the pose of the body, with rotation R, and the direction g of up in the world. a is what the accelerometer measures,
-/// the specific force, which points up at rest; its length does not matter. σ is in radians near alignment; a body that
-/// accelerates by b is off by about b / 9.81. Turning the body about g, and moving it, leave it unchanged: it holds no yaw. Smooth
-/// and defined everywhere; where a points straight down the derivative of the cost vanishes.
+/// Variables: the pose of the body, with rotation R, and the up direction g in the world. a is the measured
+/// specific force, which points up at rest; its length does not matter. σ is in radians close to alignment;
+/// an acceleration b of the body causes an error of about b / 9.81. Invariant to rotating the body about g
+/// and to moving it, so it does not constrain yaw. Smooth and defined everywhere; if a points straight down,
+/// the derivative of the cost vanishes.
 ///
 /// ```toml
 /// [[factors]]

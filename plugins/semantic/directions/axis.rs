@@ -1,29 +1,30 @@
-//! The axes of an object, by name.
+//! Named axes of an object.
 use manifactor_graph::Scalar;
 use manifactor_quadric::DualQuadric;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An axis of an object.
+/// A named axis of an object.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
-    /// The longest semi-axis at the current estimate, the first of equals: it jumps where another becomes the longest.
+    /// The longest semi-axis at the current estimate, the first of equal ones. It jumps if a different axis
+    /// becomes the longest.
     #[default]
     Longest,
-    /// The shortest, the first of equals: the normal of a flat thing.
+    /// The shortest semi-axis, the first of equal ones: the normal of a flat object.
     Shortest,
-    /// The object's own x.
+    /// The local x axis of the object.
     X,
-    /// The object's own y.
+    /// The local y axis of the object.
     Y,
-    /// The object's own z.
+    /// The local z axis of the object.
     Z,
 }
 
 impl Axis {
-    /// Its direction, a unit vector; the sign of the longest and the shortest means nothing.
+    /// Returns the unit direction of the axis. The sign of the longest and the shortest axis is arbitrary.
     pub fn of<T: Scalar>(self, quadric: &DualQuadric<T>) -> Vector3<T> {
         let s = &quadric.semi_axes;
         let index = match self {
@@ -40,7 +41,7 @@ impl Axis {
     }
 }
 
-/// Half the extent of an object along a unit vector u: e = √Σ (sₖ Rₖ · u)².
+/// Returns half the extent of an object along a unit vector u: e = √Σ (sₖ Rₖ · u)².
 pub(crate) fn extent<T: Scalar>(quadric: &DualQuadric<T>, u: &Vector3<T>) -> T {
     quadric.pose.rotation.inverse().act(u).component_mul(&quadric.semi_axes).norm_squared().sqrt()
 }

@@ -1,14 +1,14 @@
-//! Two objects are aligned.
+//! Two objects with parallel axes.
 use crate::Axis;
 use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
 
 /// An axis of an object is parallel to an axis of another: r = a₀ × a₁, of length sin(angle).
 ///
-/// Which way the axes point does not matter. σ is in radians, near alignment. Moving either of them, and turning both
-/// together, leave it unchanged, and so does turning either about its axis. Smooth, except that `longest` and `shortest` jump where
-/// another axis takes the place; perpendicular axes are a maximum, where the derivative of the cost vanishes. Defined
-/// everywhere.
+/// The signs of the axes do not matter. σ is in radians, close to alignment. Invariant to moving either
+/// object, to rotating both together, and to rotating either about its axis. Smooth, except that `longest`
+/// and `shortest` jump if a different axis becomes the longest or the shortest. Perpendicular axes are a
+/// maximum, at which the derivative of the cost vanishes. Defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -19,7 +19,7 @@ use manifactor_quadric::DualQuadric;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parallel {
-    /// The axis of each: longest, shortest, x, y or z. Default: the longest of both.
+    /// The axis of each object: longest, shortest, x, y or z. Default: the longest of both.
     #[serde(default)]
     pub axes: [Axis; 2],
 }

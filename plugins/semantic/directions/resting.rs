@@ -1,17 +1,18 @@
-//! An object is in balance.
+//! An object in balance.
 use super::S2;
 use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
 
-/// An object rests: one of its principal axes is vertical, whichever it is.
+/// An object rests: any one of its principal axes is vertical.
 ///
-/// r = up × Q up / ‖Q‖, Q = R diag(s²) Rᵀ. -Q up points from the centre to the point of the ellipsoid that touches the ground: what is
-/// in balance has it right below the centre, lying or standing. So no class has to say which axis is up, and a
-/// book that stands among books is as good as one that lies. For an axis of length a tilted by θ from the vertical, b the length across it,
-/// r is (a² - b²)/√(Σ s⁴) · sin θ cos θ: an object that is as wide as high is free, and there is no jump where another axis gets
-/// longer. σ is in these units: radians for a thin rod, less for all else. Moving and growing leave it
-/// unchanged, turning about `up` turns r. An axis halfway between two directions in balance is a maximum, where the derivative of the cost vanishes. Defined
-/// everywhere.
+/// r = up × Q up / ‖Q‖, Q = R diag(s²) Rᵀ. -Q up points from the centre to the lowest point of the ellipsoid.
+/// An object in balance, lying or standing, has this point directly below its centre. No class has to define
+/// which axis is up: a book that stands among books fits as well as one that lies. For an axis of length a
+/// tilted by θ from the vertical, and length b across it, r is (a² - b²)/√(Σ s⁴) · sin θ cos θ. An object
+/// that is as wide as high is therefore free to rotate, and there is no jump when a different axis becomes
+/// the longest. σ is in these units: radians for a thin rod, less for all other shapes. Invariant to moving
+/// and scaling; rotating about `up` rotates r. An axis halfway between two directions in balance is a
+/// maximum, at which the derivative of the cost vanishes. Defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -22,7 +23,7 @@ use manifactor_quadric::DualQuadric;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Resting {
-    /// The world's up, of any length but zero. Default: z.
+    /// The world's up direction, of any length but zero. Default: z.
     #[serde(default)]
     pub up: Up,
 }
@@ -43,10 +44,10 @@ register_invariance!(Resting, "moving and growing", |_factor, (quadric,), random
     (moved,)
 });
 
-/// An object rests on what is level along a direction that is estimated too: r = g × Q g / ‖Q‖.
+/// An object rests, with the up direction as a variable: r = g × Q g / ‖Q‖.
 ///
-/// Variables: the object, and the direction g, such as that of gravity. Objects tell where up is as well as the other way round: where
-/// nothing else knows it. Otherwise as `resting`.
+/// Variables: the object, and the direction g, for example of gravity. Resting objects then also determine
+/// the up direction, which is useful if no other sensor measures it. All else is as in `resting`.
 ///
 /// ```toml
 /// [[factors]]
@@ -68,7 +69,7 @@ impl Residual for RestingAlong {
 }
 register_factor!("resting_along", RestingAlong);
 
-/// up × Q up / ‖Q‖.
+/// Returns up × Q up / ‖Q‖.
 fn imbalance<T: Scalar>(quadric: &DualQuadric<T>, up: &Vector3<T>) -> Vector3<T> {
     let (rotation, squares) = (&quadric.pose.rotation, quadric.semi_axes.component_mul(&quadric.semi_axes));
     let touching = rotation.act(&rotation.inverse().act(up).component_mul(&squares));
@@ -118,14 +119,14 @@ mod tests {
     #[test]
     fn what_touches_the_ground_is_as_far_to_the_side_as_it_says() {
         let quadric = tilted(0.3);
-        // around the ball, in the plane in which it leans
+        // Points around the ball, in the plane of the tilt.
         let around = (0..100_000).map(|i| f64::from(i) * std::f64::consts::TAU / 1e5);
         let surface = around.map(|a| {
             let on_ball = Vector3::new(0.0, a.sin(), a.cos());
             quadric.pose.rotation.act(&on_ball.component_mul(&quadric.semi_axes))
         });
         let lowest = surface.min_by(|p, q| p.z.total_cmp(&q.z)).unwrap();
-        // that point is -Q up / √(upᵀ Q up), and √(upᵀ Q up) its depth
+        // The lowest point is -Q up / √(upᵀ Q up), at the depth √(upᵀ Q up).
         let to_the_side = of(quadric) * quadric.semi_axes.map(|s| s * s).norm() / -lowest.z;
         assert!((lowest.y.abs() - to_the_side).abs() < 1e-5, "{lowest} {to_the_side}");
     }

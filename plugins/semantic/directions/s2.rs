@@ -3,11 +3,11 @@ use manifactor_graph::prelude::*;
 use manifactor_graph::quantity::Shape;
 use nalgebra::Matrix3x2;
 
-/// A direction in space, such as gravity's: a point on the unit sphere.
+/// A direction in space, such as gravity: a point on the unit sphere.
 ///
-/// Tangent (a, b): along two axes perpendicular to the direction n, B(n) = [b₁ b₂] of Duff et al., *Building an
-/// Orthonormal Basis, Revisited* (2017). n ⊞ δ = cos|δ| n + sin|δ|/|δ| B δ, the great circle that leaves n towards B δ. The
-/// opposite of n is half a turn away in every direction: `local` takes the first.
+/// Tangent (a, b): along two axes perpendicular to the direction n, B(n) = [b₁ b₂] of Duff et al., *Building
+/// an Orthonormal Basis, Revisited* (2017). n ⊞ δ = cos|δ| n + sin|δ|/|δ| B δ, the great circle from n
+/// towards B δ. The opposite of n is half a turn away in every direction; `local` uses the first axis.
 ///
 /// ```toml
 /// [values]
@@ -16,16 +16,16 @@ use nalgebra::Matrix3x2;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct S2 {
-    /// Where it points, of any length but zero.
+    /// Direction vector, of any length but zero.
     pub direction: Direction,
 }
 
 impl S2 {
-    /// The direction of a vector that is not zero.
+    /// Creates the variable from a direction.
     pub const fn new(direction: Direction) -> Self {
         Self { direction }
     }
-    /// Two unit vectors that are perpendicular to this one and to each other.
+    /// Returns two unit vectors perpendicular to this direction and to each other.
     pub fn basis(&self) -> Matrix3x2<f64> {
         let n = *self.direction;
         let sign = 1f64.copysign(n.z);
@@ -56,7 +56,8 @@ impl Manifold for S2 {
             return *self;
         }
         let there = *self.direction * angle.cos() + self.basis() * (delta * (angle.sin() / angle));
-        // not a direction where the step is not finite: the point stays, and the residual tells
+        // A step that is not finite gives no direction: keep the current one; the residual reports the
+        // problem.
         Self { direction: Direction::new(there).unwrap_or(self.direction) }
     }
     fn local(&self, other: &Self) -> Vector2<f64> {
@@ -93,7 +94,7 @@ mod tests {
     use manifactor_testing::strategies::{signed_angle, vector};
     use proptest::prelude::*;
 
-    /// Inside of the chart: shorter than π.
+    /// Tangent vectors inside the chart: shorter than π.
     fn tangent() -> impl Strategy<Value = Vector2<f64>> {
         (signed_angle(), vector::<2>(1.0))
             .prop_map(|(angle, v)| v.try_normalize(0.0).unwrap_or(Vector2::x()) * angle)

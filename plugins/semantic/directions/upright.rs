@@ -1,14 +1,15 @@
-//! A named axis of an object is upright.
+//! A named axis of an object is vertical.
 use crate::{Axis, S2};
 use manifactor_graph::prelude::*;
 use manifactor_quadric::DualQuadric;
 
 /// A named axis of an object is vertical: r = a × up, of length sin(tilt).
 ///
-/// `vertical_orientation_smooth` for any axis: a plate lies flat with `axis = "shortest"`, a thing with axes of its own stands with
-/// `axis = "z"`. Upside down is as good as upright. σ is in radians of tilt. Turning about `up`, moving and growing
-/// leave it unchanged. `longest` and `shortest` jump where another axis takes the place; a horizontal axis is a maximum, where the
-/// derivative of the cost vanishes. Defined everywhere.
+/// Like `vertical_orientation_smooth`, but for any axis: a plate lies flat with `axis = "shortest"`, an
+/// object with known local axes stands with `axis = "z"`. Upside down counts as upright. σ is in radians of
+/// tilt. Invariant to rotating about `up`, moving and scaling. `longest` and `shortest` jump if a different
+/// axis becomes the longest or the shortest. A horizontal axis is a maximum, at which the derivative of the
+/// cost vanishes. Defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -22,7 +23,7 @@ pub struct Upright {
     /// The axis: longest, shortest, x, y or z. Default: longest.
     #[serde(default)]
     pub axis: Axis,
-    /// The world's up, of any length but zero. Default: z.
+    /// The world's up direction, of any length but zero. Default: z.
     #[serde(default)]
     pub up: Up,
 }
@@ -45,10 +46,11 @@ register_invariance!(Upright, "moving, growing, and turning about its axis", |fa
     (moved,)
 });
 
-/// A named axis of an object is along a direction that is estimated too: r = a × g, of length sin(angle).
+/// A named axis of an object is vertical, with the up direction as a variable: r = a × g, of length
+/// sin(angle).
 ///
-/// Variables: the object, and the direction g, such as that of gravity. Objects that stand upright tell where up is as well as the
-/// other way round. Otherwise as `upright`.
+/// Variables: the object, and the direction g, for example of gravity. Upright objects then also determine
+/// the up direction. All else is as in `upright`.
 ///
 /// ```toml
 /// [[factors]]

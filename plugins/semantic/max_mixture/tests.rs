@@ -25,7 +25,7 @@ fn upright_or_flat() -> MaxMixture {
     MaxMixture::new(vec![upright, flat, none]).unwrap()
 }
 
-/// The tilt that a start at some tilt ends at.
+/// Final tilt of a solve that begins at some tilt.
 fn solved(tilt: f64) -> f64 {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     values.insert("q", tilted(tilt));
@@ -44,11 +44,11 @@ fn the_estimate_decides_which_it_is() {
 
 #[test]
 fn what_fits_none_of_them_is_left_where_it_is() {
-    // at 45° either costs 25, and none of them ln(600)
+    // At 45° each of the two factors costs 25, and the component without a factor ln(600).
     assert!((solved(std::f64::consts::FRAC_PI_4) - std::f64::consts::FRAC_PI_4).abs() < 1e-9);
 }
 
-/// A depth of 1.5 m from x that is the depth of q0 or of q1.
+/// A depth of 1.5 m, measured from x, of either q0 or q1.
 fn either(weights: [f64; 2]) -> MaxMixture {
     let depth = CentroidDepth { depth: Positive::new(1.5).unwrap() };
     let [first, second] = [1, 2]

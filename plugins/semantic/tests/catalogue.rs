@@ -1,4 +1,4 @@
-//! Everything that this crate registers has docs, a schema and an example, and keeps the laws.
+//! Every type registered by this crate has docs, a schema and an example, and obeys the laws.
 use manifactor_graph::catalogue::{self, Entry};
 use manifactor_semantic as _;
 use manifactor_testing::catalogue::{documentation_law, factor_law, manifold_law};

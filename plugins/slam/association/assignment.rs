@@ -1,14 +1,15 @@
-//! Assignment of boxes to objects.
+//! Optimal assignment of detections to objects.
 use pathfinding::prelude::{Matrix, kuhn_munkres};
 
-/// Gains are compared in units of this.
+/// Resolution of the gains. The solver works with integers.
 const UNIT: f64 = 1e-6;
 
-/// Matches each row with at most one column, and each column with at most one row, so that the sum of the gains is largest
-/// (the Hungarian method).
+/// Matches each row with at most one column, and each column with at most one row, so that the sum of the
+/// gains is largest (the Hungarian method).
 ///
-/// `gains` are (row, column, gain), such as box, object and overlap. A pair that is not listed, or whose gain is not
-/// positive, is not matched. Gains count in units of 1e-6. Returns the column of each row.
+/// `gains` are (row, column, gain), for example detection, object and overlap. A pair that is not listed, or
+/// whose gain is not positive, is not matched. Gains are rounded down to multiples of 1e-6. Returns the
+/// column of each row.
 ///
 /// ```
 /// use manifactor_slam::association::best_assignment;
@@ -20,7 +21,7 @@ pub fn best_assignment(rows: usize, columns: usize, gains: &[(usize, usize, f64)
     if rows == 0 {
         return vec![];
     }
-    // a column of no gain for each row that stays alone
+    // one extra column without gain per row, for rows that stay unmatched
     let mut weights = Matrix::new(rows, columns + rows, 0_i64);
     for (row, column, gain) in gains {
         weights[(*row, *column)] = (gain / UNIT).max(0.0) as i64;

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// The source says which object a box shows; boxes that it names none for are left out.
+/// The source names the object of each detection. Detections without a name are skipped.
 ///
 /// ```toml
 /// association = { type = "given" }

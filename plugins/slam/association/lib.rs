@@ -1,8 +1,9 @@
-//! Which object a box shows, where the source does not say: chosen by name in a run's `association`.
+//! Data association: deciding which object a detection shows if the source does not name it. A run selects
+//! the method by name in `association`.
 //!
-//! An [`Associator`] names the boxes of a frame, and learns from it once the frame is in the map. What it names wrongly at first
-//! it may mend later: two objects that turn out to be one are [merged](Merge), boxes that turn out to show another object [move](Move)
-//! to it, and [`Names`] has the name that counts.
+//! An [`Associator`] assigns an object to each detection of a frame, and learns from the frame once it is in
+//! the map. Later evidence may correct an assignment: two objects are [merged](Merge), or detections
+//! [move](Move) to a different object. [`Names`] maps each original id to the current one.
 mod assignment;
 mod given;
 mod likelihood;
@@ -21,13 +22,15 @@ pub use given::Given;
 pub use likelihood::Likelihood;
 pub use names::{Merge, Move, Names};
 
-/// A way to associate boxes with objects.
+/// A method of data association.
 #[typetag::serialize(tag = "type")]
 pub trait Association: Debug + Send + Sync {
-    /// Begins, with the objects of an earlier map, where there is one, known as well as they are trusted.
+    /// Creates the associator. `known` are the objects of a prior map with trusted covariances; empty without
+    /// a prior map.
     fn begin(&self, camera: Camera, aliases: &Aliases, known: &[Arc<PriorObject>]) -> Box<dyn Associator>;
 
-    /// Returns whether it takes the names that the source gives. Where it does not, they may serve to score it.
+    /// Returns whether the method takes the object ids of the source. If not, these ids can serve to score
+    /// it.
     fn uses_names(&self) -> bool {
         false
     }
@@ -35,60 +38,61 @@ pub trait Association: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn Association, "association");
 
-/// Associates boxes with objects, frame by frame.
+/// Associates detections with objects, frame by frame.
 pub trait Associator: Debug + Send {
-    /// Names the object of each box of a frame: one that is known, a new one, or none. The last pose of the map is that of the frame,
-    /// as it is predicted.
+    /// Returns the object of each detection of a frame: a known one, a new one, or `None`. The last pose of
+    /// the map is the predicted pose of this frame.
     fn associate(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>>;
 
-    /// Names the boxes of a frame again that had these names, when all other frames have been seen.
+    /// Assigns the detections of an earlier frame again, with all later frames known. `names` are the objects
+    /// assigned so far.
     fn reconsider(&self, _: &Image<'_>, names: &[Option<ObjectId>], _: &dyn Map) -> Vec<Option<ObjectId>> {
         names.to_vec()
     }
 
-    /// Learns from the boxes of a frame, which is in the map now, under these names.
+    /// Learns from the detections of a frame that is in the map now, under these object ids.
     fn learn(&mut self, image: &Image<'_>, names: &[Option<ObjectId>], map: &dyn Map) -> Learned;
 
-    /// Learns from all frames together when no other comes.
+    /// Learns from all frames together, after the last one.
     fn settle(&mut self, _: &dyn Map) -> Learned {
         Learned::default()
     }
 }
 
-/// What a frame has taught of earlier ones.
+/// Corrections to earlier frames that follow from a frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Learned {
-    /// Objects that turn out to be one.
+    /// Pairs of objects that are merged.
     pub merged: Vec<Merge>,
-    /// Boxes that turn out to show another object, before any are merged.
+    /// Detections that move to a different object. Applied before the merges.
     pub moved: Vec<Move>,
-    /// Objects that were seen too rarely to be any, and are not looked for any more.
+    /// Objects with too few detections; the associator no longer tracks them.
     pub forgotten: Vec<ObjectId>,
 }
 
 impl Learned {
-    /// Returns whether no box has another object for it.
+    /// Returns whether no detection changes its object.
     pub fn is_nothing(&self) -> bool {
         self.moved.is_empty() && self.merged.is_empty()
     }
 }
 
-/// What an associator sees of a frame.
+/// The data of a frame that an associator uses.
 #[derive(Debug, Clone, Copy)]
 pub struct Image<'a> {
-    /// Counts the frames that are in the map.
+    /// Index of the frame among the frames in the map.
     pub frame: usize,
-    /// Seconds.
+    /// Unit: seconds.
     pub timestamp: f64,
-    /// The boxes in it.
+    /// Detections of the frame.
     pub detections: &'a [Detection],
 }
 
-/// What has been estimated so far.
+/// The current estimate of poses and objects.
 pub trait Map {
-    /// The pose of the camera in a frame, where it is still known.
+    /// Returns the camera pose of a frame, or `None` if it is no longer in the map.
     fn pose(&self, frame: usize) -> Option<Se3>;
 
-    /// An object, where it is mapped.
+    /// Returns an object, or `None` if it is not in the map.
     fn object(&self, id: ObjectId) -> Option<DualQuadric>;
 }

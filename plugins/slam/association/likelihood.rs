@@ -1,4 +1,4 @@
-//! By the joint likelihood of box and class.
+//! Data association by the joint likelihood of box and class.
 mod division;
 mod fit;
 #[cfg(test)]
@@ -22,19 +22,23 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tracker::Tracker;
 
-/// By the likelihood of box and class, under what each object is expected to look like.
+/// Assigns detections by the likelihood of box and class, given the predicted box of each object.
 ///
-/// Each object has an ellipsoid of its own from its first box on, fitted to its boxes from all sides, with a covariance: one box says
-/// where it is but for its depth. The next box is expected with S = J Σ Jᵀ + D + R: Σ of the ellipsoid, D of the camera's drift since
-/// the object was seen, R of the detector. A box costs d² + ln det 2πS - 2 ln p(class), d its distance by S; to be a new object
-/// costs what a box anywhere in the image does. The cheapest assignment of all boxes of a frame wins (Hungarian method). A box that
-/// is nearly another's twin shows the same object: detectors draw a box for each class.
+/// From its first box on, each object has an ellipsoid with a covariance, fitted to boxes from all sides. One
+/// box determines all but the depth. The innovation covariance of the next box is S = J Σ Jᵀ + D + R: Σ is
+/// the covariance of the ellipsoid, D the drift of the camera since the object was last seen, R the noise of
+/// the detector. A box costs d² + ln det 2πS - 2 ln p(class), with the Mahalanobis distance d under S. A new
+/// object costs as much as a box of any size anywhere in the image. The cheapest assignment of all boxes of a
+/// frame wins (Hungarian method). A box that nearly coincides with an assigned box gets its object, because
+/// detectors draw one box per class.
 ///
-/// An object that was lost begins again under another name. Where one ellipsoid explains the boxes of two objects that
-/// are not seen side by side, they become one; where only two explain those of one, it becomes two. All boxes of a frame are put to objects once
-/// more a while later, by what is known then: those that turn out to show another object are moved to it.
+/// An object that was lost starts again under a new id. Two objects are merged if one ellipsoid explains the
+/// boxes of both and they are not visible side by side. An object is split if only two ellipsoids explain its
+/// boxes. After a delay, all boxes of a frame are assigned a second time with the knowledge of that time, and
+/// boxes that show a different object move to it.
 ///
-/// Chosen on fr1/desk, fr1/desk2 and simulated desks: see the page on association in `docs/decisions`.
+/// The defaults were chosen on fr1/desk, fr1/desk2 and simulated desks: see the page on association in
+/// `docs/decisions`.
 ///
 /// ```toml
 /// association = { type = "likelihood", box_sigma = 4.0, box_sigma_of_size = 0.06 }
@@ -42,32 +46,35 @@ use tracker::Tracker;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Likelihood {
-    /// Standard deviation of a box's sides, in pixels.
+    /// Standard deviation of the sides of a box. Unit: pixels.
     pub box_sigma: Positive,
-    /// The same as a part of its width and height; the two add up as squares.
+    /// Standard deviation of the sides of a box, relative to its width and height. The variances of
+    /// `box_sigma` and `box_sigma_of_size` add up.
     pub box_sigma_of_size: Positive,
-    /// How many times as far off a box may be as one of many that are averaged: a detector's errors last for many frames.
+    /// Factor on the standard deviation of a single box compared with a prediction, because the errors of a
+    /// detector persist over many frames. A fit, which averages many boxes, does not use it.
     pub lasting: Positive,
-    /// How far away a new object is believed to be, in metres, until there are others to go by.
+    /// Assumed distance of a new object until the distances of other objects are known. Unit: metres.
     pub depth: Positive,
-    /// Standard deviation of the logarithm of that.
+    /// Standard deviation of the logarithm of `depth`.
     pub depth_spread: Positive,
-    /// How far the camera drifts in a second, as standard deviations of a random walk: radians.
+    /// Rotational drift of the camera: standard deviation of a random walk after one second. Unit: radians.
     pub drift_rad: Positive,
-    /// The same in metres.
+    /// Translational drift of the camera: standard deviation of a random walk after one second. Unit: metres.
     pub drift_m: Positive,
-    /// Standard deviation of measured depths, where the source has any, as a part of the depth.
+    /// Standard deviation of measured depths, relative to the depth. Only for sources with depths.
     pub depth_error: Positive,
-    /// The share of boxes that have a class which is not their object's.
+    /// Share of boxes with a class that is not the class of their object.
     pub class_error: Share,
-    /// New objects in a frame, on average.
+    /// Expected number of new objects per frame.
     pub new_objects: Positive,
-    /// Boxes in a frame with this intersection over union show one object.
+    /// Intersection over union at which two boxes of a frame show one object.
     pub twin_iou: Share,
-    /// Two objects are one where the sides of their boxes are off by this many standard deviations at most from one ellipsoid, as a root of
-    /// the mean square: 1.4 times less for two of different classes, twice as many for two of one class in one place.
+    /// Largest misfit at which two objects are merged: root mean square of the residuals of their box sides
+    /// to one ellipsoid, in standard deviations. The limit is divided by 1.4 if the classes differ, and
+    /// doubled for two objects of one class in one place.
     pub merge_error: Positive,
-    /// The boxes of a frame are put to objects once more after so many seconds, by what is known then.
+    /// Delay after which the boxes of a frame are assigned a second time. Unit: seconds.
     pub second_look_s: Positive,
 }
 
@@ -106,13 +113,13 @@ impl Likelihood {
         BoxNoise { px: *self.box_sigma, of_size: *self.box_sigma_of_size, others }
     }
 
-    /// The likelihood of a class for an object that has this share of it.
+    /// Returns the likelihood of a class, given its share of the votes of an object.
     fn likelihood(&self, share: f64) -> f64 {
         (1.0 - *self.class_error) * share + *self.class_error / CLASSES
     }
 
-    /// What a box costs that shows a new object: it is anywhere in the image, of any size and class, and as far away as objects usually are,
-    /// give or take the spread.
+    /// Returns the cost of a box that shows a new object: the box lies anywhere in the image, with any size
+    /// and class, and the distance is the usual one with its spread.
     fn cost_of_new(&self, camera: &Camera, quantities: &Quantities, usual: f64) -> f64 {
         let area = camera.size().product();
         let usual = UsualDepth { depth: usual, spread: *self.depth_spread };
@@ -121,5 +128,5 @@ impl Likelihood {
     }
 }
 
-/// Classes that a box may have by mistake: it makes next to no difference.
+/// Number of classes that a wrong box may have. The result hardly depends on it.
 const CLASSES: f64 = 20.0;

@@ -2,46 +2,46 @@ use manifactor_recording::sequence::{Detection, ObjectId};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Two objects that turn out to be one.
+/// Two objects that become one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Merge {
-    /// The name that is given up.
+    /// The id that is given up.
     pub from: ObjectId,
-    /// The one that stays.
+    /// The id that stays.
     pub into: ObjectId,
 }
 
-/// A box that turns out to show another object than was thought.
+/// A detection that moves to a different object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Move {
-    /// Counts the frames that are in the map.
+    /// Index of the frame among the frames in the map.
     pub frame: usize,
-    /// Its place among the boxes of its frame.
+    /// Index among the detections of its frame.
     #[serde(rename = "box")]
     pub place: usize,
-    /// What it was thought to show.
+    /// The object before.
     pub from: ObjectId,
-    /// What it shows.
+    /// The object now.
     pub into: ObjectId,
-    /// The box.
+    /// The detection itself.
     #[serde(skip)]
     pub detection: Detection,
 }
 
-/// What boxes are called that were called otherwise when they came.
+/// Current ids of detections whose object changed after the first assignment.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Names {
-    /// By a name that was given up, the one that stays.
+    /// Remaining id, by the id that was given up.
     merged: BTreeMap<ObjectId, ObjectId>,
-    /// By frame and place in it, the name of a box that was moved.
+    /// Object of a moved detection, by frame and index in the frame.
     moved: BTreeMap<(usize, usize), ObjectId>,
 }
 
 impl Names {
-    /// Takes note of a merge.
+    /// Records a merge.
     pub fn merge(&mut self, Merge { from, into }: Merge) {
         let into = self.now(into);
-        // a name cannot be given up for itself
+        // a merge of an id with itself changes nothing
         if from != into {
             self.merged.insert(from, into);
             let names = self.merged.values_mut().chain(self.moved.values_mut());
@@ -49,27 +49,28 @@ impl Names {
         }
     }
 
-    /// Takes note of a box that shows another object.
+    /// Records a detection that moves to a different object.
     pub fn put(&mut self, Move { frame, place, into, .. }: &Move) {
         self.moved.insert((*frame, *place), self.now(*into));
     }
 
-    /// The name of what was called so once.
+    /// Returns the current id of an object that had this id once.
     pub fn now(&self, id: ObjectId) -> ObjectId {
         self.merged.get(&id).copied().unwrap_or(id)
     }
 
-    /// The name of a box that was called so when it came, by its frame and its place in that.
+    /// Returns the current object of a detection that was first assigned to `id`, by its frame and its index
+    /// there.
     pub fn of(&self, id: ObjectId, frame: usize, place: usize) -> ObjectId {
         self.moved.get(&(frame, place)).copied().unwrap_or_else(|| self.now(id))
     }
 
-    /// How many names were given up.
+    /// Returns the number of ids that were given up.
     pub fn given_up(&self) -> usize {
         self.merged.len()
     }
 
-    /// How many boxes show another object than was thought at first.
+    /// Returns the number of detections that moved to a different object.
     pub fn moved(&self) -> usize {
         self.moved.len()
     }
@@ -115,7 +116,7 @@ mod tests {
         names.put(&put(2, 3));
         let of = |names: &Names, place| names.of(ObjectId(1), 4, place).0;
         assert_eq!((of(&names, 0), of(&names, 1), names.moved()), (2, 3, 1));
-        // what is united with the old one again is where it was, and may be moved again
+        // merged with its old object, the detection is back there, and may move again
         names.merge(merge(3, 2));
         assert_eq!(of(&names, 1), 2);
         names.put(&put(2, 5));

@@ -1,4 +1,4 @@
-//! The document that describes an experiment.
+//! Document of an experiment.
 mod axis;
 mod check;
 mod names;
@@ -23,66 +23,68 @@ pub use summary_settings::SummarySettings;
 /// An experiment: all its trials, in the order of the table.
 #[derive(Debug, Clone)]
 pub struct Experiment {
-    /// What it is called in reports.
+    /// Title in reports.
     pub title: String,
-    /// Where its results go. Default: `out/` and the document's name.
+    /// Folder of the results. Default: `out/` followed by the document's name.
     pub output: PathBuf,
-    /// What tells trials apart.
+    /// Columns that distinguish trials.
     pub columns: Vec<String>,
-    /// At least one.
+    /// At least one trial.
     pub trials: Vec<Trial>,
-    /// What is averaged and compared.
+    /// Settings of means and comparisons.
     pub summary: SummarySettings,
-    /// The folder from which the base's files are named.
+    /// Folder that the paths of the base are relative to.
     pub folder: PathBuf,
-    /// The experiment and its base as they were read, whatever was set from outside; they are written beside the results.
+    /// The experiment and its base as they were read, including values that the caller has set. They are
+    /// written beside the results.
     pub documents: Documents,
 }
 
-/// An experiment, as it is written: a run over a grid of settings and seeds.
+/// An experiment in its document: a run over a grid of settings and seeds.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ExperimentDocument {
-    /// What it is called in reports. Default: the document's name.
+    /// Title in reports. Default: the document's name.
     #[serde(default)]
     title: Option<String>,
-    /// Where its results go. Default: `out/` and the document's name.
+    /// Folder of the results. Default: `out/` followed by the document's name.
     #[serde(default)]
     output: Option<PathBuf>,
-    /// The run that it varies: a path from this document.
+    /// The run to vary: a path relative to this document.
     base: String,
-    /// Settings of the base that are others in all trials.
+    /// Settings that replace those of the base in all trials.
     #[serde(default)]
     #[schemars(with = "Option<Map<String, serde_json::Value>>")]
     set: Option<Node>,
-    /// What is varied; all combinations are run.
+    /// Settings to vary; all combinations are run.
     #[serde(default)]
     axes: Vec<AxisDocument>,
-    /// What is averaged, and what is compared with what.
+    /// Means and comparisons.
     #[serde(default)]
     #[schemars(with = "Option<SummarySettings>")]
     summary: Option<Node>,
 }
 
-/// What repeats an experiment.
+/// Documents that reproduce an experiment.
 #[derive(Debug, Clone, Default)]
 pub struct Documents {
-    /// Its own document, which names `base.toml`.
+    /// Document of the experiment, which refers to `base.toml`.
     pub experiment: serde_json::Value,
-    /// The run.
+    /// Document of the run.
     pub base: serde_json::Value,
 }
 
-/// What the column of the base's variants is called.
+/// Column of the base's variants.
 const VARIANT: &str = "variant";
-/// More than this is a mistake in a list.
+/// Largest number of trials; more of them are likely a mistake in a list.
 const MOST: usize = 1_000_000;
 
 impl Experiment {
-    /// Reads an experiment and its base. Files are found from the folder of the base.
+    /// Reads an experiment and its base. Paths are relative to the folder of the base.
     ///
     /// # Errors
-    /// Everything that is wrong with either; of the settings of the trials, what is wrong with the first that has errors.
+    /// All errors in both documents. If settings of trials are invalid, only the errors of the first such
+    /// trial are returned.
     pub fn read(document: &Document) -> Result<Self, Diagnostics> {
         let stem = stem(document, "experiment");
         let errors = Errors::new();
@@ -142,13 +144,13 @@ impl Documents {
     }
 }
 
-/// The run that `base` names, with an error of its own where it cannot be read.
+/// Opens the run that `base` names. Errors are reported.
 fn open_base(document: &Document, name: &str, errors: &Errors) -> Option<Document> {
     let beside = Path::new(document.source().name()).parent().unwrap_or(Path::new(""));
     Document::open(beside.join(name)).map_err(|diagnostics| errors.extend(diagnostics)).ok()
 }
 
-/// All combinations, the last axis changing fastest.
+/// Returns the trials of all combinations; the last axis changes fastest.
 fn trials(base: &Node, axes: &[Axis], folder: &Path, errors: &Errors) -> Option<Vec<Trial>> {
     let count = axes.iter().try_fold(1usize, |n, axis| n.checked_mul(axis.options.len()));
     if count.is_none_or(|count| count > MOST) {
@@ -163,7 +165,7 @@ fn trials(base: &Node, axes: &[Axis], folder: &Path, errors: &Errors) -> Option<
         match trial(base, choices(), folder) {
             Ok(trial) => trials.push(trial),
             Err(diagnostics) => {
-                // the others have the same errors, as a rule
+                // the remaining trials usually have equal errors
                 errors.extend(diagnostics);
                 return None;
             }

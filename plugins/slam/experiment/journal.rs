@@ -1,8 +1,9 @@
-//! The log of trials that are done: one JSON document a line with its checksum, appended and synced when a trial ends.
+//! Log of finished trials: one JSON document per line with its checksum, appended and synced when a trial
+//! ends.
 //!
-//! A trial whose line is torn is run again. Of several lines for one trial the last counts, as a trial that
-//! failed may be run again, and lines of trials that the experiment does not have any more are passed over, so that a
-//! changed experiment runs what is new and keeps what is not.
+//! A trial with an incomplete line is run again. If a trial has several lines, the last one counts, because a
+//! failed trial may be run again. Lines of trials that the experiment no longer contains are ignored. An
+//! experiment that was changed therefore runs only its new trials.
 use crate::document::folders;
 use crate::trial::{Trial, TrialRecord};
 use manifactor_formats::journal::{Journal, JournalError, Record, read};
@@ -11,7 +12,7 @@ use std::collections::HashMap;
 use std::io;
 use std::path::Path;
 
-/// The log's name in an experiment's folder.
+/// Name of the log in an experiment's folder.
 const NAME: &str = "trials.jsonl";
 
 impl Record for TrialRecord {
@@ -26,32 +27,32 @@ impl Record for TrialRecord {
     }
 }
 
-/// By labels and fingerprint of the trial.
+/// Records by labels and fingerprint of the trial.
 type Records = HashMap<(Vec<String>, String), TrialRecord>;
 
-/// A log that is open for writing, in a folder that this process alone writes into.
+/// A log that is open for writing, in a folder that only this process writes into.
 #[derive(Debug)]
 pub struct TrialLog {
     file: Journal<TrialRecord>,
     records: Records,
-    /// Held as long as the log is open.
+    /// Claimed while the log is open.
     _folder: OutputFolder,
 }
 
 impl TrialLog {
-    /// Opens the log of a folder, `trials.jsonl`, or begins one.
+    /// Opens the log of a folder, `trials.jsonl`, or creates it.
     ///
     /// # Errors
-    /// A file that cannot be read or written, is a link, or is no log; it is unchanged then.
+    /// A file that cannot be read or written, is a link, or is not a log. It stays unchanged.
     pub fn open(folder: OutputFolder) -> Result<Self, JournalError> {
         let (file, records) = Journal::open(&folder.path().join(NAME), "")?;
         Ok(Self { file, records: records.into_iter().map(keyed).collect(), _folder: folder })
     }
 
-    /// Takes over what the shards of the experiment have done and this log does not have.
+    /// Adds the trials that shards of the experiment have finished and this log does not contain.
     ///
     /// # Errors
-    /// The log of a shard that cannot be read or is none, or this one cannot be written.
+    /// If the log of a shard cannot be read or is invalid, or if this log cannot be written.
     pub fn take_over_shards(&mut self) -> Result<(), JournalError> {
         let output = self.file.path().parent().map(Path::to_owned).unwrap_or_default();
         for folder in folders(&output) {
@@ -67,20 +68,20 @@ impl TrialLog {
         Ok(())
     }
 
-    /// What a trial came to, if it is done.
+    /// Returns the record of a trial, if it is finished.
     pub fn find(&self, trial: &Trial) -> Option<&TrialRecord> {
         self.records.get(&(trial.labels.clone(), trial.fingerprint()))
     }
 
-    /// Forgets the trials that failed, so that they are run again.
+    /// Removes failed trials, so that they are run again.
     pub fn retry_failed(&mut self) {
         self.records.retain(|_, record| record.outcome.status() != "failed");
     }
 
-    /// Adds a trial that is done; it is on the disk when this returns.
+    /// Adds a finished trial. The record is on the disk when this function returns.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the log cannot be written.
     pub fn append(&mut self, record: TrialRecord) -> Result<(), JournalError> {
         let done = self.file.append(&record).and_then(|_| self.file.sync());
         done.map_err(|source| JournalError::Io { path: self.file.path().to_owned(), source })?;
@@ -120,7 +121,7 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         let line = checked_line(&serde_json::to_string(&record("ü", "torn")).unwrap());
         let line = line.trim_end().as_bytes();
-        // wherever it was torn, within a character too
+        // cut off anywhere, even within a character
         for end in 0..=line.len() {
             std::fs::write(&path, [&whole[..], &line[..end]].concat()).unwrap();
             let journal = open(folder.path()).unwrap();

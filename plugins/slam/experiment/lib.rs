@@ -1,4 +1,4 @@
-//! Experiments: the settings of one run, swept over axes; a row for each trial.
+//! Experiments: the settings of one run, varied over axes, with a row for each trial.
 //!
 //! ```toml
 //! title = "how much the noise of boxes matters"
@@ -22,8 +22,9 @@
 //! clusters = ["scene"]                                # trials of one scene are not independent
 //! metrics = ["position", "shape", "quality"]
 //! ```
-//! All combinations of all axes are run. Each [`Trial`] is solved on one thread, so that it is the same whatever else
-//! runs; it is written to a [`TrialLog`] once it is done, and not run again. The tables are made of the journal.
+//! All combinations of all axes are run. Each [`Trial`] is solved on one thread, so that its result does not
+//! depend on concurrent work. A finished trial is written to a [`TrialLog`] and is not run again. The tables
+//! are made from this log.
 mod document;
 mod journal;
 mod measures;

@@ -1,4 +1,4 @@
-//! What a trial is measured by.
+//! Measures of a trial.
 use indexmap::IndexMap;
 use manifactor_config::quoted_list;
 use manifactor_mapping::estimate::Estimate;
@@ -8,12 +8,12 @@ use manifactor_quadric::DualQuadric;
 use manifactor_recording::class::Aliases;
 use manifactor_run::output::report::{TrajectoryReport, VariantReport, alignment_name};
 
-/// A name, and what it measures of a trajectory.
+/// Name of a measure of a trajectory, and the function that computes it.
 type OfTrajectory = (&'static str, fn(&TrajectoryReport) -> Option<f64>);
-/// A name, and what it measures of a whole estimate.
+/// Name of a measure of a whole estimate, and the function that computes it.
 type OfEstimate = (&'static str, fn(&Estimate, &VariantReport) -> Option<f64>);
 
-/// What is measured under each alignment: `ate` is `ate_se3`, `ate_sim3`, ….
+/// Measures under each alignment: `ate` gives `ate_se3`, `ate_sim3`, ….
 const BY_ALIGNMENT: [OfTrajectory; 9] = [
     ("ate", |t| Some(t.estimate.ate.rmse)),
     ("odometry_ate", |t| Some(t.odometry.ate.rmse)),
@@ -26,7 +26,7 @@ const BY_ALIGNMENT: [OfTrajectory; 9] = [
     ("odometry_rpe_rotation", |t| Some(t.odometry.rpe.as_ref()?.rotation.rmse)),
 ];
 
-/// What is measured once.
+/// Measures that do not depend on an alignment.
 const ONCE: [OfEstimate; 32] = [
     ("position", |_, r| Some(r.landmarks?.estimate.rmse.position)),
     ("position_mean", |_, r| Some(r.landmarks?.estimate.mean.position)),
@@ -65,13 +65,18 @@ const ONCE: [OfEstimate; 32] = [
     ("iterations", |_, r| Some(r.solve.iterations as f64)),
 ];
 
-/// Everything that is measured of an estimate, by name. What is not known, or not finite, is left out.
+/// Returns all measures of an estimate by name. Unknown and non-finite values are left out.
 ///
-/// Lengths are in metres, angles in radians. `ate_*` and `rpe_*` are RMSEs by alignment, `odometry_*` the same of the
-/// odometry alone, `gain_*` by how much of it the ATE fell, `gain_low_*` and `gain_high_*` where that lies with 95 % confidence over blocks of ten seconds; `position` is an RMSE, `position_mean` a mean; `shape` and
-/// `quality` are mean Jaccard distances; `initial_*` are of the objects before the solve; `nees_*`
-/// are normalized errors squared by degree of freedom, 1 where covariances are right. `c_vertical` is the mean of
-/// |m · up| over objects that the paper's Table I has as vertical, m their longest axis; `c_horizontal` likewise.
+/// Lengths are in metres, angles in radians.
+/// - `ate_*` and `rpe_*` are RMSEs by alignment; `odometry_*` are RMSEs of the odometry alone.
+/// - `gain_*` is the decrease of the ATE as a share of odometry's ATE. `gain_low_*` and `gain_high_*` are the
+///   ends of its 95 % confidence interval, over blocks of ten seconds.
+/// - `position` is an RMSE, `position_mean` a mean.
+/// - `shape` and `quality` are mean Jaccard distances.
+/// - `initial_*` are measures of the objects before the solve.
+/// - `nees_*` are normalized errors squared per degree of freedom, 1 if covariances are right.
+/// - `c_vertical` is the mean of |m · up| over objects that are vertical by the paper's Table I, with their
+///   longest axis m; `c_horizontal` likewise.
 pub fn measures(estimate: &Estimate, report: &VariantReport) -> IndexMap<String, f64> {
     let aligned = report.trajectory.iter().flat_map(|trajectory| {
         BY_ALIGNMENT.iter().map(|(name, of)| (aligned(name, trajectory.alignment), of(trajectory)))
@@ -80,13 +85,13 @@ pub fn measures(estimate: &Estimate, report: &VariantReport) -> IndexMap<String,
     aligned.chain(once).filter_map(|(name, value)| Some((name, value.filter(|x| x.is_finite())?))).collect()
 }
 
-/// The names of all that is measured under these alignments.
+/// Returns the names of all measures under these alignments.
 pub(crate) fn measure_names(alignments: &[Alignment]) -> Vec<String> {
     let by = alignments.iter().flat_map(|by| BY_ALIGNMENT.iter().map(|(name, _)| aligned(name, *by)));
     by.chain(ONCE.iter().map(|(name, _)| (*name).to_owned())).collect()
 }
 
-/// All names in words: `*` stands for an alignment.
+/// Returns all names in words; `*` stands for an alignment.
 pub(super) fn measure_names_in_words() -> String {
     let stems = BY_ALIGNMENT.map(|(name, _)| format!("`{name}_*`")).join(", ");
     let once = ONCE.map(|(name, _)| format!("`{name}`")).join(", ");
@@ -98,7 +103,7 @@ fn aligned(name: &str, alignment: Alignment) -> String {
     format!("{name}_{}", alignment_name(alignment))
 }
 
-/// Objects with a semi-axis that is not positive, or a number that is none.
+/// Returns the number of objects with a semi-axis that is not positive, or with a number that is not finite.
 fn unsound(estimate: &Estimate) -> usize {
     let sound = |q: &DualQuadric| {
         let numbers = q.semi_axes.iter().chain(q.pose.translation.iter());
@@ -107,7 +112,7 @@ fn unsound(estimate: &Estimate) -> usize {
     estimate.landmarks().iter().filter(|landmark| !sound(landmark.quadric)).count()
 }
 
-/// The mean of |m · up| over mapped objects of classes that Table I gives this factor.
+/// Returns the mean of |m · up| over mapped objects of classes that have this factor in Table I.
 fn mean_alignment(estimate: &Estimate, factor: &str) -> Option<f64> {
     let up = estimate.mapping.frame.up?;
     let (rules, aliases) = (table_one().ok()?, Aliases::default());

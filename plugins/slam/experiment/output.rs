@@ -1,4 +1,4 @@
-//! The files that an experiment leaves.
+//! Files that an experiment writes.
 use crate::document::{Documents, Experiment};
 use crate::journal::TrialLog;
 use crate::summary::{Comparison, Summary, times_table, trials_table};
@@ -8,10 +8,10 @@ use manifactor_metrics::Interval;
 use manifactor_run::output::{OutputError, results, write_document, write_whole};
 use std::fmt;
 
-/// Writes all tables, and returns the summary.
+/// Writes all tables and returns the summary.
 ///
 /// # Errors
-/// If one cannot be written; those before it are there.
+/// If a file cannot be written; files written before it remain.
 pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<Summary, OutputError> {
     let file = |name: &str| experiment.output.join(name);
     let write = |name: &str, content: Result<Vec<u8>, TableError>| {
@@ -19,7 +19,7 @@ pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<Summary, Out
         write_whole(&file(name), content)
     };
     let Documents { experiment: own, base } = &experiment.documents;
-    // in a folder of their own: beside the results there may be others of these names
+    // in a separate folder, because the results may already be beside files with these names
     write_document(&file("repeat/experiment.toml"), to_toml(own))?;
     write_document(&file("repeat/base.toml"), to_toml(base))?;
     let csv = |table: &Table| table.to_csv().map(String::into_bytes);
@@ -35,7 +35,7 @@ pub fn write(experiment: &Experiment, journal: &TrialLog) -> Result<Summary, Out
 }
 
 impl Summary {
-    /// A row for each group and metric.
+    /// Returns a row for each group and metric.
     pub fn table(&self) -> Table {
         let mut table = Table::default();
         let mut rows = vec![];
@@ -71,7 +71,7 @@ impl Summary {
 type Bound = (&'static str, fn(&Interval) -> Option<f64>);
 const BOUNDS: [Bound; 3] = [("mean", |i| Some(i.mean)), ("low", |i| i.low), ("high", |i| i.high)];
 
-/// `-1.4 % [-1.9, -0.8]`: as shares of the baseline.
+/// Formats as a share of the baseline: `-1.4 % [-1.9, -0.8]`.
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Interval { mean, low, high } = self.difference;

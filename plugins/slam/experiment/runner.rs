@@ -1,4 +1,4 @@
-//! Trials on all cores, each on one thread.
+//! Parallel execution of trials, each on one thread.
 use crate::document::Experiment;
 use crate::journal::TrialLog;
 use crate::trial::{Trial, TrialOutcome, TrialRecord};
@@ -9,22 +9,22 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-/// How far an experiment is.
+/// Progress of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// Trials done, those of earlier runs included.
+    /// Finished trials, including those of earlier runs.
     pub done: usize,
-    /// Of them, those of earlier runs.
+    /// Finished trials of earlier runs.
     pub kept: usize,
     /// All trials.
     pub trials: usize,
 }
 
-/// Runs the trials that are not in the journal yet, as many at once as there are `threads`. Returns whether all are done:
-/// `interrupt` ends it early, and leaves those under way to the next run.
+/// Runs the trials that the log does not contain yet, `threads` at a time. Returns whether all trials are
+/// finished. `interrupt` ends the run early; unfinished trials are left to the next run.
 ///
 /// # Errors
-/// If the journal cannot be written. What goes wrong in a trial is its outcome.
+/// If the log cannot be written. An error within a trial becomes its outcome.
 pub fn run(
     experiment: &Experiment,
     folders: &Folders,
@@ -51,7 +51,7 @@ pub fn run(
             });
         }
         drop(send);
-        // once the receiver is gone, workers end after the trial that they are at
+        // without the receiver, workers end after their current trial
         for record in receive {
             let (trial, status) = (record.labels.join(", "), record.outcome.status());
             tracing::info!(trial, status, seconds = record.seconds, "trial");
@@ -64,7 +64,7 @@ pub fn run(
     written.map(|()| done == trials)
 }
 
-/// A trial on one thread: its solver has a pool of one. `None` where the observer stopped it.
+/// Runs a trial on one thread: its solver has a pool of one thread. `None` if the observer stopped it.
 pub fn alone(trial: &Trial, folders: &Folders, observer: &mut (dyn Observer + Send)) -> Option<TrialRecord> {
     let failed = |reason: String| TrialRecord {
         labels: trial.labels.clone(),
@@ -77,6 +77,6 @@ pub fn alone(trial: &Trial, folders: &Folders, observer: &mut (dyn Observer + Se
         Err(error) => return Some(failed(error.to_string())),
     };
     let run = || pool.install(|| trial.run(folders, observer));
-    // a defect shows in one row, and does not take the others with it
+    // a panic fails one trial and does not affect the rest
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|_| Some(failed("the trial panicked".into())))
 }

@@ -1,4 +1,4 @@
-//! JSON Schema of a run, for editors to complete and check by: that of the types that read it.
+//! JSON Schema of a run for completion and checks in editors, generated from the types that read it.
 use crate::document::ExperimentDocument;
 use manifactor_config::{Definitions, graph_root};
 use manifactor_mapping::semantics::{RulesDocument, SemanticsDocument};
@@ -26,7 +26,8 @@ pub fn run_root(definitions: &mut Definitions) -> Value {
     titled(root, "A run", "Where data come from, how a graph is built of them, how it is solved.")
 }
 
-/// The schema of a file of semantic rules, which runs name; its definitions are put among the others.
+/// Returns the schema of a file of semantic rules, which runs can name. Its definitions are added to
+/// `definitions`.
 pub fn rules_root(definitions: &mut Definitions) -> Value {
     let description = "Rules that runs name: semantics = \"this_file.toml\".";
     titled(definitions.of::<RulesDocument>(), "Semantic rules", description)

@@ -1,4 +1,4 @@
-//! Means over trials, and how far variants are apart.
+//! Means over trials, and differences between variants.
 mod markdown;
 mod table;
 
@@ -13,61 +13,61 @@ use table::records;
 pub(crate) use table::times_table;
 pub use table::trials_table;
 
-/// Means and comparisons, group by group.
+/// Means and comparisons of all groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// What the experiment is called.
+    /// Title of the experiment.
     pub title: String,
-    /// The columns that tell groups apart, the one compared last.
+    /// Columns that distinguish groups; the compared column is the last.
     pub columns: Vec<String>,
-    /// What is averaged.
+    /// Metrics that are averaged.
     pub metrics: Vec<String>,
-    /// The column whose values stand side by side in tables for people.
+    /// Column whose values are side by side in tables for people.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub across: Option<String>,
-    /// In the order of the table.
+    /// Groups in the order of the table.
     pub groups: Vec<Group>,
-    /// Trials that are not done yet.
+    /// Number of trials that are not finished.
     pub open: usize,
 }
 
-/// Trials that are alike in the columns that are kept apart.
+/// Trials with equal values in the columns that distinguish groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Group {
-    /// By column of the summary.
+    /// Labels, by column of the summary.
     pub labels: Vec<String>,
-    /// Trials done.
+    /// Number of finished trials.
     pub trials: usize,
-    /// Of them, those without an estimate.
+    /// Number of these trials without an estimate.
     pub failed: usize,
-    /// Of them, those whose solve ended without a minimum.
+    /// Number of these trials whose solve ended without a minimum.
     pub not_converged: usize,
-    /// By metric, where any trial has it.
+    /// Means by metric, if any trial has it.
     pub means: IndexMap<String, Interval>,
-    /// Against the baseline, by metric; empty for the baseline itself.
+    /// Comparisons with the baseline by metric; empty for the baseline itself.
     pub comparisons: IndexMap<String, Comparison>,
 }
 
-/// A variant against the baseline.
+/// Comparison of a variant with the baseline.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Pairs of trials that are alike in all other columns, both with the metric.
+    /// Number of pairs of trials that are equal in all remaining columns and both have the metric.
     pub pairs: usize,
-    /// The variant less the baseline.
+    /// Difference: variant minus baseline.
     pub difference: Interval,
-    /// The baseline's mean over the same pairs.
+    /// Mean of the baseline over these pairs.
     pub baseline: f64,
 }
 
 impl Comparison {
-    /// The mean difference as a share of the baseline's mean.
+    /// Returns the mean difference as a share of the baseline's mean.
     pub fn relative(&self) -> f64 {
         self.difference.mean / self.baseline.abs()
     }
 }
 
 impl Summary {
-    /// Over the trials that are done.
+    /// Summarizes the finished trials.
     pub fn new(experiment: &Experiment, journal: &TrialLog) -> Self {
         let settings = &experiment.summary;
         let records: Vec<&TrialRecord> = records(experiment, journal).collect();
@@ -91,7 +91,7 @@ impl Summary {
     }
 }
 
-/// Labels in some of the columns.
+/// Returns the labels in some of the columns.
 fn labels<'a>(record: &'a TrialRecord, columns: &[usize]) -> Vec<&'a str> {
     columns.iter().map(|i| record.labels.get(*i).map_or("", String::as_str)).collect()
 }
@@ -99,7 +99,7 @@ fn labels<'a>(record: &'a TrialRecord, columns: &[usize]) -> Vec<&'a str> {
 struct Over<'a> {
     records: &'a [&'a TrialRecord],
     by: &'a [usize],
-    /// The column that is compared, and the value of the baseline.
+    /// The compared column, and the value of the baseline.
     compared: Option<(usize, &'a str)>,
     clusters: &'a [usize],
     settings: &'a SummarySettings,

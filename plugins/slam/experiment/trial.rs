@@ -1,4 +1,4 @@
-//! One trial, and what it came to.
+//! A trial and its outcome.
 use crate::measures::measures;
 use indexmap::IndexMap;
 use manifactor_mapping::settings::Settings;
@@ -9,53 +9,53 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// One cell of an experiment.
+/// One cell of an experiment's grid.
 #[derive(Debug, Clone)]
 pub struct Trial {
-    /// By column of the experiment.
+    /// Labels, by column of the experiment.
     pub labels: Vec<String>,
-    /// Its settings, complete.
+    /// Complete settings.
     pub settings: Settings,
 }
 
-/// What a trial came to.
+/// Outcome of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "snake_case")]
 pub enum TrialOutcome {
-    /// It was solved, to a minimum or not: see `termination`.
+    /// The trial was solved, to a minimum or not: see `termination`.
     Solved {
-        /// How the solve ended: `converged`, `stalled`, `max_iterations` and so on.
+        /// Termination of the solve: `converged`, `stalled`, `max_iterations` and so on.
         termination: String,
-        /// What is measured of it, by name; finite numbers.
+        /// Finite measures by name.
         measures: IndexMap<String, f64>,
     },
     /// There is no estimate.
     Failed {
-        /// Why.
+        /// The reason.
         reason: String,
     },
 }
 
-/// A trial that is done: a line of the journal.
+/// A finished trial: one line of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrialRecord {
-    /// By column of the experiment.
+    /// Labels, by column of the experiment.
     pub labels: Vec<String>,
-    /// Of the settings; other settings are another trial.
+    /// Fingerprint of the settings; different settings are a different trial.
     pub fingerprint: String,
-    /// What it came to.
+    /// Outcome of the trial.
     pub outcome: TrialOutcome,
-    /// How long it took. No two runs agree in it, so it is in no table of results.
+    /// Duration, which differs between runs, so tables of results do not contain it. Unit: seconds.
     pub seconds: f64,
 }
 
 impl Trial {
-    /// That of its [settings](Settings::fingerprint).
+    /// Returns the fingerprint of its [settings](Settings::fingerprint).
     pub fn fingerprint(&self) -> String {
         self.settings.fingerprint()
     }
 
-    /// Runs it; `None` where the observer stopped it. Whatever goes wrong is an outcome.
+    /// Runs the trial; `None` if the observer stopped it. Errors become the outcome.
     pub fn run(&self, folders: &Folders, observer: &mut dyn Observer) -> Option<TrialRecord> {
         let clock = Instant::now();
         let outcome = match self.solve(folders, observer) {
@@ -82,7 +82,7 @@ impl Trial {
     }
 }
 
-/// The name of an ending, as documents write it.
+/// Returns the name of a termination in documents.
 fn status(termination: &Termination) -> String {
     let json = serde_json::to_value(termination).unwrap_or_default();
     json.get("status").and_then(|s| s.as_str()).unwrap_or("unknown").to_owned()

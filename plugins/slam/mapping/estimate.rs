@@ -1,4 +1,4 @@
-//! A sequence mapped and solved.
+//! Batch estimation: map and trajectory of a whole sequence.
 pub mod looks;
 pub mod refine;
 pub mod variance;
@@ -18,26 +18,26 @@ use manifactor_solve::{
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A map and a trajectory, with all that they were made of.
+/// The estimated map and trajectory, with all inputs.
 #[derive(Debug, Clone)]
 pub struct Estimate {
     /// The data.
     pub sequence: Arc<Sequence>,
-    /// The graph, and where the solve began.
+    /// The graph and its initial values.
     pub mapping: Mapping,
-    /// What the solver made of it: its outcome covers all rounds.
+    /// The solution of the last solve; its outcome covers all rounds.
     pub solution: Solution,
-    /// Time spent on objects alone.
+    /// Time for the refinement of single objects, in seconds.
     pub refinement_seconds: f64,
-    /// The noise as it was estimated, round by round; empty, where it is as given.
+    /// The estimated noise of each round; empty if the noise is given.
     pub components: Vec<Components>,
 }
 
-/// Why there is no estimate.
+/// Reason why there is no estimate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EstimateError {
-    /// Graph and values do not fit each other.
+    /// Graph and values do not match.
     #[error(transparent)]
     Compile(#[from] CompileError),
     /// The noise cannot be estimated.
@@ -45,7 +45,8 @@ pub enum EstimateError {
     Variance(#[from] VarianceError),
 }
 
-/// The graph with the shapes of all objects held that have an orientation to keep; `None` where no object has.
+/// Returns the graph with the semi-axes of all objects with orientation factors fixed; `None` if no object
+/// has such a factor.
 fn with_shapes_held(mapping: &Mapping) -> Option<Graph> {
     let mut graph = mapping.graph.clone();
     let mut oriented = mapping.mapped().filter(|object| !object.semantic_factors.is_empty()).peekable();
@@ -56,14 +57,14 @@ fn with_shapes_held(mapping: &Mapping) -> Option<Graph> {
     Some(graph)
 }
 
-/// Several solves, told as one.
+/// Accumulates several solves, reported as one.
 #[derive(Debug, Default)]
 struct Rounds {
     iterations: usize,
     times: Times,
     history: Vec<IterationRecord>,
     refinement_seconds: f64,
-    /// Joint solves so far, and the cost after the last.
+    /// Number of joint solves so far; `cost` is the cost after the last one.
     joint: usize,
     cost: Option<f64>,
 }
@@ -95,12 +96,12 @@ impl Rounds {
         Ok(solution)
     }
 
-    /// After a joint solve: whether another round would be in vain.
+    /// Called after a joint solve. Returns whether no further round is needed.
     fn settled(&mut self, outcome: &Outcome) -> bool {
         self.joint += 1;
         let cost = outcome.final_cost;
         let before = self.cost.replace(cost).unwrap_or(f64::INFINITY);
-        // not a number settles as well
+        // a NaN ends the rounds too
         let falls = before - cost > SETTLED * before || before == f64::INFINITY;
         outcome.termination == Termination::Interrupted || !(falls && cost.is_finite())
     }
@@ -112,26 +113,26 @@ impl Rounds {
     }
 }
 
-/// One object of the map.
+/// An object of the map with its estimate.
 #[derive(Debug, Clone, Copy)]
 pub struct Landmark<'a> {
-    /// What was detected of it.
+    /// The object and its measurements.
     pub object: &'a MappedObject,
-    /// What it is estimated to be, in the map's frame.
+    /// The estimated ellipsoid, in the map frame.
     pub quadric: &'a DualQuadric,
-    /// What it is, where that is known; in the frame of the ground truth.
+    /// The true object, if known, in the frame of the ground truth.
     pub truth: Option<&'a TrueObject>,
 }
 
-/// A round that lowers the cost by less than this share of it is the last.
+/// The rounds end when one lowers the cost by less than this share.
 const SETTLED: f64 = 1e-3;
 
 impl Estimate {
-    /// Solves a graph that was made of a sequence, as often as it takes to know its noise; see
-    /// [`variance`]. The graph of the estimate has the noise of its last solve.
+    /// Solves the graph of a sequence. With [`variance`] components, alternates between estimating the noise
+    /// and solving until the noise converges. The graph of the estimate has the noise of its last solve.
     ///
     /// # Errors
-    /// If graph and values do not fit each other, or the noise cannot be estimated.
+    /// If graph and values do not match, or the noise cannot be estimated.
     pub fn new(
         sequence: Arc<Sequence>,
         mapping: Mapping,
@@ -142,7 +143,7 @@ impl Estimate {
         Self::from_start(sequence, mapping, start, settings, observer)
     }
 
-    /// The same, from other values than those of the mapping.
+    /// Like [`new`](Self::new), with separate initial values.
     pub fn from_start(
         sequence: Arc<Sequence>,
         mut mapping: Mapping,
@@ -160,7 +161,7 @@ impl Estimate {
         estimate.with_noise(variance, settings, observer)
     }
 
-    /// Estimates the noise and solves, by turns.
+    /// Alternates between estimating the noise and solving.
     fn with_noise(
         mut self,
         variance: &VarianceSettings,
@@ -177,11 +178,11 @@ impl Estimate {
                 || self.components.last().is_some_and(|before| found.change(before) < *variance.tolerance);
             let Self { sequence, mut mapping, mut solution, mut components, .. } = self;
             let values = std::mem::take(&mut solution.values);
-            // what was compiled for it gives its memory back before the next solve
+            // free the compiled problem before the next solve
             drop(solution);
             found.apply(&mut mapping, variance, loss)?;
             components.push(found);
-            // near enough to go on from, until the last
+            // refine only before the last solve: an approximate solution suffices until then
             let refinements = if settled { most } else { 0 };
             let solved = Self::solve(sequence, mapping, values, refinements, settings, observer)?;
             self = Self { components, ..solved };
@@ -189,15 +190,15 @@ impl Estimate {
         Ok(self)
     }
 
-    /// Solves once, from `values`, with at most this number of refinements.
+    /// Solves once, from `values`, with at most `most` refinements.
     ///
-    /// Objects are [refined](Refiner) alone before the joint solve. That may leave one on the edge of a valley of its
-    /// orientation factor, where no joint step is possible: so poses are solved with the shapes of such objects held,
-    /// objects are refined again where the poses now are, and all is solved again, as often as the cost falls by it.
-    /// Each of these steps lowers the cost or does nothing.
+    /// Objects are [refined](Refiner) one by one before the joint solve. This may leave an object on the edge
+    /// of a valley of its orientation factor, where no joint step is possible. Then the poses are solved with
+    /// the shapes of such objects fixed, the objects are refined at the new poses, and the joint problem is
+    /// solved again, as long as the cost decreases. Each of these steps lowers the cost or changes nothing.
     ///
     /// # Errors
-    /// If graph and values do not fit each other.
+    /// If graph and values do not match.
     fn solve(
         sequence: Arc<Sequence>,
         mapping: Mapping,
@@ -228,12 +229,12 @@ impl Estimate {
         }
     }
 
-    /// The estimated trajectory, in the map's frame.
+    /// Returns the estimated trajectory, in the map frame.
     pub fn trajectory(&self) -> Vec<StampedPose> {
         self.poses(&self.solution.values)
     }
 
-    /// The trajectory by odometry alone, in the map's frame.
+    /// Returns the trajectory of the odometry alone, in the map frame.
     pub fn odometry(&self) -> Vec<StampedPose> {
         self.poses(&self.mapping.values)
     }
@@ -247,12 +248,12 @@ impl Estimate {
         stamped.collect()
     }
 
-    /// The objects as they are estimated.
+    /// Returns the objects with their estimates.
     pub fn landmarks(&self) -> Vec<Landmark<'_>> {
         self.landmarks_in(&self.solution.values)
     }
 
-    /// The objects as they began.
+    /// Returns the objects with their initial values.
     pub fn initial_landmarks(&self) -> Vec<Landmark<'_>> {
         self.landmarks_in(&self.mapping.values)
     }

@@ -1,6 +1,6 @@
-//! Which way is up, and in which frame the map is drawn.
+//! The up direction and the frame of the map.
 //!
-//! Orientation factors need the world's up, and odometry alone does not know it.
+//! Orientation factors need the up direction of the world, and odometry alone does not provide it.
 use manifactor_geometry::Se3;
 use manifactor_graph::{Direction, NoDirection};
 use manifactor_recording::sequence::{Frame, Sequence};
@@ -16,16 +16,16 @@ pub use ground_truth::GroundTruthPose;
 pub use source::FromSource;
 pub use vector::UpVector;
 
-/// Tells where up is. Chosen by name in a run's `[gravity]`.
+/// A method to find the up direction. Chosen by name in `[gravity]` of a run.
 #[typetag::serialize(tag = "type")]
 pub trait Gravity: Debug + Send + Sync {
-    /// Up, and the frame of the map.
+    /// Returns the up direction and the frame of the map.
     ///
     /// # Errors
-    /// If the sequence does not have what this needs.
+    /// If the sequence lacks the required data.
     fn locate(&self, sequence: &Sequence) -> Result<MapFrame, GravityError>;
 
-    /// In a stream: seconds after the first frame from which on nothing that comes makes a difference.
+    /// Returns the time in a stream after which new data change nothing, in seconds after the first frame.
     fn settled_after(&self) -> f64 {
         0.0
     }
@@ -33,27 +33,27 @@ pub trait Gravity: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn Gravity, "gravity");
 
-/// The frame of the map, and up in it.
+/// The frame of the map, and the up direction in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapFrame {
-    /// Takes the poses of the odometry to the map.
+    /// Transform from the odometry frame to the map frame.
     pub map_from_odometry: Se3,
     /// Up in the map; `None` if unknown.
     pub up: Option<Direction>,
 }
 
 impl MapFrame {
-    /// The odometry's own frame.
+    /// Uses the odometry frame as the map frame.
     pub fn of_odometry(up: Option<Direction>) -> Self {
         Self { map_from_odometry: Se3::identity(), up }
     }
 }
 
-/// Why up could not be had.
+/// Reason why the up direction is unknown.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GravityError {
-    /// A sequence of nothing.
+    /// The sequence has no frames.
     #[error("the sequence has no frames")]
     NoFrames,
     /// No ground truth near the first frame.
@@ -63,11 +63,11 @@ pub enum GravityError {
         nearest.map_or(String::new(), |n| format!("; the nearest is at {n} s"))
     )]
     NoGroundTruth {
-        /// The first frame's time stamp.
+        /// Timestamp of the first frame.
         timestamp: f64,
-        /// How near it should be.
+        /// Allowed time difference, in seconds.
         within: f64,
-        /// The time stamp of the nearest pose, if there is any.
+        /// Timestamp of the nearest pose, if there is one.
         nearest: Option<f64>,
     },
     /// No readings near the first frame.
@@ -76,9 +76,9 @@ pub enum GravityError {
          give the source an accelerometer file, or choose another `[gravity]`"
     )]
     NoReadings {
-        /// The first frame's time stamp.
+        /// Timestamp of the first frame.
         timestamp: f64,
-        /// How near they should be.
+        /// Allowed time difference, in seconds.
         within: f64,
     },
     /// Readings that cancel out.
@@ -113,7 +113,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// The true world's z axis is the first camera's -y.
+    /// The z axis of the true world is -y of the first camera.
     pub(crate) fn upright_camera() -> Se3 {
         let quarter = So3::exp(&Vector3::new(-std::f64::consts::FRAC_PI_2, 0.0, 0.0));
         Se3::new(quarter, Vector3::new(1.0, 2.0, 3.0))

@@ -1,8 +1,8 @@
-//! From a sequence to a graph.
+//! Construction of the graph from a sequence.
 //!
-//! Variables are the camera's poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics. Factors, in
-//! this order: the prior on the first pose; odometry between consecutive poses; for each object its boxes, then what
-//! semantic rules say of it; last, variables and factors of the document's own. Offsets of boxes, where they are asked for, come with their noise.
+//! Variables are the camera poses `x0`, `x1`, … by frame, and the objects `q<number>` as dual quadrics.
+//! Factors, in this order: the prior on the first pose; odometry between consecutive poses; for each object
+//! its boxes, then its semantic factors; last, variables and factors of the run document.
 use crate::gravity::{GravityError, MapFrame};
 use crate::mapping::measurements::{Measured, Measurements, ObjectBox};
 use crate::motion::{MotionError, RelativePose, Step};
@@ -31,65 +31,65 @@ pub use rejection::Rejection;
 use rules::Ledger;
 pub use warning::Warning;
 
-/// A graph made of a sequence, and how it was made.
+/// The graph of a sequence, and the decisions behind it.
 #[derive(Debug, Clone)]
 pub struct Mapping {
-    /// Priors, odometry, boxes and semantics.
+    /// Factors: priors, odometry, boxes and semantics.
     pub graph: Graph,
-    /// Where a solve begins.
+    /// Initial values.
     pub values: Values,
-    /// The frame of the values, and up in it.
+    /// Frame of the values, with the up direction.
     pub frame: MapFrame,
-    /// Each object that was detected, mapped or not, by number.
+    /// All detected objects, in the map or not, sorted by id.
     pub objects: Vec<MappedObject>,
-    /// What was done with the detections.
+    /// Measurements per object, and counts of unused detections.
     pub measurements: Measurements,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
 }
 
-/// An object that was detected.
+/// A detected object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MappedObject {
-    /// Its number.
+    /// Object id.
     pub id: ObjectId,
-    /// Its key in the graph, if it is mapped.
+    /// Key in the graph if the object is mapped.
     pub key: Key,
-    /// Its class; `None` where no detection named one.
+    /// Class; `None` if no detection has one.
     pub class: Option<FusedClass>,
-    /// Detections that are associated with it.
+    /// Number of detections associated with it.
     pub detections: usize,
-    /// Boxes that passed the filters.
+    /// Number of boxes that passed the filters.
     pub boxes: usize,
-    /// Why it is not mapped.
+    /// Reason why it is not mapped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<Rejection>,
-    /// Factors that semantic rules brought it, and why.
+    /// Factors from semantic rules, with their reasons.
     pub semantic_factors: Vec<Applied>,
-    /// Rules that are for its class and were not applied, and why.
+    /// Rules for its class that were not applied, with their reasons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
 }
 
-/// Why a sequence could not be mapped.
+/// Reason why a sequence cannot be mapped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MappingError {
-    /// A sequence of nothing.
+    /// The sequence has no frames.
     #[error("the sequence has no frames")]
     NoFrames,
-    /// Up is unknown.
+    /// The up direction is unknown.
     #[error(transparent)]
     Gravity(#[from] GravityError),
-    /// A semantic rule that cannot be applied.
+    /// A semantic rule cannot be applied.
     #[error(transparent)]
     Rule(#[from] RuleError),
-    /// A step that the motion model has no factor for.
+    /// The motion model has no factor for a step.
     #[error(transparent)]
     Motion(#[from] MotionError),
 }
 
-/// The frame that a pose's key names; `None` for any other key.
+/// Returns the frame of a pose key; `None` for any other key.
 pub(crate) fn frame_of(key: &Key) -> Option<usize> {
     let number = key.as_str().strip_prefix('x')?;
     let is_number = number.bytes().all(|b| b.is_ascii_digit());
@@ -97,10 +97,10 @@ pub(crate) fn frame_of(key: &Key) -> Option<usize> {
 }
 
 impl Mapping {
-    /// Makes the graph of a sequence.
+    /// Creates the graph of a sequence.
     ///
     /// # Errors
-    /// If there is no frame, or up is not known and a rule needs it.
+    /// If there is no frame, or a rule needs the up direction and it is unknown.
     pub fn new(sequence: &Sequence, settings: &Settings) -> Result<Self, MappingError> {
         let first = sequence.frames.first().ok_or(MappingError::NoFrames)?;
         let located = settings.gravity.locate(sequence)?;
@@ -117,7 +117,8 @@ impl Mapping {
         Self::assemble(sequence, settings, frame, measurements, decisions)
     }
 
-    /// Puts together what was measured and what was decided of it: a decision for each object, in their order.
+    /// Assembles the graph from measurements and decisions, with one decision per object in the order of the
+    /// objects.
     pub fn assemble(
         sequence: &Sequence,
         settings: &Settings,
@@ -142,7 +143,7 @@ impl Mapping {
         Ok(mapping)
     }
 
-    /// Objects that are in the graph.
+    /// Returns the objects in the graph.
     pub fn mapped(&self) -> impl Iterator<Item = &MappedObject> {
         self.objects.iter().filter(|object| object.rejected.is_none())
     }
@@ -229,7 +230,7 @@ impl Mapping {
     }
 }
 
-/// Detections that are not used, a warning for each reason.
+/// Returns warnings about unused detections, one per reason.
 fn unused(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
     let mut warnings = vec![];
     let (mut boxes, mut first) = (0, None);
@@ -260,7 +261,7 @@ fn unused(sequence: &Sequence, without_area: usize) -> Vec<Warning> {
     warnings
 }
 
-/// Objects that are not mapped, a warning for each kind of reason.
+/// Returns warnings about objects that are not mapped, one per kind of reason.
 fn not_mapped<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a Rejection)>) -> Vec<Warning> {
     const NAMED: usize = 5;
     let mut kinds: Vec<(&Rejection, Vec<String>)> = vec![];
@@ -287,22 +288,22 @@ fn not_mapped<'a>(objects: impl Iterator<Item = (&'a MappedObject, &'a Rejection
     kinds.into_iter().map(warning).collect()
 }
 
-/// What was decided of an object.
+/// The decision about an object.
 #[derive(Debug, Clone)]
 pub struct Decision {
-    /// Where it begins, or why it is not mapped.
+    /// Initial value, or the reason why the object is not mapped.
     pub start: Result<DualQuadric, Rejection>,
-    /// What the rules have for it; nothing, where it is not mapped.
+    /// Result of the semantic rules; empty if the object is not mapped.
     pub verdict: Verdict,
 }
 
-/// An object that is mapped, as rules look at it.
+/// Returns a mapped object as a candidate for semantic rules.
 pub fn as_candidate(measured: &Measured, start: DualQuadric) -> Candidate {
     let (key, class, known) = (object_key(measured.id), measured.class(), measured.prior.is_some());
     Candidate { key, class, start, known }
 }
 
-/// The factor that holds the first pose.
+/// Returns the prior on the first pose.
 pub fn prior_entry(value: Se3, settings: &Settings) -> FactorEntry {
     FactorEntry {
         keys: vec![pose_key(0)],
@@ -313,7 +314,7 @@ pub fn prior_entry(value: Se3, settings: &Settings) -> FactorEntry {
     }
 }
 
-/// The factor that holds an object of an earlier map, as far as that is trusted.
+/// Returns the prior on an object of the prior map, with the noise of the `[prior_map]` settings.
 pub fn known_entry(object: &PriorObject, settings: &Settings) -> FactorEntry {
     let prior_map = settings.prior_map.as_ref();
     let noise = prior_map.and_then(|prior| prior.trusted(object).noise().ok());
@@ -321,13 +322,13 @@ pub fn known_entry(object: &PriorObject, settings: &Settings) -> FactorEntry {
         keys: vec![object_key(object.id)],
         name: None,
         factor: Arc::new(QuadricPrior { value: object.quadric }),
-        // what was read has one
+        // every object that was read from a map has a noise
         noise: noise.unwrap_or_default(),
         loss: prior_map.map(|prior| prior.loss.clone()),
     }
 }
 
-/// The step between two frames, as a motion model sees it.
+/// Returns the step between two frames for a motion model.
 pub fn step<'a>(
     frames: [usize; 2],
     [from, to]: [&Frame; 2],
@@ -339,7 +340,7 @@ pub fn step<'a>(
     Step { frames, seconds: to.timestamp - from.timestamp, odometry, estimates }
 }
 
-/// The factors of a detection: that of its box, then those of what it measures besides.
+/// Returns the factors of a detection: the box factor, then the factors of its further measurements.
 pub fn view_entries<'a>(
     view: &'a ObjectBox,
     object: &'a Key,
@@ -351,7 +352,7 @@ pub fn view_entries<'a>(
     std::iter::once(box_entry(view, object.clone(), camera, settings)).chain(others)
 }
 
-/// The factor of a box.
+/// Returns the factor of a box.
 fn box_entry(view: &ObjectBox, object: Key, camera: Camera, settings: &DetectionSettings) -> FactorEntry {
     let (bounding_box, model) = (view.bounding_box, settings.model);
     FactorEntry {

@@ -1,7 +1,7 @@
-//! Motion models: the factors and variables that tie consecutive frames.
+//! Motion models: factors and variables between consecutive frames.
 //!
-//! A model sees one [`Step`] at a time, with the odometry and the estimates so far. A batch and a stream use it alike: neither knows which
-//! variables a frame has besides its pose.
+//! A model gets one [`Step`] at a time, with the odometry and the estimates so far. Batch and stream use
+//! models in the same way: neither depends on the variables of a frame besides its pose.
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{FactorEntry, Noise, Values, Variable};
@@ -15,25 +15,25 @@ pub use constant_velocity::ConstantVelocity;
 pub use manifactor_recording::keys::pose_key;
 pub use odometry::Odometry;
 
-/// Ties consecutive frames. Chosen by name in a run's `[motion]`.
+/// A model of the motion between consecutive frames. Chosen by name in `[motion]` of a run.
 #[typetag::serialize(tag = "type")]
 pub trait MotionModel: Debug + Send + Sync {
-    /// Pose of the second frame, world from camera, for an estimate `from` of the first.
+    /// Predicts the pose of the second frame, world from camera, from the estimate `from` of the first.
     fn predict(&self, step: &Step<'_>, from: &Se3) -> Se3;
 
-    /// Variables of the second frame besides its pose, where a solve begins; in the first step also those of the first frame. `poses` are
-    /// estimates of both frames, world from camera.
+    /// Returns initial values for the variables of the second frame besides its pose; in the first step also
+    /// for the first frame. `poses` are estimates of both frames, world from camera.
     fn variables(&self, _step: &Step<'_>, _poses: [&Se3; 2]) -> Values {
         Values::new()
     }
 
-    /// Factors among the variables of both frames.
+    /// Returns the factors among the variables of both frames.
     ///
     /// # Errors
-    /// If the step has no factor, for example one without a usable noise.
+    /// If the step has no factor, for example because its noise is not usable.
     fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError>;
 
-    /// Prefixes of the keys of [its variables](Self::variables): `v` for `v0`, `v1`, …
+    /// Returns the prefixes of the keys of [its variables](Self::variables): `v` for `v0`, `v1`, …
     fn prefixes(&self) -> &'static [&'static str] {
         &[]
     }
@@ -41,34 +41,34 @@ pub trait MotionModel: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn MotionModel, "motion");
 
-/// A step that a motion model has no factor for.
+/// A step without a factor in the motion model.
 #[derive(Debug, thiserror::Error)]
 #[error("no motion from frame {from} to frame {to}, {seconds} s later: {why}")]
 pub struct MotionError {
-    /// Number of the first frame.
+    /// Index of the first frame.
     pub from: usize,
-    /// Number of the second frame.
+    /// Index of the second frame.
     pub to: usize,
-    /// Time between them.
+    /// Time between the frames, in seconds.
     pub seconds: f64,
-    /// The fault.
+    /// Cause.
     pub why: String,
 }
 
-/// From one frame to the next.
+/// The step from one frame to the next.
 #[derive(Clone, Copy)]
 pub struct Step<'a> {
-    /// Numbers of both frames.
+    /// Indices of both frames.
     pub frames: [usize; 2],
     /// Time from the first frame to the second, in seconds; positive.
     pub seconds: f64,
-    /// The odometry's measurement of the step.
+    /// Odometry measurement of the step.
     pub odometry: RelativePose<'a>,
-    /// Estimates so far, by key; `None` for variables that are not in the graph.
+    /// Returns the current estimate of a key; `None` for variables that are not in the graph.
     pub estimates: &'a dyn Fn(&str) -> Option<Box<dyn Variable>>,
 }
 
-/// A relative pose as odometry measures it.
+/// A relative pose measured by odometry.
 #[derive(Debug, Clone, Copy)]
 pub struct RelativePose<'a> {
     /// Pose of the second camera in the frame of the first.
@@ -80,7 +80,7 @@ pub struct RelativePose<'a> {
 }
 
 impl Step<'_> {
-    /// The error of a model that has no factor for this step.
+    /// Returns the error of a model without a factor for this step.
     pub fn error(&self, why: &dyn fmt::Display) -> MotionError {
         let [from, to] = self.frames;
         MotionError { from, to, seconds: self.seconds, why: why.to_string() }

@@ -1,4 +1,4 @@
-//! Which objects get which factors.
+//! Semantic rules: factors that objects of certain classes get.
 //!
 //! ```toml
 //! [[semantics]]
@@ -15,8 +15,8 @@
 //! factor = { type = "beside" }
 //! noise = { sigma = 0.05 }
 //! ```
-//! The class `"*"` stands for all. `semantics = "table_one"` stands for the rules of the paper's Table I. All rules that are
-//! for an object apply to it.
+//! The class `"*"` matches all classes. `semantics = "table_one"` selects the rules of the paper's Table I.
+//! All rules that match an object apply to it.
 use manifactor_graph::checked::{Positive, Share};
 use manifactor_graph::loss::Loss;
 use manifactor_graph::{Direction, Factor, FactorEntry, Key, Noise};
@@ -44,68 +44,70 @@ pub use rule_factor::{RuleError, RuleFactor};
 /// The paper's Table I.
 pub(crate) const TABLE_ONE: &str = include_str!("semantics/table_one.toml");
 
-/// The rule of streams for the shapes of objects.
+/// Rule that streams add for the shapes of objects.
 const WEAK_SHAPE: &str = include_str!("semantics/weak_shape.toml");
 
-/// Stands for all classes.
+/// Name that matches all classes.
 const ANY: &str = "*";
-/// A class with a smaller share of an object's scores is no alternative.
+/// Smallest share of an object's scores that makes a class an alternative.
 const LEAST_SHARE: f64 = 0.05;
-/// In a mixture, the alternative that no factor holds is as likely as a residual of this many σ.
+/// In a mixture, the alternative without a factor is as likely as a residual of this many σ.
 const DOUBT: f64 = 3.0;
 
-/// Objects of these classes get this factor. All rules that are for an object apply to it.
+/// Objects of these classes get this factor. All rules that match an object apply to it.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rule {
-    /// Names of classes, as any detector spells them; `*` for all.
+    /// Class names, in the spelling of any detector; `*` for all classes.
     pub classes: Vec<String>,
-    /// The score of its class, averaged over its detections, is at least this.
+    /// Smallest score of the object's class, averaged over its detections.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min_score: Option<Share>,
-    /// It is at least this long, twice its longest semi-axis, where the solve begins, in metres.
+    /// Smallest length of the object, twice its longest semi-axis, at its initial value. Unit: metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min_size_m: Option<Positive>,
-    /// It is at most this long, in metres.
+    /// Largest length of the object, measured in the same way. Unit: metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_size_m: Option<Positive>,
-    /// Another object is near.
+    /// Second object that has to be near.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub near: Option<Near>,
-    /// Whether the factor holds only as likely as the object is of these classes, as one component of a `max_mixture` whose
-    /// other one is nothing; and then for all objects that may be of them.
+    /// Weights the factor by the share of these classes in the object's scores: it becomes one component of a
+    /// `max_mixture`, and the second component has no factor. The rule then applies to all objects that may
+    /// be of these classes.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub mixture: bool,
-    /// Keys of the document's own `variables` that the factor connects besides objects.
+    /// Keys of the document's own `variables` that the factor connects with the objects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub with: Vec<Key>,
-    /// A factor of one object, or of several that are near each other. Where its `up` is left open, it gets the run's gravity.
+    /// Factor of one object, or of several that are near each other. If its `up` is left open, it is set to
+    /// the run's up direction.
     #[schemars(with = "Box<dyn Factor>")]
     pub factor: RuleFactor,
-    /// Its noise.
+    /// Noise of the factor.
     #[serde(default, skip_serializing_if = "Noise::is_default")]
     pub noise: Noise,
-    /// Its loss. Default: none.
+    /// Robust loss of the factor. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub loss: Option<Arc<dyn Loss>>,
-    /// Whether it comes from a table that is shipped, and so names more classes than any one scene has.
+    /// True for a rule of a shipped table, which names more classes than one scene contains.
     #[serde(skip)]
     pub shipped: bool,
 }
 
-/// Returns whether a list of classes has this one, named as [`Aliases::canonical`] does.
+/// Returns whether a list of classes contains this one, a name from [`Aliases::canonical`].
 fn names(classes: &[String], class: &str, aliases: &Aliases) -> bool {
     classes.iter().any(|name| name == ANY || aliases.canonical(name) == class)
 }
 
 impl Rule {
-    /// Returns whether objects of a class, named as [`Aliases::canonical`] does, get this factor.
+    /// Returns whether objects of a class, a name from [`Aliases::canonical`], get this factor.
     pub fn applies(&self, class: &str, aliases: &Aliases) -> bool {
         names(&self.classes, class, aliases)
     }
 
-    /// How likely the factor holds for an object of that class: 1, or in a mixture the share of its scores that these
-    /// classes have. `None`, where the rule is not for it.
+    /// Returns the probability that the factor holds for an object of that class: 1, or in a mixture the
+    /// share of these classes in the object's scores. `None` if the rule does not apply.
     fn share(&self, class: Option<&FusedClass>, aliases: &Aliases) -> Option<f64> {
         let best = class.map_or("", |class| class.name.as_str());
         if !self.mixture || class.is_none() {
@@ -124,11 +126,12 @@ impl Rule {
         }
     }
 
-    /// The factor between these variables; `up` is for what takes the world's up and leaves it open. In a mixture, it
-    /// is the one or nothing, by `share`: w = p for the factor, (1 - p) exp(-3²/2) for nothing.
+    /// Returns the factor between these variables. `up` is used if the factor needs the up direction and
+    /// leaves it open. In a mixture with p = `share`, the factor has the weight p and its absence (1 - p)
+    /// exp(-3²/2).
     ///
     /// # Errors
-    /// If the factor needs to know up and up is unknown.
+    /// If the factor needs the up direction and it is unknown.
     pub fn entry(&self, keys: Vec<Key>, up: Option<Direction>, share: f64) -> Result<FactorEntry, RuleError> {
         let factor = self.factor.instantiate(up)?;
         let (noise, loss) = (self.noise.clone(), self.loss.clone());
@@ -148,25 +151,25 @@ impl Rule {
     }
 }
 
-/// The rules of a file that is shipped, by name.
+/// Returns the text of a shipped file of rules.
 pub fn shipped(name: &str) -> Option<&'static str> {
     (name == "table_one").then_some(TABLE_ONE)
 }
 
-/// Names of the files that are shipped.
+/// Names of the shipped files.
 pub(crate) const SHIPPED: [&str; 1] = ["table_one"];
 
-/// The rules of the paper's Table I.
+/// Returns the rules of the paper's Table I.
 ///
 /// # Errors
-/// If the factors that it names are not linked.
+/// If the factors in it are not linked.
 pub fn table_one() -> Result<Vec<Rule>, manifactor_config::Diagnostics> {
     read::shipped_rules("table_one", TABLE_ONE)
 }
 
-/// Adds the weak `shape_prior` of streams, unless there is a rule with one.
+/// Adds the weak `shape_prior` of streams, unless a rule has one.
 pub(crate) fn add_weak_shape(rules: &mut Vec<Rule>) {
-    // the crate links its factor
+    // cannot fail: this crate links the factor
     let weak = read::shipped_rules("weak_shape", WEAK_SHAPE).unwrap_or_default();
     let is_there = weak.iter().any(|weak| rules.iter().any(|rule| rule.factor.name() == weak.factor.name()));
     if !is_there {
@@ -174,7 +177,7 @@ pub(crate) fn add_weak_shape(rules: &mut Vec<Rule>) {
     }
 }
 
-/// Classes that a rule names and the data do not have, each once.
+/// Returns the classes that a rule names and the data do not contain, each once.
 pub fn unmatched<'a>(rule: &'a Rule, seen: &[String], aliases: &Aliases) -> Vec<&'a str> {
     let near = rule.near.iter().flat_map(|near| &near.classes);
     let mut missing: Vec<&str> = vec![];

@@ -35,60 +35,61 @@ pub use prior_map::PriorMapSettings;
 pub use report::ReportSettings;
 pub use variance::{BoxGroups, VarianceSettings};
 
-/// Settings of one estimate. Parser, defaults and schema of a document derive from this type; [`Settings::read`] adds the parts that need
-/// the rest of the document: rules, and variables and factors of its own.
+/// Settings of one estimate. Parser, defaults and schema of a document derive from this type.
+/// [`Settings::read`] adds the parts that need the rest of the document: semantic rules, and the document's
+/// own variables and factors.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// Where the sequence comes from.
+    /// Source of the sequence.
     pub source: Arc<dyn Source>,
-    /// What ties consecutive frames. Default: their odometry.
+    /// Motion model between consecutive frames. Default: odometry.
     #[serde(default = "by_odometry", skip_serializing_if = "is_by_odometry")]
     pub motion: Arc<dyn MotionModel>,
     /// Noise and loss of the odometry's relative poses.
     #[serde(default)]
     pub odometry: OdometrySettings,
-    /// The factor that holds the first pose.
+    /// Prior factor of the first pose.
     #[serde(default)]
     pub prior: PriorSettings,
-    /// A map that was made before. Default: none.
+    /// Map of an earlier run. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior_map: Option<PriorMapSettings>,
-    /// Which boxes are used, and how.
+    /// Selection, noise and loss of the bounding boxes.
     #[serde(default)]
     pub detections: DetectionSettings,
-    /// Which object a box shows. Default: the source says so.
+    /// Data association: the object that each detection shows. Default: given by the source.
     #[serde(default = "given")]
     pub association: Arc<dyn Association>,
-    /// Which objects are mapped, and where they begin.
+    /// Selection and initialization of objects.
     #[serde(default)]
     pub objects: ObjectSettings,
-    /// Which way is up.
+    /// Up direction of the world.
     #[serde(default = "from_source")]
     pub gravity: Arc<dyn Gravity>,
-    /// Which objects get which factors.
+    /// Rules that assign factors to objects.
     #[serde(skip_deserializing)]
     pub semantics: Vec<Rule>,
-    /// Variables and factors of the document's own.
+    /// Variables and factors that the document declares itself.
     #[serde(flatten, skip_deserializing)]
     #[schemars(skip)]
     pub own: OwnGraph,
-    /// Names of classes that mean the same, besides the usual ones.
+    /// Class names with the same meaning, in addition to the built-in ones.
     #[serde(default, skip_serializing_if = "no_aliases")]
     pub aliases: Aliases,
-    /// How the noise is estimated. Default: it is as given.
+    /// Estimation of the noise. Default: none; the noise is used as given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub variance_components: Option<VarianceSettings>,
-    /// How the graph is solved. Default: Levenberg-Marquardt that damps all directions alike.
+    /// Solver of the graph. Default: Levenberg-Marquardt with equal damping in all directions.
     #[serde(default = "default_solver")]
     pub solver: Arc<dyn Optimizer>,
-    /// How the graph is kept up to date while frames come in, by `manifactor online`.
+    /// Incremental smoother that `manifactor online` updates with each frame.
     #[serde(default)]
     pub online: manifactor_smoother::Settings,
-    /// What the estimate is compared with, and how.
+    /// Comparison of the estimate with ground truth and with held-out boxes.
     #[serde(default)]
     pub evaluation: EvaluationSettings,
-    /// What is written besides the usual.
+    /// Additional output.
     #[serde(default)]
     pub report: ReportSettings,
 }
@@ -101,7 +102,8 @@ fn by_odometry() -> Arc<dyn MotionModel> {
     Arc::new(Odometry {})
 }
 
-/// Documents that name no model are written as before there was a choice.
+/// Returns whether this is the default model, which is left out of a written document. Documents from before
+/// motion models could be chosen stay the same.
 fn is_by_odometry(motion: &Arc<dyn MotionModel>) -> bool {
     motion.typetag_name() == "odometry"
 }
@@ -114,17 +116,17 @@ fn from_source() -> Arc<dyn Gravity> {
     Arc::new(FromSource {})
 }
 
-/// Damping of one size for all directions: in proportion to the diagonal of H, a semi-axis that has all but vanished
-/// would go for good, since next to nothing is left of its derivative.
+/// Levenberg-Marquardt with equal damping in all directions. If damping were proportional to the diagonal of
+/// H, a semi-axis that has almost vanished could not recover, because its derivative is nearly zero.
 fn default_solver() -> Arc<dyn Optimizer> {
     Arc::new(LevenbergMarquardt { diagonal: DiagonalLimits::EVEN, ..LevenbergMarquardt::default() })
 }
 
 impl Settings {
-    /// Reads settings; files are found from `folder`.
+    /// Reads settings. Paths are relative to `folder`.
     ///
     /// # Errors
-    /// Everything that is wrong with them, at its place.
+    /// All errors in the settings, each with its position in the document.
     pub fn read(node: &Node, folder: &Path) -> Result<Self, Diagnostics> {
         let errors = Errors::new();
         let settings = Section::new(node, &errors).and_then(|mut section| {
@@ -140,7 +142,7 @@ impl Settings {
         errors.finish(settings)
     }
 
-    /// Reports settings that do not go with the motion model.
+    /// Reports settings that do not fit the motion model.
     fn check_motion(&self, node: &Node, errors: &Errors) {
         let place = |field: &str| node.field(field).unwrap_or(node).place.clone();
         let model = self.motion.typetag_name();
@@ -158,18 +160,19 @@ impl Settings {
         }
     }
 
-    /// These settings with what a stream adds: a weak `shape_prior` for all objects, unless a rule has one. While few boxes show an
-    /// object, a semi-axis would otherwise shrink to nothing or grow without limit.
+    /// Returns these settings with a weak `shape_prior` for all objects, unless a rule has one already.
+    /// Streams need this prior: while few boxes show an object, a semi-axis would shrink to zero or grow
+    /// without limit.
     #[must_use]
     pub fn for_stream(mut self) -> Self {
         add_weak_shape(&mut self.semantics);
         self
     }
 
-    /// Tells these settings from others, and this program's version from others; the same on all machines.
+    /// Returns a hash of these settings and of the program version. The hash is equal on all machines.
     pub fn fingerprint(&self) -> String {
         let mut hash = fnv::FnvHasher::default();
-        // what cannot be written has the version alone
+        // settings that cannot be serialized are identified by the version alone
         hash.write(serde_json::to_string(self).unwrap_or_default().as_bytes());
         if let Some(prior) = &self.prior_map {
             hash.write(serde_json::to_string(&prior.map).unwrap_or_default().as_bytes());

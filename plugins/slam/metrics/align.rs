@@ -1,33 +1,33 @@
-//! Bringing an estimate into the frame of the truth.
+//! Alignment of an estimate with the ground truth.
 use super::{MetricsError, PosePair};
 use manifactor_geometry::{PointPairs, Se3, Similarity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How an estimate is brought into the frame of the truth.
+/// Alignment of the estimated trajectory with the ground truth.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Alignment {
-    /// By the rotation and translation that bring the positions closest, in the mean square.
+    /// Rotation and translation with the least mean square distance of the positions.
     #[default]
     Se3,
-    /// By rotation, translation and scale: for trajectories whose scale is not known.
+    /// Rotation, translation and scale: for trajectories of unknown scale.
     Sim3,
-    /// So that the first poses agree.
+    /// Transform that makes the first poses equal.
     FirstPose,
-    /// Not at all.
+    /// No alignment.
     None,
 }
 
 impl Alignment {
-    /// Each of them.
+    /// All alignments.
     pub const ALL: [Self; 4] = [Self::Se3, Self::Sim3, Self::FirstPose, Self::None];
 }
 
-/// `truth_from_estimate` of the best alignment of that kind, and the pairs with aligned estimates.
+/// Returns the transform `truth_from_estimate` of the alignment, and the pairs with aligned estimates.
 ///
 /// # Errors
-/// If there is no pair; for the best fit of positions, where they lie on one line.
+/// If there is no pair, or if the alignment fits positions and they lie on one line.
 pub fn align(pairs: &[PosePair], kind: Alignment) -> Result<(Similarity, Vec<PosePair>), MetricsError> {
     let too_few = MetricsError::TooFew { what: "alignment", needed: 1, found: 0 };
     let first = pairs.first().ok_or(too_few)?;
@@ -42,5 +42,5 @@ pub fn align(pairs: &[PosePair], kind: Alignment) -> Result<(Similarity, Vec<Pos
     Ok((similarity, pairs.iter().map(aligned).collect()))
 }
 
-/// Share of the largest singular value below which positions lie on one line: 0.3 mm on 300 m.
+/// Singular value, relative to the largest, below which positions lie on one line: 0.3 mm on 300 m.
 const FLAT: f64 = 1e-12;

@@ -1,25 +1,25 @@
-//! Poses of two trajectories that belong together, by time.
+//! Association of the poses of two trajectories by time.
 use super::MetricsError;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 
-/// A pose and its counterpart.
+/// An estimated pose and its true counterpart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosePair {
-    /// When the estimate was, in seconds.
+    /// Timestamp of the estimate, in seconds.
     pub timestamp: f64,
     /// The true pose.
     pub truth: Se3,
-    /// The estimated one.
+    /// The estimated pose.
     pub estimate: Se3,
 }
 
-/// Pairs each pose of the shorter trajectory with the nearest in time of the longer, if that is within
-/// `within` seconds; of two equally near, with the earlier. As evo does, so that no pose of the
-/// shorter one is lost: one of the longer may serve twice. Both have to be sorted by time.
+/// Pairs each pose of the shorter trajectory with the nearest in time of the longer one, if that is within
+/// `within` seconds; the earlier one if two are equally near. As in evo, each pose of the shorter
+/// trajectory is used, and a pose of the longer one may be used twice. Both have to be sorted by time.
 ///
 /// # Errors
-/// If nothing matches.
+/// If no poses match.
 pub fn associate(
     truth: &[StampedPose],
     estimate: &[StampedPose],
@@ -46,7 +46,7 @@ fn nearest(trajectory: &[StampedPose], timestamp: f64, within: f64) -> Option<&S
     let after = trajectory.partition_point(|p| p.timestamp <= timestamp);
     let (before, after) = (trajectory[..after].last(), trajectory.get(after));
     let away = |p: &StampedPose| (p.timestamp - timestamp).abs();
-    // the earlier first: min_by takes the first of equals
+    // the earlier first, because `min_by` returns the first of equal ones
     let nearest = before.into_iter().chain(after).min_by(|a, b| away(a).total_cmp(&away(b)));
     nearest.filter(|p| away(p) <= within)
 }

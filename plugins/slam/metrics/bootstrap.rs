@@ -1,41 +1,42 @@
-//! Confidence intervals by the bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, chapter 13).
+//! Bootstrap confidence intervals (Efron and Tibshirani, An Introduction to the Bootstrap, chapter 13).
 use super::PosePair;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// A mean, and where it lies with 95 % confidence: `None`, left out of documents, where there is nothing to draw from,
-/// which is a single cluster or a single sample.
+/// A mean with its 95 % confidence interval. The bounds are `None`, and not serialized, if there is nothing
+/// to resample: a single cluster or a single resample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
-    /// Of the sample.
+    /// Mean of the sample.
     pub mean: f64,
-    /// 2.5 % of the means of samples drawn anew are below.
+    /// 2.5 % quantile of the resampled means.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
-    /// 2.5 % are above.
+    /// 97.5 % quantile of the resampled means.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub high: Option<f64>,
 }
 
 impl Interval {
-    /// Returns whether zero lies outside; not, where there is no interval.
+    /// Returns whether zero lies outside of the interval; false without an interval.
     pub fn excludes_zero(&self) -> bool {
         self.low.is_some_and(|low| low > 0.0) || self.high.is_some_and(|high| high < 0.0)
     }
 }
 
-/// The mean over all values, and its percentile interval: whole clusters are drawn, as many as there are, with
-/// replacement. `None` for no values. The same for the same seed.
+/// Returns the mean of all values and its percentile interval. Resamples whole clusters with replacement, as
+/// many as there are. `None` without values. The result depends only on the values, the number of resamples
+/// and the seed.
 pub fn bootstrap(clusters: &[Vec<f64>], resamples: usize, seed: u64) -> Option<Interval> {
-    // sums are all that a mean needs of a cluster
+    // the mean needs only the sums of the clusters
     let sums = clusters.iter().filter(|c| !c.is_empty()).map(|c| [c.iter().sum(), c.len() as f64]);
     let sums: Vec<[f64; 2]> = sums.collect();
     (!sums.is_empty()).then(|| drawn(&sums, |[sum, count]| sum / count, resamples, seed))
 }
 
-/// What `of` makes of the sum over all clusters, and its percentile interval.
+/// Returns `of` the sum over all clusters, and its percentile interval.
 fn drawn(sums: &[[f64; 2]], of: fn([f64; 2]) -> f64, resamples: usize, seed: u64) -> Interval {
     let add = |a: [f64; 2], b: &[f64; 2]| [a[0] + b[0], a[1] + b[1]];
     let mean = of(sums.iter().fold([0.0; 2], add));
@@ -51,14 +52,16 @@ fn drawn(sums: &[[f64; 2]], of: fn([f64; 2]) -> f64, resamples: usize, seed: u64
     Interval { mean, low: quantile(0.025), high: quantile(0.975) }
 }
 
-/// Errors of a trajectory last: seconds that are drawn together.
+/// Length of the blocks, in seconds. Errors of a trajectory are correlated in time, so whole blocks are
+/// resampled.
 const BLOCK: f64 = 10.0;
-/// How often they are drawn, and the seed of the draw.
+/// Number of resamples, and the seed of the draws.
 const RESAMPLES: usize = 2000;
 const SEED: u64 = 1;
 
-/// By how much the absolute trajectory error (RMSE of positions) of `after` is larger than that of `before`, as a share of it; with
-/// an interval over blocks of ten seconds, in the alignment of the whole. `None` without a pair or an error to compare with.
+/// Returns the relative change of the absolute trajectory error (RMSE of positions) from `before` to `after`.
+/// The interval resamples blocks of ten seconds, with the alignment of the whole trajectory. `None` without
+/// pairs, or if the error before is zero.
 pub fn change_of_error(before: &[PosePair], after: &[PosePair]) -> Option<Interval> {
     let began = before.first()?.timestamp;
     let mut blocks: BTreeMap<u64, [f64; 2]> = BTreeMap::new();
@@ -85,7 +88,7 @@ mod tests {
 
     #[test]
     fn an_interval_is_that_of_the_normal_law_for_many_values() {
-        // 1 to 400: the mean's standard error is 400 / √12 / √400
+        // 1 to 400: the standard error of the mean is 400 / √12 / √400
         let interval = bootstrap(&alone((1..=400).map(f64::from)), 4000, 1).unwrap();
         let expected = 1.96 * 400.0 / 12f64.sqrt() / 20.0;
         assert_eq!(interval.mean, 200.5);
@@ -121,7 +124,7 @@ mod tests {
         }
     }
 
-    /// Poses a second apart, so far off.
+    /// Poses at intervals of one second, with the given position errors.
     fn off(by: impl Fn(usize) -> f64) -> Vec<PosePair> {
         let pair = |i: usize| PosePair {
             timestamp: i as f64,

@@ -1,9 +1,9 @@
-//! Absolute and relative errors of poses that are paired.
+//! Absolute and relative errors of paired poses.
 use super::{MetricsError, PosePair, Statistics};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Absolute trajectory error: distances between positions, in metres. Align the pairs first.
+/// Returns the absolute trajectory error: distances between positions, in metres. Align the pairs first.
 ///
 /// # Errors
 /// If there is no pair.
@@ -14,7 +14,7 @@ pub fn absolute_error(pairs: &[PosePair]) -> Result<Statistics, MetricsError> {
     Statistics::of(&errors).ok_or(MetricsError::TooFew { what, needed: 1, found: 0 })
 }
 
-/// Which pairs of poses a relative error is over.
+/// Pairs of poses that a relative error covers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Pairing {
@@ -25,20 +25,20 @@ pub enum Pairing {
     All,
 }
 
-/// Relative pose error: how far motions over Δ frames are from the true ones.
+/// Relative pose error: the error of the motion over Δ frames.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RelativeError {
-    /// Metres.
+    /// Unit: metres.
     pub translation: Statistics,
-    /// Radians.
+    /// Unit: radians.
     pub rotation: Statistics,
 }
 
-/// The relative pose error over `delta` matched poses: E = (Qᵢ⁻¹Qⱼ)⁻¹ (Pᵢ⁻¹Pⱼ), Q true and P estimated.
-/// The same in any frame, but not at any scale.
+/// Returns the relative pose error over `delta` matched poses: E = (Qᵢ⁻¹Qⱼ)⁻¹ (Pᵢ⁻¹Pⱼ), with Q true and P
+/// estimated. It does not depend on the frame of the map, but on the scale.
 ///
 /// # Errors
-/// If there are not more pairs than `delta`, or that is 0.
+/// If there are not more pairs than `delta`, or `delta` is 0.
 pub fn relative_error(
     pairs: &[PosePair],
     delta: usize,
@@ -55,7 +55,7 @@ pub fn relative_error(
     both.map(|(translation, rotation)| RelativeError { translation, rotation }).ok_or(too_few)
 }
 
-/// The relative pose errors of which [`relative_error`] is the summary, in order: metres, radians.
+/// Returns the individual errors behind [`relative_error`], in order: metres, radians.
 pub fn relative_errors(pairs: &[PosePair], delta: usize, pairing: Pairing) -> Vec<(f64, f64)> {
     if delta == 0 {
         return vec![];

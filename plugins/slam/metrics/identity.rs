@@ -1,50 +1,52 @@
-//! How well boxes are put together to objects, beside the names that they truly have.
+//! Scores of a data association against the true objects.
 //!
-//! Objects have no names of their own, so that what counts is which boxes go together: of all *pairs* of boxes of one object, how
-//! many are together (recall), and of all pairs that are together, how many should be (precision). Homogeneity and
-//! completeness are those of Rosenberg and Hirschberg, V-Measure, 2007; switches and the identity F1 are those of
-//! multiple object tracking (Bernardin and Stiefelhagen, 2008; Ristani et al., 2016).
+//! Object ids are arbitrary, so the scores compare which boxes are grouped together. Recall is the share of
+//! *pairs* of boxes of one true object that are grouped together. Precision is the share of grouped pairs
+//! that belong to one true object. Homogeneity and completeness follow Rosenberg and Hirschberg, V-Measure,
+//! 2007. Switches and the identity F1 are measures of multiple object tracking (Bernardin and Stiefelhagen,
+//! 2008; Ristani et al., 2016).
 use super::matching::largest_weight;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hash;
 
-/// Scores of an association of boxes with objects.
+/// Scores of a data association.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct IdentityScores {
-    /// Boxes whose true object is known: those that count.
+    /// Number of boxes with a known true object. Only these count.
     pub boxes: usize,
-    /// Of all pairs of boxes that are together, the share that truly are.
+    /// Share of the pairs of boxes in one object that belong to one true object.
     pub precision: f64,
-    /// Of all pairs of boxes of one true object, the share that are together.
+    /// Share of the pairs of boxes of one true object that are in one object.
     pub recall: f64,
-    /// The harmonic mean of the two.
+    /// Harmonic mean of precision and recall.
     pub f1: f64,
-    /// 1 where each object has boxes of one true object only.
+    /// 1 if each object has boxes of one true object only.
     pub homogeneity: f64,
-    /// 1 where all boxes of a true object are in one object.
+    /// 1 if all boxes of each true object are in one object.
     pub completeness: f64,
-    /// The share of boxes in the right object, with objects matched one to one so that it is largest.
+    /// Share of boxes in the right object, under the one-to-one matching of objects that maximizes it.
     pub identity_f1: f64,
-    /// How many times the object changes from one box of a true object to its next.
+    /// Number of changes of the object between consecutive boxes of a true object.
     pub switches: usize,
-    /// True objects.
+    /// Number of true objects.
     pub true_objects: usize,
-    /// Objects with [`ENOUGH`] boxes.
+    /// Number of objects with at least [`ENOUGH`] boxes.
     pub objects: usize,
 }
 
-/// Boxes that make an object count.
+/// Smallest number of boxes of an object that counts.
 pub const ENOUGH: usize = 3;
 
-/// Scores boxes in order of time: the true object of each, and the one that it was put to. A box that was put to none is alone.
+/// Scores boxes in the order of time. Each has its true object and its assigned object; a box without an
+/// assigned object is alone.
 pub fn identity<T, P>(boxes: impl IntoIterator<Item = (T, Option<P>)>) -> IdentityScores
 where
     T: Copy + Ord + Hash,
     P: Copy + Ord + Hash,
 {
-    /// A box that was put to none is an object of its own.
+    /// An assigned object, or a box that is alone and counts as an object.
     #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
     enum Put<P> {
         Into(P),
@@ -77,7 +79,7 @@ where
     let given_found = cells.iter().map(|((_, put), n)| part(*n, found[put])).sum::<f64>();
     let given_truth = cells.iter().map(|((truth, _), n)| part(*n, truths[truth])).sum::<f64>();
     let left = |given: f64, of: f64| if of > 0.0 { 1.0 - given / of } else { 1.0 };
-    // of the boxes that are alone, one at most is the whole of its object
+    // of the boxes that are alone, a true object can be matched with at most one
     let mut shared = BTreeMap::new();
     for ((truth, put), n) in &cells {
         match put {
@@ -99,8 +101,8 @@ where
     }
 }
 
-/// Returns how many boxes are in the right object if objects are matched one to one so that these are the most; `None` is an
-/// object of its own for each true one.
+/// Returns the number of boxes in the right object under the best one-to-one matching of objects. `None`
+/// stands for one box that is alone, separately for each true object.
 fn best_match<T: Copy + Ord, P: Copy + Ord>(
     shared: &BTreeMap<(T, Option<P>), usize>,
     truths: &BTreeMap<T, usize>,
@@ -137,7 +139,7 @@ mod tests {
 
     #[test]
     fn pairs_are_counted_by_hand() {
-        // true pairs: 3 + 1; together: 1 + 3, of which 1 + 1 are right
+        // true pairs: 3 + 1; grouped pairs: 1 + 3, of these 1 + 1 are right
         let some = scores(&[1, 1, 1, 2, 2], &[4, 4, 5, 5, 5]);
         assert_eq!((some.precision, some.recall, some.f1), (0.5, 0.5, 0.5));
         assert_eq!((some.switches, some.objects, some.boxes), (1, 1, 5));

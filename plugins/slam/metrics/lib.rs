@@ -1,6 +1,6 @@
-//! How far a trajectory is from the truth, as the field measures it; the same numbers as `evo` gives.
+//! Trajectory errors by the standard measures, with the same numbers as `evo`.
 //!
-//! [`associate`] poses by time, [`align`] them, then take the [`absolute_error`] (ATE) or the
+//! [`associate`] poses by time, [`align`] them, then compute the [`absolute_error`] (ATE) or the
 //! [`relative_error`] (RPE). Sturm et al., A Benchmark for the Evaluation of RGB-D SLAM Systems, 2012.
 mod align;
 mod associate;
@@ -23,21 +23,21 @@ pub use manifactor_geometry::Similarity;
 pub use pairing::pair_boxes;
 pub use statistics::Statistics;
 
-/// Why an error could not be measured.
+/// Reason why an error could not be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetricsError {
-    /// No pose has a counterpart near enough in time.
+    /// No pose has a counterpart within the tolerance.
     #[error(
         "no pose of the estimate is within {within} s of a true pose; do the two share a clock?{}",
         spans(*estimate, *truth)
     )]
     NothingMatches {
-        /// The tolerance, in seconds.
+        /// Tolerance, in seconds.
         within: f64,
-        /// First and last time stamp of the estimate.
+        /// First and last timestamp of the estimate.
         estimate: Option<(f64, f64)>,
-        /// First and last time stamp of the truth.
+        /// First and last timestamp of the truth.
         truth: Option<(f64, f64)>,
     },
     /// Fewer poses than the measure needs.
@@ -45,9 +45,9 @@ pub enum MetricsError {
     TooFew {
         /// The measure.
         what: &'static str,
-        /// What it needs.
+        /// Required number of poses.
         needed: usize,
-        /// What there is.
+        /// Available number of poses.
         found: usize,
     },
     /// Positions on a line, or in one place: no rotation aligns them best.

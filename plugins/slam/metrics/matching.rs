@@ -1,13 +1,14 @@
-//! One-to-one matching of the largest weight, in memory that grows with the number of weights above zero.
+//! One-to-one matching of maximum weight, in memory proportional to the number of positive weights.
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Returns the largest sum of weights if each row is matched with one column at most, and each column with one row at most.
+/// Returns the largest sum of weights of a matching with at most one column per row, and at most one row per
+/// column.
 ///
-/// `rows` has the columns and the weights of each row; a pair that is not listed weighs nothing. The method adds row by row
-/// along the shortest augmenting path (Jonker and Volgenant, 1987).
+/// `rows` has the columns and weights of each row; a pair that is not listed has weight zero. Rows are added
+/// one by one along the shortest augmenting path (Jonker and Volgenant, 1987).
 pub(super) fn largest_weight(rows: &[Vec<(usize, i64)>], columns: usize) -> i64 {
-    // a column of its own lets each row stay unmatched
+    // an extra column per row allows the row to stay unmatched
     let edges = |row: usize| rows[row].iter().copied().chain([(columns + row, 0)]);
     let largest = |row: usize| edges(row).map(|(_, weight)| weight).max().unwrap_or(0);
     // duals: row + column ≥ weight for each pair, with equality if it is matched

@@ -7,7 +7,7 @@ use std::iter::repeat;
 /// The object of a box, if it has one.
 type Object = Option<u32>;
 
-/// The boxes of one time with the same sides: their objects in the truth, and in the estimate.
+/// Boxes with equal timestamps and sides: their objects in the truth, and in the estimate.
 #[derive(Default)]
 struct EqualBoxes {
     timestamp: f64,
@@ -15,13 +15,13 @@ struct EqualBoxes {
     found: Vec<Object>,
 }
 
-/// Returns, in order of time, the true object of each box that has one, and its object in the estimate if the box is there. Boxes are
-/// the same if their times and sides are equal; `object_key` 0 stands for no object.
+/// Returns the true object of each box that has one, in order of time, with its object in the estimate if the
+/// estimate has the box. Boxes are equal if their times and sides are; `object_key` 0 stands for no object.
 ///
-/// Equal boxes with different objects are paired so that the order of the rows does not matter: first the objects that share
-/// the most other boxes, then the rest by number.
+/// The pairing of equal boxes with different objects does not depend on the order of the rows: first the
+/// objects that share the most other boxes, then the rest by number.
 pub fn pair_boxes(truth: &[Detection], estimate: &[Detection]) -> Vec<(u32, Option<Option<u32>>)> {
-    // 0.0 and -0.0 are equal, and have different bits
+    // 0.0 and -0.0 are equal, but have different bits
     let bits = |x: f64| (x + 0.0).to_bits();
     let key = |d: &Detection| [d.timestamp, d.xmin, d.ymin, d.xmax, d.ymax].map(bits);
     let object = |d: &Detection| d.object_key.filter(|key| *key != 0);
@@ -58,7 +58,8 @@ pub fn pair_boxes(truth: &[Detection], estimate: &[Detection]) -> Vec<(u32, Opti
     pairs.into_iter().filter_map(|(_, truth, found)| Some((truth?, found))).collect()
 }
 
-/// The pairs of a true object and one of the estimate that share other boxes, the most first; none if there is no choice.
+/// Returns the pairs of a true and an estimated object that share other boxes, those with the most first.
+/// Empty if there is no choice.
 fn most_shared(
     truths: &[Object],
     found: &[Object],

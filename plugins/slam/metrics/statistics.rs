@@ -4,15 +4,15 @@ use serde::Serialize;
 /// A summary of errors, in their unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Statistics {
-    /// How many errors there are.
+    /// Number of errors.
     pub count: usize,
     /// Square root of the mean square.
     pub rmse: f64,
     /// Mean.
     pub mean: f64,
-    /// The middle one; the mean of the middle two, where their number is even.
+    /// The middle error; the mean of the middle two if their number is even.
     pub median: f64,
-    /// Standard deviation, by the number of errors.
+    /// Standard deviation, normalized by the number of errors.
     pub std: f64,
     /// Smallest.
     pub min: f64,
@@ -21,7 +21,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// The summary of some errors; `None` where there are none.
+    /// Returns the summary of errors; `None` if there are none.
     pub fn of(errors: &[f64]) -> Option<Self> {
         let mut sorted = errors.to_vec();
         sorted.sort_by(f64::total_cmp);

@@ -1,8 +1,8 @@
-//! Mapping frame by frame, as they come.
+//! Online mapping, frame by frame.
 //!
-//! A [`Mapper`] takes a frame with its boxes and has the pose and the map up to date before the next one. What
-//! [`Mapping`] decides with all boxes in view is decided here when an object is *born*, which is as soon as it can be
-//! placed, and decided again where later boxes say otherwise.
+//! A [`Mapper`] takes a frame with its boxes, and updates the pose and the map before the next one.
+//! [`Mapping`] decides about objects with all boxes known. Here, an object is added to the map as soon as its
+//! place can be determined. The decision is revised if later boxes contradict it.
 mod association;
 mod frame;
 mod gravity;
@@ -40,8 +40,9 @@ pub use locate::Located;
 
 /// A map that grows with each frame.
 ///
-/// It keeps what a batch solve at the end needs: some 70 bytes for each frame, and 50 for each box; and each object, where boxes are
-/// put to objects, with its detections. Everything else is bounded by the window of the session, where there is one.
+/// It keeps the data for a batch solve at the end: about 70 bytes per frame, and 50 per box. With data
+/// association, it also keeps each object with its detections. Everything else is bounded by the window of
+/// the smoother, if there is one.
 #[derive(Debug)]
 pub struct Mapper {
     settings: Arc<Settings>,
@@ -49,62 +50,63 @@ pub struct Mapper {
     session: Session,
     up: Up,
     associator: Box<dyn Associator>,
-    /// What boxes are called now that were called otherwise when they came.
+    /// Current objects of detections that were assigned differently at first.
     names: Names,
-    /// What was learned of earlier frames, for the next update.
+    /// Corrections to earlier frames, for the next update.
     pending: Vec<Learned>,
     measurements: Measurements,
     objects: BTreeMap<ObjectId, Tracked>,
     ledger: Ledger,
-    /// The last frame that was taken.
+    /// The last accepted frame.
     last: Option<Frame>,
-    /// Each pose as it was estimated when its frame came.
+    /// Pose estimates at the time of their frames.
     live: Vec<StampedPose>,
 }
 
-/// Why a frame is refused. The map is as it was; the next frame is tied to the last one that was taken.
+/// Reason why a frame is rejected. The map stays unchanged, and the next frame is connected to the last
+/// accepted one.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// A time stamp that does not come after the one before.
+    /// The timestamp is not later than the one before.
     #[error("the frame at {timestamp} s is left out: it does not come after the one before, at {before} s")]
     Time {
-        /// In seconds.
+        /// Timestamp of the frame, in seconds.
         timestamp: f64,
-        /// In seconds.
+        /// Timestamp of the previous frame, in seconds.
         before: f64,
     },
-    /// What the source gives is no frame.
+    /// The source returned an invalid frame.
     #[error("left out: {0}")]
     Source(String),
-    /// A pose or a time stamp that is not a number.
+    /// The pose or the timestamp is not finite.
     #[error("the frame at {timestamp} s is left out: its pose by odometry, or its time stamp, is not finite")]
     NotFinite {
-        /// In seconds.
+        /// Timestamp of the frame, in seconds.
         timestamp: f64,
     },
-    /// Up is unknown.
+    /// The up direction is unknown.
     #[error(transparent)]
     Gravity(#[from] GravityError),
-    /// A semantic rule that cannot be applied.
+    /// A semantic rule cannot be applied.
     #[error(transparent)]
     Rule(#[from] RuleError),
-    /// A step that the motion model has no factor for.
+    /// The motion model has no factor for the step.
     #[error(transparent)]
     Motion(#[from] MotionError),
-    /// Factors that do not fit.
+    /// The smoother rejects the factors.
     #[error(transparent)]
     Change(#[from] ChangeError),
-    /// A pose that cannot be taken in.
+    /// The update of the smoother fails.
     #[error(transparent)]
     Update(#[from] UpdateError),
 }
 
-/// Why a map could not be finished.
+/// Reason why a map could not be finished.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FinishError {
-    /// There is no graph.
+    /// The graph cannot be created.
     #[error(transparent)]
     Mapping(#[from] MappingError),
     /// The graph cannot be solved.
@@ -113,13 +115,13 @@ pub enum FinishError {
 }
 
 impl Mapper {
-    /// An empty map, by the settings [for streams](Settings::for_stream). If the settings have a prior map and the start in it, the
-    /// map begins with its objects.
+    /// Creates a map with the settings [for streams](Settings::for_stream). It is empty, or has the objects
+    /// of the prior map if the settings give one with a start pose.
     pub fn new(opening: Opening, settings: &Settings) -> Self {
         let settings = settings.clone().for_stream();
         let mut online = settings.online.clone();
         if let Some(window) = &mut online.window {
-            // poses leave, and nothing else
+            // only poses leave the window
             let own = settings.own.values.iter().map(|(_, value)| value.typetag_name());
             let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]);
             window.keep.extend(kept.filter_map(|name| ManifoldType::try_from(name.to_owned()).ok()));
@@ -145,11 +147,11 @@ impl Mapper {
         }
     }
 
-    /// Takes a frame in: its pose, and its boxes of objects that are in the map; then objects that it completes. The settings'
-    /// `association` says which object a box shows.
+    /// Adds a frame: its pose, and its boxes of mapped objects; then objects that can be initialized with it.
+    /// The `association` of the settings assigns the boxes to objects.
     ///
     /// # Errors
-    /// If the pose cannot be taken. Boxes that cannot be taken are no error: the report tells of them.
+    /// If the pose is rejected. Rejected boxes are not an error: the report lists them.
     pub fn take(&mut self, observation: &Observation) -> Result<FrameReport, FrameError> {
         let mut report = FrameReport::new(self.live.len(), observation.frame.timestamp);
         let seen = self.take_pose(observation, &mut report)?;
@@ -159,8 +161,8 @@ impl Mapper {
         Ok(report)
     }
 
-    /// Looks back at all frames when no other comes, and corrects what they were thought to show. What comes of it is told as if of the last
-    /// frame.
+    /// Reconsiders all frames after the last one, and corrects their data association. The changes are
+    /// reported as those of the last frame.
     pub fn settle(&mut self) -> FrameReport {
         let frame = self.live.len();
         let last = self.last.as_ref().map_or(0.0, |last| last.timestamp);
@@ -183,12 +185,13 @@ impl Mapper {
         report
     }
 
-    /// The graph so far, with its estimate.
+    /// Returns the smoother with the current graph and estimate.
     pub fn session(&mut self) -> &mut Session {
         &mut self.session
     }
 
-    /// The objects of a frame's boxes, which had these names, when all other frames have been seen.
+    /// Returns the objects of the boxes of an earlier frame with all frames known. `names` are the objects
+    /// assigned so far.
     pub fn reconsider(
         &self,
         frame: usize,
@@ -201,31 +204,31 @@ impl Mapper {
         self.associator.reconsider(&Image { frame, timestamp, detections }, names, &self.known((frame, pose)))
     }
 
-    /// What boxes are called now.
+    /// Returns the current ids of the objects of all detections.
     pub fn names(&self) -> &Names {
         &self.names
     }
 
-    /// What is measured of each object.
+    /// Returns the measurements of each object.
     pub fn measurements(&self) -> &Measurements {
         &self.measurements
     }
 
-    /// Objects that are in the map.
+    /// Returns the number of objects in the map.
     pub fn mapped(&self) -> usize {
         self.objects.values().filter(|object| object.is_mapped()).count()
     }
 
-    /// Each pose as it was estimated when its frame came.
+    /// Returns the pose estimates at the time of their frames.
     pub fn live(&self) -> &[StampedPose] {
         &self.live
     }
 
-    /// Solves all of it as one batch, from the estimate. Objects that were never seen from far enough apart to be placed as
-    /// they came have another chance, with all their boxes: what is mapped in the end is what a batch maps.
+    /// Solves the whole graph as one batch, starting from the estimate. Objects that could not be initialized
+    /// online are tried again with all their boxes, so the final map has the objects of a batch.
     ///
     /// # Errors
-    /// If `sequence`, all frames that were taken, has none, or the graph cannot be solved.
+    /// If `sequence`, which contains all accepted frames, is empty, or the graph cannot be solved.
     pub fn finish(
         self,
         sequence: Arc<Sequence>,
@@ -256,12 +259,12 @@ impl Mapper {
         Ok(Estimate::from_start(sequence, mapping, values, &self.settings, observer)?)
     }
 
-    /// The estimate of a pose; `None`, where it is not there, or not any more.
+    /// Returns the estimate of a pose; `None` if it is not in the smoother.
     fn pose(&self, frame: usize) -> Option<Se3> {
         self.session.get(pose_key(frame).as_str()).ok()
     }
 
-    /// The same, with its time; of the frame that is being taken as well.
+    /// Returns the estimate of a pose with its time. Includes the frame in progress.
     fn at(&self, frame: usize) -> Option<StampedPose> {
         let timestamp = self.live.get(frame).map(|live| live.timestamp);
         let newest = self.last.as_ref().map(|last| last.timestamp);

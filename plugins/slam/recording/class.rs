@@ -1,9 +1,9 @@
-//! Names of classes, and which of them mean the same.
+//! Names of classes, and their synonyms.
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Spellings that detectors and data sets use, and the names that COCO's own papers print.
+/// Spellings of detectors and data sets, with the names that COCO's own papers print.
 const SHIPPED: [(&str, &str); 12] = [
     ("tvmonitor", "tv monitor"),
     ("tv", "tv monitor"),
@@ -19,10 +19,10 @@ const SHIPPED: [(&str, &str); 12] = [
     ("motorbike", "motorcycle"),
 ];
 
-/// Names that stand for other names, besides the usual ones: `{ "desk lamp" = "lamp" }`.
+/// Class names that stand for other names, in addition to the built-in ones: `{ "desk lamp" = "lamp" }`.
 ///
-/// Case, underscores and hyphens make no difference: `Cell_Phone` is `cell phone`. `tvmonitor`, `pottedplant`,
-/// `couch` and their like are known without being listed.
+/// Case, underscores and hyphens make no difference: `Cell_Phone` is `cell phone`. `tvmonitor`,
+/// `pottedplant`, `couch` and similar names are built in.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Aliases(
@@ -30,7 +30,7 @@ pub struct Aliases(
 );
 
 impl Aliases {
-    /// The one name of a class.
+    /// Returns the unique name of a class.
     pub fn canonical(&self, name: &str) -> String {
         let name = plain(name);
         let own = self.0.iter().find(|(alias, _)| plain(alias) == name).map(|(_, class)| plain(class));

@@ -1,34 +1,34 @@
-//! One class for an object, out of all of its detections.
+//! Fusion of an object's detections into one class.
 use crate::class::Aliases;
 use crate::sequence::ClassScores;
 use indexmap::IndexMap;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// Scores of an object's detections, averaged.
+/// Class scores of an object, averaged over its detections.
 ///
-/// The class is the arg max of the average of the score vectors (Jablonsky et al., section V). Where a detector
-/// reports its best class only, the average is a vote in which each detection counts with its score.
+/// The class is the arg max of the averaged score vectors (Jablonsky et al., section V). If a detector
+/// reports only its best class, the average is a vote weighted by the scores.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fusion {
     /// Scores, summed over the detections.
     #[serde(rename = "scores", deserialize_with = "sums")]
     sums: IndexMap<String, f64>,
-    /// How many there were.
+    /// Number of detections.
     detections: usize,
 }
 
-/// The class of an object, and how sure it is.
+/// Class of an object, with its score.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FusedClass {
-    /// Its name, after aliases.
+    /// Name after aliases.
     pub name: String,
-    /// Its score, averaged over the detections.
+    /// Score, averaged over the detections.
     pub score: f64,
-    /// Its part of all scores, from 0 to 1.
+    /// Share of the sum of all scores, from 0 to 1.
     pub share: f64,
-    /// What else it may be: the other classes by their part of all scores, the largest first.
+    /// Alternative classes with their shares of the sum of all scores, the largest first.
     #[serde(skip_serializing_if = "IndexMap::is_empty")]
     pub others: IndexMap<String, f64>,
 }
@@ -43,11 +43,11 @@ fn sums<'de, D: Deserializer<'de>>(from: D) -> Result<IndexMap<String, f64>, D::
     }
 }
 
-/// Classes with a smaller part of all scores are not worth a word.
+/// Classes with a smaller share of the sum of all scores are not listed.
 const LEAST_SHARE: f64 = 0.01;
 
 impl FusedClass {
-    /// All classes that it may be, with their parts of all scores.
+    /// Returns all possible classes with their shares of the sum of all scores.
     pub fn shares(&self) -> impl Iterator<Item = (&str, f64)> {
         let others = self.others.iter().map(|(name, share)| (name.as_str(), *share));
         std::iter::once((self.name.as_str(), self.share)).chain(others)
@@ -55,7 +55,7 @@ impl FusedClass {
 }
 
 impl Fusion {
-    /// Counts a detection in.
+    /// Adds a detection.
     pub fn add(&mut self, scores: &ClassScores, aliases: &Aliases) {
         self.detections += 1;
         for (class, score) in scores.iter() {
@@ -63,7 +63,7 @@ impl Fusion {
         }
     }
 
-    /// Takes back a detection that was counted in.
+    /// Removes a detection that was added before.
     pub fn take_back(&mut self, scores: &ClassScores, aliases: &Aliases) {
         self.detections = self.detections.saturating_sub(1);
         for (class, score) in scores.iter() {
@@ -73,7 +73,7 @@ impl Fusion {
         }
     }
 
-    /// Counts another's detections in.
+    /// Adds all detections of `other`.
     pub fn add_all(&mut self, other: Self) {
         self.detections += other.detections;
         for (class, sum) in other.sums {
@@ -81,7 +81,7 @@ impl Fusion {
         }
     }
 
-    /// The same by the names of `aliases`: what was written under others is counted together.
+    /// Returns the scores under the canonical names of `aliases`; scores of synonyms are added up.
     pub fn canonical(&self, aliases: &Aliases) -> Self {
         let mut sums = IndexMap::new();
         for (class, sum) in &self.sums {
@@ -90,25 +90,25 @@ impl Fusion {
         Self { sums, detections: self.detections }
     }
 
-    /// The classes that were named, each with its part of all scores; for none, nothing.
+    /// Returns the detected classes, each with its share of the sum of all scores. Empty without detections.
     pub fn shares(&self) -> impl Iterator<Item = (&str, f64)> {
         let all: f64 = self.sums.values().sum();
         let share = move |sum: f64| if all > 0.0 { sum / all } else { 0.0 };
         self.sums.iter().map(move |(class, sum)| (class.as_str(), share(*sum)))
     }
 
-    /// The classes that were named, each with the sum of its scores.
+    /// Returns the detected classes, each with the sum of its scores.
     pub fn sums(&self) -> &IndexMap<String, f64> {
         &self.sums
     }
 
-    /// The class with the largest sum of scores, the first seen of equals, and that sum.
+    /// Returns the class with the largest sum of scores, and this sum. The first detected class wins ties.
     pub fn leading(&self) -> Option<(&str, f64)> {
         let best = self.sums.iter().reduce(|best, next| if next.1 > best.1 { next } else { best });
         best.map(|(name, sum)| (name.as_str(), *sum))
     }
 
-    /// The best class, the first seen of equals; `None` where no detection named any.
+    /// Returns the best class; the first detected class wins ties. `None` if no detection has a class.
     pub fn best(&self) -> Option<FusedClass> {
         let total: f64 = self.sums.values().sum();
         let share = |sum: f64| if total > 0.0 { sum / total } else { 0.0 };

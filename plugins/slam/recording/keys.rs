@@ -14,7 +14,7 @@ pub fn object_key(id: ObjectId) -> Key {
     Key::indexed("q", id)
 }
 
-/// A number for an object, the same in detections and in the truth.
+/// Number of an object, shared by detections and ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct ObjectId(pub u32);

@@ -1,7 +1,9 @@
-//! The seam of measurements: quantities that a detection measures of its object besides its box, such as a [`Depth`].
+//! Interface of measurements: quantities that a detection measures in addition to its box, such as a
+//! [`Depth`].
 //!
-//! A kind of measurement is one file: it implements [`Measurement`] and ends with `register_measurement!`. Its name is then a field of a
-//! box in JSON lines; its factor is in the graph, and its innovation counts in data association.
+//! A type of measurement is one file: it implements [`Measurement`] and ends with `register_measurement!`.
+//! Its name becomes a field of a box in JSON lines. Its factor is added to the graph, and data association
+//! uses its innovation.
 use crate::keys::pose_key;
 use manifactor_geometry::Se3;
 use manifactor_graph::loss::Loss;
@@ -17,40 +19,42 @@ mod depth;
 
 pub use depth::Depth;
 
-/// Most rows of one measurement.
+/// Largest number of rows of one measurement.
 pub const ROWS: usize = 4;
 
-/// A number for each row of a measurement; those beyond its own are not looked at.
+/// One number for each row of a measurement; further entries are ignored.
 pub type Rows = SVector<f64, ROWS>;
 
-/// A quantity that a detection measures of its object besides its box.
+/// A quantity that a detection measures of its object in addition to its box.
 pub trait Measurement: Debug + Send + Sync {
-    /// Name of the field in JSON lines.
+    /// Returns the name of the field in JSON lines.
     fn name(&self) -> &'static str;
 
-    /// The value of that field.
+    /// Returns the value of that field.
     fn to_value(&self) -> Value;
 
-    /// Factor between the pose of the camera, world from camera, and the object; of one to [`ROWS`] rows.
+    /// Returns the factor between the camera pose, world from camera, and the object; it has one to [`ROWS`]
+    /// rows.
     fn factor(&self) -> Arc<dyn Factor>;
 
-    /// Rows of the factor, one to [`ROWS`].
+    /// Returns the number of rows of the factor, one to [`ROWS`].
     fn rows(&self) -> usize {
         self.factor().erased().signature().rows.unwrap_or(ROWS).min(ROWS)
     }
 
-    /// Standard deviations of the rows, if their residual is `residual`.
+    /// Returns the standard deviations of the rows if the factor's residual is `residual`.
     fn deviations(&self, errors: &Errors, residual: &Rows) -> Rows;
 
-    /// -2 ln of the density of the measured value for an object that was never seen.
+    /// Returns -2 ln of the density of the measured value for an object that was never detected before.
     fn cost_of_new(&self, usual: &UsualDepth) -> f64;
 
-    /// Distance of the object's centre along the optical axis, in metres, if that is measured: it places new objects.
+    /// Returns the distance of the object's centre along the optical axis in metres, if measured. New objects
+    /// are initialized with it.
     fn depth(&self) -> Option<f64> {
         None
     }
 
-    /// Residual of the [factor](Self::factor) and its derivatives; `None` if it is not defined.
+    /// Returns the residual of the [factor](Self::factor) and its derivatives; `None` if it is undefined.
     fn innovation(&self, pose: &Se3, object: &DualQuadric) -> Option<Innovation> {
         let factor = self.factor();
         let variables: [&dyn Variable; 2] = [pose, object];
@@ -67,37 +71,38 @@ pub trait Measurement: Debug + Send + Sync {
     }
 }
 
-/// Errors of measurements, by the settings.
+/// Errors of measurements from the settings.
 #[derive(Debug, Clone, Copy)]
 pub struct Errors {
-    /// Standard deviation of depths, as a share of the depth.
+    /// Standard deviation of depths, as a fraction of the depth.
     pub depth: f64,
 }
 
-/// Distance of objects from the camera, as far as others show it.
+/// Usual distance of objects from the camera, estimated from known objects.
 #[derive(Debug, Clone, Copy)]
 pub struct UsualDepth {
-    /// In metres.
+    /// Depth. Unit: metres.
     pub depth: f64,
-    /// Standard deviation of its logarithm.
+    /// Standard deviation of the logarithm of the depth.
     pub spread: f64,
 }
 
-/// Difference between a predicted and a measured quantity, with derivatives by the tangents of pose and object.
+/// Difference between a predicted and a measured quantity, with derivatives in the tangent spaces of pose and
+/// object.
 #[derive(Debug, Clone, Copy)]
 pub struct Innovation {
-    /// Rows that count; the others are zero.
+    /// Number of valid rows; the remaining rows are zero.
     pub rows: usize,
-    /// Predicted less measured.
+    /// Predicted minus measured value.
     pub residual: Rows,
-    /// By the tangent of the pose.
+    /// Derivative with respect to the tangent of the pose.
     pub by_pose: SMatrix<f64, ROWS, 6>,
-    /// By the tangent of the object.
+    /// Derivative with respect to the tangent of the object.
     pub by_object: SMatrix<f64, ROWS, 9>,
 }
 
 impl Innovation {
-    /// Zeros for so many rows.
+    /// Returns zeros for this number of rows.
     pub fn none(rows: usize) -> Self {
         let (by_pose, by_object) = (SMatrix::zeros(), SMatrix::zeros());
         Self { rows, residual: Rows::zeros(), by_pose, by_object }
@@ -105,47 +110,48 @@ impl Innovation {
 }
 
 impl UsualDepth {
-    /// -2 ln of the density of a new object's depth.
+    /// Returns -2 ln of the density of a new object's depth.
     pub fn cost(&self, depth: f64) -> f64 {
         let spread = self.spread;
         ((depth / self.depth).ln() / spread).powi(2) + TAU.ln() + 2.0 * (spread * depth).ln()
     }
 }
 
-/// The measurements of one detection besides its box.
+/// All measurements of one detection in addition to its box.
 #[derive(Debug, Clone, Default)]
 pub struct Quantities(Vec<Arc<dyn Measurement>>);
 
 impl Quantities {
-    /// Nothing but the box.
+    /// No measurement besides the box.
     pub const NONE: Self = Self(vec![]);
 
-    /// One measurement.
+    /// Returns a single measurement.
     pub fn one(measurement: impl Measurement + 'static) -> Self {
         Self(vec![Arc::new(measurement)])
     }
 
-    /// All of them.
+    /// Iterates over the measurements.
     pub fn iter(&self) -> impl Iterator<Item = &dyn Measurement> {
         self.0.iter().map(|measurement| &**measurement)
     }
 
-    /// Returns whether there is nothing but the box.
+    /// Returns whether there is no measurement besides the box.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Rows of all factors together.
+    /// Returns the total number of rows of all factors.
     pub fn rows(&self) -> usize {
         self.iter().map(Measurement::rows).sum()
     }
 
-    /// Distance of the object's centre along the optical axis, in metres, if that is measured.
+    /// Returns the distance of the object's centre along the optical axis in metres, if measured.
     pub fn depth(&self) -> Option<f64> {
         self.iter().find_map(Measurement::depth)
     }
 
-    /// Factors of a frame and an object. A measurement whose deviations are no noise has none, which is logged.
+    /// Returns the factors between a frame and an object. A measurement with invalid standard deviations is
+    /// skipped and logged.
     pub fn entries<'a>(
         &'a self,
         frame: usize,
@@ -169,15 +175,16 @@ impl Quantities {
         })
     }
 
-    /// As the fields of a box in JSON lines.
+    /// Returns the measurements as fields of a box in JSON lines.
     pub(crate) fn to_fields(&self) -> impl Iterator<Item = (String, Value)> + '_ {
         self.iter().map(|measurement| (measurement.name().to_owned(), measurement.to_value()))
     }
 
-    /// Reads the fields of a box in JSON lines that are none of its own; `null` is not measured.
+    /// Reads the measurements from the remaining fields of a box in JSON lines; `null` means not measured.
     ///
     /// # Errors
-    /// A field that is no kind of measurement, where `others` are the fields that a box has besides, or one that cannot be read.
+    /// A field that is neither a type of measurement nor one of the box's `others`, or a value that cannot be
+    /// read.
     pub fn read(fields: impl IntoIterator<Item = (String, Value)>, others: &[&str]) -> Result<Self, String> {
         let mut measured = vec![];
         for (name, value) in fields {
@@ -204,17 +211,18 @@ impl PartialEq for Quantities {
     }
 }
 
-/// A kind of measurement that JSON lines can have. Written by [`register_measurement!`](crate::register_measurement).
+/// A type of measurement in JSON lines. Created by [`register_measurement!`](crate::register_measurement).
 pub struct MeasurementKind {
-    /// Name of its field.
+    /// Name of the field.
     pub name: &'static str,
-    /// Reads the field.
+    /// Reads the value of the field.
     pub read: fn(Value) -> Result<Arc<dyn Measurement>, serde_json::Error>,
 }
 
 inventory::collect!(MeasurementKind);
 
-/// Registers a [`Measurement`](crate::measurement::Measurement) that serde can read: `register_measurement!("depth", Depth);`
+/// Registers a [`Measurement`](crate::measurement::Measurement) that serde can read:
+/// `register_measurement!("depth", Depth);`
 #[macro_export]
 macro_rules! register_measurement {
     ($name:literal, $type:ty) => {

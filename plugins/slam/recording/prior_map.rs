@@ -1,7 +1,8 @@
-//! A map that was made before: what is in it is known when a run begins.
+//! Map of an earlier run, whose objects are known at the start of this run.
 //!
-//! Each object of it is a variable from the first frame on, with a factor that holds it where the map has it, as well as the map
-//! knows it. Boxes that show it are its own, and rules are not asked about it again.
+//! Each of its objects is a variable from the first frame on. A prior factor holds the object at its value in
+//! the map, with the covariance of the map. Detections of the object become its measurements, and semantic
+//! rules are not applied to it again.
 use crate::class::Aliases;
 use crate::fusion::Fusion;
 use crate::keys::ObjectId;
@@ -15,51 +16,54 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Objects, and up, in a frame of the map's own.
+/// Objects and up direction in the frame of the map.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PriorMap {
-    /// Of the form of the file.
+    /// Version of the file format.
     #[serde(deserialize_with = "version")]
     version: u32,
-    /// Up, where it is known.
+    /// Up direction, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<Direction>,
-    /// By number.
+    /// Objects, sorted by number.
     pub objects: Vec<Arc<PriorObject>>,
 }
 
-/// An object of it.
+/// An object of a prior map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PriorObject {
-    /// Its number.
+    /// Number of the object.
     pub id: ObjectId,
-    /// What detectors took it for.
+    /// Class scores of its detections.
     pub classes: Fusion,
-    /// What it is estimated to be, in the map's frame.
+    /// Estimate in the map frame.
     pub quadric: DualQuadric,
-    /// Covariance of that, in the order of its tangent: rad, then m, both in its own frame, then the logarithms of its axes.
+    /// Covariance of the estimate in tangent order: rotation in rad and centre in m, both in the object's
+    /// frame, then the logarithms of the semi-axes.
     pub covariance: [[f64; 9]; 9],
-    /// How often it was there to be seen.
+    /// Number of looks at the object, with and without a detection.
     pub looks: Looks,
-    /// The smallest size at which it was seen, in pixels: the root of a box's area. Default: not known, as in maps of earlier programs.
+    /// Smallest detected size in pixels: the square root of the box area. Default: unknown, as in maps of
+    /// earlier programs.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "least_px")]
     pub least_px: Option<f64>,
 }
 
-/// How often an object was looked at from nearby times and places, and how often it was seen then. A detector that misses an object in one frame misses
-/// it in the next as well, so that frames alone say little.
+/// Number of looks at an object, and number of looks with a detection. A look groups frames from nearby times
+/// and directions, because a detector that misses an object in one frame usually misses it in the next as
+/// well.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Looks {
-    /// All of them.
+    /// Number of looks.
     pub expected: usize,
-    /// Those with a box at least.
+    /// Number of looks with at least one box.
     pub seen: usize,
 }
 
-/// The only one that there is yet.
+/// The only version so far.
 const VERSION: u32 = 1;
 
 fn version<'de, D: Deserializer<'de>>(from: D) -> Result<u32, D::Error> {
@@ -78,16 +82,16 @@ fn least_px<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error>
 }
 
 impl PriorMap {
-    /// A map of these objects.
+    /// Creates a map of these objects.
     pub fn new(up: Option<Direction>, mut objects: Vec<Arc<PriorObject>>) -> Self {
         objects.sort_by_key(|object| object.id);
         Self { version: VERSION, up, objects }
     }
 
-    /// Reads `map.json`, as a run leaves it.
+    /// Reads `map.json`, as written by a run.
     ///
     /// # Errors
-    /// If there is none, or what it says is not a map: each at its place.
+    /// A missing file, or all errors in it, each with its position.
     pub fn read(path: &Path) -> Result<Self, Diagnostics> {
         let document = Document::open(path)?;
         let errors = Errors::new();
@@ -115,7 +119,7 @@ impl PriorMap {
         errors.finish(map)
     }
 
-    /// The same with classes by the names of `aliases`.
+    /// Returns the map with the canonical class names of `aliases`.
     pub fn with_classes(mut self, aliases: &Aliases) -> Self {
         for object in &mut self.objects {
             let object = Arc::make_mut(object);
@@ -124,7 +128,7 @@ impl PriorMap {
         self
     }
 
-    /// The object of this number.
+    /// Returns the object with this number.
     pub fn object(&self, id: ObjectId) -> Option<&Arc<PriorObject>> {
         let place = self.objects.binary_search_by_key(&id, |object| object.id).ok()?;
         self.objects.get(place)
@@ -132,22 +136,23 @@ impl PriorMap {
 }
 
 impl PriorObject {
-    /// Its covariance.
+    /// Returns the covariance as a matrix.
     pub fn covariance(&self) -> SMatrix<f64, 9, 9> {
         SMatrix::from_fn(|r, c| self.covariance[r][c])
     }
 
-    /// The noise of a factor that holds it.
+    /// Returns the noise of the factor that holds the object.
     ///
     /// # Errors
-    /// If the covariance is none; that of an object which was read is one.
+    /// If the matrix is not a covariance. An object that was read from a file has a valid one.
     pub fn noise(&self) -> Result<Noise, NoiseError> {
         let noise = Noise::covariance(DMatrix::from_fn(9, 9, |r, c| self.covariance[r][c]))?;
         noise.whitener(9)?;
         Ok(noise)
     }
 
-    /// The same, if it may be `sigma_scale` times as far off as it says, and `shape_error` besides: rad, and as a part of its size.
+    /// Returns the object with its standard deviations multiplied by `sigma_scale` and enlarged by
+    /// `shape_error`: in rad, as a fraction of its mean semi-axis, and in the logarithms of its semi-axes.
     pub fn trusted(&self, sigma_scale: f64, shape_error: f64) -> Self {
         let mut covariance = self.covariance.map(|row| row.map(|entry| entry * sigma_scale * sigma_scale));
         let size = self.quadric.semi_axes.mean();
@@ -160,12 +165,12 @@ impl PriorObject {
 }
 
 impl Looks {
-    /// How likely it is to be seen in a look.
+    /// Returns the probability of a detection in one look.
     pub fn rate(&self) -> f64 {
         (self.seen + 1) as f64 / (self.expected + 2) as f64
     }
 
-    /// Those of both.
+    /// Returns the sum of both counts.
     pub fn plus(self, other: Self) -> Self {
         Self { expected: self.expected + other.expected, seen: self.seen + other.seen }
     }

@@ -9,11 +9,11 @@ use serde_json::json;
 use std::io;
 use std::path::Path;
 
-/// The file of the true objects.
+/// File of the true objects.
 pub(crate) const OBJECTS: &str = "objects.json";
 
-/// Writes `odometry.txt` and `detections.csv`, and where the truth is known `groundtruth.txt` and
-/// `objects.json`, into a folder, which is made where it is not there.
+/// Writes `odometry.txt` and `detections.csv` into a folder, and with ground truth also `groundtruth.txt` and
+/// `objects.json`. Creates the folder if it does not exist.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -36,7 +36,7 @@ pub fn write(sequence: &Sequence, folder: &Path) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Writes the boxes alone, with the objects that they show.
+/// Writes only the boxes, with the objects that they show.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -1,8 +1,8 @@
-//! What a data source hands to the pipeline: camera, odometry, detections, and the truth where it is known.
+//! Output of a data source: camera, odometry, detections, and ground truth if known.
 //!
-//! Real data and simulated data have the same form. Frames read right to left in names:
-//! `world_from_camera` maps a point in the camera's frame to the world's; the camera looks along +z,
-//! x is right and y down in the image.
+//! Recorded and simulated data have the same form. Names of frames read from right to left:
+//! `world_from_camera` maps a point in the camera frame to the world frame. The camera looks along +z; in the
+//! image x points right and y down.
 use crate::measurement::Quantities;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -20,55 +20,56 @@ pub(crate) use observations::Observations;
 /// A recording of one camera that moves among objects.
 #[derive(Debug, Clone)]
 pub struct Sequence {
-    /// The camera; the same for all frames.
+    /// Camera, shared by all frames.
     pub camera: Camera,
-    /// By time, strictly increasing.
+    /// Frames in strictly increasing order of time.
     pub frames: Vec<Frame>,
-    /// By frame.
+    /// Detections in the order of their frames.
     pub detections: Vec<Detection>,
-    /// Up in the frame of the odometry, where the source knows it.
+    /// Up direction in the odometry frame, if the source knows it.
     pub up: Option<Direction>,
-    /// Readings of an accelerometer, where there is one.
+    /// Readings of an accelerometer, if there is one.
     pub accelerometer: Vec<Acceleration>,
-    /// What the estimate can be compared with.
+    /// Ground truth to compare the estimate with.
     pub ground_truth: Option<GroundTruth>,
-    /// Detections that the source has and that are not used.
+    /// Detections that the source contains but does not use.
     pub unused: Vec<UnusedDetection>,
 }
 
-/// Detections that a source has and that are not used, and why.
+/// Unused detections of a source, with the reason.
 #[derive(Debug, Clone, PartialEq)]
 pub enum UnusedDetection {
-    /// Rows of a file for which there is no pose at their time.
+    /// Rows of a file whose time has no pose.
     WithoutPose(WithoutPose),
     /// A box that cannot be read.
     Box {
-        /// Timestamp of its frame, in seconds.
+        /// Timestamp of its frame. Unit: seconds.
         timestamp: f64,
-        /// Its place in the frame, from 1.
+        /// Position in the frame, from 1.
         place: usize,
         /// The fault, with the expected form.
         fault: String,
     },
 }
 
-/// Detections for which there is no pose at their time.
+/// Detections whose time has no pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WithoutPose {
-    /// Rows without a pose.
+    /// Number of rows without a pose.
     pub rows: usize,
-    /// All rows.
+    /// Number of all rows.
     pub of: usize,
-    /// Largest share of the rows for which that is expected, from 0 to 1.
+    /// Largest expected share of rows without a pose, from 0 to 1.
     pub allowed: f64,
-    /// Largest difference in time that counts as a match, in seconds.
+    /// Largest time difference of a match. Unit: seconds.
     pub within: f64,
-    /// The row among them that is closest to a pose: its timestamp, and its distance from the pose, in seconds.
+    /// The row without a pose that is closest to one: its timestamp, and its distance from the pose. Unit:
+    /// seconds.
     pub nearest: (f64, f64),
 }
 
 impl WithoutPose {
-    /// Returns whether they are more than was expected.
+    /// Returns whether more rows than expected have no pose.
     pub fn is_too_many(&self) -> bool {
         self.rows as f64 > self.allowed * self.of as f64
     }
@@ -85,37 +86,37 @@ impl fmt::Display for WithoutPose {
     }
 }
 
-/// What is known of a recording before its first frame.
+/// Data of a recording that are known before its first frame.
 #[derive(Debug, Clone)]
 pub struct Opening {
-    /// The camera; the same for all frames.
+    /// Camera, shared by all frames.
     pub camera: Camera,
-    /// Up in the frame of the odometry, where the source knows it.
+    /// Up direction in the odometry frame, if the source knows it.
     pub up: Option<Direction>,
-    /// What the estimate can be compared with.
+    /// Ground truth to compare the estimate with.
     pub ground_truth: Option<GroundTruth>,
 }
 
-/// What comes with one image.
+/// Data of one image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
-    /// The image's time and its pose by odometry.
+    /// Time of the image, and its pose by odometry.
     pub frame: Frame,
-    /// The boxes in it.
+    /// Boxes in the image.
     pub detections: Vec<Detection>,
-    /// Readings of the accelerometer since the frame before.
+    /// Readings of the accelerometer since the previous frame.
     pub accelerometer: Vec<Acceleration>,
     /// Boxes that cannot be used.
     pub unused: Vec<UnusedDetection>,
 }
 
 impl Opening {
-    /// Nothing but a camera.
+    /// Creates an opening with only a camera.
     pub fn new(camera: Camera) -> Self {
         Self { camera, up: None, ground_truth: None }
     }
 
-    /// A sequence without frames.
+    /// Converts the opening to a sequence without frames.
     pub fn into_sequence(self) -> Sequence {
         let Self { camera, up, ground_truth } = self;
         Sequence {
@@ -137,56 +138,58 @@ impl AsRef<Self> for Sequence {
 }
 
 impl Sequence {
-    /// What is known before the first frame.
+    /// Returns the data that are known before the first frame.
     pub fn opening(&self) -> Opening {
         Opening { camera: self.camera, up: self.up, ground_truth: self.ground_truth.clone() }
     }
 
-    /// Frame after frame, as they came. Readings of the accelerometer come with the first frame that is not before them.
+    /// Returns the frames in order of arrival. A reading of the accelerometer belongs to the first frame at
+    /// or after its time.
     pub fn observations(&self) -> impl Iterator<Item = Observation> {
         Observations::of(self)
     }
 }
 
-/// One image, with a pose by odometry.
+/// One image, with its pose by odometry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Seconds.
+    /// Timestamp. Unit: seconds.
     pub timestamp: f64,
-    /// The dead-reckoned pose, in a world frame of the odometry's own choice; what is measured is the
-    /// relative pose of consecutive frames.
+    /// Dead-reckoned pose in a world frame that the odometry chooses. The measurement is the relative pose of
+    /// consecutive frames.
     pub world_from_camera: Se3,
 }
 
-/// One box that a detector drew, associated with an object or not.
+/// One box from a detector, with or without the object that it shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
-    /// Place in [`Sequence::frames`].
+    /// Index in [`Sequence::frames`].
     pub frame: usize,
-    /// The object that it shows, where that is known.
+    /// The object that the box shows, if known.
     pub object: Option<ObjectId>,
-    /// What the detector takes it for.
+    /// Class scores of the detector.
     pub scores: ClassScores,
-    /// Where it is in the image, in pixels.
+    /// Box in the image. Unit: pixels.
     pub bounding_box: BoundingBox,
-    /// What is measured besides the box.
+    /// Measurements in addition to the box.
     pub quantities: Quantities,
 }
 
-/// A detector's scores by class, each from 0 to 1; classes that are not listed score 0. A class with another score is not listed.
+/// Scores of a detector by class, each from 0 to 1; classes that are not listed score 0. Classes with scores
+/// outside of this range are dropped.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ClassScores(Vec<(String, f64)>);
 
 impl ClassScores {
-    /// All that is known is the best class and its score.
+    /// Creates the scores of a detector that reports only its best class.
     pub fn single(class: impl Into<String>, score: f64) -> Self {
         std::iter::once((class.into(), score)).collect()
     }
-    /// The classes and their scores, in the order given.
+    /// Returns the classes and their scores in the given order.
     pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
         self.0.iter().map(|(class, score)| (class.as_str(), *score))
     }
-    /// The class with the highest score, the first of equals; `None` where no class is listed.
+    /// Returns the class with the highest score; the first wins ties. `None` if no class is listed.
     pub fn best(&self) -> Option<(&str, f64)> {
         self.iter().reduce(|best, next| if next.1 > best.1 { next } else { best })
     }
@@ -198,37 +201,38 @@ impl FromIterator<(String, f64)> for ClassScores {
     }
 }
 
-/// A reading of an accelerometer at rest points up, with length 9.8 m/s².
+/// Reading of an accelerometer. At rest it points up and has the length 9.8 m/s².
 #[derive(Debug, Clone, PartialEq)]
 pub struct Acceleration {
-    /// Seconds.
+    /// Timestamp. Unit: seconds.
     pub timestamp: f64,
-    /// m/s², in the sensor's frame.
+    /// Acceleration in the sensor frame. Unit: m/s².
     pub acceleration: Vector3<f64>,
 }
 
-/// The truth, in a world frame of its own: that of the odometry for simulated data, another for real data.
+/// Ground truth in its world frame: the odometry frame for simulated data, a separate frame for recorded
+/// data.
 #[derive(Debug, Clone, Default)]
 pub struct GroundTruth {
-    /// `world_from_camera` by time; its time stamps need not be those of the frames.
+    /// `world_from_camera` by time. Its timestamps may differ from the timestamps of the frames.
     pub trajectory: Vec<StampedPose>,
-    /// The objects; empty if they were not measured.
+    /// True objects; empty if they were not measured.
     pub objects: Vec<TrueObject>,
 }
 
-/// An object as it is.
+/// A true object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrueObject {
-    /// Its number.
+    /// Number of the object.
     pub id: ObjectId,
-    /// Its class.
+    /// Class of the object.
     pub class: String,
-    /// Pose of the cuboid that encloses it, centre and axes.
+    /// Pose of the enclosing cuboid: centre and axes.
     pub world_from_object: Se3,
-    /// Half the extents of that cuboid along its own axes, in metres.
+    /// Half extents of the cuboid along its axes. Unit: metres.
     pub half_extents: Vector3<f64>,
-    /// The axis-aligned box around the solid itself, in the world's frame.
+    /// Axis-aligned box around the object in the world frame.
     pub bounding_box: Box3,
 }
 

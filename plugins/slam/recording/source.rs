@@ -1,4 +1,4 @@
-//! Where sequences come from, chosen by name in a run's `[source]`.
+//! Sources of sequences, selected by type in a run's `[source]`.
 use crate::sequence::{ObjectId, Sequence};
 use manifactor_config::Diagnostics;
 use manifactor_formats::FormatError;
@@ -25,16 +25,16 @@ pub use tum::TumRgbd;
 /// A source of a sequence.
 #[typetag::serialize(tag = "type")]
 pub trait Source: Debug + Send + Sync {
-    /// Reads or makes the sequence.
+    /// Reads or simulates the sequence.
     ///
     /// # Errors
-    /// Files that are not there or not what they should be; sequences of nothing.
+    /// Missing or invalid files; empty sequences.
     fn load(&self, folders: &Folders) -> Result<Sequence, SourceError>;
 
-    /// The same frame by frame, where frames come while they are mapped; `None` where all of them are there before.
+    /// Opens the sequence as a stream if frames arrive during mapping; `None` if all frames exist beforehand.
     ///
     /// # Errors
-    /// Files that are not there.
+    /// Missing files.
     fn open(&self, _folders: &Folders) -> Result<Option<Stream>, SourceError> {
         Ok(None)
     }
@@ -42,33 +42,33 @@ pub trait Source: Debug + Send + Sync {
 
 manifactor_graph::kind!(dyn Source, "source");
 
-/// Where files are looked for.
+/// Folders that contain input files.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Folders {
-    /// Where public data sets lie, each in a folder of its own: `--data`, or `MANIFACTOR_DATA`.
+    /// Folder with public data sets, one folder each: `--data`, or `MANIFACTOR_DATA`.
     pub data: Option<PathBuf>,
-    /// The folder of the run's document, from which its own files are named.
+    /// Folder of the run's document, which its paths are relative to.
     pub document: PathBuf,
 }
 
 impl Folders {
-    /// A file that belongs to the document.
+    /// Returns the path of a file relative to the document.
     pub fn beside_document(&self, path: &Path) -> PathBuf {
         self.document.join(path)
     }
 
-    /// A data set's folder: as it stands if it is absolute or lies beside the document; else in the data folder, or in
-    /// one of the folders there.
+    /// Returns the folder of a data set. The name is an absolute path or a path relative to the document;
+    /// otherwise the data folder is searched, and then the folders in it.
     ///
     /// # Errors
-    /// If there is none, with the places that were tried.
+    /// If there is none. The error lists the paths that were tried.
     pub fn data_set(&self, name: &Path) -> Result<PathBuf, SourceError> {
         let mut tried = vec![self.beside_document(name)];
         if let Some(data) = self.data.as_ref().filter(|_| name.is_relative()) {
             tried.push(data.join(name));
             let inner = std::fs::read_dir(data).into_iter().flatten().flatten().map(|entry| entry.path());
             let mut inner: Vec<PathBuf> = inner.filter(|path| path.is_dir()).collect();
-            // the order of a folder differs between file systems
+            // sorted, because the order differs between file systems
             inner.sort();
             tried.extend(inner.into_iter().map(|folder| folder.join(name)));
         }
@@ -78,27 +78,27 @@ impl Folders {
     }
 }
 
-/// Why there is no sequence.
+/// Error that prevents reading a sequence.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
-    /// A folder that is nowhere.
+    /// A folder that does not exist.
     #[error("{}", no_folder(name, tried, *no_data_folder))]
     NoFolder {
-        /// What was asked for.
+        /// Requested name.
         name: PathBuf,
-        /// Where it was looked for.
+        /// Paths that were tried.
         tried: Vec<PathBuf>,
-        /// Whether no data folder was given.
+        /// True if no data folder was given.
         no_data_folder: bool,
     },
-    /// A file that cannot be read, or that is not what it should be.
+    /// A file that cannot be read or has an invalid format.
     #[error(transparent)]
     Format(#[from] FormatError),
     /// A document in a data set that cannot be read.
     #[error(transparent)]
     Document(#[from] Diagnostics),
-    /// A true object with a length that nothing has.
+    /// A true object with an invalid length.
     #[error("{}: object {object}: half_extents must be three finite numbers above zero", file.display())]
     NoObject {
         /// The file.
@@ -112,61 +112,61 @@ pub enum SourceError {
          {{ fx = …, fy = …, cx = …, cy = …, width = …, height = … }}, or to one of {}", folder.display(), known.join(", ")
     )]
     UnknownCamera {
-        /// The sequence's folder.
+        /// Folder of the sequence.
         folder: PathBuf,
-        /// Cameras that have a name.
+        /// Names of known cameras.
         known: Vec<&'static str>,
     },
-    /// Detections of which none belongs to a frame.
+    /// Detections that match no frame.
     #[error(
         "{}: none of {detections} detections was made within {within} s of a pose in {}{}: do the two belong to the same \
          sequence? `max_time_difference` allows for more", file.display(), odometry.display(), closest(*nearest)
     )]
     NothingMatches {
-        /// The file of detections.
+        /// File of the detections.
         file: PathBuf,
-        /// The file of poses.
+        /// File of the poses.
         odometry: PathBuf,
-        /// How many detections there are.
+        /// Number of detections.
         detections: usize,
-        /// Seconds.
+        /// Largest time difference of a match. Unit: seconds.
         within: f64,
-        /// Of the detection that is closest to a pose: its time stamp, and how far the pose is away, in seconds.
+        /// Detection closest to a pose: its timestamp, and the distance from the pose. Unit: seconds.
         nearest: Option<(f64, f64)>,
     },
-    /// A timestamp far ahead of the frames around it.
+    /// A timestamp far ahead of the neighbouring frames.
     #[error(
         "the timestamp {timestamp} s is {ahead:.3} s ahead of the frame before, and the next frame does not confirm it: \
          the frame is left out"
     )]
     Ahead {
-        /// In seconds.
+        /// Timestamps of the next two frames. Unit: seconds.
         timestamp: f64,
-        /// By how much, in seconds.
+        /// Distance from the previous frame. Unit: seconds.
         ahead: f64,
     },
-    /// A first timestamp that comes after those of the next two frames.
+    /// A first timestamp that is later than those of the next two frames.
     #[error(
         "the first timestamp {timestamp} s comes after those of the next two frames, {} s and {} s: the frame is left out; \
          check the clock of the source", next[0], next[1]
     )]
     FirstAhead {
-        /// In seconds.
+        /// Timestamps of the next two frames. Unit: seconds.
         timestamp: f64,
-        /// In seconds.
+        /// Timestamps of the next two frames. Unit: seconds.
         next: [f64; 2],
     },
-    /// A line that is no frame.
+    /// A line that is not a frame.
     #[error("{}, line {line}: {message}", file.display())]
     Line {
         /// The file.
         file: PathBuf,
-        /// From 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The error.
         message: String,
     },
-    /// A stream of lines that has no frames any more.
+    /// A stream of lines without frames.
     #[error(
         "{}, line {line}: {count} lines in a row are no frames, so that the rest is not read; a frame is an object with \
          `timestamp` and `pose`: check `source.file`, or the program that writes to standard input. The last line: {message}",
@@ -175,30 +175,30 @@ pub enum SourceError {
     NoFrames {
         /// The file.
         file: PathBuf,
-        /// The last of them, from 1.
+        /// Number of the last line, from 1.
         line: usize,
-        /// How many there are.
+        /// Number of consecutive lines that are not frames.
         count: usize,
-        /// The fault of the last one.
+        /// The error in the last line.
         message: String,
     },
-    /// A stream that is there once, and was read.
+    /// A stream that can be read only once and has been read already.
     #[error("{} can be read once, and another variant has read it: run one variant, or give `file`", file.display())]
     ReadBefore {
         /// The stream.
         file: PathBuf,
     },
-    /// A box that a lens cannot have shown.
+    /// A box that is impossible for the camera's lens.
     #[error(
         "the box {bounds:?} of frame {frame} has no place in the rectified image: check the camera's numbers and its `distortion`"
     )]
     Distorted {
-        /// Of the box.
+        /// Frame of the box.
         frame: usize,
-        /// xmin, ymin, xmax, ymax, in pixels.
+        /// Sides xmin, ymin, xmax, ymax. Unit: pixels.
         bounds: [f64; 4],
     },
-    /// A camera model with a distortion beside it.
+    /// A camera model together with a separate distortion.
     #[error(
         "`source.camera` is a model of its lens and `source.distortion` is another: leave one of them out"
     )]

@@ -1,9 +1,19 @@
-//! The files that a run leaves.
+//! Files that a run writes.
 //!
-//! `report.json` and `record.json` (all that there is to draw) for the run as a whole, and a folder for each variant with
-//! `config.toml` (all settings, ready to be run again), `trajectory.txt` (TUM's format; `live.txt` as it was when each frame came, where they came one by one), `detections.csv` (the boxes with the objects that they were put to, where the source does not say), `objects.json`, `frames.jsonl` (poses
-//! and boxes, a frame a line), `graph.json` (the literal graph at the estimate), `map.json` (the objects with their covariances, for another run to begin with), `iterations.csv` and `metrics.json`; with `report.covariances` also `covariances.json`. Each file is written whole or not at all,
-//! into an [`OutputFolder`].
+//! The folder of the run contains `report.json`, and `record.json` with all data to draw. Each variant has a
+//! folder with these files:
+//! - `config.toml`: all settings, ready to run again
+//! - `trajectory.txt`: the trajectory in TUM's format; `live.txt` for a stream, with each pose as estimated
+//!   when its frame arrived
+//! - `detections.csv`: the boxes with their objects, if data association was done
+//! - `objects.json`: the objects
+//! - `frames.jsonl`: poses and boxes, one frame per line
+//! - `graph.json`: the literal graph at the estimate
+//! - `map.json`: the objects with their covariances, as prior map of a later run
+//! - `iterations.csv` and `metrics.json`
+//! - `covariances.json`, with `report.covariances`
+//!
+//! Each file is written completely or not at all, into an [`OutputFolder`].
 use crate::output::record::{FrameRecord, RECORD, RunRecord, VariantRecord};
 use crate::output::report::{RunReport, VariantReport};
 use manifactor_config::{Format, WriteError, to_toml, write_graph};
@@ -31,51 +41,51 @@ pub use folder::{FolderError, OutputFolder};
 pub use map::{MapError, map_of};
 pub use own_map::refuse_own_maps;
 
-/// The name of the file with a variant's map.
+/// Name of the file with a variant's map.
 const MAP: &str = "map.json";
 
-/// Why results could not be written.
+/// Error while writing results.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
     /// A file or folder that cannot be written.
     #[error("{} cannot be written: {source}", path.display())]
     Io {
-        /// Which.
+        /// Path of the file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Covariances that are asked for, and infinite or out of reach.
+    /// Requested covariances that are infinite or cannot be computed.
     #[error("covariances.json: {0}")]
     Covariance(#[from] CovarianceError),
     /// Boxes that cannot be written.
     #[error(transparent)]
     Boxes(#[from] FormatError),
-    /// A table that no format can hold.
+    /// A table that no format can represent.
     #[error("{}: {source}", path.display())]
     Table {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The reason.
         source: TableError,
     },
-    /// A result that no document can hold.
+    /// A result that no document can represent.
     #[error("{}: {source}", path.display())]
     Document {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The reason.
         source: WriteError,
     },
 }
 
-/// The folder of a variant.
+/// Returns the folder of a variant.
 pub(crate) fn variant_folder(output: &Path, variant: &str) -> PathBuf {
     output.join(slug(variant))
 }
 
-/// Writes a file whole or not at all, and the folders that it lies in, where they are not there.
+/// Writes a file completely or not at all. Creates missing parent folders.
 ///
 /// # Errors
 /// If the folder or the file cannot be written.
@@ -87,7 +97,7 @@ pub fn write_whole(path: &Path, content: impl AsRef<[u8]>) -> Result<(), OutputE
     whole::write_whole(path, content.as_ref()).map_err(fail)
 }
 
-/// Removes a file, if it is there.
+/// Removes a file if it exists.
 fn remove(path: &Path) -> Result<(), OutputError> {
     match std::fs::remove_file(path) {
         Err(source) if source.kind() != io::ErrorKind::NotFound => {
@@ -100,16 +110,16 @@ fn remove(path: &Path) -> Result<(), OutputError> {
 /// Writes the report and the record of a run.
 ///
 /// # Errors
-/// If one cannot be written.
+/// If a file cannot be written.
 pub fn write_report(output: &Path, report: &RunReport, record: &RunRecord) -> Result<(), OutputError> {
     write_document(&output.join(RECORD), compact(record))?;
     write_document(&output.join("report.json"), results(report))
 }
 
-/// Writes all files of a variant into its folder, and returns it.
+/// Writes all files of a variant into its folder, and returns the folder.
 ///
 /// # Errors
-/// If one cannot be written; those before it are there.
+/// If a file cannot be written; files written before it remain.
 pub fn write_variant(
     run: &RunDocument,
     variant: &Variant,
@@ -135,7 +145,7 @@ pub fn write_variant(
         Ok(map) => write_document(&file(MAP), results(&map))?,
         Err(error) => {
             tracing::warn!("there is no {MAP}: {error}");
-            // that of an earlier run would be taken for the map of these results
+            // an old file would be mistaken for the map of these results
             remove(&file(MAP))?;
         }
     }
@@ -148,24 +158,24 @@ pub fn write_variant(
     Ok(folder)
 }
 
-/// Writes a document, if there is one.
+/// Writes a document if it could be formatted.
 pub fn write_document(path: &Path, text: Result<String, WriteError>) -> Result<(), OutputError> {
     let text = text.map_err(|source| OutputError::Document { path: path.to_owned(), source })?;
     write_whole(path, &text)
 }
 
-/// Each on a line.
+/// Returns the frames as JSON, one per line.
 fn lines(frames: &[FrameRecord]) -> Result<String, WriteError> {
     frames.iter().map(|frame| Ok(compact(frame)? + "\n")).collect()
 }
 
-/// Results as JSON, to be read by people as well. Unlike in a document, a number may be infinite or none, as a cost that
-/// overflows is: it is null.
+/// Returns results as readable JSON. Unlike documents, results may contain infinite numbers or NaN, such as a
+/// cost that overflows; these become null.
 pub fn results(value: &impl Serialize) -> Result<String, WriteError> {
     serde_json::to_string_pretty(value).map(|text| text + "\n").map_err(|error| inexpressible(&error))
 }
 
-/// The same on one line.
+/// Returns results as JSON on one line.
 fn compact(value: &impl Serialize) -> Result<String, WriteError> {
     serde_json::to_string(value).map_err(|error| inexpressible(&error))
 }
@@ -174,7 +184,7 @@ fn inexpressible(error: &serde_json::Error) -> WriteError {
     WriteError::Inexpressible { format: Format::Json, message: error.to_string() }
 }
 
-/// The settings of one variant as a document of its own.
+/// Returns the settings of one variant as a separate document.
 fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> {
     #[derive(Serialize)]
     struct Resolved<'a> {
@@ -191,7 +201,7 @@ fn resolved(run: &RunDocument, variant: &Variant) -> Result<String, WriteError> 
         #[serde(skip_serializing_if = "Option::is_none")]
         about: Option<&'a str>,
     }
-    // names that are not UTF-8 have no other form in a document
+    // a document cannot represent names that are not UTF-8
     let output = variant_folder(&run.output, &variant.name).display().to_string();
     let folder = absolute(&run.folder).display().to_string();
     let variants = [Named { name: &variant.name, about: variant.about.as_deref() }];

@@ -1,4 +1,4 @@
-//! A run from its document to its report.
+//! Execution of a run document, up to its report.
 use crate::output::report::{AssociationReport, Found, HeldOutReport, RunReport, VariantReport};
 use association::{Associated, associated};
 use location::find;
@@ -23,63 +23,64 @@ mod stream;
 
 pub use stream::{Watch, online};
 
-/// Why a variant could not be run.
+/// Reason why a variant could not be run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
-    /// There is no sequence.
+    /// The sequence cannot be loaded.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// There is no graph.
+    /// The graph cannot be created.
     #[error(transparent)]
     Mapping(#[from] MappingError),
     /// The graph cannot be solved.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
-    /// Frames that cannot be kept.
+    /// The journal cannot be written or read.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// A journal among files that the run writes.
+    /// The journal lies in the folder of the results.
     #[error(
         "the journal {} lies in {}, where the run writes its results: name a file outside of that folder",
         path.display(), output.display()
     )]
     JournalAmongResults {
-        /// The journal.
+        /// Path of the journal.
         path: PathBuf,
-        /// The folder of the results.
+        /// Folder of the results.
         output: PathBuf,
     },
-    /// A journal of a run with several variants.
+    /// A journal for a run with several variants.
     #[error("a journal is that of one variant: name another document, or leave all others out")]
     JournalOfVariants,
-    /// A map that came frame by frame has no end.
+    /// The map of a stream cannot be finished.
     #[error(transparent)]
     Finish(#[from] FinishError),
 }
 
-/// A sequence that is mapped and not solved.
+/// A sequence with its graph, before the solve.
 #[derive(Debug)]
 pub struct Mapped<'a> {
-    /// With the objects that its boxes were put to.
+    /// The sequence with the assigned objects of its boxes.
     pub sequence: Arc<Sequence>,
     /// The graph.
     pub mapping: Mapping,
-    /// What it was made with: where the run begins in a map that was made before is known now, if it was found.
+    /// The settings of the graph. If the start pose in a prior map was found, they include it.
     pub settings: Cow<'a, Settings>,
-    /// How boxes were put to objects.
+    /// Report of the data association.
     pub association: Option<AssociationReport>,
-    /// Where the run begins in a map that was made before, if that was to be found, and was.
+    /// The start pose in the prior map, if it was searched and found.
     pub found: Option<Found>,
-    /// Boxes that are not in the graph, and are to be predicted.
+    /// Boxes that were held out of the graph for evaluation.
     pub held_out: Vec<Detection>,
 }
 
 impl<'a> Mapped<'a> {
-    /// Finds where a sequence begins in the settings' prior map, puts its boxes to objects, and makes its graph.
+    /// Finds the start pose in the prior map of the settings, assigns the boxes to objects, and creates the
+    /// graph.
     ///
     /// # Errors
-    /// If no graph can be made of it.
+    /// If the graph cannot be created.
     pub fn new(
         sequence: Arc<Sequence>,
         settings: &'a Settings,
@@ -105,7 +106,7 @@ impl<'a> Mapped<'a> {
 /// Maps, solves and evaluates a sequence.
 ///
 /// # Errors
-/// If no graph can be made of it. Numerical trouble is no error: see the report.
+/// If the graph cannot be created. Numerical problems are not errors: see the report.
 pub fn estimate(
     name: &str,
     sequence: Arc<Sequence>,
@@ -124,10 +125,10 @@ pub fn estimate(
     Ok((estimate, report))
 }
 
-/// A run under way: sequences are loaded once for all variants that share them.
+/// A run in progress. It loads each sequence once for all variants that share it.
 #[derive(Debug)]
 pub struct Run<'a> {
-    /// What to do.
+    /// The run document.
     pub document: &'a RunDocument,
     folders: Folders,
     loaded: Vec<(String, Arc<Sequence>)>,
@@ -137,7 +138,7 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Nothing done yet; `data` is the folder of public data sets.
+    /// Starts a run. `data` is the folder of public data sets.
     pub fn new(document: &'a RunDocument, data: Option<PathBuf>) -> Self {
         let folders = Folders { data, document: document.folder.clone() };
         Self { document, folders, loaded: vec![], journal: None, began: Instant::now(), reports: vec![] }
@@ -148,13 +149,13 @@ impl<'a> Run<'a> {
         self.journal = Some(journal);
     }
 
-    /// The sequence of a variant.
+    /// Returns the sequence of a variant.
     ///
     /// # Errors
-    /// If its source has none.
+    /// If its source has no sequence.
     pub fn sequence(&mut self, variant: &Variant) -> Result<Arc<Sequence>, SourceError> {
         let source = &variant.settings.source;
-        // what is written alike is the same source
+        // sources with equal settings are equal
         let name = serde_json::to_string(source).unwrap_or_default();
         if let Some((_, sequence)) = self.loaded.iter().find(|(known, _)| *known == name && !name.is_empty())
         {
@@ -168,7 +169,8 @@ impl<'a> Run<'a> {
     /// Maps, solves and evaluates one variant.
     ///
     /// # Errors
-    /// If there is no data, or no graph can be made of it. Numerical trouble is no error: see the report.
+    /// If there is no data, or the graph cannot be created. Numerical problems are not errors: see the
+    /// report.
     pub fn variant(
         &mut self,
         variant: &Variant,
@@ -180,10 +182,10 @@ impl<'a> Run<'a> {
         Ok(self.keep(variant, done, clock))
     }
 
-    /// The same, frame by frame; see [`online`].
+    /// Runs one variant frame by frame; see [`online`].
     ///
     /// # Errors
-    /// If there is no data, or no graph can be made of it.
+    /// If there is no data, or the graph cannot be created.
     pub fn variant_online(
         &mut self,
         variant: &Variant,
@@ -216,7 +218,7 @@ impl<'a> Run<'a> {
         (estimate, report)
     }
 
-    /// The report over all variants that were run.
+    /// Returns the report on all variants that were run.
     pub fn finish(self) -> RunReport {
         let ended = |report: &VariantReport| {
             let interrupted = report.online.as_ref().is_some_and(|online| online.interrupted);

@@ -1,7 +1,7 @@
-//! What objects of a class look like: a typical solid, resting as such things rest.
+//! Typical solids of the classes, in their usual resting position.
 use super::solid::Solid;
 
-/// A class with its solid; z is up where it rests as usual.
+/// A class with its solid. In the usual resting position z points up.
 pub(super) struct Kind {
     pub class: &'static str,
     pub solid: fn() -> Solid,
@@ -9,7 +9,7 @@ pub(super) struct Kind {
 
 macro_rules! kinds {
     ($($class:literal => $solid:expr),+ $(,)?) => {
-        /// COCO's names, as the detections of real data have them; sizes of common things, in metres.
+        /// COCO's class names, as in recorded detections, with typical sizes in metres.
         pub(super) const KINDS: &[Kind] = &[$(Kind { class: $class, solid: || $solid }),+];
     };
 }
@@ -33,7 +33,7 @@ kinds! {
     "sports ball" => Solid::ball(0.11),
 }
 
-/// The kind of a class.
+/// Returns the solid of a class.
 pub(super) fn kind(class: &str) -> Option<&'static Kind> {
     KINDS.iter().find(|kind| kind.class == class)
 }

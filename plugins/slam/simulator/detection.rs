@@ -1,4 +1,4 @@
-//! What the detector makes of each image.
+//! Simulated detections in each image.
 use super::moves::Scene;
 use super::occlusion::DepthImage;
 use super::scene::SceneObject;
@@ -11,12 +11,12 @@ use manifactor_recording::sequence::{ClassScores, Detection};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-/// What the errors of a detector are drawn from, and what lasts of them.
+/// Random number streams of a detector's errors, and the errors that persist.
 pub(super) struct Errors {
     boxes: Pcg64,
     mistakes: Pcg64,
     depths: Pcg64,
-    /// Of each object: the noise of its last box, and the seconds since.
+    /// For each object: the noise of its last box, and the seconds since then.
     lasting: Vec<([f64; 4], f64)>,
 }
 
@@ -26,13 +26,13 @@ impl Errors {
     }
 }
 
-/// From where an image is taken, and what hides what in it, where anything does.
+/// Camera pose of an image, and its depth image if objects hide each other.
 struct View<'a> {
     pose: &'a Se3,
     depths: Option<DepthImage>,
 }
 
-/// A box of an object, and which object it is taken for.
+/// A box of an object, and the object that it is assigned to.
 struct Seen {
     bounding_box: BoundingBox,
     scores: ClassScores,
@@ -41,8 +41,8 @@ struct Seen {
 }
 
 impl Simulated {
-    /// All boxes, image by image. Errors are drawn from the first `errors` where objects are at first, and from the second where they
-    /// have been moved to.
+    /// Returns all boxes, image by image. The first `errors` apply to objects in their first place, and the
+    /// second to objects that have been moved.
     pub(super) fn detect(
         &self,
         scene: &Scene,
@@ -69,7 +69,8 @@ impl Simulated {
             let view = View { pose, depths };
             for (i, object) in scene.objects.iter().enumerate() {
                 let class = (usual[i], classes.as_slice());
-                // what has left draws its noise as well: a move changes nothing but its own effect
+                // an object draws noise even after it has moved away, so that a move changes only its own
+                // effect
                 let mut seen = self.see(i, object, &view, class, &mut before);
                 if let Some(moved) = scene.moved(i, time) {
                     seen = self.see(i, moved, &view, class, &mut after);
@@ -87,7 +88,8 @@ impl Simulated {
         detections
     }
 
-    /// What the detector makes of one object, where it makes anything of it: one of this usual class, of these.
+    /// Simulates the detection of one object; `None` if it is not detected. `usual` is the class that the
+    /// detector usually reports.
     fn see(
         &self,
         i: usize,
@@ -102,7 +104,7 @@ impl Simulated {
         let world_from_object = &object.truth.world_from_object;
         let Boxes { whole, inside } = object.solid.boxes(world_from_object, &self.camera, view.pose)?;
         let left = view.depths.as_ref().map_or(Some((inside, 1.0)), |depths| depths.left_of(i, inside));
-        // what is hidden draws its noise as well: one setting changes nothing but its own effect
+        // a hidden object draws noise as well, so that a setting changes only its own effect
         let (seen, share) = left.unwrap_or((inside, 0.0));
         let visible = share * inside.area() / whole.area();
         let drawn = self.detector.draw(&seen, visible, &self.camera, (noise, *seconds), boxes);

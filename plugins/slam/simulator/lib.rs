@@ -1,7 +1,7 @@
 //! A seeded simulator of the paper's protocol (Jablonsky, Milford and Sünderhauf, section V-B).
 //!
-//! A scene of solids, a camera that moves around them, odometry and boxes with noise: each from a seed
-//! of its own, so that one can be varied while the others stay. The same settings give the same bits.
+//! It simulates a scene of solids, a camera that moves around them, and noisy odometry and boxes. Scene,
+//! trajectory and noise have separate seeds. Equal settings give equal bits.
 use manifactor_formats::tum::StampedPose;
 use manifactor_graph::{Direction, register};
 use manifactor_quadric::Camera;
@@ -30,12 +30,13 @@ pub use trajectory::TrajectorySettings;
 
 use detection::Errors;
 
-/// A simulated scene, trajectory and detector.
+/// Simulated scene, trajectory and detector.
 ///
-/// Objects are solids with flat faces (cuboids, round bodies, folded sheets) that rest on a plane; their
-/// boxes come from their projected corners, clipped by the image, so that an ellipsoid is a model of them
-/// and not the truth. Odometry has 5 % noise of translation and 15 % of rotation, boxes have 2 px.
-/// `seed` is that of the noise; scene and trajectory have theirs, and with another of them the noise is another too.
+/// Objects are solids with flat faces (cuboids, round bodies, folded sheets) that rest on a plane. Their
+/// boxes enclose the projected corners, clipped by the image border, so an ellipsoid is only a model of their
+/// shape. Odometry has 5 % noise of translation and 15 % of rotation, and boxes have 2 px. `seed` is the seed
+/// of the noise. The scene and the trajectory have separate seeds, and changing one of them also changes the
+/// noise.
 ///
 /// ```toml
 /// source = { type = "simulated", seed = 1, scene = { seed = 3, objects = 15, tilted = 0.1 }, trajectory = { frames = 200 } }
@@ -43,19 +44,19 @@ use detection::Errors;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Simulated {
-    /// What all noise depends on.
+    /// Seed of all noise.
     pub seed: u64,
-    /// The camera. Default: the paper's.
+    /// The camera. Default: the camera of the paper.
     pub camera: Camera,
-    /// Which objects there are.
+    /// Objects of the scene.
     pub scene: SceneSettings,
-    /// How the camera moves.
+    /// Motion of the camera.
     pub trajectory: TrajectorySettings,
-    /// Noise of odometry.
+    /// Noise of the odometry.
     pub odometry: MotionNoise,
     /// Noise of boxes and classes.
     pub detector: Detector,
-    /// An accelerometer in the camera's frame, with a reading for each image. Default: none.
+    /// Accelerometer in the camera frame with one reading for each image. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accelerometer: Option<AccelerometerNoise>,
 }
@@ -76,16 +77,16 @@ impl Default for Simulated {
     }
 }
 
-/// Why a simulation cannot be run.
+/// Error that prevents a simulation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulationError {
-    /// A class that no solid is known for.
+    /// A class without a known solid.
     #[error("no solid is known for the class `{class}`; those known are {}", known.join(", "))]
     UnknownClass {
         /// The class.
         class: String,
-        /// What there is.
+        /// Known classes.
         known: Vec<&'static str>,
     },
     /// Too many objects for the rectangle.
@@ -99,18 +100,19 @@ pub enum SimulationError {
 }
 
 impl Simulated {
-    /// Runs it.
+    /// Runs the simulation.
     ///
     /// # Errors
-    /// Settings that make no sense, or a scene without room.
+    /// Invalid settings, or a scene without enough room.
     pub fn simulate(&self) -> Result<Sequence, SimulationError> {
         let scene = self.scene.scene()?;
         let mut path = Pcg64::seed_from_u64(self.trajectory.seed);
         let poses = self.trajectory.poses(*self.scene.height, &mut path);
-        // trials of other scenes or trajectories have noise of their own, whatever the seed: they are independent
+        // mixes the seeds, so that trials with different scenes or trajectories have independent noise for
+        // any seed
         let seeds = [self.seed, self.scene.seed, self.trajectory.seed];
         let mixed = seeds.iter().fold(0, |mixed, seed| Pcg64::seed_from_u64(mixed ^ seed).next_u64());
-        // a stream for each, so that more of one does not change the other
+        // separate random streams: more draws from one do not change the rest
         let mut noise = Pcg64::seed_from_u64(mixed);
         let (mut motion, boxes) = (Pcg64::from_rng(&mut noise), Pcg64::from_rng(&mut noise));
 

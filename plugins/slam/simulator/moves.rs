@@ -1,4 +1,4 @@
-//! Objects that are put elsewhere.
+//! Objects that are moved during the simulation.
 use super::SimulationError;
 use super::scene::{SceneObject, SceneSettings};
 use manifactor_geometry::{Se3, So3};
@@ -10,27 +10,27 @@ use rand_pcg::Pcg64;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Which object is where, and when.
+/// Objects and their moves.
 pub(super) struct Scene {
-    /// As they are at first.
+    /// Objects before their moves.
     pub(super) objects: Vec<SceneObject>,
-    /// Those that are put elsewhere, by their place in the list, as they are then.
+    /// Moved objects after their moves, by index.
     moved: BTreeMap<usize, SceneObject>,
     moved_at_s: f64,
 }
 
 impl Scene {
-    /// An object as it is after its move, if that was by then.
+    /// Returns an object after its move, if it has been moved by this time.
     pub(super) fn moved(&self, object: usize, time: f64) -> Option<&SceneObject> {
         self.moved.get(&object).filter(|_| time >= self.moved_at_s)
     }
 
-    /// An object where it is at a time.
+    /// Returns an object as it is at a time.
     pub(super) fn at(&self, object: usize, time: f64) -> &SceneObject {
         self.moved(object, time).unwrap_or(&self.objects[object])
     }
 
-    /// What there is from time 0 to the `last`, by number.
+    /// Returns the true objects that exist between time 0 and `last`, sorted by number.
     pub(super) fn truth(self, last: f64) -> Vec<TrueObject> {
         let Self { objects, moved, moved_at_s } = self;
         let is_there = |i: &usize| moved_at_s > 0.0 || !moved.contains_key(i);
@@ -43,7 +43,7 @@ impl Scene {
 }
 
 impl SceneSettings {
-    /// Objects and their moves; the same for the same settings.
+    /// Returns the objects and their moves. Equal settings give equal scenes.
     pub(super) fn scene(&self) -> Result<Scene, SimulationError> {
         let mut rng = Pcg64::seed_from_u64(self.seed);
         let objects = self.objects(&mut rng)?;
@@ -59,7 +59,8 @@ impl SceneSettings {
         Ok(Scene { objects, moved, moved_at_s: *self.moved_at_s })
     }
 
-    /// The same object under another number, apart from where it and all others are, turned about the vertical.
+    /// Returns the object with a new number, at a place apart from all objects and from its own place, turned
+    /// about the vertical.
     fn elsewhere(
         &self,
         object: &SceneObject,
@@ -83,7 +84,7 @@ impl SceneSettings {
     }
 }
 
-/// The circle around an object, seen from above: its centre and radius.
+/// Returns the circle around an object seen from above: centre and radius.
 fn footprint(object: &SceneObject) -> (Vector3<f64>, f64) {
     let Se3 { rotation, translation, .. } = &object.truth.world_from_object;
     let reach = object.solid.corners().map(|corner| rotation.act(corner).xy().norm());
@@ -97,7 +98,7 @@ mod tests {
     use manifactor_graph::checked::{NotNegative, Share};
     use manifactor_recording::sequence::{Detection, Sequence};
 
-    /// A third of the objects is put elsewhere after 10 of 20 seconds.
+    /// Returns settings that move a third of the objects after 10 of 20 seconds.
     fn moving() -> Simulated {
         let mut settings = Simulated::default();
         settings.scene.area = [NotNegative::literal(3.0), NotNegative::literal(2.4)];
@@ -168,7 +169,7 @@ mod tests {
                 .is_some_and(|object| !is[15..].iter().any(|moved| moved.half_extents == object.half_extents))
         };
         assert_eq!(of(&moved, &stays), of(&still, &stays));
-        // what has moved is seen under its new number alone
+        // a moved object appears only under its new number
         let after = of(&moved, &|d| d.frame >= 100 && !stays(d));
         assert!(after.len() > 300 && after.iter().all(|d| d.object.is_some_and(|id| id.0 > 15)));
         assert_eq!(moved.detections, settings.simulate().unwrap().detections);

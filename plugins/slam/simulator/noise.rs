@@ -1,4 +1,4 @@
-//! What is wrong with measurements.
+//! Noise of simulated measurements.
 use manifactor_geometry::Se3;
 use manifactor_graph::Manifold;
 use manifactor_graph::checked::{NotNegative, Positive, Share};
@@ -12,9 +12,10 @@ use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Noise of odometry: zero-mean and Gaussian, a share of each motion, applied through retract.
+/// Noise of the odometry: zero-mean and Gaussian, proportional to each motion, applied through retract.
 ///
-/// The paper says 5 % of translation and 15 % of rotation, and not of what: see `spread`.
+/// The paper gives 5 % of translation and 15 % of rotation, but not the reference of these shares: see
+/// `spread`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MotionNoise {
@@ -22,7 +23,8 @@ pub struct MotionNoise {
     pub translation: NotNegative,
     /// Standard deviation as a share of the rotation.
     pub rotation: NotNegative,
-    /// What the share is of.
+    /// Length that the shares refer to: the length of the motion, for the whole error or for each axis, or
+    /// the component of the motion along each axis.
     pub spread: Spread,
 }
 
@@ -36,16 +38,16 @@ impl Default for MotionNoise {
     }
 }
 
-/// Of what a motion's noise is a share.
+/// Reference of the shares of a motion's noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Spread {
-    /// The length of the motion, for the whole error: each axis has the share / √3.
+    /// The length of the motion gives the whole error: each axis has the share / √3.
     #[default]
     Total,
-    /// The length of the motion, for the error along each axis.
+    /// The length of the motion gives the error along each axis.
     PerAxis,
-    /// The motion along each axis, for the error along it.
+    /// The component of the motion along an axis gives the error along this axis.
     Component,
 }
 
@@ -54,7 +56,7 @@ fn normal(rng: &mut Pcg64) -> f64 {
 }
 
 impl MotionNoise {
-    /// A relative pose as it is measured.
+    /// Returns a relative pose with noise.
     pub(super) fn corrupt(&self, motion: &Se3, rng: &mut Pcg64) -> Se3 {
         let turn = self.sigmas(&motion.rotation.log(), *self.rotation);
         let shift = self.sigmas(&motion.translation, *self.translation);
@@ -70,13 +72,13 @@ impl MotionNoise {
     }
 }
 
-/// An accelerometer, and what it does wrong: white noise, and an offset that stays.
+/// Errors of an accelerometer: white noise, and a constant offset.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AccelerometerNoise {
-    /// Standard deviation of each axis, in m/s².
+    /// Standard deviation of the white noise of each axis. Unit: m/s².
     pub sigma: NotNegative,
-    /// Standard deviation of the offset of each axis, in m/s².
+    /// Standard deviation of the offset of each axis. Unit: m/s².
     pub bias: NotNegative,
 }
 
@@ -86,16 +88,17 @@ impl Default for AccelerometerNoise {
     }
 }
 
-/// What an accelerometer at rest reads, in m/s².
+/// Reading of an accelerometer at rest. Unit: m/s².
 const GRAVITY: f64 = 9.81;
 
 impl AccelerometerNoise {
-    /// What it reads at each pose, in the camera's frame: up, and its own acceleration, by differences over `interval` seconds.
+    /// Returns the reading at each pose, in the camera frame: up plus the acceleration of the camera, from
+    /// finite differences over `interval` seconds.
     pub(super) fn read(&self, poses: &[Se3], interval: f64, rng: &mut Pcg64) -> Vec<Vector3<f64>> {
         let bias = Vector3::from_fn(|_, _| *self.bias * normal(rng));
         let at = |i: usize| poses[i.min(poses.len() - 1)].translation;
         let reading = |i: usize| {
-            // at both ends, that of the pose beside; of two poses nobody can tell
+            // the first and last pose use the acceleration of their neighbour; two poses determine none
             let middle = i.clamp(1, poses.len().saturating_sub(2).max(1));
             let moved = at(middle + 1) - at(middle) * 2.0 + at(middle - 1);
             let moved = if poses.len() < 3 { Vector3::zeros() } else { moved };
@@ -107,38 +110,41 @@ impl AccelerometerNoise {
     }
 }
 
-/// A detector and what it does wrong. Shares and rates are from 0 to 1.
+/// A detector and its errors. Shares and rates are from 0 to 1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Detector {
-    /// Standard deviation of each side of a box, in pixels. The paper says a variance of 4 px², its
-    /// authors' code draws with 2 px: the same.
+    /// Standard deviation of each side of a box. The paper gives a variance of 4 px², and its authors' code
+    /// draws with 2 px, which is equal. Unit: pixels.
     pub sigma_px: NotNegative,
-    /// What the noise has besides, as a part of width and height; the two add up as squares.
+    /// Additional standard deviation, as a share of width and height. The variances add up.
     pub sigma_of_size: NotNegative,
-    /// For how long the noise of an object's boxes lasts, in seconds: after that time 1/e of it is left. 0 for new noise in each frame.
+    /// Correlation time of the noise of an object's boxes: after this time 1/e of the noise remains. 0 for
+    /// independent noise in each frame. Unit: seconds.
     pub noise_lasts_s: NotNegative,
-    /// Boxes of nothing in an image, on average.
+    /// Mean number of false boxes per image.
     pub false_boxes: NotNegative,
-    /// Boxes with a side shorter than this are not seen, in pixels.
+    /// Boxes with a shorter side are not detected. Unit: pixels.
     pub min_size_px: NotNegative,
-    /// Objects of which less than this share is in the image are not seen.
+    /// Objects are detected only if at least this share of them is inside the image.
     pub min_visible: Share,
-    /// Rate at which a box is not there.
+    /// Rate of missed detections.
     pub missed: Share,
-    /// Rate at which something hides a part of an object: its box loses part of one side.
+    /// Rate of partial occlusions: the box loses part of one side.
     pub occluded: Share,
-    /// By how much of its width or height such a box shrinks, at most.
+    /// Largest share of its width or height that such a box loses.
     pub occlusion: Share,
-    /// Whether nearer objects hide what is behind them: a box is around what is left to see, to four pixels or a thousandth of the image, and `min_visible` is about it.
+    /// Lets nearer objects hide the objects behind them. A box then encloses the visible part, to four pixels
+    /// or a thousandth of the image, and `min_visible` refers to this part.
     pub occluded_by_objects: bool,
-    /// Rate at which a box is put to another object of the scene: a tracker's mistake.
+    /// Rate of boxes that are assigned to a wrong object of the scene, as by a tracker's mistake.
     pub wrong_object: Share,
-    /// Share of the objects that are taken for another class in most of their images.
+    /// Share of the objects that are detected under a wrong class in most of their images.
     pub misclassified: Share,
-    /// Rate at which a box has another class than the object's usual.
+    /// Rate of boxes with a class other than the object's usual one.
     pub confused: Share,
-    /// Standard deviation of the depths of objects' centres that come with their boxes, as a part of the depth. Default: none come.
+    /// Standard deviation of the measured depth of an object's centre, as a fraction of the depth. Default:
+    /// no depths.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub depth_error: Option<Positive>,
 }
@@ -165,9 +171,9 @@ impl Default for Detector {
 }
 
 impl Detector {
-    /// The box that it draws; `None` where it draws none.
-    /// `visible` is the share of the object that is to be seen; `noise` is that of its box before, in standard deviations, and of this
-    /// one after; `seconds` have passed.
+    /// Returns the detected box; `None` if the object is not detected. `visible` is the visible share of the
+    /// object. `noise` is the noise of its previous box in standard deviations, and is updated to this box;
+    /// `seconds` have passed in between.
     pub(super) fn draw(
         &self,
         bounding_box: &BoundingBox,
@@ -176,7 +182,7 @@ impl Detector {
         (noise, seconds): (&mut [f64; 4], f64),
         rng: &mut Pcg64,
     ) -> Option<BoundingBox> {
-        // the same draws for each box, seen or not: one setting changes nothing but its own effect
+        // equal draws for each box, detected or not, so that one setting changes only its own effect
         let (missed, hidden) = (rng.random_bool(*self.missed), rng.random_bool(*self.occluded));
         let (side, share) = (rng.random_range(0..4), rng.random::<f64>() * *self.occlusion);
         let left = if self.noise_lasts_s > NotNegative::literal(0.0) {
@@ -202,7 +208,7 @@ impl Detector {
         (!missed && large && visible >= *self.min_visible).then(|| BoundingBox::new(b).ok()).flatten()
     }
 
-    /// What it takes an object for whose usual class is this.
+    /// Returns the detected class of an object whose usual class is `usual`.
     pub(super) fn classify(&self, usual: &str, classes: &[&str], rng: &mut Pcg64) -> ClassScores {
         let (confused, score) = (rng.random_bool(*self.confused), rng.random_range(0.5..1.0));
         let other = another(usual, classes, rng);
@@ -211,7 +217,8 @@ impl Detector {
 }
 
 impl Detector {
-    /// Measurements besides the box, of an object at this depth in metres: its depth, if it is in front of the camera.
+    /// Returns the measurements besides the box, of an object at this depth in metres: its depth, if it is in
+    /// front of the camera.
     pub(super) fn measure(&self, depth: f64, rng: &mut Pcg64) -> Quantities {
         let Some(relative) = self.depth_error else { return Quantities::NONE };
         let error = relative.get() * normal(rng);
@@ -219,7 +226,7 @@ impl Detector {
         measured.map_or(Quantities::NONE, |measured| Quantities::one(Depth(measured)))
     }
 
-    /// Boxes of nothing in an image.
+    /// Returns the false boxes of an image.
     pub(super) fn imagine(
         &self,
         camera: &Camera,
@@ -242,13 +249,13 @@ impl Detector {
     }
 }
 
-/// The object that a box is put to, of so many: with this rate another one.
+/// Returns the object that a box is assigned to, out of `objects`: a wrong one at this rate.
 pub(super) fn mistaken(rate: f64, own: usize, objects: usize, rng: &mut Pcg64) -> usize {
     let (wrong, step) = (rng.random_bool(rate), rng.random_range(1..objects.max(2)));
     if wrong { (own + step) % objects.max(1) } else { own }
 }
 
-/// A class that is not this one, if there is any.
+/// Returns a different class, if there is one.
 pub(super) fn another<'a>(class: &'a str, classes: &[&'a str], rng: &mut Pcg64) -> &'a str {
     let others: Vec<&str> = classes.iter().copied().filter(|c| *c != class).collect();
     let i = rng.random_range(0..others.len().max(1));

@@ -1,27 +1,27 @@
-//! What of each object others leave to see: a coarse image of depths.
+//! Mutual occlusion of objects, from a coarse depth image.
 use super::solid::{Solid, inside_convex, project};
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::{Vector2, Vector3};
 
-/// Side of a cell of the image, in pixels, where that makes no more cells than these along either side of the image.
+/// Side of a cell in pixels, unless this gives more than `MOST_CELLS` along a side of the image.
 const CELL: f64 = 4.0;
 const MOST_CELLS: f64 = 1000.0;
 
-/// An image of which object is the nearest in each cell.
+/// The nearest object in each cell of an image.
 pub(super) struct DepthImage {
-    /// Side of a cell, in pixels.
+    /// Side of a cell. Unit: pixels.
     cell: f64,
     columns: usize,
     rows: usize,
-    /// By cell: how far away the nearest surface is, and whose it is.
+    /// For each cell: depth of the nearest surface, and its object.
     nearest: Vec<(f64, usize)>,
-    /// By object: the cells that it covers, row by row, each once.
+    /// For each object: the cells that it covers, row by row and without duplicates.
     covered: Vec<Vec<usize>>,
 }
 
 impl DepthImage {
-    /// Draws all solids, each with its pose in the frame of the camera.
+    /// Draws all solids, each with its pose in the camera frame.
     pub(super) fn new<'a>(solids: impl Iterator<Item = (&'a Solid, Se3)>, camera: &Camera) -> Self {
         let size = camera.size();
         let cell = CELL.max(size.max() / MOST_CELLS);
@@ -50,7 +50,7 @@ impl DepthImage {
         image
     }
 
-    /// Visits the cells of a face, with how far away it is there.
+    /// Visits the cells of a face, with its depth in each cell.
     fn draw(
         &mut self,
         face: &[Vector3<f64>],
@@ -75,7 +75,7 @@ impl DepthImage {
                 }
                 let y = (p.y - camera.cy) / camera.fy;
                 let x = (p.x - camera.cx - camera.skew * y) / camera.fx;
-                // where the ray meets the plane of the face
+                // depth at the intersection of the ray with the plane of the face
                 let depth = normal.dot(a) / normal.dot(&Vector3::new(x, y, 1.0));
                 let cell = row * self.columns + column;
                 if depth > 0.0 {
@@ -85,8 +85,8 @@ impl DepthImage {
         }
     }
 
-    /// The box of an object with sides where what is left to see ends, and which share of it is; `None` where nothing is. What is too
-    /// small for a cell is as it was.
+    /// Returns the box of an object, reduced to the visible part, and the visible share; `None` if nothing is
+    /// visible. An object smaller than a cell keeps its box.
     pub(super) fn left_of(&self, object: usize, bounding_box: BoundingBox) -> Option<(BoundingBox, f64)> {
         let covered = self.covered.get(object)?;
         if covered.is_empty() {
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn what_is_behind_ends_where_the_other_begins() {
-        // the nearer one, at 0.95 m, covers x > 320 px
+        // the nearer sheet, at 0.95 m, covers x > 320 px
         let sheet = ([0.4, 0.4, 0.1], [0.0, 0.0, 2.0]);
         let found = seen(&[sheet, ([1.0, 1.0, 0.1], [0.5, 0.0, 1.0])]);
         let (behind, share) = found[0].unwrap();
@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(behind.xmin, whole(&sheet).xmin);
         assert!((share - 0.5).abs() < 0.05, "{share}");
         assert_eq!(found[1].unwrap().1, 1.0);
-        // and all of it, where it is in the middle
+        // in the middle it covers everything
         assert!(seen(&[sheet, ([1.0, 1.0, 0.1], [0.0, 0.0, 1.0])])[0].is_none());
     }
 }

@@ -13,7 +13,7 @@ fn a_written_recording_is_read_back() {
     settings.detector.false_boxes = NotNegative::literal(0.2);
     settings.detector.depth_error = Some(Positive::literal(0.02));
     let mut sequence = settings.simulate().unwrap();
-    // a detector need not say what it sees
+    // a detector may omit the class
     sequence.detections[3].scores = ClassScores::default();
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

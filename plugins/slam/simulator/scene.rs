@@ -1,4 +1,4 @@
-//! Objects on a plane.
+//! Scenes of objects on a plane.
 use super::SimulationError;
 use super::catalogue::{KINDS, kind};
 use super::solid::Solid;
@@ -14,38 +14,40 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::Deref;
 
-/// Which objects there are: classes at random, at random places of a rectangle, apart from each other.
+/// Objects of the scene: random classes at random places of a rectangle, apart from each other.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneSettings {
-    /// What the scene depends on, and nothing else does.
+    /// Seed of the scene. It also changes the noise.
     pub seed: u64,
-    /// How many objects: at most ten thousand, as each is placed apart from all others.
+    /// Number of objects. At most 10 000, because each is placed apart from all others.
     pub objects: Count<0, 10_000>,
-    /// Their classes, in turn; all that are known, where none is given.
+    /// Classes of the objects, in turn. Default: all known classes.
     pub classes: Vec<String>,
-    /// Extents of the rectangle, in metres; its centre is the origin.
+    /// Extents of the rectangle; its centre is the origin. Unit: metres.
     pub area: [NotNegative; 2],
-    /// Height of the plane that they rest on, in metres.
+    /// Height of the plane that objects rest on. Unit: metres.
     pub height: Finite,
-    /// Least distance between the outlines of two objects, seen from above, in metres.
+    /// Smallest distance between the outlines of two objects, seen from above. Unit: metres.
     pub gap: NotNegative,
-    /// Sizes vary by up to this share.
+    /// Largest random change of an object's size, as a share of the size.
     pub size_variation: Share,
-    /// Share of the objects that lean or lie otherwise than usual.
+    /// Share of the objects that do not stand or lie as usual.
     pub tilted: Share,
-    /// By how much those are tilted, from and to, in degrees.
+    /// Smallest and largest tilt of these objects. Unit: degrees.
     pub tilt: [Finite; 2],
-    /// Share of the objects that are put elsewhere, one after the other: to a free place that is apart from their own, and turned about the vertical.
-    /// Each has a new number from then on: to a map of what stands still it is another object. Default: 0.
+    /// Share of the objects that are moved, one after another: to a free place apart from their own, and
+    /// turned about the vertical. A moved object gets a new number, because it is a new object for a static
+    /// map. Default: 0.
     #[serde(skip_serializing_if = "is_zero")]
     pub moved: Share,
-    /// When they are, in seconds. The truth has an object at each place where it is in some image. Default: 0, before the first image.
+    /// Time of the moves. The ground truth contains every place that an object has at the time of any image.
+    /// Default: 0, before the first image. Unit: seconds.
     #[serde(skip_serializing_if = "is_zero")]
     pub moved_at_s: NotNegative,
 }
 
-/// What is as usual is not written.
+/// Returns whether a setting is zero, the default, which is not written.
 fn is_zero(number: &impl Deref<Target = f64>) -> bool {
     **number == 0.0
 }
@@ -71,25 +73,26 @@ impl Default for SceneSettings {
 /// An object of a scene.
 #[derive(Debug, Clone)]
 pub struct SceneObject {
-    /// What is true of it.
+    /// Ground truth of the object.
     pub truth: TrueObject,
-    /// Its shape, in the frame of the truth's `world_from_object`.
+    /// Shape, in the frame of the truth's `world_from_object`.
     pub solid: Solid,
-    /// Whether it stands otherwise than its kind does.
+    /// True if the object does not stand or lie as usual for its class.
     pub tilted: bool,
 }
 
 impl SceneSettings {
-    /// The objects; the same for the same settings.
+    /// Returns the objects. Equal settings give equal objects.
     ///
     /// # Errors
-    /// A class that is not known, a share that is none, a rectangle that is too small.
+    /// An unknown class, or a rectangle that is too small.
     pub fn objects(&self, rng: &mut Pcg64) -> Result<Vec<SceneObject>, SimulationError> {
         let classes: Vec<&str> = match self.classes.is_empty() {
             true => KINDS.iter().map(|kind| kind.class).collect(),
             false => self.classes.iter().map(String::as_str).collect(),
         };
-        // in turn, but each turn in another order: many kinds in a small scene, no kind left out for long
+        // each turn contains all classes in random order: a small scene has many classes, and no class is
+        // missing for long
         let mut order: Vec<&str> = vec![];
         let mut placed: Vec<(Vector3<f64>, f64)> = vec![];
         let mut objects = vec![];
@@ -141,7 +144,7 @@ impl SceneSettings {
         Ok(SceneObject { truth, solid, tilted })
     }
 
-    /// A place for something of this radius, apart from what there is.
+    /// Returns a free place for an object of this radius, apart from the placed objects.
     pub(super) fn place(
         &self,
         radius: f64,

@@ -1,20 +1,20 @@
-//! The true shapes of objects: solids with flat faces, of which an ellipsoid is only a model.
+//! True shapes of objects: solids with flat faces, which an ellipsoid only approximates.
 use manifactor_geometry::Se3;
 use manifactor_quadric::{BoundingBox, Camera};
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::TAU;
 
-/// Nearer than this nothing is seen, in metres.
+/// Near plane: closer parts are not visible. Unit: metres.
 const NEAR: f64 = 0.05;
 
-/// Convex faces in space, corner after corner. The frame's origin is the centre of the box around it.
+/// Convex faces in space, each a list of corners. The frame's origin is the centre of the enclosing box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solid {
     faces: Vec<Vec<Vector3<f64>>>,
 }
 
 impl Solid {
-    /// A box of these extents, in metres.
+    /// Returns a box of these extents in metres.
     pub fn cuboid(extents: [f64; 3]) -> Self {
         let [x, y, z] = extents.map(|e| e / 2.0);
         let rectangle = |a: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
@@ -27,12 +27,12 @@ impl Solid {
         }
     }
 
-    /// A round body along z: radii at the bottom and the top, and the height, in metres.
+    /// Returns a round body along z: radii at the bottom and the top, and the height, in metres.
     pub fn frustum(bottom: f64, top: f64, height: f64) -> Self {
         Self::turned(&[(bottom, -height / 2.0), (top, height / 2.0)])
     }
 
-    /// A ball, in metres.
+    /// Returns a ball with this radius in metres.
     pub fn ball(radius: f64) -> Self {
         const RINGS: usize = 8;
         let ring = |i: usize| {
@@ -42,7 +42,7 @@ impl Solid {
         Self::turned(&(0..=RINGS).map(ring).collect::<Vec<_>>())
     }
 
-    /// An outline of (radius, z), turned about z.
+    /// Returns the body that an outline of (radius, z) forms when it is rotated about z.
     fn turned(outline: &[(f64, f64)]) -> Self {
         const SIDES: usize = 24;
         let at = |(radius, z): (f64, f64), i: usize| {
@@ -57,8 +57,8 @@ impl Solid {
         Self { faces: caps.chain(bands).collect() }
     }
 
-    /// A flat part with an upright part along its far edge, as a chair or an open laptop: width, depth,
-    /// height and the thickness of both parts, in metres.
+    /// Returns a flat part with an upright part along its far edge, like a chair or an open laptop: width,
+    /// depth, height and the thickness of both parts, in metres.
     pub fn folded([width, depth, height]: [f64; 3], thickness: f64) -> Self {
         let flat = Self::cuboid([width, depth, thickness]).moved(Vector3::z() * (thickness - height) / 2.0);
         let back = Self::cuboid([width, thickness, height]).moved(Vector3::y() * (depth - thickness) / 2.0);
@@ -70,25 +70,25 @@ impl Solid {
         self
     }
 
-    /// The same shape, larger by a factor.
+    /// Returns the shape scaled by a factor.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         self.faces.iter_mut().flatten().for_each(|corner| *corner *= factor);
         self
     }
 
-    /// All corners; those of several faces several times.
+    /// Returns the corners of all faces; shared corners are repeated.
     pub fn corners(&self) -> impl Iterator<Item = &Vector3<f64>> {
         self.faces.iter().flatten()
     }
 
-    /// Half the extents along its own axes.
+    /// Returns half the extents along the axes of the solid.
     pub fn half_extents(&self) -> Vector3<f64> {
         self.corners().fold(Vector3::zeros(), |most, corner| most.sup(&corner.abs()))
     }
 
-    /// The box around what a camera sees of it, without and with the image's border; `None` where
-    /// nothing is in front, or nothing in the image.
+    /// Returns the boxes around the solid in an image, without and with the image border. `None` if no part
+    /// is in front of the camera or inside the image.
     pub fn boxes(&self, world_from_object: &Se3, camera: &Camera, world_from_camera: &Se3) -> Option<Boxes> {
         let (mut whole, mut inside) = (Extent::default(), Extent::default());
         for front in self.in_front(&world_from_camera.between(world_from_object)) {
@@ -99,13 +99,13 @@ impl Solid {
                 image = clip(&image, |p| p[axis]);
                 image = clip(&image, |p| size[axis] - p[axis]);
             }
-            // where an edge meets the border, up to rounding
+            // an edge that meets the border may be off by rounding
             image.iter().for_each(|p| inside.add(&p.sup(&Vector2::zeros()).inf(&size)));
         }
         Some(Boxes { whole: whole.bounding_box()?, inside: inside.bounding_box()? })
     }
 
-    /// What of its faces is in front of a camera, in the camera's frame.
+    /// Returns the parts of the faces in front of a camera, in the camera frame.
     pub(super) fn in_front(&self, camera_from_object: &Se3) -> impl Iterator<Item = Vec<Vector3<f64>>> {
         self.faces.iter().map(|face| {
             let seen: Vec<_> = face.iter().map(|corner| camera_from_object.act(corner)).collect();
@@ -114,22 +114,22 @@ impl Solid {
     }
 }
 
-/// The boxes around an object's image.
+/// Boxes around an object in an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Boxes {
-    /// Around all of it, as if the image had no border.
+    /// Box around the whole object, as if the image had no border.
     pub whole: BoundingBox,
-    /// Around what is inside of the image.
+    /// Box around the part inside the image.
     pub inside: BoundingBox,
 }
 
-/// Where a point is seen, in pixels.
+/// Projects a point to pixels.
 pub(super) fn project(camera: &Camera, p: &Vector3<f64>) -> Vector2<f64> {
     let (x, y) = (p.x / p.z, p.y / p.z);
     Vector2::new(camera.fx * x + camera.skew * y + camera.cx, camera.fy * y + camera.cy)
 }
 
-/// Returns whether a point is in a convex polygon, whichever way around that goes.
+/// Returns whether a point is in a convex polygon of either orientation.
 pub(super) fn inside_convex(polygon: &[Vector2<f64>], p: &Vector2<f64>) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let sides = polygon.iter().zip(next).map(|(a, b)| (b - a).perp(&(p - a)));
@@ -137,7 +137,7 @@ pub(super) fn inside_convex(polygon: &[Vector2<f64>], p: &Vector2<f64>) -> bool 
     low >= 0.0 || high <= 0.0
 }
 
-/// The part of a polygon where `distance` is not negative (Sutherland and Hodgman).
+/// Returns the part of a polygon in which `distance` is not negative (Sutherland and Hodgman).
 fn clip<const D: usize>(
     polygon: &[nalgebra::SVector<f64, D>],
     distance: impl Fn(&nalgebra::SVector<f64, D>) -> f64,
@@ -156,7 +156,7 @@ fn clip<const D: usize>(
     part
 }
 
-/// Bounds of points, as they come.
+/// Bounds of the points that were added.
 #[derive(Default)]
 struct Extent(Option<(Vector2<f64>, Vector2<f64>)>);
 

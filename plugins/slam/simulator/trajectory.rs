@@ -1,4 +1,4 @@
-//! How the camera moves: on an arc around the scene, up and down, in and out, its eye on the objects.
+//! Motion of the camera: an arc around the scene with waves in height and distance, directed at the objects.
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::checked::{Count, Finite, NotNegative, Positive};
 use nalgebra::{Matrix3, Vector3};
@@ -8,25 +8,26 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// An arc around the origin. Its first angle, its waves and where it looks depend on `seed`.
+/// An arc around the origin. `seed` determines its first angle, its waves and the points that the camera
+/// looks at.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrajectorySettings {
-    /// What the trajectory depends on, and nothing else does.
+    /// Seed of the trajectory. It also changes the noise.
     pub seed: u64,
     /// Number of images.
     pub frames: Count<2, 1_000_000>,
-    /// Time between two images, in seconds.
+    /// Time between two images. Unit: seconds.
     pub interval: Positive,
-    /// How far around it goes, in degrees.
+    /// Angle of the arc. Unit: degrees.
     pub sweep: Finite,
-    /// Mean distance from the vertical axis, in metres.
+    /// Mean distance from the vertical axis. Unit: metres.
     pub radius: Positive,
-    /// Mean height over the plane, in metres.
+    /// Mean height above the plane. Unit: metres.
     pub height: Finite,
-    /// By how much distance and height vary, in metres.
+    /// Amplitudes of the waves in distance and height. Unit: metres.
     pub waves: [NotNegative; 2],
-    /// How far from the scene's centre the eye wanders, in metres.
+    /// Amplitude of the viewed point's motion around the centre of the scene. Unit: metres.
     pub wander: NotNegative,
 }
 
@@ -46,7 +47,7 @@ impl Default for TrajectorySettings {
 }
 
 impl TrajectorySettings {
-    /// `world_from_camera` for each image, for objects that rest at a height.
+    /// Returns `world_from_camera` for each image, for objects that rest at the height `ground`.
     pub fn poses(&self, ground: f64, rng: &mut Pcg64) -> Vec<Se3> {
         let start = rng.random::<f64>() * TAU;
         let mut wave = |size: f64| {
@@ -70,11 +71,11 @@ impl TrajectorySettings {
     }
 }
 
-/// A camera at `eye` that looks at `target`, upright: z forward, x right, y down.
+/// Returns the pose of an upright camera at `eye` that looks at `target`: z forward, x right, y down.
 fn looking(eye: Vector3<f64>, target: Vector3<f64>) -> Se3 {
     let forward = (target - eye).normalize();
     let right = forward.cross(&Vector3::z());
-    // straight up or down, any right will do
+    // any right direction is valid for a view straight up or down
     let right = right.try_normalize(1e-9).unwrap_or_else(Vector3::x);
     let down = forward.cross(&right);
     Se3::new(So3::from_matrix(&Matrix3::from_columns(&[right, down, forward])), eye)

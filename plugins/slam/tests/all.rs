@@ -1,4 +1,4 @@
-//! Mapping, from sequences to reports.
+//! Tests of mapping, from sequences to reports.
 #![allow(
     missing_docs,
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! Boxes put to objects that nobody has named.
+//! Data association of boxes without known objects.
 use crate::prior_map::Found;
 use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
@@ -23,7 +23,7 @@ use manifactor_solve::Silent;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// A desk whose objects come in three classes, seen by a detector that errs.
+/// A desk with objects of three classes, and a detector with errors.
 const DESK: &str = r#"
 semantics = []
 association = { type = "likelihood" }
@@ -57,7 +57,7 @@ fn scores(report: &VariantReport) -> IdentityScores {
     report.association.as_ref().unwrap().in_the_end.unwrap()
 }
 
-/// The names of all boxes as they come, by this association.
+/// Returns the objects that this association assigns to all boxes as they arrive.
 fn names(settings: &Settings, sequence: &Sequence) -> Vec<Option<ObjectId>> {
     let mut mapper = Mapper::new(sequence.opening(), settings);
     sequence.observations().flat_map(|frame| mapper.take(&frame).unwrap().names).collect()
@@ -107,7 +107,7 @@ fn a_detector_gone_mad_is_borne() {
     let mut named = BTreeSet::new();
     for frame in sequence.observations() {
         let report = mapper.take(&frame).unwrap();
-        // not all boxes are looked at
+        // the number of boxes per frame is limited
         assert!(report.names.iter().flatten().count() <= 200);
         named.extend(report.names.into_iter().flatten());
     }
@@ -115,11 +115,11 @@ fn a_detector_gone_mad_is_borne() {
     assert!(all.objects.len() < 1000 && all.objects.len() < named.len(), "{}", all.objects.len());
 }
 
-/// Calls all objects by other names in every other frame, and finds out later.
+/// Assigns wrong objects in every second frame, and corrects them later.
 #[derive(Debug, Clone, serde::Serialize)]
 struct Twofold {
     found_out_at: usize,
-    /// Whether objects are merged then, or the boxes moved, each of which was put to the next object until then.
+    /// If true, the correction merges objects. Otherwise it moves boxes that had the next object until then.
     merges: bool,
     #[serde(skip)]
     wrong: Vec<Move>,
@@ -168,7 +168,8 @@ impl Associator for Twofold {
     }
 }
 
-/// Maps as `Twofold` does: what is in the map in the end is what is there by the right names. Returns the most objects that were there.
+/// Maps with `Twofold` and checks that the final map equals the map with the right objects. Returns the
+/// largest number of objects on the way.
 fn found_out(merges: bool) -> usize {
     let (settings, sequence) = scene(&[]);
     let (given, twofold) = (by(&settings, Given {}), by(&settings, Twofold::new(merges)));
@@ -179,7 +180,7 @@ fn found_out(merges: bool) -> usize {
         assert_eq!(report.refused, Vec::<String>::new());
         most = most.max(mapper.mapped());
         let (moved, merged) = (!report.moved.is_empty(), !report.merged.is_empty());
-        // it is corrected with the next frame
+        // the correction takes effect with the next frame
         assert_eq!((merged, moved), (merges && report.frame == 121, !merges && report.frame == 121));
     }
     let mut expected = Mapper::new(sequence.opening(), &given);
@@ -277,7 +278,7 @@ fn depths_place_objects_at_once_and_tell_what_moves() {
     let initialiser = ["objects.initialiser={type=\"depth\",thickness=0.0}"];
     let (without, sequence) = scene(&[]);
     let (settings, measured) = scene(&[&with[..], &initialiser].concat());
-    // the same boxes
+    // both sequences have equal boxes
     assert!(
         sequence.detections.iter().zip(&measured.detections).all(|(a, b)| a.bounding_box == b.bounding_box)
     );

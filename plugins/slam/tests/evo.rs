@@ -1,5 +1,5 @@
-//! Trajectory errors agree with those of `evo` to 1e-6, on published trajectories. `evo/figures.py` made
-//! the figures.
+//! Trajectory errors agree with those of `evo` to 1e-6 on published trajectories. `evo/figures.py` computed
+//! the reference values.
 use manifactor_formats::tum;
 use manifactor_slam::metrics::{
     Alignment, Pairing, Statistics, absolute_error, align, associate, relative_error,

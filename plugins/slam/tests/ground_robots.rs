@@ -1,4 +1,4 @@
-//! Robots in the plane that measure landmarks with known ids.
+//! Planar robots that measure landmarks with known ids.
 mod mr_clam;
 mod victoria_park;
 
@@ -16,11 +16,11 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// The variable that says how the steering errs.
+/// Key of the steering error.
 const STEERING: &str = "steering";
 
-/// Odometry of a car whose steering errs for good: it turns by another angle than it says, by so many radians a metre, and by a share
-/// of the angle.
+/// Odometry of a car with a constant steering error: the car turns by a different angle than reported, by an
+/// offset in radians per metre and by a share of the angle.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, JsonSchema)]
 struct Steered {
     relative: Se2,
@@ -49,16 +49,16 @@ fn data(path: &str) -> Option<PathBuf> {
     file.exists().then_some(file)
 }
 
-/// The rows of a table of numbers, without comments.
+/// Reads a table of numbers without its comments.
 fn rows(path: PathBuf) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(path).unwrap();
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     lines.map(|line| line.split_whitespace().map(|field| field.parse().unwrap()).collect()).collect()
 }
 
-/// A pose of the robot.
+/// One pose of the robot, with its measurements.
 struct Step {
-    /// How it has moved since the last.
+    /// Motion since the previous pose.
     odometry: Option<(Se2, Noise)>,
     seen: Vec<Seen>,
 }
@@ -66,24 +66,24 @@ struct Step {
 /// A measurement of a landmark.
 #[derive(Clone)]
 struct Seen {
-    /// The landmark's id.
+    /// Id of the landmark.
     id: usize,
-    /// Where it is from the robot, in metres.
+    /// Position relative to the robot. Unit: metres.
     place: Vector2<f64>,
     factor: Arc<dyn Factor>,
     noise: Noise,
     loss: Option<Arc<dyn Loss>>,
 }
 
-/// What a session came to, pose by pose.
+/// Results of a smoother, pose by pose.
 struct Driven {
     session: Session,
-    /// Where the newest pose was after its update, and where odometry alone leads.
+    /// Newest pose after its update, and the pose from odometry alone.
     newest: Vec<Vector2<f64>>,
     odometry: Vec<Vector2<f64>>,
-    /// CPU time of the steps, in milliseconds.
+    /// CPU times of the steps. Unit: milliseconds.
     times: Vec<f64>,
-    /// By what share the estimate costs more than a batch solve from it, now and then.
+    /// Relative excess of the cost over a batch solve from the estimate, at some of the steps.
     gaps: Vec<f64>,
 }
 
@@ -156,7 +156,7 @@ impl Driven {
         (0..self.newest.len()).map(place).collect()
     }
 
-    /// The root of the mean square of the path's errors and the largest, and the motion that leads to the truth.
+    /// Returns the root mean square and the largest error of the aligned path, and the aligning motion.
     fn path_errors(&self, truth: &[Vector2<f64>]) -> ((f64, f64), Se2) {
         let path = self.path();
         (aligned_errors(&path, truth), align(&path, truth))
@@ -167,13 +167,13 @@ impl Driven {
     }
 }
 
-/// The same after alignment.
+/// Returns the root mean square and the largest error after alignment.
 fn aligned_errors(path: &[Vector2<f64>], truth: &[Vector2<f64>]) -> (f64, f64) {
     let motion = align(path, truth);
     errors(&path.iter().map(|place| motion.act(place)).collect::<Vec<_>>(), truth)
 }
 
-/// The motion that takes the first points to the second with the least sum of squares.
+/// Returns the motion from the first points to the second that minimizes the sum of squares.
 fn align(from: &[Vector2<f64>], to: &[Vector2<f64>]) -> Se2 {
     let centre = |points: &[Vector2<f64>]| points.iter().sum::<Vector2<f64>>() / points.len() as f64;
     let (a, b) = (centre(from), centre(to));
@@ -187,7 +187,7 @@ fn align(from: &[Vector2<f64>], to: &[Vector2<f64>]) -> Se2 {
     Se2::new(rotation, b - turned)
 }
 
-/// The root of the mean square, and the largest.
+/// Returns the root mean square and the largest distance.
 fn errors(found: &[Vector2<f64>], truth: &[Vector2<f64>]) -> (f64, f64) {
     let apart: Vec<f64> = found.iter().zip(truth).map(|(a, b)| (a - b).norm()).collect();
     let square = apart.iter().map(|x| x * x).sum::<f64>() / apart.len() as f64;

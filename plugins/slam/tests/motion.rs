@@ -1,4 +1,4 @@
-//! Motion models, in a batch and in a stream.
+//! Motion models, in batch and in a stream.
 use crate::online::{both, run_of};
 use manifactor_geometry::Twist;
 use manifactor_slam::mapping::Mapping;
@@ -6,7 +6,8 @@ use manifactor_slam::run::Run;
 use manifactor_slam::run_document::RunDocument;
 use manifactor_solve::Silent;
 
-/// A camera that walks around a desk with a poor odometry. Depths give the scale, which no velocity and no box does.
+/// A camera that moves around a desk with poor odometry. Only depths determine the scale; velocities and
+/// boxes do not.
 const DESK: &str = r#"
 semantics = "table_one"
 source = { type = "simulated", scene = { objects = 12 }, trajectory = { frames = 80 }, detector = { depth_error = 0.02 }, odometry = { translation = 0.3, rotation = 0.15 } }

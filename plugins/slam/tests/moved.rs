@@ -1,4 +1,4 @@
-//! Objects that are put elsewhere, between two runs or within one.
+//! Objects that are moved, between two runs or within one.
 use crate::prior_map::{Found, begun, in_map, sequence, settings, told};
 use manifactor_slam::estimate::Estimate;
 use manifactor_slam::output::map_of;
@@ -11,10 +11,10 @@ use manifactor_solve::Silent;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
 
-/// A share of a quarter: three of twelve.
+/// A quarter of the objects: three of twelve.
 const MOVED: &str = "source.scene.moved=0.25";
 
-/// The numbers of those objects of the truth that are at these places.
+/// Returns the numbers of the true objects at these places.
 fn at(places: impl Iterator<Item = Vector3<f64>>, truth: &[TrueObject]) -> BTreeSet<ObjectId> {
     let distance =
         |place: &Vector3<f64>, object: &TrueObject| (object.world_from_object.translation - place).norm();
@@ -50,7 +50,7 @@ fn what_is_moved_between_two_runs_is_gone_and_added() {
         let (left, new) = (was.difference(&is).copied().collect(), is.difference(&was).copied().collect());
         match association == given {
             true => assert_eq!((gone, added), (left, new)),
-            // what is moved a little is taken for what it was
+            // an object that moved only a little is taken for its old self
             false => assert!(gone.len() >= 2 && gone.is_subset(&left) && added.is_subset(&new), "{prior:?}"),
         }
         assert_eq!(report.gone, prior.gone);
@@ -62,7 +62,7 @@ fn place(estimate: &Estimate, id: ObjectId) -> Option<Vector3<f64>> {
     all.iter().find(|landmark| landmark.object.id == id).map(|landmark| landmark.quadric.centroid())
 }
 
-/// Twice around the table, of which things are moved after the first time.
+/// Two turns around the table; objects are moved after the first.
 fn twice(more: &[&str]) -> Settings {
     let twice = ["source.trajectory.sweep=720", "source.trajectory.frames=400", "source.scene.moved_at_s=20"];
     settings(&[&twice[..], more].concat())
@@ -96,7 +96,7 @@ fn what_is_moved_within_a_stream_is_told_and_not_in_its_map() {
 
 #[test]
 fn what_stays_is_not_told() {
-    // nor what is not seen as its boxes are held out
+    // nor are objects gone whose boxes are held out
     for more in [&[][..], &["evaluation.holdout.last=0.3"]] {
         let settings = twice(more);
         let (_, report) = estimate("still", sequence(&settings), &settings, &mut Silent).unwrap();

@@ -1,4 +1,4 @@
-//! Frame by frame, beside the batch.
+//! Online mapping, compared with the batch solve.
 use crate::tum::{data, document};
 use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
@@ -18,7 +18,7 @@ use manifactor_solve::Silent;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// Keeps what came of each frame.
+/// Collects the reports of all frames.
 #[derive(Default)]
 pub(crate) struct Kept(Vec<FrameReport>);
 
@@ -35,7 +35,7 @@ impl Watch for Kept {
     }
 }
 
-/// Looks at the map after each frame, and after the last.
+/// Checks the map after each frame, and after the last.
 #[derive(Default)]
 struct Looking {
     frames: usize,
@@ -55,7 +55,7 @@ impl Watch for Looking {
         assert_eq!(mapper.objects().count(), mapper.mapped());
         assert_eq!(mapper.pose_of(report.frame), Some(report.pose));
         assert_eq!(mapper.pose_of(report.frame + 1), None);
-        // odometry leads away from the estimate, frame by frame
+        // odometry drifts away from the estimate, frame by frame
         let apart = (mapper.odometry(observation).unwrap().translation - report.pose.translation).norm();
         assert!(apart < if report.frame == 0 { 1e-9 } else { 1.0 }, "{apart} m at frame {}", report.frame);
         self.frames += 1;
@@ -77,7 +77,7 @@ fn the_map_can_be_looked_at_after_each_frame_and_has_all_poses_with_a_window() {
     assert_eq!((looking.frames, looking.ends), (80, 1));
 }
 
-/// A desk, seen from a camera that walks around it.
+/// A desk, and a camera that moves around it.
 const DESK: &str = r#"
 semantics = "table_one"
 source = { type = "simulated", scene = { objects = 8 }, trajectory = { frames = 80 } }
@@ -98,20 +98,20 @@ pub(crate) fn both(
 ) -> (VariantReport, VariantReport, Kept) {
     let (mut kept, mut run) = (Kept::default(), Run::new(run, data));
     let (_, online) = run.variant_online(variant, &mut kept, &mut Silent).unwrap();
-    // a stream says a little of the shape of all objects
+    // a stream adds a weak prior for the shape of all objects
     let batch = Variant { settings: variant.settings.clone().for_stream(), ..variant.clone() };
     let (_, batch) = run.variant(&batch, &mut Silent).unwrap();
     (online, batch, kept)
 }
 
-/// The settings of a document without variants, and its sequence.
+/// Returns the settings of a document without variants, and its sequence.
 fn scene(text: &str) -> (Settings, Sequence) {
     let settings = run_of(text, &[]).variants.remove(0).settings;
     let sequence = settings.source.load(&Folders::default()).unwrap();
     (settings, sequence)
 }
 
-/// What is estimated after these frames, as text with all digits.
+/// Returns the estimate after these frames as text with all digits.
 fn mapped(mapper: &mut Mapper) -> String {
     let values = mapper.session().estimates();
     values.iter().map(|(key, value)| format!("{key} {}\n", serde_json::to_string(value).unwrap())).collect()
@@ -136,7 +136,7 @@ fn a_map_that_grew_ends_as_the_batch_does() {
     let born: usize = kept.0.iter().map(|frame| frame.born.len()).sum();
     assert_eq!((stream.born, stream.objects, stream.refusals), (born, born - stream.withdrawn, 0));
     assert!(born >= 4, "objects come before the end: {born} of {}", online.counts.objects);
-    // the estimate was there when it was needed: not that of the end, and not far from it
+    // the live estimate differs from the final one, but not by much
     let (live, end) = (stream.trajectory[0].estimate.ate.rmse, online.trajectory[0].estimate.ate.rmse);
     assert!(live < 4.0 * end.max(0.01), "{live} {end}");
 }
@@ -183,7 +183,7 @@ fn an_object_of_several_things_is_taken_out_again_and_does_not_come_back() {
     let mut objects: Vec<ObjectId> = sequence.detections.iter().filter_map(|d| d.object).collect();
     objects.sort_unstable();
     objects.dedup();
-    // from the middle on, one number stands for two things
+    // from the middle on, one number stands for two objects
     let (one, other) = (objects[0], objects[1]);
     for detection in sequence.detections.iter_mut().filter(|d| d.frame > 40 && d.object == Some(other)) {
         detection.object = Some(one);
@@ -257,7 +257,7 @@ fn boxes_that_cannot_be_taken_are_told_and_the_pose_is_taken() {
         frame: 0,
         object: Some(ObjectId(id)),
         scores: ClassScores::single("cup", 0.5),
-        // a square of it is infinite
+        // its square is infinite
         quantities: Quantities::NONE,
         bounding_box: BoundingBox { xmin: 1e200, ymin: 1e200, xmax: 2e200, ymax: 2e200 },
     };
@@ -279,12 +279,12 @@ fn a_pose_that_cannot_be_taken_is_an_error_and_the_stream_goes_on() {
     let last = sequence.observations().last().unwrap();
     let mut frame = last.frame.clone();
     frame.timestamp += 1.0;
-    // a camera that has jumped by more than any square of it can hold
+    // the jump of the camera is too large to be squared
     frame.world_from_camera = Se3::new(frame.world_from_camera.rotation, nalgebra::Vector3::repeat(1e200));
     let detections: Vec<Detection> = last.detections;
     let taken = mapper.take(&Observation { frame, detections, accelerometer: vec![], unused: vec![] });
     assert!(matches!(taken, Err(FrameError::Update(_))), "{taken:?}");
-    // and the stream goes on from the frame before
+    // the stream continues from the frame before
     let mut next = sequence.frames.last().unwrap().clone();
     next.timestamp += 2.0;
     let taken = mapper
@@ -309,7 +309,7 @@ fn a_pose_that_overflows_leaves_nothing_behind_in_the_session() {
     let taken = mapper.take(&observation(&frame, 2.0));
     assert!(matches!(taken, Err(FrameError::NotFinite { .. })), "{taken:?}");
     mapper.session().save().unwrap();
-    // its timestamp counts for nothing
+    // its timestamp is ignored
     mapper.take(&observation(sequence.frames.last().unwrap(), 1.0)).unwrap();
 }
 
@@ -374,7 +374,7 @@ fn root() -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The document that `docs/association.md` recommends for streams.
+/// Returns the settings that `docs/association.md` recommends for streams.
 fn recommended() -> Settings {
     let page = std::fs::read_to_string(root().join("docs/association.md")).unwrap();
     let mut blocks = page.split("```toml\n").skip(1).filter_map(|block| block.split("```").next());
@@ -396,7 +396,7 @@ fn keeps_shapes(settings: &Settings) {
     let desk = std::fs::read_to_string(root().join("examples/desk/desk.toml")).unwrap();
     let (_, sequence) = scene(&desk);
     let sequence = Sequence {
-        // names are not given
+        // no object numbers from the source
         detections: sequence.detections.iter().map(|d| Detection { object: None, ..d.clone() }).collect(),
         ..sequence
     };

@@ -1,4 +1,4 @@
-//! Runs that begin with the map of another run.
+//! Runs that begin with the map of an earlier run.
 use manifactor_config::{Document, Format};
 use manifactor_geometry::Se3;
 use manifactor_graph::Direction;
@@ -20,7 +20,7 @@ use std::ops::{ControlFlow, Range};
 use std::path::Path;
 use std::sync::Arc;
 
-/// A table with objects of a few classes, seen by a detector that errs and gives no names.
+/// A table with objects of a few classes, and a detector with errors that gives no object numbers.
 const TABLE: &str = r#"
 semantics = "table_one"
 association = { type = "likelihood" }
@@ -35,7 +35,7 @@ trajectory = { frames = 240, seed = 1 }
 detector = { missed = 0.1, misclassified = 0.05, sigma_px = 3.0 }
 "#;
 
-/// Another walk around the same table.
+/// A second walk around this table.
 const AGAIN: [&str; 2] = ["source.seed=2", "source.trajectory.seed=2"];
 
 pub(crate) fn settings(sets: &[&str]) -> Settings {
@@ -48,7 +48,7 @@ pub(crate) fn sequence(settings: &Settings) -> Arc<Sequence> {
     Arc::new(settings.source.load(&Folders::default()).unwrap())
 }
 
-/// Some of the frames, with an odometry that begins where they do.
+/// Returns some of the frames; the odometry begins at the first of them.
 fn part(all: &Sequence, frames: Range<usize>) -> Arc<Sequence> {
     let (mut part, first) = (all.opening().into_sequence(), all.frames[frames.start].world_from_camera);
     part.up = all.up.map(|up| Direction::new(first.rotation.inverse().act(&up)).unwrap());
@@ -59,7 +59,7 @@ fn part(all: &Sequence, frames: Range<usize>) -> Arc<Sequence> {
     Arc::new(part)
 }
 
-/// The map of a walk around the table, in a file.
+/// Maps a walk around the table and writes the map to a file.
 fn mapped(folder: &Path, change: impl FnOnce(&mut Sequence)) -> PriorMap {
     let settings = settings(&[]);
     let mut sequence = Sequence::clone(&sequence(&settings));
@@ -75,7 +75,7 @@ pub(crate) fn in_map(folder: &Path, more: &[&str]) -> Settings {
     settings(&[&AGAIN[..], more, &[&file]].concat())
 }
 
-/// Notes the poses, the names in the first frame, and when the place was found.
+/// Records the poses, the objects in the first frame, and the time of the relocalization.
 #[derive(Default)]
 pub(crate) struct Found {
     poses: Vec<Se3>,
@@ -101,7 +101,8 @@ impl Watch for Found {
     }
 }
 
-/// Degrees and metres between the truth and a pose in the frame of the first run's map, which is that of the simulated world.
+/// Returns the error of a pose in degrees and metres. The first run's map frame is the frame of the simulated
+/// world.
 fn off(sequence: &Sequence, frame: usize, pose: &Se3) -> [f64; 2] {
     let error = sequence.ground_truth.as_ref().unwrap().trajectory[frame].pose.between(pose);
     [error.rotation.log().norm().to_degrees(), error.translation.norm()]
@@ -153,7 +154,8 @@ fn a_batch_finds_the_same_place_as_a_stream() {
     let (_, report) =
         online("stream", all.clone().into(), &settings, &mut Found::default(), &mut Silent).unwrap();
     assert_eq!(mapped.found, told(&report).found);
-    // what the map was until then is not counted: all that was born since is there in the end, or was merged or withdrawn
+    // counts of the first map are dropped: every object added since exists at the end, or was merged or
+    // removed
     let known = begun(folder.path(), &told(&report).found.as_ref().unwrap().located.start, &[]);
     let (_, alone) = online("known", all.clone().into(), &known, &mut Found::default(), &mut Silent).unwrap();
     let [found, alone] = [report.online.unwrap(), alone.online.unwrap()];
@@ -193,7 +195,7 @@ fn another_table_is_not_taken_for_this_one() {
         let prior = told(&report);
         assert!(!prior.is_located && prior.seen.is_empty() && prior.added.is_empty());
         assert!(report.warnings.iter().any(|warning| warning.to_string().contains("not clear where in")));
-        // it has a map of its own
+        // the run has made a new map
         assert!(estimate.mapping.mapped().count() >= 8);
     }
 }
@@ -204,7 +206,7 @@ fn a_room_with_a_few_things_that_stand_as_in_the_map_is_not_taken_for_it() {
     let map = mapped(folder.path(), |_| {});
     let settings = in_map(folder.path(), &[]);
     let all = sequence(&settings);
-    // of twelve things, the layout of five fits; the others are nowhere
+    // the layout of five objects fits among twelve; the remaining objects are missing
     let mut few = Sequence::clone(&all);
     few.detections.retain(|detection| detection.object.is_some_and(|id| id.0 <= 5));
     for (stream, is_located) in [(all, true), (Arc::new(few), false)] {
@@ -220,7 +222,7 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
     let known = |id: u32| {
         move |detection: &manifactor_slam::sequence::Detection| detection.object != Some(ObjectId(id))
     };
-    // the first walk sees all but one, and the second all but another
+    // each walk misses one object, each a different one
     let map = mapped(folder.path(), |sequence| sequence.detections.retain(known(2)));
     let settings = in_map(folder.path(), &[]);
     let mut second = Sequence::clone(&sequence(&settings));
@@ -241,7 +243,7 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
     let after = map_of(&estimate, &settings).unwrap();
     assert!(after.object(prior.gone[0]).is_none());
     assert!(prior.added.iter().any(|id| near(id, &after, place(2))), "{prior:?}");
-    // a map that is extended knows its objects better, and what they were in both walks
+    // an extended map has smaller covariances, and the looks and classes of both walks
     let id = prior.seen[0];
     let looks = |map: &PriorMap| map.object(id).unwrap().looks.expected;
     assert!(looks(&after) > looks(&map));
@@ -250,7 +252,7 @@ fn what_is_gone_is_told_and_what_is_new_is_added() {
     assert!(better + 1 >= prior.seen.len(), "{better} of {}", prior.seen.len());
 }
 
-/// Settings of a run that knows where it begins in the map: simulated walks begin at the pose that their odometry begins at.
+/// Returns settings with a known start in the map: simulated walks begin at the first pose of their odometry.
 pub(crate) fn begun(folder: &Path, first: &Se3, more: &[&str]) -> Settings {
     let rotation = format!("prior_map.start.rotation={:?}", first.rotation.quaternion_xyzw());
     let translation = format!("prior_map.start.translation={:?}", first.translation.as_slice());
@@ -263,7 +265,7 @@ fn what_is_not_seen_again_does_not_fade() {
     let mut map = mapped(folder.path(), |_| {});
     for _ in 0..2 {
         let all = sequence(&in_map(folder.path(), &[]));
-        // too few frames to say that anything is gone
+        // with so few frames no object counts as gone
         let mut few = Sequence::clone(&all);
         few.frames.truncate(3);
         few.detections.clear();
@@ -293,14 +295,14 @@ fn an_older_map_does_not_stay_beside_results_without_one() {
     let record = VariantRecord::new(variant, &estimate);
     let written = write_variant(&run, variant, &estimate, &report, &record).unwrap();
     assert!(written.join("map.json").is_file());
-    // of a graph with a variable that is not there nothing has a covariance
+    // a graph with an unknown variable has no covariances
     let value = *estimate.landmarks()[0].quadric;
     estimate.mapping.graph.add(["nowhere"], QuadricPrior { value });
     write_variant(&run, variant, &estimate, &report, &record).unwrap();
     assert!(!written.join("map.json").exists() && written.join("objects.json").is_file());
 }
 
-/// Frames that cannot be taken at both sides of the place where it is found.
+/// Invalid frames before and after the relocalization.
 #[test]
 fn a_frame_that_is_left_out_counts_once_and_in_no_number() {
     let folder = tempfile::tempdir().unwrap();
@@ -314,12 +316,12 @@ fn a_frame_that_is_left_out_counts_once_and_in_no_number() {
     let online = report.online.as_ref().unwrap();
     assert_eq!((online.refusals, online.refused.len(), watch.0), (1, 1, 1));
     let mapped = Mapped::new(all, &settings, &mut Silent);
-    // a batch takes no frame that is not finite: it is the place that is compared, by the number of frames that were taken
+    // a batch does not accept non-finite frames, so only the frame of the relocalization is compared
     let found = mapped.map(|mapped| mapped.found.unwrap().frame);
     assert_eq!(found.ok().or(watch.1), watch.1);
 }
 
-/// Counts frames that are left out, and notes when the place was found.
+/// Counts skipped frames, and records the time of the relocalization.
 struct Left(usize, Option<usize>);
 
 impl Watch for Left {
@@ -370,7 +372,7 @@ fn what_the_solver_has_rejected_says_nothing_in_the_map() {
     let rejected: Vec<usize> =
         (0..estimate.solution.weights.len()).filter(|i| estimate.solution.weights[*i] == 0.0).collect();
     assert!(rejected.len() > 5, "{rejected:?}");
-    // the same estimate of a graph that never had what was rejected
+    // must equal the estimate of a graph that never contained the rejected factors
     let mut without = estimate.clone();
     let mut place = 0;
     without.mapping.graph.factors_mut().retain(|_| {
@@ -390,7 +392,7 @@ fn what_is_too_far_away_to_be_seen_is_not_looked_at() {
     let folder = tempfile::tempdir().unwrap();
     let map = mapped(folder.path(), |_| {});
     assert!(map.objects.iter().all(|object| object.least_px.is_some_and(|size| size > 5.0)));
-    // a map of things that were seen from close by only
+    // a map of objects that were only detected from nearby
     let near = map.objects.iter().map(|object| {
         let object = PriorObject { least_px: Some(1000.0), ..PriorObject::clone(object) };
         Arc::new(object)

@@ -1,4 +1,4 @@
-//! The scenes of the simulated experiment, as they were settled before anything was tuned.
+//! Scenes of the simulated experiment, as fixed before any tuning.
 use manifactor_config::{Document, Format};
 use manifactor_slam::experiment::{Experiment, Trial};
 use manifactor_slam::run::Run;
@@ -18,13 +18,13 @@ fn experiment(name: &str) -> Experiment {
     Experiment::read(&Document::open(folder().join(name)).unwrap()).unwrap()
 }
 
-/// The scene of a trial.
+/// Returns the scene of a trial.
 fn scene<'a>(experiment: &Experiment, trial: &'a Trial) -> &'a str {
     let column = experiment.columns.iter().position(|column| column == "scene").unwrap();
     &trial.labels[column]
 }
 
-/// A line for each object: the scene, the object, its class, its place and the extents of the box around it, in mm.
+/// Returns a line for each object: scene, object, class, place and extents of its box, in mm.
 fn objects(scene: &str, sequence: &Sequence) -> String {
     let mut text = String::new();
     for object in &sequence.ground_truth.as_ref().unwrap().objects {
@@ -69,7 +69,7 @@ fn nothing_is_tuned_on_the_scenes_that_are_reported() {
 
 #[test]
 fn errors_are_as_large_as_covariances_say_where_the_noise_is_known() {
-    // an even circle: all motions are alike, and their noise is a share of them
+    // an even circle: all motions are equal, and their noise is a share of them
     let (frames, share) = (60, 0.05);
     let turn = 300f64.to_radians() / f64::from(frames - 1);
     let step = 2.0 * 2.2 * (turn / 2.0).sin();

@@ -1,6 +1,6 @@
-//! The TUM RGB-D sequences of the paper, read where `MANIFACTOR_DATA` says that they lie.
+//! TUM RGB-D sequences of the paper, read from the folder in `MANIFACTOR_DATA`.
 //!
-//! Settings and reference: gtsam-quadrics 0.3.0 with GTSAM's Levenberg-Marquardt on the same input.
+//! Settings and reference: gtsam-quadrics 0.3.0 with GTSAM's Levenberg-Marquardt on equal input.
 use manifactor_config::Document;
 use manifactor_slam::estimate::Estimate;
 use manifactor_slam::mapping::Mapping;
@@ -11,7 +11,7 @@ use manifactor_slam::variance::MotionChoice;
 use manifactor_solve::{Silent, Stall, Termination};
 use std::path::{Path, PathBuf};
 
-/// The data folder; `None`, with a message, if it is not given.
+/// Returns the data folder; `None`, with a message, if it is not given.
 pub(crate) fn data() -> Option<PathBuf> {
     let data = std::env::var_os("MANIFACTOR_DATA").map(PathBuf::from);
     if data.is_none() {
@@ -32,7 +32,7 @@ fn run(data: &Path, document: &RunDocument, variant: &str) -> (Estimate, Variant
     Run::new(document, Some(data.to_owned())).variant(variant, &mut Silent).unwrap()
 }
 
-/// Objects and boxes of a config's variant `Q`.
+/// Returns the numbers of objects and boxes of a config's variant `Q`.
 fn counts(data: &Path, config: &str, odometry: &str) -> (usize, usize) {
     let run = document(config, &[&format!("source.odometry = 'trajectories/{odometry}.txt'")]);
     let variant = run.variants.iter().find(|variant| variant.name == "Q").unwrap();
@@ -41,8 +41,8 @@ fn counts(data: &Path, config: &str, odometry: &str) -> (usize, usize) {
     (mapping.mapped().count(), mapping.mapped().map(|object| object.boxes).sum())
 }
 
-/// The cost as GTSAM 4.0 reports it for factors with a Cauchy(1) loss: the residual is weighted before the loss is
-/// taken of it, ½ ln(1 + s/(1 + s)) instead of ½ ln(1 + s).
+/// Returns the cost as GTSAM 4.0 reports it for factors with a Cauchy(1) loss. GTSAM weights the residual
+/// before it applies the loss: ½ ln(1 + s/(1 + s)) instead of ½ ln(1 + s).
 fn weighted_twice(estimate: &Estimate) -> f64 {
     let cost = |factor: &manifactor_graph::batch::FactorState| {
         let s: f64 = factor.whitened.iter().map(|x| x * x).sum();
@@ -52,7 +52,7 @@ fn weighted_twice(estimate: &Estimate) -> f64 {
     estimate.solution.factors.iter().map(cost).sum()
 }
 
-/// No number that is none, no semi-axis that is not positive, no factor that is lost in silence.
+/// Checks that all numbers are finite, all semi-axes positive, and that no factor is lost without a message.
 fn assert_sound(estimate: &Estimate, what: &str) {
     assert!(estimate.solution.outcome.final_cost.is_finite(), "{what}");
     let finite = estimate.solution.values.iter().all(|(_, value)| value.erased().is_finite());
@@ -73,7 +73,7 @@ fn the_same_objects_and_boxes_pass_the_filters_as_in_the_reference() {
     assert_eq!(counts(&data, fr3, "dxslam_drifting_gpetrak"), (42, 9707));
 }
 
-/// A row of the reference's table: costs and ATE (m) of Q, Q+O, Q C and Q+O C, and the ATE of what came in.
+/// A row of the reference's table: costs and ATE (m) of Q, Q+O, Q C and Q+O C, and the ATE of the input.
 struct Reference {
     config: &'static str,
     odometry: &'static str,
@@ -160,7 +160,7 @@ fn no_cost_is_above_the_reference() {
             if cost > reference * 1.001 {
                 above.push(format!("{what}: {cost}, reference {reference}"));
             }
-            // the orientation factor's cost jumps where another semi-axis becomes the longest; as the reference,
+            // the orientation factor's cost jumps at a change of the longest semi-axis; as in the reference,
             // at most 100 iterations are made
             let ended = &report.solve.termination;
             let at_a_jump = *ended == Termination::Stalled { reason: Stall::Jump } && variant.contains('O');
@@ -202,7 +202,7 @@ fn at_no_setting_an_estimate_is_unsound() {
     }
 }
 
-/// The gain of ATE and the noise of odometry that is found, where the document says that its noise is `sigma`.
+/// Returns the gain of ATE and the estimated noise of odometry if the document gives `sigma` as its noise.
 fn corrected(data: &Path, odometry: &str, sigma: f64) -> (f64, MotionChoice) {
     let sets = [
         format!("source.odometry = 'trajectories/{odometry}.txt'"),

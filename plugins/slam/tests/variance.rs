@@ -1,4 +1,4 @@
-//! Variance components on data whose noise is known.
+//! Variance components on data with known noise.
 use manifactor_config::{Document, Format};
 use manifactor_graph::loss::Loss;
 use manifactor_slam::run::Run;
@@ -7,7 +7,8 @@ use manifactor_slam::variance::Components;
 use manifactor_solve::Silent;
 use std::sync::Arc;
 
-/// The noise that is found in a simulated recording, where the search begins at `sigma` and `sigma_px`.
+/// Returns the noise that is estimated in a simulated recording, with `sigma` and `sigma_px` as initial
+/// values.
 fn found(odometry: f64, sigma: f64, sigma_px: f64) -> Components {
     let text = format!(
         "
@@ -30,10 +31,10 @@ fn found(odometry: f64, sigma: f64, sigma_px: f64) -> Components {
 fn the_noise_of_the_simulation_is_found_whatever_the_document_says_of_it() {
     let [found, again] = [found(0.1, 0.0001, 50.0), found(0.1, 0.1, 2.0)];
     assert_eq!(found, again);
-    // balls are ellipsoids: the detector's 2 px are all there is
+    // balls are ellipsoids, so the detector's 2 px are the only error
     let sigma_px = found.boxes["all"].sigma_px;
     assert!((sigma_px - 2.0).abs() < 0.3, "{sigma_px}");
-    // 10 % of 5 degrees, by axis; the grid has half decades
+    // 10 % of 5 degrees, per axis; the grid has half decades
     let expected = 0.1 * (300f64 / 59.0).to_radians() / 3f64.sqrt();
     let choice = found.odometry.unwrap();
     assert!(!choice.is_kept(), "{choice:?}");
@@ -54,7 +55,7 @@ fn a_worse_odometry_is_found_to_be_worse() {
     assert!(bad.rotation > 2.0 * good.rotation && bad.translation > good.translation, "{good:?} {bad:?}");
 }
 
-/// The losses of the boxes' factors after one round, with the correlation time that the round found.
+/// Returns the losses of the boxes' factors after one round, with the correlation time of that round.
 fn losses(loss: &str) -> (Vec<Arc<dyn Loss>>, f64) {
     let text = format!(
         "

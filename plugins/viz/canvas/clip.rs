@@ -1,8 +1,9 @@
-//! Restricts paths to a little more than the sheet. A renderer computes in single precision or in fixed point, so that a
-//! coordinate far outside is drawn wrong, and makes tiny-skia panic.
+//! Clips paths slightly outside the sheet. Renderers compute in single precision or fixed point, so they
+//! draw far coordinates incorrectly, and tiny-skia panics.
 use super::{Item, Sheet};
 
-/// Pixels around the sheet: wider than any stroke, so that an edge along this border is not visible.
+/// Margin around the sheet, wider than any stroke, so that an edge along this border is not visible. Unit:
+/// pixels.
 const MARGIN: f64 = 64.0;
 
 type Point = [f64; 2];
@@ -17,8 +18,8 @@ struct Side {
 }
 
 impl Sheet {
-    /// The items that can be drawn. Paths are cut at a margin around the sheet; paths, dots and texts outside of it, and
-    /// those with a coordinate that is not finite, are left out.
+    /// Returns the items that can be drawn. Paths are clipped at a margin around the sheet. Items outside
+    /// of it, and items with a non-finite coordinate, are omitted.
     pub(super) fn drawable(&self) -> impl Iterator<Item = Item> {
         let sides = [
             Side { axis: 0, bound: self.width + MARGIN, sign: 1.0 },
@@ -48,7 +49,8 @@ impl Side {
         self.sign * p[self.axis] <= self.sign * self.bound
     }
 
-    /// The point at which a segment crosses the bound. Computed with halves, as the difference of two finite numbers may overflow.
+    /// Returns the intersection of a segment with the bound. It computes with halves, because the
+    /// difference of two finite numbers may overflow.
     fn crossing(&self, a: Point, b: Point) -> Point {
         let from = 0.5 * a[self.axis];
         let share = (0.5 * self.bound - from) / (0.5 * b[self.axis] - from);
@@ -58,7 +60,7 @@ impl Side {
     }
 }
 
-/// The part of a filled polygon that lies inside (Sutherland and Hodgman, 1974).
+/// Returns the part of a filled polygon that lies inside (Sutherland and Hodgman, 1974).
 fn polygon(points: &[Point], sides: &[Side]) -> Vec<Point> {
     sides.iter().fold(points.to_vec(), |points, side| {
         let ends = points.iter().cycle().skip(1);
@@ -75,7 +77,7 @@ fn polygon(points: &[Point], sides: &[Side]) -> Vec<Point> {
     })
 }
 
-/// The parts of a line that lie inside.
+/// Returns the parts of a line that lie inside.
 fn lines(points: &[Point], sides: &[Side]) -> Vec<Vec<Point>> {
     let mut parts: Vec<Vec<Point>> = vec![];
     for (a, b) in points.iter().zip(points.iter().skip(1)) {

@@ -1,4 +1,4 @@
-//! The letters of pictures: DejaVu Sans, which is part of the program, so that widths and PNGs are the same everywhere.
+//! The font of the pictures: DejaVu Sans, embedded so that text widths and PNGs are identical on all systems.
 use std::sync::LazyLock;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
@@ -14,7 +14,7 @@ fn glyph(face: &Face<'_>, c: char) -> GlyphId {
     face.glyph_index(c).unwrap_or_default()
 }
 
-/// How wide a text is at a size, in pixels.
+/// Returns the width of a text at a font size. Unit: pixels.
 pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
     let Some(face) = face(bold) else { return 0.6 * size * text.chars().count() as f64 };
     let units = text.chars().map(|c| f64::from(face.glyph_hor_advance(glyph(face, c)).unwrap_or(0)));
@@ -33,7 +33,7 @@ pub(crate) fn outlines(text: &str, size: f64, bold: bool, builder: &mut dyn Outl
     }
 }
 
-/// Takes outlines, in pixels.
+/// A receiver of outlines. Unit: pixels.
 pub(crate) trait Outlines {
     fn begin(&mut self, at: [f64; 2]);
     fn line(&mut self, to: [f64; 2]);

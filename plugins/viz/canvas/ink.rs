@@ -1,31 +1,31 @@
-//! Colours by what they mean: the same in all pictures of a run and in its page.
+//! Colours by meaning, shared by all pictures of a run and its page.
 
-/// What is drawn: decides the colour.
+/// The meaning of an element, which determines its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ink {
-    /// What it is drawn on.
+    /// The background.
     Paper,
     /// Titles and labels.
     Text,
-    /// What has to step back: axes and their numbers.
+    /// Less important elements: axes and their numbers.
     Faint,
     /// Lines behind the data.
     Grid,
     /// The true trajectory.
     Truth,
-    /// The trajectory by odometry alone.
+    /// The trajectory from odometry alone.
     Odometry,
     /// The estimated trajectory.
     Estimate,
-    /// Values that stand out.
+    /// Outliers.
     Outlier,
-    /// A class of objects, by its place among all classes.
+    /// A class of objects, by its index among all classes.
     Class(usize),
-    /// A curve of a chart, by its place.
+    /// A curve of a chart, by its index.
     Series(usize),
 }
 
-/// Dark lines on white, or light ones on black.
+/// A colour theme: dark lines on white, or light ones on black.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Theme {
     /// For paper.
@@ -35,18 +35,19 @@ pub enum Theme {
     Dark,
 }
 
-/// Of classes: neither so light nor so dark that they are lost on white or on black.
+/// Colours of classes, all of medium lightness, so that they are visible on white and on black.
 const CLASSES: [&str; 24] = [
     "#7b61d9", "#d6455d", "#2b9e55", "#1a9fc0", "#b8479e", "#c08a0e", "#1f9c8c", "#a06c3a", "#859528",
     "#4c78d6", "#dc6a3c", "#7d8590", "#5fa548", "#a55a80", "#e0559b", "#0d9a72", "#9a78e0", "#c4785a",
     "#4c8a8c", "#b04a40", "#5b7ff0", "#a5973a", "#d58724", "#7f8236",
 ];
 
-/// Of curves, told apart by those who see no red: after Okabe and Ito.
+/// Colours of curves that remain distinct without red (protanopia), after Okabe and Ito.
 const SERIES: [&str; 8] =
     ["#1f83c4", "#dd6b20", "#1b9e77", "#c76aa3", "#d19a08", "#4fa9dc", "#8a8f98", "#a09a10"];
 
-/// The inks that differ between themes, with their names in style sheets, on light and on dark.
+/// The inks that depend on the theme, with their names in style sheets and their colours on light and on
+/// dark.
 const THEMED: [(Ink, &str, [&str; 2]); 5] = [
     (Ink::Paper, "paper", ["#ffffff", "#14171c"]),
     (Ink::Text, "text", ["#1d2129", "#e6e9ee"]),
@@ -56,12 +57,12 @@ const THEMED: [(Ink, &str, [&str; 2]); 5] = [
 ];
 
 impl Ink {
-    /// Its name as a variable of a style sheet, if it depends on the theme.
+    /// Returns the name of its style sheet variable, if it depends on the theme.
     pub(crate) fn variable(self) -> Option<&'static str> {
         THEMED.iter().find(|(ink, ..)| *ink == self).map(|(_, name, _)| *name)
     }
 
-    /// Its colour.
+    /// Returns the colour as hexadecimal text.
     pub(crate) fn hex(self, theme: Theme) -> &'static str {
         let of = |list: &'static [&'static str], place: usize| list.get(place % list.len()).copied();
         let fixed = match self {
@@ -79,7 +80,7 @@ impl Ink {
         fixed.unwrap_or_else(themed)
     }
 
-    /// Its parts of red, green and blue.
+    /// Returns red, green and blue.
     pub(crate) fn rgb(self, theme: Theme) -> [u8; 3] {
         let hex = self.hex(theme);
         [1, 3, 5]
@@ -87,7 +88,7 @@ impl Ink {
     }
 }
 
-/// The variables of all inks that depend on the theme, for a page.
+/// Returns the style sheet variables of all inks that depend on the theme.
 pub(crate) fn style_sheet(theme: Theme) -> String {
     THEMED.iter().map(|(ink, name, _)| format!("--{name}:{};", ink.hex(theme))).collect()
 }

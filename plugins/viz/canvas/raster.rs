@@ -1,15 +1,16 @@
-//! A sheet as PNG.
+//! The PNG of a sheet.
 use super::font::{Outlines, outlines, text_width};
 use super::{Anchor, DASHES, Ink, Item, Sheet, Text, Theme};
 use tiny_skia::{Color, FillRule, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform};
 
-/// Pixels of a PNG for each of the sheet: sharp where it is shown large, and in print. Fewer, where the sheet is large.
+/// Resolution of a PNG, so that it is sharp when enlarged or printed. Reduced for large sheets. Unit:
+/// pixels per pixel of the sheet.
 const SCALE: f64 = 2.0;
-/// Most pixels along a side.
+/// Largest width and height. Unit: pixels.
 const MOST: f64 = 16_000.0;
 
 impl Sheet {
-    /// The PNG's bytes; `Err` says why there is none.
+    /// Returns the bytes of the PNG, or the reason why it cannot be drawn.
     pub(crate) fn png(&self, theme: Theme) -> Result<Vec<u8>, String> {
         let scale = SCALE.min(MOST / self.width.max(self.height));
         let [width, height] = [self.width, self.height].map(|x| x * scale);
@@ -87,7 +88,7 @@ fn polygon(points: &[[f64; 2]], closed: bool) -> Option<Path> {
     builder.finish()
 }
 
-/// The outline of a text where it stands.
+/// Returns the outline of a text at its position.
 fn letters(text: &Text) -> Option<Path> {
     let width = text_width(&text.text, text.size, text.bold);
     let before = match text.anchor {

@@ -1,14 +1,14 @@
-//! A sheet as SVG.
+//! The SVG of a sheet.
 use super::{Anchor, DASHES, Ink, Item, Sheet, Stroke, Text, Theme};
 use crate::xml::escape;
 use std::fmt::Write as _;
 
-/// Where colours come from.
+/// Source of the colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Colors {
-    /// A theme, for a file.
+    /// The colours of a theme, for a file.
     Of(Theme),
-    /// The variables of the page that it is a part of, which follow the reader's choice.
+    /// The variables of the surrounding page, which follow the reader's choice.
     OfPage,
 }
 
@@ -22,11 +22,11 @@ impl Colors {
     }
 }
 
-/// As DejaVu Sans is wide; widths were measured with it.
+/// Fonts with the width of DejaVu Sans, which measures the texts.
 const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
 
 impl Sheet {
-    /// A document, or a part of a page; `title` is read aloud in place of it.
+    /// Returns an SVG document, or a part of a page. Screen readers read `title` instead of the picture.
     pub(crate) fn svg(&self, title: &str, colors: Colors) -> String {
         let (width, height) = (number(self.width), number(self.height));
         let mut svg = format!(
@@ -44,7 +44,7 @@ impl Sheet {
                 }
                 Item::Dot { at: [x, y], radius, ink } => {
                     let (x, y, r) = (number(x), number(y), number(radius));
-                    // writing to a String does not fail
+                    // writing to a String cannot fail
                     let _ = writeln!(
                         svg,
                         "<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{}\"/>",
@@ -108,12 +108,12 @@ fn words(svg: &mut String, text: &Text, colors: Colors) {
     let _ = writeln!(svg, ">{}</text>", escape(&text.text));
 }
 
-/// What a corner of a line needs: the PNG has half a pixel for it.
+/// Formats a corner of a line; the PNG has half a pixel of accuracy.
 fn tenths(x: f64) -> String {
     number((x * 10.0).round() / 10.0)
 }
 
-/// Hundredths of a pixel.
+/// Formats a number with hundredths of a pixel.
 fn number(x: f64) -> String {
     let text = format!("{x:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -1,12 +1,12 @@
-//! The frame of a chart: where numbers stand on the sheet, and the lines and numbers around them.
+//! The frame of a chart: its scales on the sheet, and the lines and numbers around it.
 use super::scale::Scale;
 use crate::canvas::{Anchor, Ink, Sheet, Stroke, Text, text_width};
 
-/// Pixels of the letters of numbers and of labels.
+/// Font sizes of numbers, labels and titles. Unit: pixels.
 pub(crate) const NUMBERS: f64 = 11.0;
 pub(crate) const LABELS: f64 = 12.0;
 pub(crate) const TITLE: f64 = 15.0;
-/// What lies above a chart for its title.
+/// Height of the title above a chart. Unit: pixels.
 pub(crate) const HEAD: f64 = 26.0;
 
 /// Two scales on a rectangle of the sheet.
@@ -21,7 +21,7 @@ pub(crate) struct Axes {
 }
 
 impl Axes {
-    /// What numbers and a label to the left of the area take.
+    /// Width of the numbers and of the label to the left of the area.
     pub(crate) fn left(y: &Scale, height: f64) -> f64 {
         let widest = y
             .ticks(rows(height))
@@ -31,12 +31,12 @@ impl Axes {
         widest + LABELS + 18.0
     }
 
-    /// What numbers, and a label if there is one, take below the area.
+    /// Height of the numbers, and of the label if there is one, below the area.
     pub(crate) fn below(label: &str) -> f64 {
         if label.is_empty() { 20.0 } else { 38.0 }
     }
 
-    /// Where a point stands.
+    /// Position of a point on the sheet.
     pub(crate) fn point(&self, x: f64, y: f64) -> [f64; 2] {
         let [xmin, ymin, xmax, ymax] = self.area;
         [xmin + self.x.place(x) * (xmax - xmin), ymax - self.y.place(y) * (ymax - ymin)]
@@ -47,7 +47,7 @@ impl Axes {
         self.draw_with(sheet, |text| text);
     }
 
-    /// The same for an image, whose y grows downward: the scale has -y, and y is written.
+    /// Draws the frame of an image, whose y grows downward. The scale holds -y, and the numbers show y.
     pub(crate) fn draw_downward(&self, sheet: &mut Sheet) {
         self.draw_with(sheet, |text| text.trim_start_matches('-').to_owned());
     }
@@ -78,12 +78,12 @@ impl Axes {
     }
 }
 
-/// How many numbers fit upward.
+/// Number of tick labels that fit vertically.
 fn rows(height: f64) -> usize {
     (height / 32.0).clamp(3.0, 8.0) as usize
 }
 
-/// A text, cut where it would be wider than this.
+/// Shortens a text to a width.
 pub(crate) fn fitted(text: &str, size: f64, width: f64) -> String {
     if text_width(text, size, false) <= width {
         return text.to_owned();
@@ -99,7 +99,7 @@ pub(crate) fn fitted(text: &str, size: f64, width: f64) -> String {
     kept + "…"
 }
 
-/// A title at the top of a sheet, cut if the sheet is too narrow for it.
+/// Draws a title at the top of a sheet, shortened to the width of the sheet.
 pub(crate) fn title(sheet: &mut Sheet, text: &str) {
     // bold letters are wider by a tenth
     let text = fitted(text, 1.12 * TITLE, sheet.width - 20.0);

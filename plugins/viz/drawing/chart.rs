@@ -1,30 +1,30 @@
-//! Curves over a common axis, in one panel or in several above each other.
+//! Curves over a common axis, in one panel or in several stacked ones.
 use super::axes::{Axes, HEAD, title};
 use super::legend::{Entry, legend};
 use super::scale::Scale;
 use super::series::stretches;
 use crate::canvas::{Ink, Sheet, Stroke};
 
-/// Curves over a common axis.
+/// A panel of curves.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Chart {
-    /// What is upward, with its unit.
+    /// Quantity on the y axis, with its unit.
     pub(crate) y: String,
-    /// Whether y goes by powers of ten.
+    /// True for a logarithmic y axis.
     pub(crate) log_y: bool,
-    /// Whether y begins at zero.
+    /// True if the y axis begins at zero.
     pub(crate) begun_at_zero: bool,
     pub(crate) curves: Vec<Curve>,
 }
 
-/// A curve, with its name.
+/// A named curve.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Curve {
     pub(crate) name: String,
     pub(crate) stroke: Stroke,
-    /// Whether each point has a dot.
+    /// True if each point has a dot.
     pub(crate) dots: bool,
-    /// In order along the axis; one that is not finite is a value that is missing.
+    /// Points in order of x. A non-finite point is a missing value.
     pub(crate) points: Vec<(f64, f64)>,
 }
 
@@ -43,8 +43,8 @@ impl Curve {
     }
 }
 
-/// Panels above each other over one axis, under a title. Points that are not finite, or not above zero on an axis of
-/// powers, are left out; `None` where no panel has any point.
+/// Draws stacked panels over one axis, with a title. Points that are not finite are omitted, and also
+/// points at or below zero on a logarithmic axis. Returns `None` if no panel has a point.
 pub(crate) fn figure(
     text: &str,
     x: &str,
@@ -76,7 +76,7 @@ pub(crate) fn figure(
     let entries = legend(&entries, width - 20.0);
     let top = HEAD + entries.height + 8.0;
     let each = (height - top - Axes::below(x)) / panels.len() as f64;
-    // room above each panel but the first for the numbers of the one before
+    // space above each panel except the first, for the numbers of the panel above it
     let each = each.max(70.0);
     let scales: Vec<Scale> = panels.iter().filter_map(upward).collect();
     let left = scales.iter().map(|y| Axes::left(y, each - 22.0)).fold(0.0, f64::max);
@@ -113,8 +113,8 @@ fn points(panel: &Chart) -> impl Iterator<Item = &(f64, f64)> {
     panel.curves.iter().flat_map(|curve| &curve.points)
 }
 
-/// A line of no more points than can be told apart: of those that share a pixel to the right, the first, the lowest,
-/// the highest and the last.
+/// Reduces a line to the points that are visible. In each column of pixels, it keeps the first, the lowest,
+/// the highest and the last point.
 fn thinned(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     if points.len() < 1500 {
         return points;

@@ -1,4 +1,4 @@
-//! How values are distributed, group by group.
+//! Distributions of values by group.
 use super::axes::{Axes, HEAD, LABELS, NUMBERS, fitted, title};
 use super::scale::Scale;
 use crate::canvas::{Anchor, Ink, Sheet, Stroke, Text, text_width};
@@ -6,15 +6,15 @@ use crate::canvas::{Anchor, Ink, Sheet, Stroke, Text, text_width};
 /// Groups of values, one below the other.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Distribution {
-    /// Written over it.
+    /// Title of the picture.
     pub(crate) title: String,
-    /// What the values are, with their unit.
+    /// Meaning of the values, with their unit.
     pub(crate) x: String,
     /// The groups, each with its name.
     pub(crate) groups: Vec<(String, Vec<f64>)>,
 }
 
-/// The five numbers of a box, after Tukey, and what lies beyond its whiskers.
+/// The five numbers of Tukey's box plot, and the values beyond the whiskers.
 #[derive(Debug, Clone, PartialEq)]
 struct FiveNumbers {
     whiskers: [f64; 2],
@@ -22,15 +22,15 @@ struct FiveNumbers {
     beyond: Vec<f64>,
 }
 
-/// Pixels of a group; how many groups there is room for; dots that are drawn of each.
+/// Height of a group in pixels, largest number of groups, and largest number of dots of a group.
 const ROW: f64 = 30.0;
 const ROWS: usize = 400;
 const DOTS: usize = 60;
 
 impl Distribution {
-    /// A box from quartile to quartile for each group, with the median in it; whiskers to the last value within one and a
-    /// half times its width; values beyond the whiskers as dots, those off the scale counted at an arrow. Values
-    /// that are not finite are left out; `None` where nothing is left.
+    /// Draws a box plot for each group: the box spans the quartiles and shows the median; the whiskers end
+    /// at the last value within 1.5 times the box's width. Values beyond the whiskers are dots; values off
+    /// the scale are counted at an arrow. Non-finite values are omitted. Returns `None` if nothing is left.
     pub(crate) fn sheet(&self, width: f64) -> Option<Sheet> {
         let groups = self.groups.iter().filter_map(|(name, values)| Some((name, FiveNumbers::of(values)?)));
         let mut groups: Vec<(&String, FiveNumbers)> = groups.collect();
@@ -88,14 +88,14 @@ impl FiveNumbers {
         let quartile = |share: f64| {
             let place = share * (sorted.len() - 1) as f64;
             let at = |place: f64| sorted.get(place as usize).copied().unwrap_or(last);
-            // not by the difference, which overflows between -1e308 and 1e308
+            // the difference of the two would overflow between -1e308 and 1e308
             at(place.floor()) * (1.0 - place.fract()) + at(place.ceil()) * place.fract()
         };
         let quartiles = [quartile(0.25), quartile(0.5), quartile(0.75)];
         let reach = 1.5 * (quartiles[2] - quartiles[0]);
         let (low, high) = (quartiles[0] - reach, quartiles[2] + reach);
         let inside = || sorted.iter().copied().filter(|x| *x >= low && *x <= high);
-        // between two values, a quartile may lie outside of all that is inside
+        // an interpolated quartile may lie outside of all values between the whiskers
         let whiskers = [
             inside().fold(last, f64::min).min(quartiles[0]),
             inside().fold(first, f64::max).max(quartiles[2]),
@@ -118,7 +118,7 @@ impl FiveNumbers {
         sheet.outline(corners, stroke, Some((Ink::Series(0), 0.25)));
         sheet.line(vec![[median, y - half], [median, y + half]], Stroke::solid(Ink::Text, 2.0));
         let (seen, unseen): (Vec<f64>, Vec<f64>) = self.beyond.iter().partition(|x| axes.x.holds(**x));
-        // the ends are what matters; between them one dot in so many
+        // the ends matter most; between them, only every n-th dot is drawn
         let each = seen.len().div_ceil(DOTS).max(1);
         let ends = |i: usize| i.is_multiple_of(each) || i + 1 == seen.len();
         seen.iter()
@@ -140,7 +140,7 @@ impl FiveNumbers {
     }
 }
 
-/// How many values lie outside, and how far the farthest is.
+/// Describes the number of values off the scale, and the farthest of them.
 fn far(list: &[f64]) -> String {
     let farthest = list.iter().copied().fold(0.0, |far: f64, x| if x.abs() > far.abs() { x } else { far });
     let farthest = if farthest.abs() < 1e9 { format!("{farthest:.3}") } else { format!("{farthest:.3e}") };

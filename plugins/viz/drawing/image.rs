@@ -1,4 +1,4 @@
-//! What a camera sees: boxes as they were measured, and what the estimate puts there.
+//! The image of a camera: measured boxes and the predictions of the estimate.
 use super::axes::{Axes, HEAD, title};
 use super::labels::{Label, place};
 use super::legend::{Entry, legend};
@@ -10,15 +10,17 @@ use crate::canvas::{Ink, Sheet, Stroke};
 use manifactor_slam::record::{FrameRecord, SeenBox, VariantRecord};
 use nalgebra::{Matrix2, Point2};
 
-/// Most pixels upward for each to the right: a camera that is higher is drawn flatter, as a PNG takes memory for each pixel.
+/// Largest ratio of height to width. A taller image is drawn flatter, because a PNG needs memory for each
+/// pixel.
 const HIGHEST: f64 = 4.0;
 
-/// Pixels upward of the picture of a camera's image that is drawn at this width.
+/// Height of the picture of a camera's image, drawn at a width. Unit: pixels.
 fn drawn_height([width, height]: [f64; 2], drawn: f64) -> f64 {
     drawn * (height / width).min(HIGHEST)
 }
 
-/// One image: measured boxes dashed, estimated ellipses and the boxes around them solid, by class. Pixels, y downward.
+/// Draws one image: measured boxes dashed, estimated ellipses and their bounding boxes solid, coloured by
+/// class. Unit: pixels, y downward.
 pub(crate) fn image(
     variant: &VariantRecord,
     number: usize,
@@ -74,19 +76,19 @@ pub(crate) fn image(
     Picture::new(&format!("image_{number:06}"), format!("{text}: boxes measured and estimated"), sheet)
 }
 
-/// The corners of a box, of what of it is in the image.
+/// Returns the corners of a box, clipped to the image.
 fn clipped([xmin, ymin, xmax, ymax]: [f64; 4], [width, height]: [f64; 2]) -> [[f64; 2]; 4] {
     let corners = [[xmin, ymin], [xmax, ymin], [xmax, ymax], [xmin, ymax]];
     corners.map(|[x, y]| [x.clamp(0.0, width), y.clamp(0.0, height)])
 }
 
-/// The outline of an ellipse.
+/// Returns the outline of an ellipse.
 fn outline([x, y, xx, xy, yy]: [f64; 5]) -> Option<Vec<Point2<f64>>> {
     ellipse(&Point2::new(x, y), &Matrix2::new(xx, xy, xy, yy))
 }
 
-/// An even choice of `count` of the frames in which mapped objects were seen, the first and the last among them; all, if
-/// there are no more.
+/// Selects `count` evenly spaced frames with mapped objects, including the first and the last. Returns all
+/// of them if there are no more than `count`.
 pub(crate) fn frames_seen(variant: &VariantRecord, count: usize) -> Vec<usize> {
     let seen = |frame: &FrameRecord| frame.boxes.iter().any(|seen| seen.ellipse.is_some());
     let frames = variant.frames.iter().enumerate().filter(|(_, frame)| seen(frame)).map(|(i, _)| i);
@@ -96,7 +98,7 @@ pub(crate) fn frames_seen(variant: &VariantRecord, count: usize) -> Vec<usize> {
 fn spread(frames: &[usize], count: usize) -> Vec<usize> {
     let count = count.min(frames.len());
     let last = count.saturating_sub(1).max(1);
-    // a number of frames squared is far from the largest number
+    // the square of a number of frames cannot overflow
     let places = (0..count).map(|k| k * (frames.len() - 1) / last);
     places.filter_map(|place| frames.get(place).copied()).collect()
 }

@@ -1,7 +1,7 @@
-//! Names beside what they name, none on another.
+//! Labels next to their objects, without overlaps.
 use crate::canvas::{Ink, Sheet, Text, text_width};
 
-/// A name, and the box around what it names: xmin, ymin, xmax, ymax in pixels.
+/// A name, and the box around its object: xmin, ymin, xmax, ymax. Unit: pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Label {
     pub(crate) text: String,
@@ -12,8 +12,8 @@ pub(crate) struct Label {
 const SIZE: f64 = 11.0;
 const GAP: f64 = 3.0;
 
-/// Draws the labels that have room within `area`: above, below, to the right or to the left of what they name. One that
-/// has none is left out: the legend has its colour.
+/// Draws the labels that fit within `area`: above, below, to the right or to the left of their object. A
+/// label without room is omitted, because the legend has its colour.
 pub(crate) fn place(sheet: &mut Sheet, labels: &[Label], area: [f64; 4]) {
     let mut taken: Vec<[f64; 4]> = vec![];
     for label in labels {

@@ -1,4 +1,4 @@
-//! What the lines and colours of a picture stand for, in rows.
+//! The legend: names of lines and colours, in rows.
 use super::axes::{NUMBERS, fitted};
 use crate::canvas::{Ink, Sheet, Stroke, Text, text_width};
 
@@ -9,14 +9,14 @@ pub(crate) struct Entry {
     pub(crate) mark: Mark,
 }
 
-/// How an entry is shown.
+/// The sample of an entry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Mark {
     Line(Stroke),
     Patch(Ink),
 }
 
-/// Pixels of a row, of a mark, and from a mark to its name.
+/// Height of a row, width of a sample, and gap between a sample and its name. Unit: pixels.
 const ROW: f64 = 18.0;
 const MARK: f64 = 22.0;
 const GAP: f64 = 5.0;
@@ -31,7 +31,7 @@ impl Entry {
     }
 }
 
-/// Entries side by side, in as many rows as this width asks for.
+/// Draws entries side by side, in as many rows as the width requires.
 pub(crate) fn legend(entries: &[Entry], width: f64) -> Sheet {
     let mut sheet = Sheet::new(width, 0.0);
     let (mut x, mut y) = (0.0, 0.0);

@@ -11,19 +11,19 @@ use super::viewpoint::Viewpoint;
 use crate::canvas::{Ink, Sheet, Stroke};
 use nalgebra::{Point2, Vector2, Vector3};
 
-/// Classes in the legend.
+/// Number of classes in the legend.
 const CLASSES: usize = 60;
-/// The least and the largest height of the area as a share of the width.
+/// Smallest and largest height of the area, as a fraction of the width.
 const SHARES: [f64; 2] = [0.3, 0.9];
 
-/// A class, and the outline of an object of it.
+/// A class, and the outline of one of its objects.
 type Outline<'a> = (&'a str, Vec<Point2<f64>>);
 
-/// Draws a scene, in metres, both axes to the same scale.
+/// Draws a scene in metres, with one scale for both axes.
 ///
-/// What is true is dashed, what is estimated solid and filled; objects have the colour of their class. The picture shows
-/// all trajectories and true objects whole; an estimate far away from them is left outside, and the title says how many
-/// are. Coordinates that are not finite, or beyond the reach of an axis, are left out.
+/// The truth is dashed, the estimate solid and filled; objects have the colour of their class. The picture
+/// shows all trajectories and true objects entirely. A far estimate is left outside, and the title has the
+/// number of such estimates. Coordinates that are not finite, or beyond the range of an axis, are omitted.
 pub(crate) fn map(scene: &Scene, view: Viewpoint, palette: &Palette, width: f64) -> Picture {
     let plane = view.plane(&scene.up);
     let point = |p: Vector3<f64>| Some(plane.project(&p)).filter(|p| p.iter().all(|x| x.abs() <= FAR));
@@ -65,7 +65,7 @@ pub(crate) fn map(scene: &Scene, view: Viewpoint, palette: &Palette, width: f64)
     for (track, stretches) in scene.tracks.iter().zip(&tracks) {
         stretches.iter().for_each(|points| sheet.line(drawn(points), track.stroke));
     }
-    // seen from the side, what stands on one table stands on one line
+    // labels would overlap in a side view, because all objects on a table are on one line
     if view == Viewpoint::Top {
         let label = |(class, outline): &&Outline<'_>| Label {
             text: (*class).to_owned(),
@@ -103,7 +103,7 @@ fn entries(
     entries
 }
 
-/// The box around points.
+/// Returns the bounding box of points.
 fn around(points: &[[f64; 2]]) -> [f64; 4] {
     let end =
         |of: fn(&[f64; 2]) -> f64, pick: fn(f64, f64) -> f64, from| points.iter().map(of).fold(from, pick);
@@ -125,13 +125,14 @@ impl Extent {
         self.0 = Some((low.inf(p), high.sup(p)));
     }
 
-    /// How far out of it a point lies along x or y.
+    /// Returns how far a point lies outside along x or y.
     fn beyond(&self, p: &Point2<f64>) -> f64 {
         self.0.map_or(0.0, |(low, high)| (low - p).sup(&(p - high)).max().max(0.0))
     }
 
-    /// Includes the outlines that lie within half the extent's size around it, or three times as far out as the median
-    /// one, and returns them; how many do not. What most objects are beyond is a camera that hardly moved.
+    /// Includes the outlines within a margin around the extent, and returns them with the number of
+    /// outlines outside. The margin is half the extent's size, or three times the distance of the median
+    /// outline if that is larger. Most objects are far outside if the camera hardly moved.
     fn include_near<'a>(&mut self, outlines: &'a [Outline<'a>]) -> (Vec<&'a Outline<'a>>, usize) {
         let beyond = |o: &Outline<'_>| o.1.iter().map(|p| self.beyond(p)).fold(0.0, f64::max);
         let distances: Vec<f64> = outlines.iter().map(beyond).collect();
@@ -146,19 +147,19 @@ impl Extent {
         (near, outside)
     }
 
-    /// The longer side.
+    /// Returns the longer side.
     fn size(&self) -> f64 {
         self.0.map_or(0.0, |(low, high)| (high - low).max())
     }
 
-    /// Where it is shown on a sheet of this width.
+    /// Returns its scales on a sheet of this width.
     fn on(&self, width: f64) -> Plot {
         let (low, high) = self.0.unwrap_or((Point2::new(-1.0, -1.0), Point2::new(1.0, 1.0)));
-        // one point alone, or points so far out that a margin drowns in rounding
+        // for a single point, or points so far out that a relative margin is below rounding
         let margin = (0.03 * self.size()).max(1e-9 * low.coords.amax().max(high.coords.amax()));
         let margin = Vector2::repeat(if margin > 0.0 { margin } else { 1.0 });
         let (middle, mut half) = (nalgebra::center(&low, &high), 0.5 * (high - low) + margin);
-        // numbers and labels take at most that much; what they leave shows a little more to the right and left
+        // the most that numbers and labels need; space that they leave widens the view on both sides
         let across = width - 100.0;
         let height = (across * half.y / half.x).clamp(SHARES[0] * width, SHARES[1] * width);
         let metres = (half.x / across).max(half.y / height);
@@ -171,10 +172,10 @@ impl Extent {
     }
 }
 
-/// What is left free to the right, in pixels.
+/// Space at the right edge. Unit: pixels.
 const RIGHT: f64 = 18.0;
 
-/// Scales that are alike on both axes, and the area that they ask for, below 0.
+/// Scales with equal units on both axes, and the area that they need, from 0 downward.
 struct Plot {
     x: Scale,
     y: Scale,

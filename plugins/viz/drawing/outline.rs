@@ -1,23 +1,23 @@
-//! Outlines of ellipsoids, seen from far away.
+//! Outlines of ellipsoids in a parallel projection.
 use crate::drawing::scale::FAR;
 use crate::drawing::viewpoint::Plane;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Vector3};
 
-/// An ellipsoid: what objects are drawn as.
+/// An ellipsoid, the shape of a drawn object.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Shape {
-    /// Where it is, metres.
+    /// Centre. Unit: metres.
     pub(crate) centroid: Vector3<f64>,
-    /// A semi-axis in each column, metres: R diag(s).
+    /// One semi-axis per column: R diag(s). Unit: metres.
     pub(crate) axes: Matrix3<f64>,
 }
 
-/// Corners of the polygon that an ellipse is drawn as.
+/// Number of corners of the polygon that approximates an ellipse.
 const CORNERS: usize = 48;
 
 impl Shape {
-    /// The closed outline of its shadow, the ellipse of Σ a_k a_kᵀ, a_k the projected semi-axes. `None` if
-    /// there is nothing to draw that is finite and within the reach of an axis.
+    /// Returns the closed outline of its projection, the ellipse of Σ a_k a_kᵀ with the projected semi-axes
+    /// a_k. `None` if no finite outline lies within the range of an axis.
     pub(crate) fn outline(&self, plane: &Plane) -> Option<Vec<Point2<f64>>> {
         let projected = self.axes.column_iter().map(|a| plane.project(&a.into_owned()).coords);
         let projected = Matrix2x3::from_columns(&projected.collect::<Vec<_>>());
@@ -25,10 +25,10 @@ impl Shape {
     }
 }
 
-/// The closed polygon of an ellipse: centre + L (cos φ, sin φ) with L Lᵀ = Σ, its first point repeated at the end. `None` if
-/// there is nothing to draw that is finite and within the reach of an axis.
+/// Returns the closed polygon of an ellipse: centre + L (cos φ, sin φ) with L Lᵀ = Σ, and the first point
+/// repeated at the end. `None` if no finite outline lies within the range of an axis.
 pub(crate) fn ellipse(centre: &Point2<f64>, shape: &Matrix2<f64>) -> Option<Vec<Point2<f64>>> {
-    // Cholesky by hand: it has to take flat ones too
+    // a hand-written Cholesky factorization, because degenerate ellipses are allowed
     let a = shape.m11.sqrt();
     let b = if a > 0.0 { shape.m21 / a } else { 0.0 };
     let c = (shape.m22 - b * b).max(0.0).sqrt();

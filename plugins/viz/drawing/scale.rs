@@ -1,9 +1,9 @@
-//! An axis: which numbers it spans, and which of them are written.
+//! An axis: its range and its ticks.
 
-/// The farthest from zero that an axis reaches: margins and ratios of larger numbers would overflow.
+/// Largest absolute value on an axis; margins and ratios of larger numbers would overflow.
 pub(crate) const FAR: f64 = 1e300;
 
-/// What an axis spans, from where the data begin to where they end.
+/// Range of an axis, from the first to the last value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scale {
     low: f64,
@@ -12,24 +12,25 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// From one number to another.
+    /// Creates a linear scale between two numbers.
     pub(crate) fn new(low: f64, high: f64) -> Self {
         Self { low, high, log: false }.with_extent()
     }
 
-    /// Over numbers that are finite; above zero, if the axis goes by powers of ten. `None` for none.
+    /// Creates a scale over the finite numbers, on a logarithmic axis only over positive ones. `None` if
+    /// there are none.
     pub(crate) fn over(numbers: impl Iterator<Item = f64>, log: bool) -> Option<Self> {
         let shown = numbers.filter(|x| x.is_finite() && (!log || *x > 0.0));
         let ends = shown.fold(None, |ends: Option<(f64, f64)>, x| {
             Some(ends.map_or((x, x), |(low, high)| (low.min(x), high.max(x))))
         });
-        // margins and ratios of what is farther out would overflow
+        // margins and ratios of larger numbers would overflow
         let (low, high) = ends.map(|(low, high)| (low.clamp(-FAR, FAR), high.clamp(-FAR, FAR)))?;
         let low = if log { low.max(high * 1e-100).max(1.0 / FAR) } else { low };
         Some(Self { low, high: high.max(low), log }.with_extent())
     }
 
-    /// A scale that is as wide as it can be drawn: one number alone, or several that rounding makes one, get room.
+    /// Widens a scale that is too narrow to draw, because all of its numbers are equal up to rounding.
     fn with_extent(self) -> Self {
         let Self { low, high, log } = self;
         if log {
@@ -47,7 +48,7 @@ impl Scale {
         Self { low: low - room, high: high + room, log }
     }
 
-    /// With a share of its extent above, and below if it does not begin at zero.
+    /// Adds a share of the range above, and also below unless the axis begins at zero.
     pub(crate) fn with_margin(self, share: f64) -> Self {
         let Self { low, high, log } = self;
         if log {
@@ -58,7 +59,8 @@ impl Scale {
         Self { low: if low == 0.0 { 0.0 } else { low - margin }, high: high + margin, log }
     }
 
-    /// From 0 at its lower end to 1 at its upper. A number farther from zero than [`FAR`] has the place of `FAR`.
+    /// Maps a number to its position, from 0 at the lower end to 1 at the upper end. Numbers are clamped to
+    /// ±[`FAR`].
     pub(crate) fn place(&self, x: f64) -> f64 {
         let x = x.clamp(-FAR, FAR);
         if self.log {
@@ -72,7 +74,7 @@ impl Scale {
         x.is_finite() && x >= self.low && x <= self.high
     }
 
-    /// The numbers to write, about as many as asked for, each as it is written.
+    /// Returns roughly `most` ticks, each with its label.
     pub(crate) fn ticks(&self, most: usize) -> Vec<(f64, String)> {
         if self.log && self.high > 10.0 * self.low { self.powers(most) } else { self.round_numbers(most) }
     }
@@ -101,12 +103,12 @@ impl Scale {
     }
 }
 
-/// A number, with the digits that tell it from its neighbours a step away.
+/// Formats a number with enough digits to distinguish it from its neighbours at this step.
 fn written(x: f64, step: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();
     }
-    // the place of the last digit: a step of 0.2 takes one behind the point, as 0.5 does and 0.1
+    // position of the last digit: a step of 0.2 needs one decimal, like 0.5 and 0.1
     let exponent = |x: f64| (x.abs() * 1.0001).log10().floor() as i32;
     let last = exponent(step);
     if last >= 5 || (last < -4 && x.abs() < 1e-2) {

@@ -1,4 +1,4 @@
-//! What there is to see of a variant.
+//! The drawable content of a variant.
 use super::outline::Shape;
 use crate::canvas::{Ink, Stroke};
 use manifactor_graph::Direction;
@@ -6,10 +6,10 @@ use manifactor_quadric::DualQuadric;
 use manifactor_slam::record::{FrameRecord, ObjectRecord, RunRecord, Solid, VariantRecord};
 use nalgebra::{Matrix3, Vector3};
 
-/// Trajectories and objects in one frame, in metres.
+/// Trajectories and objects in one frame. Unit: metres.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Scene {
-    /// Written over the picture.
+    /// Title of the picture.
     pub(crate) title: String,
     /// Up, in the frame of the scene.
     pub(crate) up: Direction,
@@ -24,29 +24,29 @@ pub(crate) struct Scene {
 pub(crate) struct Track {
     /// Its name in the legend.
     pub(crate) name: String,
-    /// How it is drawn.
+    /// Style of its line.
     pub(crate) stroke: Stroke,
-    /// Where the camera was, frame by frame; `None` where that is not known.
+    /// Position of the camera in each frame; `None` if it is unknown.
     pub(crate) positions: Vec<Option<Vector3<f64>>>,
 }
 
-/// An object: where it is, where it is estimated to be, or both.
+/// An object: its true shape, its estimated shape, or both.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Object {
     /// Its class.
     pub(crate) class: String,
-    /// What it is.
+    /// The true shape.
     pub(crate) truth: Option<Shape>,
-    /// What the solver makes of it.
+    /// The estimated shape.
     pub(crate) estimate: Option<Shape>,
 }
 
-/// A colour for each class of a run: the same in all of its pictures.
+/// A colour for each class of a run, shared by all of its pictures.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Palette(Vec<String>);
 
 impl Palette {
-    /// In alphabetical order over all variants.
+    /// Creates the palette in alphabetical order over all variants.
     pub(crate) fn of(run: &RunRecord) -> Self {
         Self::new(run.variants.iter().flat_map(VariantRecord::classes))
     }
@@ -67,18 +67,18 @@ impl Palette {
     }
 }
 
-/// The three trajectories of a run, each with how it is drawn in all pictures.
+/// The three trajectories of a run, each with its style in all pictures.
 pub(crate) const TRACKS: [(&str, Stroke); 3] = [
     ("true", Stroke { ink: Ink::Truth, width: 1.6, dashed: true }),
     ("odometry", Stroke { ink: Ink::Odometry, width: 1.6, dashed: false }),
     ("estimated", Stroke { ink: Ink::Estimate, width: 2.0, dashed: false }),
 ];
 
-/// Where a trajectory is in a frame.
+/// Reads the position of a trajectory in a frame.
 type PositionOf = fn(&FrameRecord) -> Option<Vector3<f64>>;
 
 impl Scene {
-    /// Of a variant.
+    /// Creates the scene of a variant.
     pub(crate) fn of(title: impl Into<String>, variant: &VariantRecord) -> Self {
         let positions: [PositionOf; 3] = [
             |f| f.truth.map(|pose| pose.translation),
@@ -113,7 +113,7 @@ fn ellipsoid(quadric: &DualQuadric) -> Shape {
     Shape { centroid: quadric.pose.translation, axes }
 }
 
-/// The ellipsoid that fills the cuboid of a solid.
+/// Returns the ellipsoid that fills the cuboid of a solid.
 fn solid(truth: &Solid) -> Shape {
     let axes = truth.pose.rotation.matrix() * Matrix3::from_diagonal(&Vector3::from(truth.half_extents));
     Shape { centroid: truth.pose.translation, axes }

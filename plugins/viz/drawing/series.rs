@@ -1,11 +1,11 @@
-//! Series that have gaps, and more points than can be told apart.
+//! Series with gaps, or with more points than are visible.
 
-/// Multiples of the usual step from a value to the next from which on there is a gap between them.
+/// Smallest gap, as a multiple of the usual step between two values.
 const GAP: usize = 5;
-/// Pixels within which a point of a path adds nothing to the one before.
+/// Smallest distance of two points on a path. Unit: pixels.
 const SPACING: f64 = 0.5;
 
-/// The parts of a series between its gaps: a line across a gap would show what nobody knows.
+/// Splits a series at its gaps, because a line across a gap would show unknown values.
 pub(crate) fn stretches<T: Copy>(series: impl IntoIterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let series = series.into_iter().enumerate();
     let known: Vec<(usize, T)> = series.filter_map(|(i, value)| Some((i, value?))).collect();
@@ -16,7 +16,7 @@ pub(crate) fn stretches<T: Copy>(series: impl IntoIterator<Item = Option<T>>) ->
     parts.map(|part| part.iter().map(|(_, value)| *value).collect()).collect()
 }
 
-/// A path without the points that cannot be told from the one before; its ends stay.
+/// Removes the points of a path that are too close to the previous one; keeps both ends.
 pub(crate) fn spaced(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let (Some(mut kept), Some(last)) = (points.first().copied(), points.last().copied()) else {
         return points;

@@ -1,33 +1,34 @@
-//! Where a picture is taken from.
+//! Viewing directions.
 use manifactor_graph::Direction;
 use nalgebra::{Point2, Vector3};
 
-/// Where a picture is taken from: always from far away, without perspective.
+/// Viewing direction of a parallel projection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Viewpoint {
     /// From above.
     Top,
-    /// From the side, up being up.
+    /// From the side, with up at the top.
     Side,
 }
 
-/// The farthest from zero that a coordinate is drawn: its square is finite, so that outlines and margins are.
+/// Largest absolute coordinate. Its square is finite, so outlines and margins are finite too.
 const FAR: f64 = 1e150;
 
-/// The plane of a picture: two unit vectors at a right angle.
+/// The plane of a picture: two orthogonal unit vectors.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Plane {
     right: Vector3<f64>,
     upward: Vector3<f64>,
-    /// Names of the two axes, where they are axes of the frame.
+    /// Names of the two axes, if they are axes of the frame.
     pub(crate) labels: [&'static str; 2],
 }
 
 impl Viewpoint {
-    /// The plane of the picture where `up` is up. With z up, a top view shows x to the right and y upward.
+    /// Returns the plane of the picture for this up direction. With z up, a top view shows x to the right
+    /// and y upward.
     pub(crate) fn plane(self, up: &Direction) -> Plane {
         let up: Vector3<f64> = **up;
-        // the axis of the frame that is least along `up`; x, where x and y are alike
+        // the frame's axis with the smallest component along `up`; x if x and y are equal
         let right = match up.x.abs() <= up.y.abs() + 1e-9 {
             true => Vector3::x(),
             false => Vector3::y(),
@@ -42,13 +43,13 @@ impl Viewpoint {
 }
 
 impl Plane {
-    /// The point that is drawn for `p`. Coordinates are limited to ±[`FAR`].
+    /// Projects `p`. Coordinates are limited to ±[`FAR`].
     pub(crate) fn project(&self, p: &Vector3<f64>) -> Point2<f64> {
         Point2::new(self.right.dot(p), self.upward.dot(p)).map(|x| x.clamp(-FAR, FAR))
     }
 }
 
-/// The name of an axis of the frame; nothing more than `horizontal` for any other direction.
+/// Returns the name of an axis of the frame, or `horizontal` for any different direction.
 fn name(direction: &Vector3<f64>) -> &'static str {
     let names = [["x", "-x"], ["y", "-y"], ["z", "-z"]];
     let found = names.iter().zip(direction.iter()).find(|(_, along)| along.abs() > 1.0 - 1e-6);

@@ -6,8 +6,8 @@ use crate::pages::run_page::{WIDTH, version};
 use manifactor_formats::table::{Column, Table};
 use manifactor_slam::experiment::{Experiment, Summary};
 
-/// The pictures of an experiment, one a metric, at this width in pixels: a curve over the column that the summary names, or
-/// distributions.
+/// Draws one picture for each metric of an experiment: curves over the column that the summary names, or
+/// distributions. Unit of `width`: pixels.
 pub fn experiment_pictures(
     experiment: &Experiment,
     summary: &Summary,
@@ -31,10 +31,10 @@ pub fn experiment_pictures(
     summary.metrics.iter().filter_map(picture).collect()
 }
 
-/// Trials that the page lists.
+/// Largest number of trials in the page.
 const TRIALS: usize = 1000;
 
-/// The page of an experiment. `trials` is the table of trials, `config` what was read.
+/// Returns the page of an experiment. `trials` is the table of trials, `config` the text of the document.
 pub fn experiment_page(experiment: &Experiment, summary: &Summary, trials: &Table, config: &str) -> String {
     let mut page = Page::new(&experiment.title);
     let done = experiment.trials.len() - summary.open;
@@ -78,7 +78,7 @@ fn short(x: f64) -> String {
     if x.fract() == 0.0 && x.abs() < 1e9 { x.to_string() } else { format!("{x:.5}") }
 }
 
-/// Values of a metric, group by group of the summary.
+/// Returns the values of a metric by group of the summary.
 fn distribution(summary: &Summary, trials: &Table, metric: &str) -> Distribution {
     let column = |name: &str| trials.columns.iter().find(|(own, _)| own == name).map(|(_, column)| column);
     let texts = |name: &String| match column(name) {
@@ -103,7 +103,8 @@ fn distribution(summary: &Summary, trials: &Table, metric: &str) -> Distribution
     }
 }
 
-/// Means of a metric over a column of numbers: a curve for each combination of the others.
+/// Returns the means of a metric over a numeric column: one curve for each combination of the remaining
+/// columns.
 fn curves(summary: &Summary, x: &str, metric: &str) -> Vec<Curve> {
     let place = summary.columns.iter().position(|column| column == x);
     let mut curves: Vec<Curve> = vec![];

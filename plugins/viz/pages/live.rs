@@ -1,4 +1,4 @@
-//! The state of a map that grows, as its page shows it.
+//! The state of a growing map for its live page.
 mod notes;
 mod path;
 #[cfg(test)]
@@ -21,21 +21,21 @@ use path::Path;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 
-/// Frames whose latencies are shown, of those that were taken.
+/// Number of recent frames whose latencies are shown.
 const LATENCIES: usize = 300;
-/// Variables and directions that are named where they are undetermined.
+/// Largest number of undetermined variables and directions that are listed.
 const NAMED: usize = 20;
-/// Characters of a class that are written beside a box.
+/// Largest length of a class name next to a box. Unit: characters.
 const ROOM: usize = 20;
 
-/// What the page of [`live_page`](crate::live_page) shows. It is cheap to keep up to date, and cheap to clone, so that the
-/// thread that maps never waits for those who look: what they are sent is made of a clone.
+/// State of the [`live_page`](crate::live_page). Updates and clones are cheap, so the mapping thread never
+/// waits for browsers: a server encodes a clone.
 #[derive(Debug, Clone, Default)]
 pub struct LiveMap {
     title: String,
     variant: String,
     phase: Phase,
-    /// Frames that were taken.
+    /// Number of accepted frames.
     frames: usize,
     timestamp: f64,
     camera: Option<Camera>,
@@ -43,50 +43,51 @@ pub struct LiveMap {
     path: Path,
     boxes: Vec<LiveBox>,
     objects: Vec<ObjectRecord>,
-    /// In the order in which they came, so that colours stay.
+    /// Classes in order of appearance, so that their colours stay.
     classes: Vec<String>,
     seconds: VecDeque<f64>,
     cost: Option<f64>,
-    /// Variables that wait, and directions that nothing constrains; the first of them in words.
+    /// Number of undetermined variables and directions, and descriptions of the first of them.
     waiting: usize,
     undetermined: Vec<String>,
     boxes_so_far: usize,
     notes: Notes,
 }
 
-/// How far a stream is.
+/// Phase of a stream.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Phase {
-    /// For its first frame.
+    /// Before the first frame.
     #[default]
     Waiting,
-    /// Frames come.
+    /// Frames arrive.
     Running,
-    /// All frames have come, and are solved as one batch.
+    /// All frames have arrived, and are solved as one batch.
     Solving {
         /// Iterations so far.
         iteration: usize,
     },
-    /// All is done, in these words.
+    /// The end, with a message.
     Ended(String),
 }
 
 /// A box of the last frame.
 #[derive(Debug, Clone)]
 enum LiveBox {
-    /// Of an object.
+    /// The box of an object.
     Named(SeenBox, String),
-    /// Of no object, or of one that is not known yet.
+    /// A box without an object, or of an object that is not in the map yet.
     Nameless(BoundingBox, String),
 }
 
 impl LiveMap {
-    /// A map of nothing yet: the run's title and the variant's name.
+    /// Creates an empty map with the run's title and the variant's name.
     pub fn new(title: &str, variant: &str) -> Self {
         Self { title: title.to_owned(), variant: variant.to_owned(), ..Self::default() }
     }
 
-    /// Takes in what came of a frame: work for the objects of the map and the boxes of the frame, and not for the path.
+    /// Adds the result of a frame. The time depends on the number of objects and boxes, but not on the
+    /// length of the path.
     pub fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
@@ -106,7 +107,7 @@ impl LiveMap {
         (self.frames, self.timestamp) = (report.frame + 1, report.timestamp);
         self.boxes_so_far += report.boxes;
         if let Some(located) = &report.located {
-            // frames before this one were taken again, in the frame of another map
+            // the earlier frames were mapped again in the frame of the prior map
             self.path.begin_odometry_at(&located.start);
             self.path.correct(|frame| mapper.pose_of(frame));
         }
@@ -133,14 +134,14 @@ impl LiveMap {
         }
     }
 
-    /// Brings the whole path up to date, and the cost: work for all that is in the map.
+    /// Updates the whole path and the cost. The time is linear in the size of the map.
     pub fn refresh(&mut self, mapper: &mut Mapper) {
         self.path.correct(|frame| mapper.pose_of(frame));
         self.cost = Some(mapper.session().cost());
         self.look(mapper);
     }
 
-    /// Shows the map that all frames together give.
+    /// Shows the map estimated from all frames.
     pub fn settle(&mut self, estimate: &Estimate) {
         let poses = estimate.trajectory();
         self.path.correct(|frame| poses.get(frame).map(|stamped| stamped.pose));
@@ -150,25 +151,25 @@ impl LiveMap {
             record(mark.object.id, class, mark.object.boxes, *mark.quadric)
         };
         self.hold(landmarks.iter().map(record).collect());
-        // what was seen in the last image is told of the map as it was then
+        // the predictions of the last image belong to the earlier estimate
         self.boxes.iter_mut().for_each(LiveBox::forget_estimate);
         self.cost = Some(estimate.solution.outcome.final_cost);
     }
 
-    /// How far the stream is, and the cost where that is known.
+    /// Sets the phase of the stream, and the cost if it is known.
     pub fn enter(&mut self, phase: Phase, cost: Option<f64>) {
         self.phase = phase;
         self.cost = cost.or(self.cost);
     }
 
-    /// Objects, and which way is up.
+    /// Updates the objects and the up direction.
     fn look(&mut self, mapper: &Mapper) {
         self.camera = Some(*mapper.camera());
         let record = |(measured, quadric): (&Measured, DualQuadric)| {
             record(measured.id, measured.class_name(), measured.views.len(), quadric)
         };
         self.hold(mapper.objects().map(record).collect());
-        // where up is unknown, up in the first image is the best guess
+        // if up is unknown, up in the first image is the best guess
         let image_up = || self.path.first().map(|first| first.rotation.act(&-Vector3::y()));
         let up = mapper.up().or_else(|| Direction::new(image_up()?).ok());
         self.up = up.unwrap_or(self.up);
@@ -183,7 +184,7 @@ impl LiveMap {
         self.objects = objects;
     }
 
-    /// The boxes of a frame, each with what the estimate puts there.
+    /// Stores the boxes of a frame, each with the prediction of the estimate.
     fn see(&mut self, report: &FrameReport, observation: &Observation, mapper: &Mapper) {
         let known = |id: ObjectId| self.objects.iter().find(|object| object.id == id);
         let boxes = observation.detections.iter().zip(&report.names).map(|(detection, name)| {
@@ -200,7 +201,7 @@ impl LiveMap {
         self.boxes = boxes.collect();
     }
 
-    /// What the page's script reads.
+    /// Returns the input of the page's script.
     pub fn to_json(&self) -> Value {
         let seconds: Vec<f64> = self.seconds.iter().copied().collect();
         let (latencies, ms) = (Latencies::of(&seconds), |seconds: f64| number(1e3 * seconds, 3));
@@ -231,14 +232,14 @@ impl LiveMap {
         })
     }
 
-    /// The map, as the script of every map draws it.
+    /// Returns the map in the format of the map script, which all pages share.
     fn scene(&self) -> Value {
         let color =
             |class: &String| self.classes.iter().position(|own| own == class).map_or(Ink::Text, Ink::Class);
         let objects = self.objects.iter().map(|object| of_object(object, color(&object.class)));
         let start = self.path.start();
         let mut frames: Vec<Value> = self.path.frames().map(|frame| of_frame(frame, start)).collect();
-        // boxes stand at the end of what is told of a frame, and those of the last alone are kept
+        // the boxes are the last part of a frame, and only the last frame keeps them
         for parts in frames.iter_mut().filter_map(Value::as_array_mut) {
             parts.pop();
             parts.push(Value::Null);
@@ -252,7 +253,7 @@ impl LiveMap {
     }
 }
 
-/// Before the first frame.
+/// Camera before the first frame.
 const NO_CAMERA: Camera = Camera { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, skew: 0.0, width: 4, height: 3 };
 
 impl LiveBox {
@@ -262,7 +263,7 @@ impl LiveBox {
         }
     }
 
-    /// As the script of every map draws it, and what is written beside it.
+    /// Returns the box in the format of the map script, and its label.
     fn to_json(&self) -> Value {
         match self {
             Self::Named(seen, label) => match of_box(seen) {
@@ -277,7 +278,7 @@ impl LiveBox {
     }
 }
 
-/// As much of a class as has room beside its box.
+/// Shortens a class name to the space next to its box.
 fn short(class: &str) -> String {
     match class.char_indices().nth(ROOM) {
         Some((end, _)) => format!("{}…", class.get(..end).unwrap_or_default()),
@@ -285,7 +286,7 @@ fn short(class: &str) -> String {
     }
 }
 
-/// What is known of an object while frames come.
+/// Returns the record of an object while frames arrive.
 fn record(id: ObjectId, class: Option<&str>, boxes: usize, estimate: DualQuadric) -> ObjectRecord {
     ObjectRecord {
         id,

@@ -1,4 +1,4 @@
-//! The page of a map that grows: it draws each state that its server sends.
+//! The page of a growing map: it draws each state that its server sends.
 use super::page::Page;
 use super::run_page::version;
 use super::viewer;
@@ -7,7 +7,7 @@ const MARKUP: &str = include_str!("assets/live.html");
 const STYLE: &str = include_str!("assets/live.css");
 const SCRIPTS: [&str; 2] = [include_str!("assets/latencies.js"), include_str!("assets/live.js")];
 
-/// The page. It asks for `events` beside it, with the same query: server-sent events, each the
+/// Returns the page. It requests `events` next to it, with its own query: server-sent events, each with the
 /// [JSON](crate::LiveMap::to_json) of a whole state.
 pub fn live_page() -> String {
     let mut page = Page::live("Live map", STYLE);
@@ -17,7 +17,7 @@ pub fn live_page() -> String {
     page.html()
 }
 
-/// What stands above the map, and what below.
+/// Splits the markup into the parts above and below the map.
 fn parts() -> [&'static str; 2] {
     MARKUP.split_once("<!-- map -->\n").map_or([MARKUP, ""], |(above, below)| [above, below])
 }

@@ -1,10 +1,10 @@
-//! A page of HTML with everything in it: it opens without a network, and fetches nothing.
+//! A self-contained HTML page, which needs no network.
 use crate::canvas::{Theme, style_sheet};
 use crate::drawing::Picture;
 use crate::xml::escape;
 use std::fmt::Write as _;
 
-/// A page that grows from top to bottom.
+/// A page under construction, from top to bottom.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Page {
     title: String,
@@ -15,48 +15,48 @@ pub(crate) struct Page {
 }
 
 const STYLE: &str = include_str!("assets/page.css");
-/// What a browser may do with the page: run what is in it, and fetch nothing.
+/// Content security policy: run the embedded code, and fetch nothing.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
-/// What a live page may do besides, and that it has no icon for the browser to ask for.
+/// Additional permissions of a live page, and an empty icon, so that the browser does not request one.
 const LIVE: (&str, &str) = ("; connect-src 'self'", "<link rel=\"icon\" href=\"data:,\">\n");
 
 impl Page {
-    /// A page with a heading.
+    /// Creates a page with a heading.
     pub(crate) fn new(title: &str) -> Self {
         let body = format!("<h1>{}</h1>\n", escape(title));
         Self { title: title.to_owned(), body, ..Self::default() }
     }
 
-    /// A page that may ask the server that it came from for more, with a style of its own beside that of all pages.
+    /// Creates a page that may send requests to its server, with an additional style.
     pub(crate) fn live(title: &str, style: &'static str) -> Self {
         Self { style, is_live: true, ..Self::new(title) }
     }
 
-    /// A heading, with a name that links lead to.
+    /// Adds a heading with an anchor for links.
     pub(crate) fn heading(&mut self, text: &str) -> &mut Self {
         self.push(&format!("<h2>{}</h2>", escape(text)))
     }
 
-    /// A heading within a part.
+    /// Adds a heading within a section.
     pub(crate) fn subheading(&mut self, text: &str) -> &mut Self {
         self.push(&format!("<h3>{}</h3>", escape(text)))
     }
 
-    /// A paragraph.
+    /// Adds a paragraph.
     pub(crate) fn paragraph(&mut self, text: &str) -> &mut Self {
         self.push(&format!("<p class=\"note\">{}</p>", escape(text)))
     }
 
-    /// A list of warnings; nothing for none.
+    /// Adds a list of warnings, or nothing if there are none.
     pub(crate) fn warnings(&mut self, texts: &[String]) -> &mut Self {
         let items: String =
             texts.iter().map(|text| format!("<li class=\"warning\">{}</li>", escape(text))).collect();
         if texts.is_empty() { self } else { self.push(&format!("<ul>{items}</ul>")) }
     }
 
-    /// Words, each with what it means.
+    /// Adds terms with their definitions.
     pub(crate) fn definitions(&mut self, list: &[(&str, &str)]) -> &mut Self {
         let items =
             list.iter().map(|(word, text)| format!("<dt>{}</dt><dd>{}</dd>", escape(word), escape(text)));
@@ -64,17 +64,17 @@ impl Page {
         if list.is_empty() { self } else { self.push(&format!("<dl>{items}</dl>")) }
     }
 
-    /// Links to files that lie beside the page, by their paths from its folder.
+    /// Adds links to files by their paths from the page's folder.
     pub(crate) fn files(&mut self, paths: &[String]) -> &mut Self {
         let links = paths.iter().map(|path| format!("<li><a href=\"{0}\">{0}</a></li>", escape(path)));
         let links: String = links.collect();
         self.push(&format!("<ul class=\"files\">{links}</ul>"))
     }
 
-    /// A table; cells that are numbers stand to the right.
+    /// Adds a table; numbers are right-aligned.
     pub(crate) fn table(&mut self, header: &[String], rows: &[Vec<String>]) -> &mut Self {
         let mut html = String::from("<div class=\"wide\" tabindex=\"0\"><table><thead><tr>");
-        // writing to a String does not fail
+        // writing to a String cannot fail
         for (column, cell) in header.iter().enumerate() {
             let cells = || {
                 rows.iter()
@@ -100,13 +100,13 @@ impl Page {
         self.push(&(html + "</tbody></table></div>"))
     }
 
-    /// A picture with what it shows, in words.
+    /// Adds a picture with a caption.
     pub(crate) fn picture(&mut self, picture: &Picture, caption: &str) -> &mut Self {
         let html = figure(picture, caption);
         self.push(&html)
     }
 
-    /// Pictures side by side where there is room, under one caption each.
+    /// Adds pictures with captions, side by side if there is room.
     pub(crate) fn pictures<'a>(
         &mut self,
         pictures: impl Iterator<Item = (&'a Picture, String)>,
@@ -115,7 +115,7 @@ impl Page {
         if figures.is_empty() { self } else { self.push(&format!("<div class=\"figures\">{figures}</div>")) }
     }
 
-    /// A text as it is, such as a config, behind a line that opens it.
+    /// Adds a preformatted text, such as a config, in a section that is closed at first.
     pub(crate) fn folded(&mut self, summary: &str, text: &str) -> &mut Self {
         self.push(&format!(
             "<details><summary>{}</summary><pre>{}</pre></details>",
@@ -124,13 +124,13 @@ impl Page {
         ))
     }
 
-    /// Markup and scripts of the program's own: never what others wrote.
+    /// Adds trusted markup and scripts of the program, never foreign text.
     pub(crate) fn own(&mut self, html: &str, scripts: &str) -> &mut Self {
         self.scripts += scripts;
         self.push(html)
     }
 
-    /// Data for scripts, to be found by `id`.
+    /// Adds data for scripts, in an element with the given `id`.
     pub(crate) fn data(&mut self, id: &'static str, value: &serde_json::Value) -> &mut Self {
         self.push(&format!(
             "<script type=\"application/json\" id=\"{id}\">{}</script>",
@@ -144,7 +144,7 @@ impl Page {
         self
     }
 
-    /// The page.
+    /// Returns the HTML of the page.
     pub(crate) fn html(&self) -> String {
         let (title, body) = (escape(&self.title), &self.body);
         let (light, dark) = (style_sheet(Theme::Light), style_sheet(Theme::Dark));
@@ -173,8 +173,8 @@ fn figure(picture: &Picture, caption: &str) -> String {
     )
 }
 
-/// JSON that ends no script, opens no comment, and holds no character that a page may not: all of these occur in its texts
-/// alone, where JSON has another way to write them.
+/// Escapes JSON for a script element: sequences that end a script or open a comment, and characters that
+/// are not allowed in a page. They occur only in strings, so JSON escapes can replace them.
 fn in_script(json: &str) -> String {
     let mut out = String::with_capacity(json.len());
     for c in json.chars() {

@@ -1,4 +1,4 @@
-//! The page of a run: the map in 3D, its variants side by side, and what was done with each object.
+//! The page of a run: the map in 3D, its variants side by side, and the factors of each object.
 use super::run_tables::{held_out, noise, objects, overview, own_variables, words};
 use super::{page::Page, viewer};
 use crate::drawing::{Palette, Picture, Scene, Viewpoint, map};
@@ -6,10 +6,10 @@ use crate::run::{RESIDUALS, cost, images, maps_and_charts, residual_row};
 use manifactor_slam::record::{RunRecord, VariantRecord};
 use manifactor_slam::report::{RunReport, VariantReport};
 
-/// Pixels of pictures, narrow enough to be read on a phone.
+/// Width of pictures, small enough for a phone. Unit: pixels.
 pub(super) const WIDTH: f64 = 560.0;
 
-/// What the words of the overview mean.
+/// Definitions of the terms in the overview.
 const DEFINITIONS: [(&str, &str); 5] = [
     (
         "ATE",
@@ -27,7 +27,7 @@ const DEFINITIONS: [(&str, &str); 5] = [
     ),
 ];
 
-/// The page. `record` and `report` have the same variants; `configs` are the resolved configs of these.
+/// Returns the page. `record` and `report` have the same variants; `configs` are their resolved configs.
 pub fn run_page(report: &RunReport, record: &RunRecord, configs: &[String]) -> String {
     let mut page = Page::new(&report.title);
     let (header, rows) = overview(report);
@@ -65,7 +65,7 @@ fn in_3d(page: &mut Page, record: &RunRecord, palette: &Palette) {
     page.own(viewer::MARKUP, &viewer::SCRIPTS.concat()).own("", viewer::REPLAY);
 }
 
-/// Each kind of picture once, the variants beside each other.
+/// Adds each kind of picture once, with the variants next to each other.
 fn side_by_side(page: &mut Page, record: &RunRecord, palette: &Palette) {
     page.heading("Variants side by side");
     if let Some(picture) = cost(&record.variants, WIDTH) {
@@ -85,7 +85,7 @@ fn side_by_side(page: &mut Page, record: &RunRecord, palette: &Palette) {
     }
 }
 
-/// Pictures by name, each with what it shows.
+/// Captions of the pictures by name.
 const CAPTIONS: [(&str, &str); 8] = [
     (
         "cost",
@@ -109,7 +109,7 @@ const CAPTIONS: [(&str, &str); 8] = [
     ),
 ];
 
-/// What is told of one variant alone.
+/// Adds the section of one variant.
 fn variant(page: &mut Page, report: &VariantReport, record: &VariantRecord, palette: &Palette, config: &str) {
     page.heading(&report.name);
     if let Some(about) = &record.about {
@@ -145,7 +145,7 @@ fn files(record: &VariantRecord) -> Vec<String> {
     NAMES.iter().map(|name| format!("{}/{name}", record.folder)).collect()
 }
 
-/// What made a page.
+/// Returns the program and version that made a page.
 pub(crate) fn version() -> String {
     format!("Made by manifactor {}.", env!("CARGO_PKG_VERSION"))
 }

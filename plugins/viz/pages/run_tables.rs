@@ -10,7 +10,7 @@ pub(super) fn words<const N: usize>(words: [&str; N]) -> Vec<String> {
     words.map(str::to_owned).into()
 }
 
-/// All variants in a table: its header and its rows.
+/// Returns the header and the rows of a table of all variants.
 pub(super) fn overview(report: &RunReport) -> (Vec<String>, Vec<Vec<String>>) {
     let header = [
         "variant",
@@ -46,7 +46,7 @@ pub(super) fn overview(report: &RunReport) -> (Vec<String>, Vec<Vec<String>>) {
     (words(header), report.table().into_iter().map(row).collect())
 }
 
-/// The noise, where it was estimated.
+/// Adds the noise, if it was estimated.
 pub(super) fn noise(page: &mut Page, report: &VariantReport) {
     let Some(noise) = report.variance_components.last() else { return };
     let rounds = report.variance_components.len();
@@ -76,7 +76,7 @@ pub(super) fn noise(page: &mut Page, report: &VariantReport) {
     );
 }
 
-/// How well boxes are predicted that were held out, by class.
+/// Adds the prediction of held-out boxes, by class.
 pub(super) fn held_out(page: &mut Page, report: &VariantReport) {
     let Some(held_out) = &report.held_out else { return };
     let unmapped = held_out.unmapped;
@@ -98,7 +98,7 @@ pub(super) fn held_out(page: &mut Page, report: &VariantReport) {
     page.table(&words(["class", "boxes", "objects", "out of view", "IoU", "error (px)"]), &rows);
 }
 
-/// The variables that the run's document has added.
+/// Adds the variables from the run's document.
 pub(super) fn own_variables(page: &mut Page, record: &VariantRecord) {
     if record.variables.is_empty() {
         return;
@@ -109,7 +109,7 @@ pub(super) fn own_variables(page: &mut Page, record: &VariantRecord) {
     page.table(&words(["variable", "before", "estimate"]), &rows.collect::<Vec<_>>());
 }
 
-/// Each object, and what was done with it.
+/// Adds each object with its factors.
 pub(super) fn objects(page: &mut Page, report: &VariantReport) {
     page.subheading("Objects").paragraph("What was applied to each, and why.");
     page.table(&words(OBJECTS), &report.objects.iter().map(object_row).collect::<Vec<_>>());
@@ -145,7 +145,7 @@ fn object_row(report: &ObjectReport) -> Vec<String> {
     ]
 }
 
-/// Each semantic factor with its reason, then what might have been one, and why it is none.
+/// Lists the semantic factors with their reasons, then the candidates that were not applied with theirs.
 fn applied(object: &MappedObject) -> String {
     let own = |key: &&Key| **key != object.key;
     let applied = object.semantic_factors.iter().map(|a| {

@@ -1,4 +1,4 @@
-//! The map in 3D: the data that the page's own script draws, and the markup that it fills.
+//! The map in 3D: the data and the markup for the page's script.
 use crate::canvas::{Ink, Theme};
 use crate::drawing::Palette;
 use manifactor_geometry::Se3;
@@ -10,7 +10,7 @@ use manifactor_slam::record::{
 use serde_json::{Value, json};
 
 pub(super) const MARKUP: &str = include_str!("assets/map.html");
-/// The map's, in the order in which they use each other. A page adds one that feeds the map.
+/// Scripts of the map, in order of their dependencies. A page adds a script that feeds the map.
 pub(super) const SCRIPTS: [&str; 6] = [
     include_str!("assets/algebra.js"),
     include_str!("assets/shapes.js"),
@@ -21,20 +21,21 @@ pub(super) const SCRIPTS: [&str; 6] = [
 ];
 pub(super) const REPLAY: &str = include_str!("assets/replay.js");
 
-/// All that the script draws. Metres to a hundredth of a millimetre and pixels to a tenth: no more is seen.
+/// Returns the data for the script. Metres are rounded to 0.01 mm and pixels to a tenth, below the visible
+/// resolution.
 pub(super) fn data(run: &RunRecord, palette: &Palette) -> Value {
     let scenes = run.variants.iter().map(|variant| of_variant(variant, palette));
     of_scenes(&scenes.collect::<Vec<_>>())
 }
 
-/// Scenes side by side, with the colours of their paths.
+/// Combines scenes side by side, with the colours of their paths.
 pub(super) fn of_scenes(scenes: &[Value]) -> Value {
     let color = |ink: Ink| ink.hex(Theme::Light);
     let colors = json!({ "odometry": color(Ink::Odometry), "estimate": color(Ink::Estimate) });
     json!({ "colors": colors, "variants": scenes })
 }
 
-/// Frames of a variant that the page has: more cannot be told apart on a screen, and a browser takes long to read them.
+/// Largest number of frames per variant. More are not visible on a screen, and slow to load.
 const FRAMES: usize = 5000;
 
 fn of_variant(variant: &VariantRecord, palette: &Palette) -> Value {
@@ -52,7 +53,7 @@ fn of_variant(variant: &VariantRecord, palette: &Palette) -> Value {
     )
 }
 
-/// What the script draws beside others of its kind. `frames` are all, or every second, third, … of a long recording.
+/// Returns the data of one scene. `frames` are all frames, or every second, third, … of a long recording.
 pub(super) fn scene(
     name: &str,
     up: &Direction,
@@ -121,7 +122,7 @@ pub(super) fn of_object(object: &ObjectRecord, color: Ink) -> Value {
     })
 }
 
-/// The centre to a tenth of a pixel; where the outline is large, its squares to whole ones.
+/// Rounds the centre to a tenth of a pixel; for a large outline, its squares to integers.
 fn ellipse([x, y, xx, xy, yy]: [f64; 5]) -> Vec<Value> {
     let digits = if xx.min(yy) > 100.0 { 0 } else { 1 };
     [numbers([x, y].iter(), 1), numbers([xx, xy, yy].iter(), digits)].concat()
@@ -136,15 +137,15 @@ fn numbers<'a>(list: impl Iterator<Item = &'a f64>, digits: i32) -> Vec<Value> {
     list.map(|x| number(*x, digits)).collect()
 }
 
-/// A number with so many digits behind its point.
+/// Rounds a number to this number of decimals.
 pub(super) fn number(x: f64, digits: i32) -> Value {
     let unit = 10f64.powi(digits);
     let near = (x * unit).round() / unit;
     match near {
-        // whole numbers have no point
+        // integers have no decimal point
         near if near.fract() == 0.0 && near.abs() < 1e9 => Value::from(near as i64),
         near if near.is_finite() => Value::from(near),
-        // what is too large to be rounded has no such digits
+        // a number too large for rounding has no such decimals
         _ => Value::from(x),
     }
 }

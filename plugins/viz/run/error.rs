@@ -1,4 +1,4 @@
-//! Errors against the truth over time, as evo draws them.
+//! Errors against the truth over time, as in evo.
 use super::{TIME, clock};
 use crate::canvas::Ink;
 use crate::drawing::{Chart, Curve, Picture, figure};
@@ -20,7 +20,7 @@ fn curves(variant: &VariantRecord, error: impl Fn(&TrackedPose) -> Option<f64>) 
     BOTH.iter().map(curve).collect()
 }
 
-/// How the trajectories were aligned, in words.
+/// Describes the alignment of the trajectories.
 fn aligned(variant: &VariantRecord) -> String {
     use manifactor_slam::metrics::Alignment;
     let how = variant.alignment.map(|alignment| match alignment {
@@ -32,7 +32,7 @@ fn aligned(variant: &VariantRecord) -> String {
     how.unwrap_or_default().to_owned()
 }
 
-/// The absolute error of positions.
+/// Draws the absolute error of positions.
 pub(super) fn absolute(variant: &VariantRecord, width: f64) -> Option<Picture> {
     let curves = curves(variant, |pose| pose.error);
     let panel = Chart { y: "APE (m)".into(), begun_at_zero: true, curves, ..Chart::default() };
@@ -41,7 +41,7 @@ pub(super) fn absolute(variant: &VariantRecord, width: f64) -> Option<Picture> {
     Some(Picture::new("error_over_time", text, sheet))
 }
 
-/// The relative error of motions.
+/// Draws the relative error of motions.
 pub(super) fn relative(variant: &VariantRecord, width: f64) -> Option<Picture> {
     let panel = |y: &str, part: usize, unit: f64| {
         let curves = curves(variant, |pose| pose.relative?.get(part).map(|x| x * unit));

@@ -1,4 +1,4 @@
-//! Position and orientation over time, true, by odometry and estimated, as evo draws them.
+//! True, odometry and estimated position and orientation over time, as in evo.
 use super::{TIME, clock};
 use crate::canvas::Ink;
 use crate::drawing::{Chart, Curve, Picture, figure};
@@ -12,13 +12,13 @@ const TRACKS: [(&str, Ink, Part); 3] = [
     ("estimated", Ink::Estimate, |f| Some(f.estimate.pose)),
 ];
 
-/// x, y and z.
+/// Draws x, y and z.
 pub(super) fn positions(variant: &VariantRecord, width: f64) -> Option<Picture> {
     let of = |poses: &[Se3]| poses.iter().map(|pose| pose.translation.into()).collect();
     picture(variant, "xyz", "position over time", ["x (m)", "y (m)", "z (m)"], of, width)
 }
 
-/// Roll, pitch and yaw: the turns about x, y and z, one after the other.
+/// Draws roll, pitch and yaw, the successive rotations about x, y and z.
 pub(super) fn angles(variant: &VariantRecord, width: f64) -> Option<Picture> {
     let of = |poses: &[Se3]| {
         let angles = poses.iter().map(|pose| {
@@ -51,13 +51,13 @@ fn picture(
             panel.curves.push(if ink == Ink::Truth { curve.dashed() } else { curve });
         }
     }
-    // what is true lies over the others
+    // the truth is drawn over the remaining curves
     panels.iter_mut().for_each(|panel| panel.curves.rotate_left(1));
     let sheet = figure(text, TIME, false, &panels, width, 0.9 * width)?;
     Some(Picture::new(name, text, sheet))
 }
 
-/// Angles in degrees without jumps by a whole turn.
+/// Removes jumps by a whole turn from angles in degrees.
 fn unwrapped(mut angles: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
     let mut before: Option<[f64; 3]> = None;
     for angle in &mut angles {

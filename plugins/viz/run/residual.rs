@@ -1,8 +1,8 @@
-//! Residuals at the estimate: how they are distributed, and in numbers.
+//! Residuals at the estimate: their distributions and statistics.
 use crate::drawing::{Distribution, Picture};
 use manifactor_slam::record::{FactorResiduals, VariantRecord};
 
-/// By type of factor, in standard deviations.
+/// Draws the distribution of the residuals by type of factor, in standard deviations.
 pub(super) fn residuals(variant: &VariantRecord, width: f64) -> Option<Picture> {
     let groups = variant.residuals.iter().map(|of| (of.factor.clone(), of.rows.clone())).collect();
     let title = "residuals at the estimate".to_owned();
@@ -11,11 +11,11 @@ pub(super) fn residuals(variant: &VariantRecord, width: f64) -> Option<Picture> 
     Some(Picture::new("residuals", "residuals at the estimate, by type of factor", sheet))
 }
 
-/// What [`row`] has.
+/// Columns of [`row`].
 pub(crate) const RESIDUALS: [&str; 7] =
     ["factor", "count", "inactive", "RMS", "median", "largest", "mean weight"];
 
-/// One type of factor in numbers.
+/// Returns the statistics of one type of factor.
 pub(crate) fn row(of: &FactorResiduals) -> Vec<String> {
     let mut sizes: Vec<f64> = of.rows.iter().map(|x| x.abs()).collect();
     sizes.sort_by(f64::total_cmp);

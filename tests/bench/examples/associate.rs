@@ -1,8 +1,9 @@
-//! Association alone, on the poses of the odometry: how the settings of `likelihood` were chosen.
+//! Data association alone, on the poses of the odometry. The settings of `likelihood` were chosen with it.
 //!
-//! `associate [SETTING=VALUE…] [-r] SEQUENCE…`; a sequence is a folder of TUM and its odometry, `1_desk:dvo_vo.txt`, or the seed of a
-//! simulated desk: below 100 with objects of all classes, below 200 bottles in a crowd, else a crowd of three classes. With -r, the mean is that
-//! of names that were reconsidered when all had been seen.
+//! `associate [SETTING=VALUE…] [-r] SEQUENCE…`. A sequence is a folder of TUM with its odometry,
+//! `1_desk:dvo_vo.txt`, or the seed of a simulated desk: below 100 with objects of all classes, below 200 a
+//! crowd of bottles, else a crowd of three classes. With -r, the mean is over the associations after a
+//! final reconsideration of all frames.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 use manifactor_geometry::Se3;
 use manifactor_quadric::DualQuadric;
@@ -14,7 +15,7 @@ use manifactor_slam::simulator::Simulated;
 use manifactor_slam::source::{Folders, Source, TumRgbd};
 use serde_json::{Value, from_str, from_value, json};
 
-/// A map of nothing but the poses of the odometry.
+/// A map that has only the poses of the odometry.
 struct Odometry<'a>(&'a Sequence);
 
 impl Map for Odometry<'_> {
@@ -50,7 +51,7 @@ fn load(name: &str) -> Sequence {
     from_value::<Simulated>(source).unwrap().load(&folders).unwrap()
 }
 
-/// Scores of names as they come, in the end, and when all is reconsidered.
+/// Scores of the associations at arrival, at the end, and after a final reconsideration.
 fn scores(settings: &Likelihood, sequence: &Sequence) -> [IdentityScores; 3] {
     let map = Odometry(sequence);
     let mut associator = settings.begin(sequence.camera, &Aliases::default(), &[]);

@@ -1,12 +1,13 @@
-//! What the default solver costs beside plain Gauss-Newton from the same start, whatever the unit of the noise: a table
-//! in Markdown.
+//! Cost of the default solver compared with plain Gauss-Newton from the same initial values, for any unit
+//! of the noise. Prints a table in Markdown.
 //!
 //! `RAYON_NUM_THREADS=1 cargo run --release -p manifactor-bench --example auto -- FILE...`
 //!
-//! Each pose graph is solved with its information times 1, 2, 4 and 100, by `gauss_newton`, `auto`, and Gauss-Newton from a
-//! chordal start, in turns; each solve is a whole one, compilation included. Times are the least of at least nine turns,
-//! and of as many as fit into three seconds, at most a hundred: CPU time. Last comes a graph that
-//! is not a file: a sphere of poses with so much rotational noise that its odometry leads nowhere.
+//! Each pose graph is solved with its information times 1, 2, 4 and 100, by `gauss_newton`, by `auto`, and
+//! by Gauss-Newton from a chordal start, in turns. Each solve is complete, including compilation. Times are
+//! CPU times, the least of at least nine turns, and of as many turns as fit into three seconds, at most a
+//! hundred. The last graph does not come from a file: a sphere of poses with so much rotational noise that
+//! its odometry is useless as an initial guess.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_geometry::{Between, Chordal, Se3};
@@ -19,7 +20,7 @@ use std::path::Path;
 use std::time::Instant;
 
 const TIMES: [f64; 4] = [1.0, 2.0, 4.0, 100.0];
-/// Two solves end at the same minimum, where their costs differ by less than this share.
+/// Largest relative difference of the costs of two solves at the same minimum.
 const SAME: f64 = 1e-6;
 
 fn main() {
@@ -42,7 +43,7 @@ fn main() {
     println!("\nThe largest ratio where both end at the same minimum: {worst:.2}");
 }
 
-/// The same graph with its information multiplied.
+/// Returns the graph with its information multiplied.
 fn scaled(graph: &Graph, times: f64) -> Graph {
     let mut graph = graph.clone();
     for entry in graph.factors_mut() {
@@ -51,7 +52,7 @@ fn scaled(graph: &Graph, times: f64) -> Graph {
     graph
 }
 
-/// Prints what each method takes; the ratio, where both end at the same minimum.
+/// Prints the results of each method. Returns the ratio if both solvers end at the same minimum.
 fn row(name: &str, times: f64, graph: &Graph, values: &Values) -> f64 {
     let plain = || solve(graph, values, &GaussNewton::default(), &mut Silent).unwrap().outcome;
     let auto = || solve(graph, values, &Auto::default(), &mut Silent).unwrap().outcome;
@@ -69,7 +70,7 @@ fn row(name: &str, times: f64, graph: &Graph, values: &Values) -> f64 {
             *least = least.min(cpu_seconds() - begin);
         }
         turns += 1;
-        // one that runs for seconds says enough
+        // a solve of several seconds needs no repetition
         if clock.elapsed().as_secs_f64() > 20.0 {
             break;
         }
@@ -93,14 +94,14 @@ fn row(name: &str, times: f64, graph: &Graph, values: &Values) -> f64 {
     ratio
 }
 
-/// CPU time of this thread: that of others, which share the machine, does not count.
+/// CPU time of this thread, independent of the load of the machine. Unit: seconds.
 fn cpu_seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Rings of poses on a sphere, each measured from the one before and the one below, rotations with σ = 0.3 rad about each
-/// axis where the graph says 0.05; values along the odometry.
+/// Rings of poses on a sphere, each measured from the previous one and from the one below. Rotations have σ
+/// = 0.3 rad about each axis, but the graph claims 0.05. The initial values follow the odometry.
 fn noisy_sphere(rings: usize, each: usize) -> (Graph, Values) {
     let mut rng = Pcg64::seed_from_u64(12);
     let mut normal = move |sigma: f64| {

@@ -1,4 +1,4 @@
-//! What it costs to linearise a factor that is a formula, beside the same factor in Rust:
+//! Time to linearize a factor given as a formula, compared with the same factor in Rust:
 //! `cargo run --release -p manifactor-bench --example formulas`
 #![allow(clippy::print_stdout)]
 use manifactor_expression::{Constant, Expression};
@@ -31,7 +31,8 @@ fn values() -> Values {
     values
 }
 
-/// Nanoseconds to linearise one factor, whitening and normal equations included: the best of fifteen rounds.
+/// Time to linearize one factor, including whitening and normal equations, the best of fifteen rounds.
+/// Unit: nanoseconds.
 fn time(
     keys: &[&str],
     factor: &(impl Factor + Clone + 'static),

@@ -1,7 +1,10 @@
-//! A sequence of KITTI tracking as a recording: poses, a detector's boxes, and the numbers of those objects that stand still.
+//! Converts a sequence of KITTI tracking to a recording: poses, boxes of a detector, and the numbers of
+//! static objects.
 //!
-//! `kitti FOLDER SEQUENCE OUT`: FOLDER has `orbslam3_poses` (3 × 4, by frame), `label_02` and `pointrcnn_car`. A box gets the number of the track
-//! whose box it overlaps most with, if that is by half and its object is within 2 m of one place in 10 frames or more; else none.
+//! `kitti FOLDER SEQUENCE OUT`: FOLDER has `orbslam3_poses` (3 × 4, by frame), `label_02` and
+//! `pointrcnn_car`. A box gets the number of the track whose box it overlaps most, if the overlap is at
+//! least one half and the object stays within 2 m of one place in 10 frames or more; otherwise it gets
+//! none.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic, missing_docs)]
 use manifactor_geometry::{Se3, So3};
 use manifactor_graph::checked::Positive;
@@ -13,15 +16,15 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Of the sequences from 26 September 2011.
+/// Camera of the sequences from 26 September 2011.
 const CAMERA: Camera =
     Camera { fx: 721.5377, fy: 721.5377, cx: 609.5593, cy: 172.854, skew: 0.0, width: 1242, height: 375 };
-/// Seconds between two images.
+/// Time between two images. Unit: seconds.
 const INTERVAL: f64 = 0.1;
-/// Metres that an object that stands still seems to move at most, and frames that it is seen in at least.
+/// Largest apparent motion of a static object in metres, and smallest number of its frames.
 const STILL: (f64, usize) = (2.0, 10);
 
-/// An object where it was labelled.
+/// A labelled object.
 struct Label {
     track: u32,
     bounding_box: BoundingBox,
@@ -54,7 +57,7 @@ fn labels(text: &str) -> BTreeMap<usize, Vec<Label>> {
     all
 }
 
-/// Tracks of objects that stand still.
+/// Returns the tracks of static objects.
 fn still(labels: &BTreeMap<usize, Vec<Label>>, poses: &[Se3]) -> Vec<u32> {
     let mut places: BTreeMap<u32, Vec<Vector3<f64>>> = BTreeMap::new();
     for (frame, labels) in labels {
@@ -88,7 +91,7 @@ fn main() {
     for line in read("pointrcnn_car").lines() {
         let n = numbers(line.split(','));
         let frame = n[0] as usize;
-        // the net projects boxes beyond the image, and its scores have no bounds
+        // the network predicts boxes beyond the image, and unbounded scores
         let inside = [n[2].max(0.0), n[3].max(0.0), n[4].min(1242.0), n[5].min(375.0)];
         let Ok(bounding_box) = BoundingBox::new(inside) else { continue };
         let scores = ClassScores::single("car", 1.0 / (1.0 + (-n[6]).exp()));

@@ -1,4 +1,4 @@
-//! What it costs to linearise a bounding-box factor, analytically and by automatic differentiation:
+//! Time to linearize a bounding-box factor, analytically and by automatic differentiation:
 //! `cargo run --release -p manifactor-bench --example linearise_boxes`
 #![allow(clippy::print_stdout)]
 use manifactor_geometry::{Se3, So3};
@@ -10,7 +10,7 @@ use std::time::Instant;
 
 type Views = <BoundingBoxFactor as Residual>::Variables;
 
-/// 200 cameras on a circle that look at its centre, 50 objects around that; those that are seen.
+/// 200 cameras on a circle that look at its centre, and 50 objects around it; returns the visible pairs.
 fn scene() -> Vec<(Se3, DualQuadric)> {
     let mut seen = vec![];
     for i in 0..200 {
@@ -27,7 +27,7 @@ fn scene() -> Vec<(Se3, DualQuadric)> {
     seen
 }
 
-/// Nanoseconds for one view, the best of seven rounds.
+/// Time for one view, the best of seven rounds. Unit: nanoseconds.
 fn time(views: &[(Se3, DualQuadric)], mut run: impl FnMut(&Se3, &DualQuadric)) -> f64 {
     let round = |run: &mut dyn FnMut(&Se3, &DualQuadric)| {
         let start = Instant::now();

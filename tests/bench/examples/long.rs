@@ -1,10 +1,11 @@
-//! A robot that drives for hours through streets: what memory and time do.
+//! Memory and time of a robot that drives through streets for hours.
 //!
-//! `cargo run --release -p manifactor-bench --example long -- [--poses N] [--step METRES] [--seconds S] [--seed N]`. Streets cross
-//! every ten metres, twenty one way and twenty the other; at each crossing the robot goes on in a direction drawn at random. It makes ten
-//! poses a second, one for each step. At a crossing where it has been before, a factor closes the loop to the pose of its last visit. With
-//! `--seconds`, a window: closures to poses that have left are left out. A row for each tenth of the way. CPU time of one thread, in
-//! milliseconds.
+//! `cargo run --release -p manifactor-bench --example long -- [--poses N] [--step METRES] [--seconds S]
+//! [--seed N]`. Streets cross every ten metres, twenty in each direction. At each crossing the robot turns
+//! in a random direction. It makes ten poses per second, one for each step. At a crossing that it has
+//! visited before, a factor closes the loop to the pose of its last visit. `--seconds` sets a window; loop
+//! closures to marginalized poses are left out. Prints one row for each tenth of the way. Times are CPU
+//! times of one thread in milliseconds.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::replay::Latencies;
 use manifactor_geometry::{Between, Se2, So2};
@@ -18,11 +19,12 @@ use rand_pcg::Pcg64;
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
 
-/// Metres from crossing to crossing, and streets each way.
+/// Distance of two crossings in metres, and number of streets in each direction.
 const BLOCK: f64 = 10.0;
 const STREETS: i32 = 20;
 
-/// Standard deviations, in metres and radians: of a step of a metre, growing with its root, and of a closure.
+/// Standard deviations in metres and radians: of a step of one metre (proportional to the square root of
+/// its length), and of a loop closure.
 const ODOMETRY: [f64; 3] = [0.05, 0.05, 0.01];
 const CLOSURE: [f64; 3] = [0.1, 0.1, 0.02];
 
@@ -31,18 +33,18 @@ fn cpu_seconds() -> f64 {
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Megabytes of the process that are in memory, where the system says so.
+/// Resident memory of the process, on systems that report it. Unit: megabytes.
 fn resident() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
     line.and_then(|line| line.trim().trim_end_matches(" kB").parse::<f64>().ok()).unwrap_or_default() / 1e3
 }
 
-/// The robot as it truly drives.
+/// The true motion of the robot.
 struct Robot {
     rng: Pcg64,
     steps_a_block: usize,
-    /// Steps since the last crossing, which crossing that was, and the direction from there, in quarters of a turn.
+    /// Steps since the last crossing, that crossing, and the direction in quarters of a turn.
     since: usize,
     crossing: [i32; 2],
     quarters: i32,
@@ -72,7 +74,7 @@ impl Robot {
         Se2::new(rotation, Vector2::new(x, y) + rotation.act(&Vector2::new(way, 0.0)))
     }
 
-    /// One step on; the crossing, where it comes to one.
+    /// Moves by one step; returns the crossing if it reaches one.
     fn go(&mut self) -> Option<[i32; 2]> {
         self.since += 1;
         if self.since < self.steps_a_block {
@@ -86,9 +88,9 @@ impl Robot {
         Some(self.crossing)
     }
 
-    /// A motion as it is measured: with an error of these standard deviations.
+    /// Measures a motion with an error of these standard deviations.
     fn measure(&mut self, motion: &Se2, sigmas: &[f64; 3]) -> Se2 {
-        // twelve uniform numbers have the variance of a normal one
+        // the sum of twelve uniform numbers has the variance of a normal one
         let mut normal = || (0..12).map(|_| self.rng.random_range(-0.5..0.5)).sum::<f64>();
         let error = Vector3::from_fn(|i, _| sigmas[i] * normal());
         Se2::compose(motion, &Se2::exp(&error))
@@ -152,7 +154,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let Latencies { p50, p99, max, total } = Latencies::of(&times);
             times.clear();
             let (resident, fronts) = (resident(), session.bytes() as f64 / 1e6);
-            // a text of all poses would be the largest thing in memory
+            // a text of all poses would be the largest object in memory
             let saved = if is_windowed {
                 format!("{:.1}", session.save()?.len() as f64 / 1e3)
             } else {
@@ -170,7 +172,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let best = session.finish(&LevenbergMarquardt::default(), &mut Silent)?.outcome.final_cost;
     println!("cost {cost:.3}, as one batch {best:.3}: {:.1e} above", (cost - best) / best);
     if !is_windowed {
-        // how much of the memory history has made: the same graph, ordered at once
+        // memory that is due to the history, compared with the same graph ordered at once
         let mut fresh = Session::new(Settings::default());
         fresh.push(&session.graph().0, &session.estimates())?;
         let begin = cpu_seconds();

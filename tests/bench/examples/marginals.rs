@@ -1,4 +1,4 @@
-//! How long covariances take: of all variables, of one after them, and of one that is asked for first.
+//! Time of covariances: of all variables, of one after them, and of one that is requested first.
 //!
 //! `cargo run --release -p manifactor-bench --example marginals -- GRAPH.g2o…`: milliseconds, medians of nine.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]

@@ -1,10 +1,13 @@
-//! Replays pose graphs with false loop closures among the true ones: what a session rejects, beside batch graduated non-convexity.
+//! Replays pose graphs with false loop closures among the true ones, and compares the rejections of a
+//! session with batch graduated non-convexity.
 //!
-//! `cargo run --release -p manifactor-bench --example outliers -- [--share PERCENT]… [--seeds N] [--first SEED] [--clusters N] [--batch] GRAPH.g2o…`.
-//! False closures are so many for each hundred true ones; they lie between poses drawn at random, and say that these are up to
-//! 10 m and 3.1 rad apart. With `--clusters N` they come in runs of N that agree with each other, as where two places look alike. Precision and
-//! recall are of rejections: how many of those rejected are false, and how many of the false are rejected. CPU time of one thread, in
-//! milliseconds. Cost: ½ Σ ‖r‖² of the true factors, those that were rejected too, at the end, by that of their optimum.
+//! `cargo run --release -p manifactor-bench --example outliers -- [--share PERCENT]… [--seeds N] [--first
+//! SEED] [--clusters N] [--batch] GRAPH.g2o…`. `--share` is the number of false closures per hundred true
+//! ones. They connect random poses, with a relative pose of up to 10 m and 3.1 rad. With `--clusters N`
+//! they come in runs of N consistent ones, like two places that look alike. Precision is the share of false
+//! closures among the rejected ones, recall the share of rejected closures among the false ones. Times are
+//! CPU times of one thread in milliseconds. The cost is ½ Σ ‖r‖² of the true factors at the end, including
+//! rejected ones, divided by that of their optimum.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options};
 use manifactor_formats::replay::{Latencies, Replay};
@@ -26,12 +29,13 @@ fn number(key: &Key) -> usize {
     key.as_str()[1..].parse().unwrap()
 }
 
-/// Whether a factor is a loop closure.
+/// Returns whether a factor is a loop closure.
 fn closes(entry: &FactorEntry) -> bool {
     entry.keys.len() == 2 && number(&entry.keys[0]).abs_diff(number(&entry.keys[1])) != 1
 }
 
-/// A graph with false closures, each before the true ones of its latest pose or after them; which are false.
+/// A graph with false closures before or after the true ones of their latest pose, and the flags that mark
+/// the false ones.
 struct Misled {
     graph: Graph,
     is_false: Vec<bool>,
@@ -59,7 +63,7 @@ fn mislead(truth: &Graph, values: &Values, share: usize, cluster: usize, seed: u
             let place = |i: usize| *values.get::<Se2>(key(i).as_str()).unwrap();
             let first = Se2::exp(&Vector3::new(within(10.0), within(10.0), within(3.1)));
             for i in 0..cluster.min(wanted - made) {
-                // the same two places, seen from further on
+                // the same pair of places, observed from further poses
                 let from_a = Se2::compose(&Se2::inverse(&place(a + i)), &place(a));
                 let from_b = Se2::compose(&Se2::inverse(&place(b)), &place(b + i));
                 let relative = Se2::compose(&Se2::compose(&from_a, &first), &from_b);
@@ -82,7 +86,7 @@ fn mislead(truth: &Graph, values: &Values, share: usize, cluster: usize, seed: u
     Misled { graph, is_false }
 }
 
-/// ½ Σ ‖r‖² of the true factors.
+/// Returns ½ Σ ‖r‖² of the true factors.
 fn cost(truth: &Graph, values: &Values) -> f64 {
     Problem::compile(truth, values).unwrap().cost().cost
 }
@@ -91,7 +95,7 @@ struct Line {
     name: String,
     precision: f64,
     recall: f64,
-    /// Of the true ones, how many were rejected.
+    /// Share of the true closures that were rejected.
     lost: f64,
     latencies: Latencies,
     cost: f64,

@@ -1,16 +1,16 @@
-//! Replays pose graphs through a session, pose by pose: latencies, and how far the estimate is from the optimum of what was
-//! known so far.
+//! Replays pose graphs through a session, pose by pose. Reports latencies, and the gap between the estimate
+//! and the optimum of the graph so far.
 //!
-//! `cargo run --release -p manifactor-bench --example replay -- [--gaps N] [--clamp] [--json] GRAPH.g2o…`. Each pose starts from its
-//! odometry, never from the file's vertices. CPU time of one
-//! thread, in milliseconds; the gap is (cost − optimum) / optimum, every N poses.
+//! `cargo run --release -p manifactor-bench --example replay -- [--gaps N] [--clamp] [--json] GRAPH.g2o…`.
+//! The initial value of each pose comes from its odometry, never from the file's vertices. Times are CPU
+//! times of one thread in milliseconds; the gap is (cost − optimum) / optimum, every N poses.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options, PoseGraph, Repair};
 use manifactor_formats::replay::{Latencies, Replay};
 use manifactor_smoother::{Session, Settings};
 use manifactor_solve::{LevenbergMarquardt, Silent};
 
-/// Of this thread: what others do on the machine has no part in it.
+/// CPU time of this thread, independent of the load of the machine. Unit: seconds.
 fn cpu_seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64

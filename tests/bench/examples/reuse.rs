@@ -1,8 +1,10 @@
-//! A map that is used again: made of one part of a sequence, then found again and extended by other parts.
+//! Reuse of a map: made from one part of a sequence, then relocalized in and extended by further parts.
 //!
-//! `reuse RUN.toml FROM..TO START[..END]… [KEY=VALUE…]`: frames FROM to TO make the map; each stream begins at frame START, at an unknown pose, and goes
-//! on until END, or as long as the sequence; `OTHER.toml:START` is one of another document. For each: after how many frames its pose was known, and how far off it was then
-//! and in the end, against the ground truth as the map has it. The variant is the one called `ours`, or the last.
+//! `reuse RUN.toml FROM..TO START[..END]… [KEY=VALUE…]`: frames FROM to TO make the map. Each stream begins
+//! at frame START with an unknown pose, and ends at END or with the sequence; `OTHER.toml:START` is a
+//! stream of a different document. For each stream, it prints the number of frames before the
+//! relocalization, and the pose errors at that frame and at the end, against the ground truth in the map's
+//! frame. The variant is the one called `ours`, or the last.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 use manifactor_config::Document;
 use manifactor_formats::tum::StampedPose;
@@ -20,7 +22,7 @@ use manifactor_solve::Silent;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
-/// The frames of a part of a sequence. Its odometry begins elsewhere, as after a restart.
+/// The frames of a part of a sequence. Its odometry begins at a different pose, as after a restart.
 fn part(all: &Sequence, frames: Range<usize>) -> Sequence {
     let mut part = all.opening().into_sequence();
     let observations = all.observations().skip(frames.start).take(frames.len());
@@ -33,7 +35,7 @@ fn part(all: &Sequence, frames: Range<usize>) -> Sequence {
     part
 }
 
-/// The map's frame in that of the truth.
+/// Transformation from the map's frame to the frame of the truth.
 fn truth_from_map(sequence: &Sequence, trajectory: &[StampedPose]) -> Se3 {
     let truth = &sequence.ground_truth.as_ref().unwrap().trajectory;
     let pairs = associate(truth, trajectory, 0.02).unwrap();
@@ -41,7 +43,7 @@ fn truth_from_map(sequence: &Sequence, trajectory: &[StampedPose]) -> Se3 {
     Se3::new(found.rotation, found.translation)
 }
 
-/// Degrees and metres from the truth.
+/// Errors of a pose in degrees and metres.
 fn off(sequence: &Sequence, truth_from_map: &Se3, pose: &StampedPose) -> Option<[f64; 2]> {
     let truth = &sequence.ground_truth.as_ref().unwrap().trajectory;
     let pair = associate(truth, std::slice::from_ref(pose), 0.02).ok()?.pop()?;
@@ -49,13 +51,13 @@ fn off(sequence: &Sequence, truth_from_map: &Se3, pose: &StampedPose) -> Option<
     Some([error.rotation.log().norm().to_degrees(), error.translation.norm()])
 }
 
-/// Root mean squares of these over a trajectory.
+/// Root mean squares of these errors over a trajectory.
 fn rmse(sequence: &Sequence, truth_from_map: &Se3, trajectory: &[StampedPose]) -> [f64; 2] {
     let all: Vec<_> = trajectory.iter().filter_map(|pose| off(sequence, truth_from_map, pose)).collect();
     [0, 1].map(|i| (all.iter().map(|error| error[i] * error[i]).sum::<f64>() / all.len() as f64).sqrt())
 }
 
-/// Notes when the place was found, and where the camera was estimated to be from then on.
+/// Records the frame of the relocalization, and the poses estimated from then on.
 #[derive(Default)]
 struct Found {
     at: Option<(usize, Vec<StampedPose>, Located)>,
@@ -91,7 +93,7 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let (sets, places): (Vec<_>, Vec<_>) =
         arguments.iter().skip(1).partition(|argument| argument.contains('='));
-    // what is said of the map is said where there is one
+    // settings of the prior map apply only to runs that have one
     let (of_map, sets): (Vec<_>, Vec<_>) = sets.into_iter().partition(|set| set.starts_with("prior_map."));
     let mut document = Document::open(&arguments[0]).unwrap();
     document.set(&sets).unwrap();
@@ -117,7 +119,7 @@ fn main() {
     let variant = run.variants.iter().find(|v| v.name == "ours").or(run.variants.last()).unwrap();
 
     for place in &places[1..] {
-        // a stream of another document
+        // a stream of a different document
         let other = place.split_once(':').map(|(other, _)| {
             let mut document = Document::open(other).unwrap();
             document.set(&sets).unwrap();

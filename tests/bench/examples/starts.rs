@@ -1,5 +1,5 @@
-//! Pose graphs from different starts: what the start costs, how long it takes, and where a solve gets from it;
-//! then, whether that is the global minimum.
+//! Pose graphs from different initial values: cost and time of the start, the cost after a solve from it,
+//! and whether that is the global minimum.
 //!
 //! `cargo run --release -p manifactor-bench --example starts -- FILE...`
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]

@@ -1,6 +1,7 @@
-//! A run's sequence frame by frame, beside the batch: latencies, gaps, trajectories.
+//! A run's sequence frame by frame, compared with the batch: latencies, gaps, trajectories.
 //!
-//! `stream RUN.toml [--data FOLDER] [--variant NAME] [--gap N] [KEY=VALUE…]`; times are those of the wall, on one thread.
+//! `stream RUN.toml [--data FOLDER] [--variant NAME] [--gap N] [KEY=VALUE…]`; times are wall-clock times of
+//! one thread.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 use manifactor_config::Document;
 use manifactor_formats::replay::Latencies;
@@ -13,7 +14,7 @@ use manifactor_solve::{Optimizer, Silent};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Every so many frames, the gap to a batch solve of the same factors.
+/// Computes the gap to a batch solve of the same factors, every `every` frames.
 struct Gaps {
     every: usize,
     frames: usize,

@@ -1,8 +1,8 @@
-//! A pose graph over and over, through a window that moves: what memory and time do.
+//! Memory and time of a pose graph that is repeated through a moving window.
 //!
-//! `cargo run --release -p manifactor-bench --example window -- [--passes N] [--poses N] GRAPH.g2o`. Each pass drives the graph
-//! again from where the last one ended, with new names; factors to poses that have left are left out. CPU time of one
-//! thread, in milliseconds.
+//! `cargo run --release -p manifactor-bench --example window -- [--passes N] [--poses N] GRAPH.g2o`. Each
+//! pass drives the graph again from the end of the previous pass, with new names; factors to marginalized
+//! poses are left out. Times are CPU times of one thread in milliseconds.
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 use manifactor_formats::pose_graph::{self, Options, PoseGraph};
 use manifactor_formats::replay::{Latencies, Replay};
@@ -10,13 +10,13 @@ use manifactor_graph::{FactorEntry, Graph, Key, Values};
 use manifactor_smoother::{Session, Settings, Span, Window};
 use std::num::NonZeroUsize;
 
-/// Of this thread: what others do on the machine has no part in it.
+/// CPU time of this thread, independent of the load of the machine. Unit: seconds.
 fn cpu_seconds() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Megabytes of the process that are in memory, where the system says so.
+/// Resident memory of the process, on systems that report it. Unit: megabytes.
 fn resident() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
     for pass in 0..passes {
         let (mut replay, mut times, mut left_out) = (Replay::of(&graph, &values), vec![], 0);
-        // where the pass would be without a window: odometry goes on from there
+        // estimates of the pass without a window, from which odometry continues
         let mut all = Values::new();
         while let Some(step) = replay.step(|key| {
             let now = session.estimate(name(pass, &key.into()).as_str());
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let (mut factors, mut values) = (Graph::new(), Values::new());
             for (key, value) in step.values.iter() {
                 all.insert_boxed(key.clone(), value.erased().clone_box());
-                // a new pass stands where the last one ended
+                // a new pass begins at the end of the previous one
                 let start = last.take_if(|_| pass > 0 && times.is_empty());
                 let place = start.and_then(|last| session.estimate(last.as_str()));
                 values.insert_boxed(name(pass, key), place.unwrap_or_else(|| value.erased().clone_box()));

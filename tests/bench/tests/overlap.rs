@@ -1,4 +1,4 @@
-//! The associations by overlap: documents name them, and the likelihood of this project is better.
+//! The associations by overlap can be named in documents, and the likelihood of this project is better.
 #![allow(missing_docs, clippy::unwrap_used)]
 use manifactor::config::{Document, Format};
 use manifactor::prelude::*;
@@ -14,7 +14,7 @@ use manifactor_bench as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A desk whose objects come in three classes, seen by a detector that errs.
+/// A desk with objects of three classes, seen by an imperfect detector.
 const DESK: &str = r#"
 semantics = []
 association = { type = "likelihood" }

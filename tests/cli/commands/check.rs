@@ -1,4 +1,4 @@
-//! `manifactor check`: documents, and what stands out in their values.
+//! `manifactor check`: documents, and findings at their values.
 use crate::{Ran, folder, manifactor, path};
 
 fn check(name: &str, text: &str) -> Ran {

@@ -16,7 +16,7 @@ fn every_mistake_is_shown_with_its_line() {
     let folder = folder(&[("graph.toml", BROKEN)]);
     let ran = manifactor(&format!("check {} --json", path(&folder, "graph.toml"))).ended(2);
     ran.complains("did you mean `between_se2`?");
-    // the line itself, under the message
+    // the line itself, below the message
     ran.complains("factor = { type = \"betwen_se2\"");
     let errors = ran.json()["errors"].as_array().unwrap().clone();
     let lines: Vec<_> = errors.iter().map(|e| e["line"].as_u64().unwrap()).collect();

@@ -4,7 +4,7 @@ const TRUTH: &str = "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n2 1 1 0 0 0 0 1\n3 0 1 0.
 
 #[test]
 fn a_moved_trajectory_has_no_error_once_it_is_aligned() {
-    // half a turn about z, and 5 m away
+    // half a turn about z, and a translation of 5 m
     let moved = "0 5 0 0 0 0 1 0\n1 4 0 0 0 0 1 0\n2 4 -1 0 0 0 1 0\n3 5 -1 0.5 0 0 1 0\n";
     let folder = folder(&[("truth.txt", TRUTH), ("moved.txt", moved)]);
     let files = format!("{} {}", path(&folder, "truth.txt"), path(&folder, "moved.txt"));
@@ -60,7 +60,7 @@ fn boxes_that_do_not_meet_are_an_error() {
 
 #[test]
 fn the_order_of_rows_does_not_change_the_scores_of_boxes() {
-    // in each frame the same box has two objects; the third object tells which is which nowhere
+    // each frame has two objects for one box, and the third object never resolves the ambiguity
     let row = |time: usize, side: usize, object: usize| format!("{time},cup,0.5,{side},1,50,50,{object}\n");
     let frame = |time: usize| [row(time, 1, 7), row(time, 1, 3), row(time, 1, 0), row(time, 2, 5 + time % 2)];
     let mut rows: Vec<String> = (0..40).flat_map(frame).collect();
@@ -68,7 +68,7 @@ fn the_order_of_rows_does_not_change_the_scores_of_boxes() {
     let header = "timestamp,class_name,score,xmin,ymin,xmax,ymax,object_key\n";
     let file = |rows: &[String]| format!("{header}{}", rows.concat());
     let one = file(&rows);
-    // a fixed shuffle: 53 shares no factor with the 161 rows
+    // a fixed shuffle: 53 is coprime to the number of rows, 161
     let shuffled: Vec<String> = (0..rows.len()).map(|i| rows[i * 53 % rows.len()].clone()).collect();
     rows.reverse();
     let folder = folder(&[("one.csv", &one), ("two.csv", &file(&rows)), ("three.csv", &file(&shuffled))]);

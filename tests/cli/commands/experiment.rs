@@ -13,7 +13,7 @@ set = { semantics = [] }
 name = "Q+O"
 "#;
 
-/// Twelve trials, of which the four without room for their objects fail.
+/// Twelve trials; the four without room for their objects fail.
 const SWEEP: &str = r#"
 title = "small sweep"
 base = "base.toml"
@@ -45,7 +45,7 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
     let ran = sweep(&folder, &whole, 2).ended(0);
     assert!(ran.stdout.contains("less the baseline") && ran.stdout.contains("position"), "{}", ran.stdout);
 
-    // or it ends before, on a machine that is fast enough
+    // or it ends earlier, on a fast machine
     ends_before(&path(&folder, "sweep.toml"), Path::new(&killed), &Moment::Trials(3));
     let (log, done) = (format!("{killed}/trials.jsonl"), trials(Path::new(&killed)));
     assert!(done >= 3);
@@ -62,7 +62,7 @@ fn a_killed_sweep_goes_on_and_ends_with_the_same_tables() {
     );
     assert_eq!(trials(Path::new(&killed)), 12);
     assert!(tables(&killed) == tables(&whole));
-    // a third time there is nothing to do
+    // the third call has nothing to do
     let ran = sweep(&folder, &killed, 2).ended(0);
     assert!(ran.stderr.contains("12 of 12 trials done, 12 of them before"), "{}", ran.stderr);
     assert_eq!(trials(Path::new(&killed)), 12);
@@ -128,7 +128,7 @@ fn parts_of_a_sweep_end_with_the_same_tables_when_they_are_put_together() {
     let part = |text: &str| {
         manifactor(&format!("experiment {} --out {parts} --shard {text}", path(&folder, "sweep.toml")))
     };
-    // one is left for the end, and one was torn
+    // one part is left for the end, and one was torn
     for text in ["1/3", "3/3"] {
         let ran = part(text).ended(0);
         assert!(ran.stderr.contains("This part has 4 trials") && ran.stdout.is_empty(), "{}", ran.stderr);

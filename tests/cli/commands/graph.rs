@@ -86,7 +86,7 @@ fn a_graph_or_a_run_comes_from_standard_input() {
     let graph = path(&files, "graph.toml");
     let expected = cost(manifactor(&format!("solve {graph} --json")));
     assert_eq!(cost(fed("solve - --json", GRAPH)), expected);
-    // as JSON, and as a pose graph, which its first line tells
+    // as JSON, and as a pose graph, which is recognized by its first line
     let as_json = path(&files, "graph.json");
     manifactor(&format!("solve {graph} --out {as_json}")).ended(0);
     fed("solve - --json", &std::fs::read_to_string(&as_json).unwrap()).ended(0);

@@ -6,7 +6,7 @@ fn a_sound_factor_is_told_what_it_leaves_free() {
     let text = &ran.stdout;
     assert!(text.contains("Free: 8 of 9 directions: "), "{text}");
     assert!(text.contains("q0.(x, y, z, log_a, log_b, log_c); 2 combinations of q0.(rx, ry, rz)"), "{text}");
-    // |m · up| has a kink where the axis lies flat, and its own jump where another becomes the longest
+    // |m · up| has a kink if the axis is horizontal, and a jump if a different axis becomes the longest
     assert!(text.contains("Kink: row 0 by q0.(r") && text.contains("Jump: row 0 by q0.(log_a"), "{text}");
     assert!(
         manifactor("check-factor supporting_plane")

@@ -2,7 +2,7 @@ use crate::commands::online::{DESK, LIVE};
 use crate::{fed, folder, manifactor, path};
 use serde_json::Value;
 
-/// The report of a run's only variant.
+/// Returns the report of a run's only variant.
 fn report(out: &str) -> Value {
     let text = std::fs::read_to_string(format!("{out}/report.json")).unwrap();
     serde_json::from_str::<Value>(&text).unwrap()["variants"][0].take()
@@ -16,7 +16,7 @@ fn a_second_run_begins_with_the_map_of_the_first() {
     let map = format!("{first}/estimate/map.json");
     let before = std::fs::read(&map).unwrap();
     let objects = report(&first)["counts"]["objects"].as_u64().unwrap();
-    // names are those of the source in both, so that the place is clear
+    // both runs use the names of the source, so the poses are unambiguous
     let again = format!("{desk} --out {second} --set prior_map.file={map}");
     let ran = manifactor(&format!("run {again} --set source.seed=9")).ended(0);
     assert!(ran.stdout.contains("seen again, none gone"), "{}", ran.stdout);
@@ -25,7 +25,8 @@ fn a_second_run_begins_with_the_map_of_the_first() {
     assert_eq!(prior["is_located"], true);
     assert_eq!(prior["found"]["matches"].as_array().map(|matches| matches.len() >= 4), Some(true), "{prior}");
     assert_eq!(std::fs::read(&map).unwrap(), before, "a map that is read is not written");
-    // a stream, from lines with names; its map can be begun with again, and the frame that shows the place is told whatever others are
+    // a stream from lines with names; its map can be a prior map again, and the frame of the relocalization
+    // is reported for any --every
     let frames = manifactor(&format!("simulate {desk} --lines")).ended(0).stdout;
     let (live, third) = (path(&folder, "live.toml"), path(&folder, "third"));
     let map = format!("{second}/estimate/map.json");
@@ -56,7 +57,7 @@ fn a_run_does_not_write_over_the_map_that_it_reads() {
     std::fs::write(&desk, output(&folder)).unwrap();
     manifactor(&format!("run {desk}")).ended(0);
     let before = std::fs::read(&own).unwrap();
-    // the same command with the map that it has left: another table than the one that is seen, so that the place is not found
+    // the same command with its own map; the scene is a different table, so the relocalization fails
     for command in ["run", "online"] {
         let again = format!("{command} {desk} --set source.scene.seed=99 --set prior_map.file={own}");
         let refused = manifactor(&again).ended(2);

@@ -2,7 +2,7 @@ use crate::{folder, manifactor, root, run};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The folder that this test was built into: what is there need not be built again.
+/// The folder of this test's build, so that existing crates are not built again.
 fn target() -> PathBuf {
     let binary = Path::new(env!("CARGO_BIN_EXE_manifactor"));
     binary.ancestors().nth(2).unwrap().to_owned()
@@ -15,14 +15,14 @@ fn a_new_plugin_compiles_and_passes_outside_of_the_workspace() {
     let checkout = root().display().to_string();
     let said = run(["new", "plugin", &name, "--manifactor", &checkout], &[]).ended(0).stdout;
     assert!(said.contains("cargo test"), "{said}");
-    // the versions that are built already
+    // the versions that are already built
     std::fs::copy(root().join("Cargo.lock"), folder.path().join("on_the_shelf/Cargo.lock")).unwrap();
     let mut cargo = Command::new(env!("CARGO"));
     cargo
         .args(["test", "--offline", "--quiet", "--features", "cli"])
         .current_dir(&name)
         .env("CARGO_TARGET_DIR", target());
-    // all of ours are built anew for a crate outside: quickly, rather than well
+    // our crates are rebuilt for the external crate, so a fast build matters more than fast code
     cargo.env("CARGO_INCREMENTAL", "0");
     for part in
         ["", "-tree", "-graph", "-solve", "-config", "-testing", "-cli", "-geometry", "-quadric", "-semantic"]

@@ -13,7 +13,7 @@ odometry = { noise = { sigma = 0.01 } }
 detections = { loss = { type = "cauchy", scale = 2.8 } }
 "#;
 
-/// Poses of a trajectory.
+/// Returns the number of poses in a trajectory.
 fn count(text: &str) -> usize {
     text.lines().filter(|line| !line.starts_with('#')).count()
 }
@@ -32,7 +32,7 @@ fn a_run_is_mapped_frame_by_frame() {
     assert!(std::fs::read_to_string(format!("{out}/estimate/latency.svg")).unwrap().contains("p99"));
     let metrics: Value = serde_json::from_str(&poses("metrics.json")).unwrap();
     assert!(metrics["online"]["latencies"]["p99"].as_f64().unwrap() > 0.0);
-    // the folder is that of this command: another's results would mix with it
+    // the folder belongs to this command; results of a different command would mix with them
     manifactor(&format!("run {desk} --out {out}"))
         .ended(2)
         .complains("holds the results of `manifactor online");
@@ -70,7 +70,7 @@ fn a_stream_that_waits_is_interrupted_and_written() {
     assert_eq!(count(&std::fs::read_to_string(format!("{out}/estimate/live.txt")).unwrap()), 1);
 }
 
-/// The desk's frames, as they come from somewhere else.
+/// The desk's frames from standard input.
 pub(crate) const LIVE: &str = r#"
 semantics = "table_one"
 association = { type = "likelihood" }
@@ -89,7 +89,7 @@ fn frames_that_come_as_lines_are_mapped_without_names() {
     let (desk, live, out) = (path(&folder, "desk.toml"), path(&folder, "live.toml"), path(&folder, "out"));
     let lines = manifactor(&format!("simulate {desk} --lines")).ended(0).stdout;
     assert_eq!(lines.lines().count(), 60);
-    // twice a frame, and a line that is none
+    // a frame twice, and an invalid line
     let second = lines.lines().nth(1).unwrap();
     let broken = lines.replacen(second, &format!("{second}\n{{\n{second}"), 1);
     let ran = fed(&format!("online {live} --out {out}"), &broken).ended(0);
@@ -109,7 +109,7 @@ fn frames_that_come_as_lines_are_mapped_without_names() {
         "{}",
         metrics["association"]
     );
-    // what boxes were put to is a file of detections, which scores as the report says
+    // the associations are a file of detections, which scores as in the report
     let truth = path(&folder, "truth");
     manifactor(&format!("simulate {desk} --out {truth}")).ended(0);
     let files = format!("{truth}/detections.csv {out}/estimate/detections.csv");
@@ -130,7 +130,7 @@ fn boxes_that_nobody_names_are_told_of_what_would_name_them() {
     }
 }
 
-/// A frame whose boxes have no names.
+/// Returns a frame whose boxes have no names.
 fn nameless(line: &str) -> String {
     let mut frame: Value = serde_json::from_str(line).unwrap();
     for seen in frame["boxes"].as_array_mut().unwrap() {
@@ -147,16 +147,16 @@ fn standard_input_is_read_once() {
     let (live, out) = (path(&folder, "live.toml"), path(&folder, "out"));
     let ran = fed(&format!("online {live} --out {out}"), &lines).ended(2);
     ran.complains("standard input can be read once");
-    // a batch keeps what it has read
+    // a batch run keeps the frames in memory for the second variant
     fed(&format!("run {live} --out {out}_of_run"), &lines).ended(0);
 }
 
-/// Whole lines of a file.
+/// Returns the number of complete lines in a file.
 fn lines_of(file: &str) -> usize {
     std::fs::read(file).unwrap_or_default().iter().filter(|byte| **byte == b'\n').count()
 }
 
-/// The binary at work on the first so many lines: no more come, and none is the last.
+/// Starts the binary with the first `count` lines; no more come, and the stream stays open.
 fn waiting(command: &str, stderr: Stdio, lines: &str, count: usize) -> (Child, ChildStdin) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
         .current_dir(root())
@@ -198,7 +198,7 @@ fn a_stream_that_is_killed_at_any_moment_goes_on_with_the_same_map() {
         let read = |out: &str| std::fs::read_to_string(format!("{out}/estimate/{file}")).unwrap();
         assert!(read(&whole) == read(&out), "{file}");
     }
-    // other settings make another map
+    // different settings make a different map
     let ran = fed(&format!("{command} --set online.bend=0.2"), &frames);
     ran.ended(2).complains("is the journal of other settings");
 }
@@ -212,7 +212,7 @@ fn a_signal_while_no_frame_comes_ends_the_stream_with_its_map() {
     let (mut child, input) = waiting(&command, Stdio::piped(), &frames, 20);
     let mut said = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     assert!(said.any(|line| line.contains("20 frames")), "it ended before its frames");
-    // standard input stays open, and silent
+    // standard input stays open and silent
     Command::new("kill").args(["-INT", &child.id().to_string()]).output().unwrap();
     let rest: Vec<String> = said.collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");

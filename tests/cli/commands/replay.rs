@@ -1,7 +1,7 @@
 use crate::{folder, manifactor, path};
 use serde_json::Value;
 
-/// A square that is walked twice, with closures; edges out of order, and no vertices.
+/// A square that is walked twice, with loop closures; edges out of order, and no vertices.
 fn square() -> String {
     let mut edges: Vec<String> = (0..15)
         .map(|i| {
@@ -31,7 +31,7 @@ fn a_pose_graph_is_replayed_pose_by_pose() {
     assert_eq!(summary["variables"], 16);
     assert_eq!(summary["termination"]["status"], "converged");
     assert!(summary["latencies"]["max"].as_f64().unwrap() >= summary["latencies"]["p50"].as_f64().unwrap());
-    // the same minimum as a batch solve has
+    // the same minimum as a batch solve
     let batch = manifactor(&format!("solve {graph} --json")).ended(0).json();
     let (found, expected) = (summary["final_cost"].as_f64().unwrap(), batch["final_cost"].as_f64().unwrap());
     assert!((found - expected).abs() <= 1e-6 * expected, "{found} {expected}");
@@ -81,10 +81,10 @@ fn settings_come_from_the_document_and_the_command_line() {
         let relinearized = lines(&ran.stdout)[0]["report"]["relinearized"].as_u64().unwrap();
         (lines(&ran.stdout)[0]["gap"].as_f64().unwrap(), relinearized)
     };
-    // all that moves is linearized anew at each update: the last update is a step of Gauss-Newton
+    // every update relinearizes all moving variables, so the last update is a Gauss-Newton step
     let exact = "--set online.relinearize_every=1 --set online.bend=0 --set online.deviation=0";
     assert!(gap(exact).0 < 1e-9 && gap(exact).1 > gap("").1);
-    // the same from a document
+    // the same settings from a document
     let literal = path(&folder, "square.toml");
     manifactor(&format!("solve {graph} --out {literal}")).ended(0);
     let text = std::fs::read_to_string(&literal).unwrap();
@@ -120,7 +120,7 @@ fn a_window_leaves_old_poses_behind() {
     let graph = path(&folder, "square.g2o");
     let ran = manifactor(&format!("replay {graph} --json --set online.window.poses=5")).ended(0);
     let summary = lines(&ran.stdout).pop().unwrap();
-    // each closure is eight poses back
+    // each closure connects to the eighth previous pose
     assert_eq!((summary["variables"].clone(), summary["left_out"].clone()), (5.into(), 8.into()));
     manifactor(&format!("replay {graph} --set online.window.keep=1")).ended(2);
     let by_time = manifactor(&format!("replay {graph} --set online.window.seconds=5")).ended(2);

@@ -2,7 +2,7 @@ use crate::{folder, manifactor, path};
 use serde_json::Value;
 use std::path::Path;
 
-/// The desk, with fewer frames and objects.
+/// The desk with fewer frames and objects.
 const SMALL: &str = "--set source.trajectory.frames=40 --set source.scene.objects=5";
 
 #[test]
@@ -82,7 +82,7 @@ fn a_simulated_sequence_is_written_as_files() {
     for file in ["odometry.txt", "detections.csv", "groundtruth.txt", "objects.json"] {
         assert!(Path::new(&out).join(file).is_file(), "{file}");
     }
-    // and the odometry of a simulation can be evaluated like any other
+    // the odometry of a simulation can be evaluated like any other trajectory
     let json =
         manifactor(&format!("evaluate {out}/groundtruth.txt {out}/odometry.txt --json")).ended(0).json();
     assert_eq!(json["pairs"], 40);
@@ -116,7 +116,7 @@ fn what_rules_applied_to_which_object_and_why_is_told() {
     because(&left_out, "parallel", "the rule connects it with q");
     let plane = applied.iter().find(|a| a["factor"] == "supporting_plane").unwrap();
     assert_eq!((plane["rule"].as_u64(), &plane["keys"][1]), (Some(1), &Value::from("table")));
-    // the plane is a variable of the graph, and the config that is written has it again
+    // the plane is a variable of the graph, and the written config has it too
     assert!(read("graph.json").contains(r#""key":"table""#));
     let config = format!("{out}/with-rules/config.toml");
     manifactor(&format!("check {config}")).ended(0);

@@ -9,7 +9,7 @@ fn validator(document: &str) -> Validator {
     jsonschema::validator_for(&manifactor(&format!("schema {document}")).ended(0).json()).unwrap()
 }
 
-/// All documents in a folder and below.
+/// Collects all documents in a folder and below.
 fn documents(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
         if entry.is_dir() {
@@ -31,7 +31,7 @@ fn the_schema_accepts_every_example_and_refuses_a_misspelt_one() {
     documents(&root().join("examples"), &mut found);
     assert!(found.len() >= 8, "{found:?}");
     for path in &found {
-        // the factor of an example that is a program of its own
+        // its factor is registered by a separate example program
         if path.ends_with("01_new_factor/desk.toml") {
             continue;
         }

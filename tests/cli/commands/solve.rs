@@ -1,6 +1,6 @@
 use crate::{folder, manifactor, path, run};
 
-/// Two poses a metre apart; the second begins elsewhere.
+/// Two poses a metre apart; the second has a wrong initial value.
 const GRAPH: &str = r#"
 [[variables]]
 key = "x0"
@@ -32,7 +32,7 @@ fn a_literal_graph_is_solved_and_written() {
     for stage in ["compile", "linearize", "factorize", "solve", "other", "total"] {
         assert!(json["seconds"][stage].as_f64().unwrap() >= 0.0, "{stage}");
     }
-    // what was written is a solved graph
+    // the output is a solved graph
     let again = manifactor(&format!("solve {solved} --json")).ended(0).json();
     assert!(again["initial_cost"].as_f64().unwrap() < 1e-12);
 }
@@ -125,7 +125,7 @@ value = { type = "se2", translation = [3.0, 1.0], angle = 0.4 }
 
 #[test]
 fn results_are_the_same_for_any_number_of_threads() {
-    // more factors than one thread is given
+    // more factors than a single thread gets
     let mut text = String::new();
     for i in 0..400 {
         let (x, y) = (f64::from(i) * 0.1, f64::from(i * i % 7) * 0.01);
@@ -225,8 +225,7 @@ fn a_solved_pose_graph_is_certified_on_request() {
     ran.complains("factor 0 has a robust loss");
 }
 
-/// A line of poses with loop closures, one of them false.
-/// A straight chain, and a wrong edge between its ends.
+/// A straight chain of poses, and a wrong edge between its ends.
 fn with_an_outlier(length: usize) -> String {
     let mut text = String::new();
     for i in 0..12 {
@@ -266,7 +265,7 @@ fn an_outlier_is_rejected_and_named() {
 
 #[test]
 fn what_costs_the_most_is_shown_with_the_condition() {
-    // too long: one that is too short bends the chain, by steps without end
+    // too long: an edge that is too short bends the chain, and steps never end
     let folder = folder(&[("graph.g2o", &with_an_outlier(20))]);
     let file = path(&folder, "graph.g2o");
     let ran = manifactor(&format!("solve {file}")).ended(0);
@@ -313,7 +312,8 @@ fn things_on_a_desk_come_to_where_their_relations_put_them() {
         all.iter().find(|v| v["key"] == key).unwrap()["value"].clone()
     };
     let height = |key: &str| value(key)["translation"][2].as_f64().unwrap();
-    // book and cup on a desk at 0.72 m: half the book above it, and half the cup above that
+    // a book and a cup on a desk at 0.72 m: the half height of the book above it, then the half height of
+    // the cup
     assert!((height("book") - 0.74).abs() < 0.02, "{}", height("book"));
     assert!((height("cup") - 0.82).abs() < 0.03, "{}", height("cup"));
     assert!(value("up")["direction"][2].as_f64().unwrap() > 0.999);

@@ -1,4 +1,4 @@
-//! Disks that are full, files that may not grow, folders for reading only, streams without a reader, and too little memory.
+//! Full disks, files that may not grow, read-only folders, streams without a reader, and too little memory.
 use crate::commands::experiment::tables;
 use crate::{folder, manifactor, path, root};
 use std::io::Read;
@@ -22,7 +22,7 @@ metrics = ["position"]
 resamples = 20
 "#;
 
-/// Runs the binary after a line of shell, which may narrow what it can do.
+/// Runs the binary after a line of shell, which may restrict its resources.
 fn after(line: &str, arguments: &str) -> Output {
     let script = format!("{line}; exec \"$0\" \"$@\"");
     let mut command = Command::new("sh");
@@ -30,7 +30,7 @@ fn after(line: &str, arguments: &str) -> Output {
     command.current_dir(root()).env("NO_COLOR", "1").output().unwrap()
 }
 
-/// No file grows beyond so many blocks of 512 bytes, and a signal comes with a write that would.
+/// Limits all files to this many blocks of 512 bytes; a write beyond that raises a signal.
 fn small_files(blocks: usize) -> String {
     format!("ulimit -f {blocks}")
 }
@@ -107,7 +107,8 @@ fn a_full_standard_output_is_an_error() {
     refused(&ran, &["standard output", "No space left on device"]);
 }
 
-/// Runs the binary with a pipe without a reader as one of its streams: the other stream, and the exit code.
+/// Runs the binary with one stream into a pipe without a reader. Returns the text of the open stream and
+/// the exit code.
 fn unheard(stderr: bool, arguments: &str) -> (String, Option<i32>) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_manifactor"));
     command.args(arguments.split_whitespace()).current_dir(root()).env("NO_COLOR", "1");
@@ -119,7 +120,7 @@ fn unheard(stderr: bool, arguments: &str) -> (String, Option<i32>) {
     };
     drop(reader);
     let mut child = command.spawn().unwrap();
-    // with its ends of the pipes
+    // closes its ends of the pipes
     drop(command);
     let mut text = String::new();
     heard.read_to_string(&mut text).unwrap();
@@ -149,12 +150,12 @@ fn a_standard_error_that_cannot_be_written_changes_nothing() {
     let ran = after("exec 2> /dev/full", &format!("experiment {sweep} --out {out} -v"));
     assert_eq!(ran.status.code(), Some(0));
     assert!(Path::new(&out).join("report.html").is_file());
-    // what is wrong is told by the exit code
+    // the exit code shows the error
     assert_eq!(after("exec 2> /dev/full", "solve nowhere.g2o").status.code(), Some(3));
     assert_eq!(after("exec 2> /dev/full", "solve --nothing").status.code(), Some(2));
 }
 
-/// Runs the binary with a file system of its own at `place`; what is there at the end follows the marker.
+/// Runs the binary with a separate file system at `place`; its final content follows the marker.
 fn on_a_disk(options: &str, place: &Path, arguments: &str) -> Option<Output> {
     let place = place.display();
     let script = format!(

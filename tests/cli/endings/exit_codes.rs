@@ -6,7 +6,7 @@ use tempfile::TempDir;
 
 const SEEN: &str = "source = { type = 'simulated', scene = { objects = 2 }, trajectory = { frames = 12 } }\n";
 
-/// A variable with one factor: `residual` of x, from 0.7.
+/// A variable at 0.7 with one factor: `residual` of x.
 fn graph(residual: &str, domain: &str) -> String {
     format!(
         "[[variables]]\nkey = 'x'\nvalue = {{ type = 'point1', position = [0.7] }}\n[[factors]]\nkeys = ['x']\n\
@@ -41,7 +41,7 @@ fn files() -> TempDir {
     ])
 }
 
-/// The exit codes of commands that end so.
+/// The exit codes of commands with this ending.
 fn codes(ending: &str) -> Vec<i32> {
     let folder = files();
     let at = |name: &str| path(&folder, name);
@@ -80,7 +80,7 @@ fn codes(ending: &str) -> Vec<i32> {
             code("simulate @seen.toml --out @sim");
             let file = folder.path().join("sim/detections.csv");
             let text = std::fs::read_to_string(&file).unwrap();
-            // every other frame 4 ms late
+            // every second frame is 4 ms late
             let late = |line: &str| {
                 let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
                 if let Ok(timestamp) = cells[1].parse::<f64>() {
@@ -98,7 +98,7 @@ fn codes(ending: &str) -> Vec<i32> {
         "a journal cannot be kept" => {
             let online = "online @seen.toml --out @out --force --set objects.min_views=1 --journal";
             assert_eq!(code(&format!("{online} @frames.jsonl")), 0);
-            // among the results, where they would be written over it
+            // among the results, which would overwrite it
             assert_eq!(code(&format!("{online} @out/report.json")), 2);
             codes(&[&format!("{online} @nowhere/frames.jsonl"), &format!("{online} /proc/frames.jsonl")])
         }

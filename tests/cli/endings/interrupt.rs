@@ -1,11 +1,11 @@
-//! Ctrl-C and SIGTERM while a solve is under way: at what the program says of its work, not after a time.
+//! Ctrl-C and SIGTERM during a solve, triggered by the program's messages and not by time.
 use crate::{Ran, folder, manifactor, path, root};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Lines, Read, Write};
 use std::process::{Child, ChildStderr, Command, Stdio};
 
-/// Gauss-Newton on x² + 1, which has no root: x jumps about without end, and no step is the last. (The cost rises where
-/// |x| < 1/√3, which no two steps in a row do, so that the solver never finds that it diverges.)
+/// Gauss-Newton on x² + 1, which has no root: x jumps forever, and no step is the last. The cost rises only
+/// if |x| < 1/√3, never in two steps in a row, so the solver never detects divergence.
 pub(crate) const ENDLESS: &str = r#"
 [solver]
 type = "gauss_newton"
@@ -18,12 +18,12 @@ keys = ["root"]
 factor = { type = "expression", variables = { x = "point1" }, residual = ["x * x + 1"] }
 "#;
 
-/// A run in which nothing is seen: poses that odometry alone ties.
+/// A run without detections: poses connected by odometry alone.
 pub(crate) const RUN: &str = r#"
 source = { type = "simulated", scene = { objects = 1 }, trajectory = { frames = 6 }, detector = { missed = 1.0 } }
 "#;
 
-/// The binary at work, heard line by line.
+/// The binary at work, with its messages line by line.
 pub(crate) struct AtWork {
     child: Child,
     stderr: Lines<BufReader<ChildStderr>>,
@@ -44,7 +44,7 @@ impl AtWork {
         Self { child, stderr, said: String::new() }
     }
 
-    /// Listens until it says this, and a few lines more.
+    /// Reads until these words, and a few lines more.
     pub(crate) fn until(mut self, words: &str, more: usize) -> Self {
         let mut heard = false;
         while !heard {
@@ -57,13 +57,13 @@ impl AtWork {
         self
     }
 
-    /// Sends a signal, unless it has ended meanwhile.
+    /// Sends a signal, unless the process has already ended.
     fn signal(self, signal: &str) -> Self {
         let _ = Command::new("kill").args([signal, &self.child.id().to_string()]).output().unwrap();
         self
     }
 
-    /// Sends a signal, unless it has ended meanwhile, and waits for the end.
+    /// Sends a signal, unless the process has already ended, and waits for the end.
     pub(crate) fn ended_by(self, signal: &str) -> Ran {
         self.signal(signal).end()
     }
@@ -91,7 +91,7 @@ fn a_signal_ends_a_solve_with_the_best_values_written() {
         let ran = solve.until("iteration", 20).ended_by(signal).ended(130);
         assert!(ran.stderr.contains("interrupted: ending with what there is"), "{}", ran.stderr);
         assert!(ran.stdout.contains("interrupted"), "{}", ran.stdout);
-        // whole, and no worse than where it began
+        // complete, and no worse than the initial value
         let x = read(&out)["variables"][0]["value"]["position"][0].as_f64().unwrap();
         assert!(x.abs() < 0.7, "{x}");
         let files = std::fs::read_dir(folder.path()).unwrap();
@@ -100,7 +100,7 @@ fn a_signal_ends_a_solve_with_the_best_values_written() {
     }
 }
 
-/// Two variants: the first ends after so many steps, the second does not end.
+/// Two variants: the first ends after this number of steps, the second does not end.
 fn two_variants(steps: u32) -> String {
     let first = format!("name = \"first\"\nset = {{ solver = {{ stop = {{ max_iterations = {steps} }} }} }}");
     format!("{RUN}{ENDLESS}[[variants]]\n{first}\n[[variants]]\nname = \"second\"\n")
@@ -150,7 +150,7 @@ fn a_signal_ends_the_drawing_of_pictures() {
     let folder = folder(&[("run.toml", RUN)]);
     let (config, out, plots) = (path(&folder, "run.toml"), path(&folder, "out"), path(&folder, "plots"));
     manifactor(&format!("run {config} --out {out}")).ended(0);
-    // a pipe in place of the record: the command waits for it with its handler of signals in place
+    // a pipe instead of the record: the command waits for it after installing its signal handler
     let record = std::fs::read(format!("{out}/record.json")).unwrap();
     let pipe = path(&folder, "run/record.json");
     std::fs::create_dir(path(&folder, "run")).unwrap();

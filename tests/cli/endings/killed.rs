@@ -1,4 +1,4 @@
-//! Sweeps that are killed at random moments of their work, and go on.
+//! Sweeps that are killed at random moments of their work, and continued.
 use crate::commands::experiment::tables;
 use crate::{folder, manifactor, path, root};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -6,9 +6,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Moments in all; `MANIFACTOR_KILLS` asks for more.
+/// Number of kills; `MANIFACTOR_KILLS` sets a different one.
 const KILLS: usize = 20;
-/// Most trials from one kill to the next.
+/// Largest number of trials between two kills.
 const APART: usize = 60;
 
 const BASE: &str = r#"
@@ -32,16 +32,16 @@ fn sweep() -> String {
     )
 }
 
-/// When a sweep is killed: by what can be seen of it, and not by a time, which is another on each machine.
+/// The moment of a kill, defined by visible progress and not by a time, which depends on the machine.
 pub(crate) enum Moment {
-    /// So many trials are in the journal.
+    /// The journal has this number of trials.
     Trials(usize),
-    /// This file is there.
+    /// This file exists.
     File(&'static str),
 }
 
 impl Moment {
-    /// One of any; the tables are written in no time, and are one moment in eight all the same.
+    /// Returns a random moment. The tables are written quickly, but one moment in eight is among them.
     fn any(rng: &mut StdRng, done: usize) -> Self {
         const FILES: [&str; 6] = [
             "repeat/base.toml",
@@ -65,13 +65,13 @@ impl Moment {
     }
 }
 
-/// Whole lines of the journal.
+/// Returns the number of complete lines in the journal.
 pub(crate) fn trials(out: &Path) -> usize {
     let journal = std::fs::read(out.join("trials.jsonl")).unwrap_or_default();
     journal.iter().filter(|byte| **byte == b'\n').count()
 }
 
-/// Runs a sweep until it ends or the moment has come to kill it; whether it ended.
+/// Runs a sweep until it ends or is killed at the moment; returns whether it ended.
 pub(crate) fn ends_before(config: &str, out: &Path, moment: &Moment) -> bool {
     let mut child = Command::new(env!("CARGO_BIN_EXE_manifactor"))
         .current_dir(root())

@@ -1,4 +1,4 @@
-//! What is there already, and who else writes there.
+//! Existing files, and concurrent processes that write to the same folder.
 use crate::{Ran, folder, manifactor, path};
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn into(folder: &tempfile::TempDir, (command, document): (&str, &str), out: &Pat
     manifactor(&format!("{command} {} --out {} {more}", path(folder, document), out.display()))
 }
 
-/// A solve of so little may end without a minimum.
+/// A solve this small may end without a minimum.
 #[track_caller]
 fn done(ran: &Ran) {
     assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
@@ -110,7 +110,7 @@ fn a_command_writes_again_into_its_own_folder_and_not_into_that_of_others() {
     let ran = into(&folder, ("run", "other.toml"), &out[0], "").ended(2);
     ran.complains("would mix with them");
     done(&into(&folder, ("run", "other.toml"), &out[0], "--force"));
-    // the config that a run has written writes beside itself
+    // a run from the written config writes next to it
     done(&manifactor(&format!("run {}/estimate/config.toml", out[0].display())));
 }
 
@@ -154,7 +154,7 @@ fn a_sweep_touches_only_a_log_of_its_own() {
     }
 }
 
-/// A pipe that gives a text to the first who opens it; whoever opens it again waits for ever.
+/// Creates a pipe that gives a text to its first reader; any later reader waits forever.
 #[cfg(unix)]
 fn pipe(folder: &tempfile::TempDir, name: &str, text: &'static str) -> String {
     let place = path(folder, name);
@@ -171,7 +171,7 @@ fn a_pipe_is_read_once() {
         factors = [{ keys = ['x'], factor = { type = 'prior_point1', value = { position = [2.0] } } }]\n";
     let folder = folder(&[]);
     let run = |arguments: &str| {
-        // a guard against waiting for ever, not a measure of speed
+        // a guard against endless waiting, not a measure of speed
         let mut command = std::process::Command::new("timeout");
         command.arg("120").arg(env!("CARGO_BIN_EXE_manifactor")).args(arguments.split_whitespace());
         let output = command.env("NO_COLOR", "1").output().unwrap();
@@ -182,6 +182,6 @@ fn a_pipe_is_read_once() {
     run(&format!("check {}", pipe(&folder, "b.toml", LITERAL))).ended(0);
     let wrong = run(&format!("solve {}", pipe(&folder, "c.txt", "VERTEX_SE2 0 0 zero 0\n"))).ended(2);
     wrong.complains("expected a finite number, got `zero`");
-    // the line itself, under the message
+    // the line itself, below the message
     wrong.complains("VERTEX_SE2 0 0 zero 0");
 }

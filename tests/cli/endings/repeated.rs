@@ -1,4 +1,4 @@
-//! A run again: on other threads, and from what it has written.
+//! Repeated runs: on different numbers of threads, and from their own output.
 use crate::{folder, manifactor, path};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ factor = { type = "vertical_orientation" }
 noise = { sigma = 0.1 }
 "#;
 
-/// What is in a folder, file by file, without how long things took.
+/// Returns the content of a folder by file, without durations.
 pub(crate) fn timeless(folder: &Path) -> BTreeMap<String, String> {
     let mut files = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -45,7 +45,7 @@ pub(crate) fn timeless(folder: &Path) -> BTreeMap<String, String> {
                 forget_times(&mut json);
                 format!("{json:#}")
             }
-            // the last column is seconds
+            // the last column is a duration
             "csv" => text.lines().map(|line| line.rsplit_once(',').unwrap().0.to_owned() + "\n").collect(),
             _ => text,
         };
@@ -67,7 +67,7 @@ fn forget_times(json: &mut Value) {
     }
 }
 
-/// With what names the folder, as it is another each time.
+/// Compares two results, with the names of their folders replaced.
 pub(crate) fn same(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>, places: [&str; 2]) {
     assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
     for (name, text) in a {
@@ -88,7 +88,8 @@ fn a_run_leaves_the_same_bytes_on_any_number_of_threads() {
         out
     });
     let one = timeless(Path::new(&out[0]));
-    // three of the run, and its marker; of each variant ten, and eight charts and four images, each as SVG and as PNG
+    // three files of the run and its marker; for each variant ten files, and eight charts and four images
+    // as SVG and PNG
     assert_eq!(one.len(), 4 + 2 * (10 + 2 * 12), "{:?}", one.keys());
     for other in &out[1..] {
         same(&one, &timeless(Path::new(other)), [&out[0], other]);
@@ -106,7 +107,7 @@ fn a_run_is_repeated_from_its_folder_alone() {
     assert_eq!(report["complete"], true);
     let fingerprints = [0, 1].map(|i| report["variants"][i]["fingerprint"].as_str().unwrap().to_owned());
     assert!(fingerprints[0].len() == 16 && fingerprints[0] != fingerprints[1], "{fingerprints:?}");
-    // the rules are in the settings by now
+    // the settings already contain the rules
     std::fs::remove_file(first.path().join("rules.toml")).unwrap();
     for variant in ["without", "with-orientation"] {
         let ran = manifactor(&format!("run {a}/{variant}/config.toml --out {b}/{variant}"));

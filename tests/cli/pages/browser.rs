@@ -1,4 +1,5 @@
-//! A headless Chromium, driven by its DevTools protocol over two pipes: NUL-terminated JSON on file descriptors 3 and 4.
+//! A headless Chromium, controlled by its DevTools protocol over two pipes: NUL-terminated JSON on file
+//! descriptors 3 and 4.
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -6,7 +7,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-/// How long one answer may take on a busy machine.
+/// Time limit for one answer on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A browser with one tab.
@@ -16,15 +17,16 @@ pub(crate) struct Browser {
     from: Receiver<Value>,
     sent: u64,
     session: String,
-    /// What addresses of the page shown begin with.
+    /// Common prefix of the addresses that the page may request.
     origin: String,
-    /// What was not an answer, in order.
+    /// Messages that were not answers, in order.
     events: Vec<Value>,
     _profile: tempfile::TempDir,
 }
 
 impl Browser {
-    /// `None`, said aloud, where there is no Chromium, or no shell to connect its pipes.
+    /// Starts the browser. Returns `None`, with a message, if there is no Chromium, or no shell to connect
+    /// its pipes.
     pub(crate) fn open(flags: &str) -> Option<Self> {
         let names = ["chromium", "chromium-browser", "google-chrome"];
         let there = |name: &&str| cfg!(unix) && Command::new(name).arg("--version").output().is_ok();
@@ -67,7 +69,7 @@ impl Browser {
         Some(browser)
     }
 
-    /// Asks for something, and waits for the answer.
+    /// Sends a request, and waits for the answer.
     pub(crate) fn call(&mut self, method: &str, parameters: impl Into<Value>) -> Value {
         self.sent += 1;
         let mut message = json!({ "id": self.sent, "method": method });
@@ -92,7 +94,7 @@ impl Browser {
         self.visit(&format!("file://{}", file.display()), "file:", width, scheme);
     }
 
-    /// The same for an address, and what all begin with that its page may ask for.
+    /// Opens an address. The page may only request addresses that begin with `origin`.
     pub(crate) fn visit(&mut self, address: &str, origin: &str, width: u32, scheme: &str) {
         origin.clone_into(&mut self.origin);
         let window = json!({ "width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500 });
@@ -104,7 +106,7 @@ impl Browser {
         self.until("document.readyState === 'complete'");
     }
 
-    /// What an expression of the page comes to; a promise is waited for.
+    /// Evaluates an expression in the page; a promise is awaited.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let asked = json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
         let answer = self.call("Runtime.evaluate", asked);
@@ -112,14 +114,14 @@ impl Browser {
         answer["result"]["value"].clone()
     }
 
-    /// Waits until a condition of the page holds, looking each time that it draws.
+    /// Waits until a condition of the page holds; it is checked in every animation frame.
     pub(crate) fn until(&mut self, condition: &str) {
         self.value(&format!(
             "new Promise(done => {{ const look = () => ({condition}) ? done(true) : requestAnimationFrame(look); look(); }})"
         ));
     }
 
-    /// Presses the left button at a point, moves by some way, and lets go.
+    /// Presses the left button at a point, moves by this offset, and releases it.
     pub(crate) fn drag(&mut self, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) {
         let mut mouse = |kind: &str, x: f64, y: f64| {
             let event =
@@ -134,7 +136,7 @@ impl Browser {
         mouse("mouseReleased", x + dx, y + dy);
     }
 
-    /// Puts two fingers on a point's right and left, and moves them apart.
+    /// Puts two fingers to the right and left of a point, and moves them apart.
     pub(crate) fn pinch(&mut self, [x, y]: [f64; 2], from: f64, to: f64) {
         let fingers =
             |gap: f64| json!([{ "x": x - gap, "y": y, "id": 0 }, { "x": x + gap, "y": y, "id": 1 }]);
@@ -148,7 +150,8 @@ impl Browser {
         }
     }
 
-    /// Fails for an error that the page has met since it was shown, and for anything that it wanted from a network.
+    /// Fails if the page has reported an error since it was shown, or has requested anything from a
+    /// network.
     #[track_caller]
     pub(crate) fn was_quiet(&self) {
         for event in &self.events {
@@ -161,7 +164,7 @@ impl Browser {
         }
     }
 
-    /// Keeps a picture of the window for people, where MANIFACTOR_SCREENSHOTS names a folder.
+    /// Saves a screenshot for people, if MANIFACTOR_SCREENSHOTS names a folder.
     pub(crate) fn keep(&mut self, name: &str) {
         let Ok(folder) = std::env::var("MANIFACTOR_SCREENSHOTS") else { return };
         let shot = self.call("Page.captureScreenshot", json!({ "format": "png" }));
@@ -178,7 +181,7 @@ impl Drop for Browser {
     }
 }
 
-/// Base 64.
+/// Decodes base 64.
 fn decoded(text: &str) -> Vec<u8> {
     let alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let (mut bytes, mut bits, mut held) = (vec![], 0u32, 0);

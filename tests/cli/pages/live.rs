@@ -1,4 +1,4 @@
-//! The page of a stream, in a browser, while its frames come.
+//! The page of a stream, in a browser, while its frames arrive.
 use crate::commands::online::{DESK, LIVE};
 use crate::endings::repeated::{same, timeless};
 use crate::pages::browser::Browser;
@@ -10,10 +10,10 @@ use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 
-/// What a detector may call a thing.
+/// A malicious class name from a detector.
 const NASTY: &str = "<script>document.title=1</script><img src=x onerror=document.title=2>";
 
-/// The binary at work on frames that a test gives it.
+/// The binary at work on frames from a test.
 struct Stream {
     child: Child,
     frames: Option<ChildStdin>,
@@ -47,12 +47,12 @@ impl Stream {
         stream.flush().unwrap();
     }
 
-    /// No more frames come.
+    /// Ends the stream of frames.
     fn end(&mut self) {
         self.frames = None;
     }
 
-    /// The exit code, and what it said after its address.
+    /// Returns the exit code, and the messages after the address.
     fn ended(mut self) -> (i32, String) {
         let mut said = String::new();
         self.stderr.read_to_string(&mut said).unwrap();
@@ -60,7 +60,7 @@ impl Stream {
     }
 }
 
-/// The desk's frames; one of its classes has another name.
+/// The desk's frames; one of its classes is renamed.
 fn frames(desk: &str, renamed: &str) -> Vec<String> {
     let lines = manifactor(&format!("simulate {desk} --lines")).ended(0).stdout;
     let rename = |line: &str| {
@@ -75,7 +75,7 @@ fn frames(desk: &str, renamed: &str) -> Vec<String> {
     lines.lines().map(rename).collect()
 }
 
-/// Looks until the server closes the connection: from now on, as it has sent a state already.
+/// Reads until the server closes the connection. The server has already sent a state before this returns.
 fn look(url: &str) -> JoinHandle<()> {
     let host = url.trim_start_matches("http://").trim_end_matches('/').to_owned();
     let mut stream = TcpStream::connect(&host).unwrap();
@@ -106,7 +106,7 @@ fn a_page_shows_the_map_as_it_grows() {
     let objects = number(&mut browser, "mapView.variants[0].objects.length");
     assert!(objects > 3, "{objects} objects");
     assert_eq!(number(&mut browser, "document.querySelectorAll('#objects tbody tr').length"), objects);
-    // the canvas has more colours than paper and lines
+    // the canvas has more colours than background and lines
     browser.until("+canvas.dataset.drawn > 0 && canvas.dataset.frame === '29'");
     let colors = "(() => { const c = document.createElement('canvas'); [c.width, c.height] = [300, 200];
         const draw = c.getContext('2d'); draw.drawImage(canvas, 0, 0, 300, 200);
@@ -114,7 +114,7 @@ fn a_page_shows_the_map_as_it_grows() {
     assert!(number(&mut browser, colors) > 100);
     let image = number(&mut browser, "document.querySelector('#images canvas').height");
     assert!(image > 100, "the image's boxes: {image} pixels high");
-    // more frames, and a class that is no markup
+    // more frames, and a class that must not become markup
     stream.give(&frames[30..]);
     browser.until("document.documentElement.dataset.frames === '60'");
     assert!(number(&mut browser, "document.querySelectorAll('#latencies polyline').length") == 1);
@@ -126,14 +126,14 @@ fn a_page_shows_the_map_as_it_grows() {
     );
     assert_eq!(browser.value("document.querySelectorAll('img').length"), 0);
     assert_eq!(browser.value("document.title"), "live");
-    // an object is picked by keys
+    // an object is selected by keys
     browser.value("canvas.focus(); canvas.dispatchEvent(new KeyboardEvent('keydown', { key: 'n' })); 0");
     browser.until("canvas.dataset.selected !== ''");
     let told = browser.value("document.getElementById('object').textContent");
     let told = told.as_str().unwrap();
     assert!(told.contains("semi-axes (m)") && told.contains("boxes") && !told.contains("seen in"), "{told}");
     browser.was_quiet();
-    // who comes late has all of it, on a phone too
+    // a late browser gets the whole state, on a phone too
     for (width, scheme) in [(1280, "dark"), (390, "dark"), (1280, "light")] {
         browser.visit(&url, &url, width, scheme);
         browser.until("document.documentElement.dataset.frames === '60'");
@@ -150,7 +150,7 @@ fn a_page_shows_the_map_as_it_grows() {
     assert_eq!(code, 0, "{said}");
     assert_eq!(browser.value("document.getElementById('words').textContent"), "all is written");
     assert_eq!(browser.value("document.documentElement.dataset.frames"), "60");
-    // what it shows is what was written
+    // the page shows the same results as the written files
     let metrics = std::fs::read_to_string(format!("{out}/estimate/metrics.json")).unwrap();
     let metrics: Value = serde_json::from_str(&metrics).unwrap();
     assert_eq!(browser.value("livePage.state.cost"), metrics["solve"]["final_cost"]);
@@ -189,7 +189,7 @@ fn a_page_says_that_its_program_has_gone() {
     let folder = folder(&[("desk.toml", DESK), ("live.toml", LIVE)]);
     let (live, out) = (path(&folder, "live.toml"), path(&folder, "out"));
     let frames = frames(&path(&folder, "desk.toml"), "laptop");
-    // without WebGL there are the boxes of the image all the same
+    // without WebGL, the boxes of the image are still shown
     let Some(mut browser) = Browser::open("--disable-3d-apis") else { return };
     let mut stream = Stream::begin(&format!("online {live} --out {out} --view=localhost"));
     let url = stream.url.clone();
@@ -224,7 +224,7 @@ fn others_need_the_token_that_is_told() {
     assert_eq!((token.len(), status(&format!("/?token={token}"))), (32, "200".to_owned()));
     let mut stream = stream;
     stream.end();
-    // a stream of no frames has no map
+    // a stream without frames has no map
     assert_ne!(stream.ended().0, 0);
 }
 
@@ -239,7 +239,7 @@ fn an_address_that_cannot_be_is_told_before_any_frame() {
     assert!(!Path::new(&out).exists());
     let ran = manifactor(&format!("online {desk} --out {out} --view=nowhere:80")).ended(2);
     ran.complains("expected an address such as 8080");
-    // nobody has to look
+    // the run does not need a browser
     let ran = manifactor(&format!("online {desk} --out {out} --view --json --every 60")).ended(0);
     let first: Value = serde_json::from_str(ran.stdout.lines().next().unwrap()).unwrap();
     assert!(first["view"].as_str().unwrap().starts_with("http://127.0.0.1:"), "{first}");

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 const SMALL: &str = "--set source.trajectory.frames=30 --set source.scene.objects=4";
 
-/// Nothing that a browser would fetch: no addresses but names of namespaces, and no scripts or styles of others.
+/// Checks that a browser would fetch nothing: the only addresses are namespaces, and no scripts or styles
+/// are external.
 fn assert_self_contained(html: &str) {
     for attribute in ["src=", "href=\"http", "url(http", "@import", "<link", "<script src"] {
         assert!(!html.contains(attribute), "{attribute}");
@@ -15,7 +16,7 @@ fn assert_self_contained(html: &str) {
     }
 }
 
-/// The page of the desk, with fewer frames and objects.
+/// The page of the desk with fewer frames and objects.
 fn desk(out: &str) -> PathBuf {
     let ran = manifactor(&format!("run examples/desk/desk.toml --out {out} {SMALL}"));
     assert!(ran.code == 0 || ran.code == 1, "{}", ran.stderr);
@@ -71,13 +72,13 @@ fn the_map_turns_zooms_and_tells_of_an_object() {
         assert!(wide <= f64::from(width), "{wide} of {width} pixels");
         browser.value("document.getElementById('map').scrollIntoView()");
         browser.keep(&format!("map_{width}_{scheme}"));
-        // a plot's letters follow the page's theme
+        // the text of a plot follows the page's theme
         let ink = browser.value("getComputedStyle(document.querySelector('svg text')).fill");
         assert_eq!(ink, if scheme == "dark" { "rgb(230, 233, 238)" } else { "rgb(29, 33, 41)" });
         browser.was_quiet();
     }
     let number = |browser: &mut Browser, expression: &str| browser.value(expression).as_f64().unwrap();
-    // the object that is nearest, where it is seen
+    // the position of the nearest object in the view
     browser.value(
         "const view = window.mapView, near = view.variants[0].objects.filter(o => o.estimate)
             .sort((a, b) => norm(sub(a.estimate, view.orbit.eye)) - norm(sub(b.estimate, view.orbit.eye)))[0];
@@ -196,13 +197,13 @@ fn pictures_go_nowhere_but_into_their_folders() {
     manifactor(&format!(
         "run examples/desk/desk.toml --out {out} --set source.trajectory.frames=20 --set source.scene.objects=4"
     ));
-    // another's folder
+    // a folder of a different command
     std::fs::create_dir_all(format!("{other}/quadricslam")).unwrap();
     std::fs::write(format!("{other}/quadricslam/map.ply"), "precious").unwrap();
     manifactor(&format!("plot {out} --out {other}")).ended(2);
     assert_eq!(std::fs::read_to_string(format!("{other}/quadricslam/map.ply")).unwrap(), "precious");
     manifactor(&format!("plot {out} --out {other} --force")).ended(0);
-    // a record that leads out of the folder
+    // a record with a path outside of the folder
     let record = std::fs::read_to_string(format!("{out}/record.json")).unwrap();
     let moved = record.replacen("\"folder\":\"quadricslam\"", "\"folder\":\"../escaped\"", 1);
     assert_ne!(moved, record);

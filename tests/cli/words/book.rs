@@ -1,9 +1,9 @@
-//! The commands in the book are ones that the command line understands, on files that are there.
+//! The command line accepts the commands in the book, and their files exist.
 use crate::root;
 use clap::Parser;
 use std::path::Path;
 
-/// The lines of the blocks of shell in a page, without comments.
+/// Returns the lines of the shell blocks in a page, without comments.
 fn commands(page: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(page).unwrap();
     let (mut found, mut open) = (vec![], false);

@@ -1,4 +1,4 @@
-//! What is said while a program works: nothing, unless somebody asks.
+//! The log: silent by default.
 use crate::{folder, manifactor, path};
 
 const GRAPH: &str = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.5\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nFIX 0\n";
@@ -17,7 +17,7 @@ fn a_log_is_there_for_those_who_ask() {
     for event in ["read", "compiled", "step", "converged", "written"] {
         assert!(two.contains(event), "{event} is not in:\n{two}");
     }
-    // results are the same, and on standard output alone
+    // the results are unchanged, and on standard output alone
     let quiet = manifactor(&format!("solve {graph}")).ended(0).stdout;
     assert_eq!(
         manifactor(&format!("-vv solve {graph}")).ended(0).stdout.lines().next(),

@@ -1,8 +1,8 @@
-//! `docs/mistakes.md`: what it says is printed is what is printed.
+//! The output in `docs/mistakes.md` is the real output.
 use crate::{folder, root};
 use std::process::Command;
 
-/// A block between fences, with the line before it.
+/// A fenced block, and the line before it.
 struct Block<'a> {
     language: &'a str,
     text: String,
@@ -24,7 +24,7 @@ fn blocks(page: &str) -> Vec<Block<'_>> {
     blocks
 }
 
-/// What a command prints, run where the graph is.
+/// Returns the output of a command in the folder of the graph.
 fn printed(command: &str, graph: &str) -> String {
     let folder = folder(&[("graph.toml", graph)]);
     let words = command.split_whitespace().skip(1);

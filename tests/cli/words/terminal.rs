@@ -1,7 +1,7 @@
-//! What others wrote does not command a terminal, a browser or a spreadsheet.
+//! Foreign text does not control a terminal, a browser or a spreadsheet.
 use crate::{folder, manifactor, path};
 
-/// Titles, names and keys that clear the screen, by C0 and by C1; and what no XML may hold.
+/// Titles, names and keys that clear the screen, by C0 and by C1, and characters that are invalid in XML.
 const NASTY: &str = r#""\u001b[2J\u009b2J\u007f\ufffe""#;
 
 fn graph() -> String {
@@ -47,7 +47,7 @@ fn no_control_character_is_printed() {
     }
 }
 
-/// Neither XML nor HTML holds these.
+/// Neither XML nor HTML allows these.
 #[track_caller]
 fn holds_what_it_may(text: &str) {
     let unfit = |c: &char| matches!(c, '\u{fffe}' | '\u{ffff}') || (c.is_control() && !"\n\t".contains(*c));

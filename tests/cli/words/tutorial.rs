@@ -1,10 +1,11 @@
-//! `docs/tutorial.md`, followed by a user with data of another kind: other class names, another camera, labels as shares of the image.
+//! `docs/tutorial.md`, followed by a user with different data: class names, camera, and labels as fractions
+//! of the image.
 use crate::{manifactor, root};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
-/// The first block of `language` in the tutorial that contains `text`.
+/// Returns the first block of `language` in the tutorial that contains `text`.
 fn block(language: &str, text: &str) -> String {
     let page = std::fs::read_to_string(root().join("docs/tutorial.md")).unwrap();
     let opening = format!("```{language}\n");
@@ -17,7 +18,7 @@ fn block(language: &str, text: &str) -> String {
 
 const CAMERA: &str = "{ fx = 500.0, fy = 510.0, cx = 400.0, cy = 310.0, width = 800, height = 600 }";
 
-/// The simulated desk through another camera.
+/// The simulated desk through a different camera.
 fn simulated(folder: &Path) {
     let camera = "source.camera";
     let set = [
@@ -32,7 +33,7 @@ fn simulated(folder: &Path) {
     manifactor(&format!("simulate examples/desk/desk.toml {set} --out {}", folder.display())).ended(0);
 }
 
-/// Writes the boxes as YOLO's text labels, with class names that no table of ours knows.
+/// Writes the boxes as YOLO's text labels, with class names that are in none of our tables.
 fn write_labels(detections: &Path, labels: &Path) -> Vec<String> {
     std::fs::create_dir(labels).unwrap();
     let text = std::fs::read_to_string(detections).unwrap();

@@ -22,7 +22,8 @@ set = { semantics = "table_one" }
 /// Experiments with more trials are read, but not split.
 const SPLIT: usize = 200;
 
-/// Reads documents of experiments. Each trial has all columns and is in one shard, and the documents of the results make equal trials.
+/// Reads documents of experiments. Each trial has all columns and is in one shard, and the documents of the
+/// results give equal trials.
 pub fn experiment(data: &[u8]) {
     let folder = temporary();
     let Some(experiment) = read(folder.path(), &String::from_utf8_lossy(data), BASE, Format::Toml) else {
@@ -61,7 +62,8 @@ fn read(folder: &Path, text: &str, base: &str, format: Format) -> Option<Experim
     Experiment::read(&Document::parse(&name, text, format).ok()?).ok()
 }
 
-/// Reads journals of trials, unchanged and with checksums that fit. `FINGERPRINT` stands for the fingerprint of a trial.
+/// Reads journals of trials, unchanged and with valid checksums. `FINGERPRINT` stands for the fingerprint
+/// of a trial.
 pub fn trials(data: &[u8]) {
     static TRIAL: LazyLock<Trial> = LazyLock::new(|| {
         let run = Document::parse("run.toml", "source = { type = \"simulated\" }", Format::Toml);

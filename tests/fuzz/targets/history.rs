@@ -1,4 +1,4 @@
-//! Histories of the smoother, with one change in each line and any numbers.
+//! Histories of the smoother, with one change per line and arbitrary numbers.
 use super::{is_finite, third};
 use manifactor::geometry::{BearingRange2, Between, Point2, Prior, Range, Se2, So2};
 use manifactor::graph::checked::Positive;
@@ -6,15 +6,16 @@ use manifactor::graph::{Fixed, Variable};
 use manifactor::prelude::*;
 use manifactor::smoother::{FactorId, Session, Settings};
 
-/// Longer histories are cut off here, to keep each input fast.
+/// Longer histories are truncated, so that each input is fast.
 const LONGEST: usize = 120;
-/// Passes of one update that a history may ask for.
+/// Largest number of passes in one update.
 const PASSES: usize = 3;
 
-/// Applies changes, updates, and restarts. An update that fails leaves no trace, a saved session goes on with the same bits, and all
-/// estimates are finite.
+/// Applies changes, updates, and restarts. A failed update has no effect, a saved session continues bit for
+/// bit, and all estimates are finite.
 ///
-/// The first line can have settings, `settings {"relinearize_every": 1}`. Indices count variables and factors, and wrap around.
+/// The first line can have settings, `settings {"relinearize_every": 1}`. Indices count variables and
+/// factors, and wrap around.
 pub fn history(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     let mut lines = text.lines().take(LONGEST).peekable();
@@ -24,7 +25,7 @@ pub fn history(data: &[u8]) {
     settings.passes = settings.passes.min(PASSES);
     let session = Session::new(settings);
     let mut own = Smoother::new(session);
-    // a session that has never seen the updates that failed
+    // a session that has never processed the failed updates
     let mut twin: Option<Smoother> = None;
     for line in lines.map(Line::new) {
         match line.name() {
@@ -83,10 +84,10 @@ struct Smoother {
     session: Session,
     keys: Vec<Key>,
     ids: Vec<FactorId>,
-    /// As the last update that succeeded left them.
+    /// Text of the session after the last successful update.
     saved: String,
     saved_ids: Vec<FactorId>,
-    /// No change is pending.
+    /// True if no change is pending.
     is_idle: bool,
 }
 
@@ -105,7 +106,7 @@ impl Smoother {
         Self { session, keys, ids, saved, saved_ids, is_idle: true }
     }
 
-    /// Makes a change; whether the session has taken it.
+    /// Makes a change; returns whether the session accepted it.
     fn change(&mut self, line: &Line<'_>) -> bool {
         self.is_idle = false;
         let (mut graph, mut values) = (Graph::new(), Values::new());
@@ -188,7 +189,7 @@ impl Smoother {
         }
     }
 
-    /// Updates the session; whether that succeeds.
+    /// Updates the session; returns whether that succeeded.
     fn update(&mut self) -> bool {
         let before = self.last_bits();
         let updated = self.session.update().is_ok();
@@ -201,7 +202,7 @@ impl Smoother {
         } else {
             assert_eq!(self.bits(), before, "a failed update has changed estimates");
             assert_eq!(without_ids(&saved), without_ids(&self.saved), "a failed update has left a trace");
-            // void ids are never given again, so that the text differs by the next one
+            // invalid ids are never used again, so the text differs in the next id
             self.saved = saved;
             self.ids.clone_from(&self.saved_ids);
         }
@@ -210,12 +211,12 @@ impl Smoother {
         updated
     }
 
-    /// Estimates as the last update that succeeded left them.
+    /// Returns the estimates after the last successful update.
     fn last_bits(&self) -> Vec<(Key, Vec<u64>)> {
         bits(&Session::load(&self.saved).unwrap_or_else(|e| panic!("{e}")))
     }
 
-    /// All estimates and covariances are finite.
+    /// Checks that all estimates and covariances are finite.
     fn check(&self) {
         let values = self.session.estimates();
         assert_eq!(values.len(), self.session.variables(), "a variable has no estimate");
@@ -252,7 +253,7 @@ fn pose([x, y, angle]: [f64; 3]) -> Se2 {
     Se2::new(So2::exp(angle), [x, y].into())
 }
 
-/// All estimates, bit by bit.
+/// Returns all estimates as bits.
 fn bits(session: &Session) -> Vec<(Key, Vec<u64>)> {
     let numbers = |value: &dyn Variable| -> Vec<f64> {
         let value = value.erased().as_any();
@@ -267,7 +268,8 @@ fn bits(session: &Session) -> Vec<(Key, Vec<u64>)> {
     session.estimates().iter().map(|(key, value)| (key.clone(), bits(value))).collect()
 }
 
-/// A saved session without the id of the next factor. A place that is free may have held a variable of the failed update.
+/// Returns a saved session without the id of the next factor. A free slot may have held a variable of the
+/// failed update.
 fn without_ids(saved: &str) -> serde_json::Value {
     let document = saved.split_once('\n').and_then(|(_, json)| serde_json::from_str(json).ok());
     let mut document: serde_json::Value = document.unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The map that is built frame by frame, with any numbers.
+//! The map that is built frame by frame, with arbitrary numbers.
 use super::{assert_alike, is_finite, temporary, third};
 use manifactor::config::{Document, Format};
 use manifactor::geometry::{Se3, So3};
@@ -17,10 +17,10 @@ use manifactor::slam::settings::Settings;
 use manifactor::smoother::Session;
 use std::sync::{Arc, LazyLock};
 
-/// Longer streams are cut off here, to keep each input fast.
+/// Longer streams are truncated, so that each input is fast.
 const LONGEST: usize = 60;
 
-/// Settings that the first line names by their number.
+/// Settings, selected by a number in the first line.
 const SETTINGS: [&str; 5] = [
     "",
     "association = { type = \"likelihood\" }",
@@ -29,9 +29,11 @@ const SETTINGS: [&str; 5] = [
     "gravity = { type = \"accelerometer\" }\nsemantics = \"table_one\"",
 ];
 
-/// Maps frames with boxes. A refused frame leaves no trace, all estimates are finite, and the map at the end is read back.
+/// Maps frames with boxes. A refused frame has no effect, all estimates are finite, and the map at the end
+/// is read back.
 ///
-/// A line is `frame TIME TX TY TZ RX RY RZ`, `box OBJECT XMIN YMIN XMAX YMAX SCORE CLASS DEPTH`, or `feel TIME X Y Z`.
+/// A line is `frame TIME TX TY TZ RX RY RZ`, `box OBJECT XMIN YMIN XMAX YMAX SCORE CLASS DEPTH`, or `feel
+/// TIME X Y Z`.
 pub fn mapper(data: &[u8]) {
     static READ: LazyLock<Vec<Settings>> = LazyLock::new(|| SETTINGS.map(settings).to_vec());
     let text = String::from_utf8_lossy(data);
@@ -39,7 +41,7 @@ pub fn mapper(data: &[u8]) {
     let settings = &READ[number.unwrap_or_default() % SETTINGS.len()];
     let opening = Opening::new(super::stream::camera());
     let new = || Mapper::new(opening.clone(), settings);
-    // the second one never sees a frame that the first one refuses
+    // the second one gets only the frames that the first one accepts
     let (mut mapper, mut clean) = (new(), new());
     let mut sequence = opening.clone().into_sequence();
     for observation in observations(&text) {

@@ -7,7 +7,8 @@ use manifactor::prelude::*;
 use manifactor::smoother::{ChangeError, Session, Settings};
 use std::collections::HashSet;
 
-/// Replays g2o and TORO files pose by pose. Each factor and each variable comes once, and all estimates are finite.
+/// Replays g2o and TORO files pose by pose. Each factor and each variable occurs once, and all estimates
+/// are finite.
 pub fn replay(data: &[u8]) {
     let Ok(read) = pose_graph::parse(&String::from_utf8_lossy(data), "graph.g2o", &Options::default()) else {
         return;
@@ -21,7 +22,7 @@ pub fn replay(data: &[u8]) {
     let (mut factors, mut keys, has_poses) = (0, HashSet::new(), !steps.is_empty());
     loop {
         let left = steps.len();
-        // factors come from a file that was checked: their types fit
+        // the factors come from a checked file, so their types fit
         let step = steps.step(|key| session.estimate(key)).unwrap_or_else(|e| panic!("{e}"));
         let Some(step) = step else { break };
         assert_eq!(steps.len() + 1, left);
@@ -32,7 +33,7 @@ pub fn replay(data: &[u8]) {
         let before = session.variables();
         match session.push(&step.factors, &step.values) {
             Ok(_) => {}
-            // odometry of huge numbers leads nowhere
+            // odometry with huge numbers is not a valid initial guess
             Err(ChangeError::Graph(errors))
                 if errors.iter().all(|e| matches!(e, GraphError::NotFinite { .. })) =>
             {

@@ -2,8 +2,8 @@
 use super::is_finite;
 use manifactor::smoother::Session;
 
-/// Loads saved sessions, unchanged and with a checksum that fits. A session that is loaded is finite, and goes on with equal bits after
-/// a second restart.
+/// Loads saved sessions, unchanged and with a valid checksum. A loaded session is finite, and continues bit
+/// for bit after a second restart.
 pub fn session(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     for text in [text.to_string(), resealed(&text)] {

@@ -1,4 +1,4 @@
-//! Streams of frames: lines of JSON, and the journal that keeps them.
+//! Streams of frames: lines of JSON, and the journal that stores them.
 use super::{assert_alike, temporary};
 use manifactor::formats::whole::{checked_line, read_checked_line};
 use manifactor::geometry::Se3;
@@ -10,7 +10,8 @@ use manifactor::slam::stream::Stream;
 use std::collections::HashSet;
 use std::path::Path;
 
-/// Reads lines of JSON. Each line is a frame or an error with its number, and frames that are written are read back.
+/// Reads lines of JSON. Each line is a frame or an error with its line number, and written frames are read
+/// back.
 pub fn json_lines(data: &[u8]) {
     let folder = temporary();
     let read = lines(folder.path(), data);
@@ -39,13 +40,13 @@ pub fn json_lines(data: &[u8]) {
     }
 }
 
-/// Reads journals of frames, unchanged and with checksums that fit.
+/// Reads journals of frames, unchanged and with valid checksums.
 pub fn frame_journal(data: &[u8]) {
     kept(data);
     kept(&sealed(data));
 }
 
-/// A journal that is refused is not touched. One that is read keeps new frames, and gives all of them again.
+/// A refused journal is not modified. An accepted journal stores new frames, and returns all frames again.
 fn kept(bytes: &[u8]) {
     let folder = temporary();
     let path = folder.path().join("frames.jsonl");
@@ -77,10 +78,10 @@ fn kept(bytes: &[u8]) {
     assert_eq!(again.iter().collect::<Vec<_>>(), kept);
 }
 
-/// Settings that the journals of the corpus are for.
+/// Settings of the corpus's journals.
 const FINGERPRINT: &str = "7";
 
-/// Adds checksums that fit to all lines but the first.
+/// Adds valid checksums to all lines except the first.
 pub(super) fn sealed(data: &[u8]) -> Vec<u8> {
     let (first, rest) = data.split_at(data.iter().position(|byte| *byte == b'\n').map_or(0, |end| end + 1));
     let mut bytes = first.to_vec();
@@ -88,13 +89,13 @@ pub(super) fn sealed(data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Adds checksums that fit. A last line without an end stays unchanged.
+/// Adds valid checksums. A last line without an end stays unchanged.
 pub(super) fn sealed_lines(data: &[u8]) -> Vec<u8> {
     let seal = |line: &[u8]| {
         let text = String::from_utf8_lossy(line);
         let object = match (read_checked_line(line), text.strip_suffix('\n')) {
             (_, None) | (Ok(_), _) => return line.to_vec(),
-            // a checksum that does not fit
+            // an invalid checksum
             (_, Some(text)) => match text.split_once("\",").filter(|_| text.starts_with("{\"checksum\"")) {
                 Some((_, rest)) => format!("{{{rest}"),
                 None => text.to_owned(),
@@ -119,7 +120,7 @@ fn lines(folder: &Path, bytes: &[u8]) -> Vec<Result<Observation, SourceError>> {
     stream.map_or(vec![], |stream| stream.observations.collect())
 }
 
-/// Compares two frames, but for unused boxes and the last digits of a rotation.
+/// Compares two frames, except for unused boxes and the last digits of a rotation.
 fn same_frame(frame: &Observation, again: &Observation) {
     assert_eq!(frame.frame.timestamp.to_bits(), again.frame.timestamp.to_bits());
     assert_eq!(frame.frame.world_from_camera.translation, again.frame.world_from_camera.translation);

@@ -3,9 +3,10 @@ use manifactor::quadric::DualQuadric;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An object is in the middle of its shelf: r = c · along - middle, in metres.
+/// Places an object in the middle of its shelf: r = c · along - middle, in metres.
 ///
-/// c is its centroid. Moving across `along`, turning and growing leave it unchanged. Smooth and defined everywhere.
+/// c is the object's centroid. Motion orthogonal to `along`, rotation and growth leave r unchanged. Smooth
+/// and defined everywhere.
 ///
 /// ```toml
 /// [[factors]]
@@ -16,9 +17,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InTheMiddle {
-    /// Along the shelf, of any length but zero.
+    /// Direction along the shelf, of any length except zero.
     pub along: Direction,
-    /// The middle of the shelf, in metres along it.
+    /// Position of the middle along the shelf. Unit: metres.
     pub middle: f64,
 }
 

@@ -3,10 +3,10 @@ use manifactor::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A door hangs in its frame, open by an angle: r = Log((F A Rz(angle))⁻¹ D), (rx, ry, rz, x, y, z).
+/// A door that hangs in its frame, open by an angle: r = Log((F A Rz(angle))⁻¹ D), (rx, ry, rz, x, y, z).
 ///
-/// F is the frame's pose, D the door's, and A the hinge in the frame, its axis along z. Two rotations that are half a turn
-/// apart have two shortest ways between them: there the residual jumps.
+/// F is the frame's pose, D the door's, and A the hinge in the frame, its axis along z. The residual jumps if
+/// two rotations are half a turn apart, because there are two shortest paths between them.
 ///
 /// ```toml
 /// [[factors]]
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hinge {
-    /// The hinge in the frame: the door turns about its z.
+    /// Pose of the hinge in the frame: the door turns about its z axis.
     pub axis: Se3,
 }
 

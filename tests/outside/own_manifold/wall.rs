@@ -2,10 +2,11 @@ use manifactor::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A wall, seen from above: the points p of the plane with p · n = distance, where n = (cos angle, sin angle).
+/// A wall, seen from above: the points p of the plane with p · n = distance and n = (cos angle, sin angle).
 /// Tangent (angle, distance), in radians and metres.
 ///
-/// Half a turn and the distance's other sign make the same wall: a start on the wrong side stays there.
+/// Adding half a turn and changing the sign of the distance gives the same wall, so an initial value on the
+/// wrong side stays there.
 ///
 /// ```toml
 /// value = { type = "wall", angle = 1.5, distance = 2.0 }
@@ -13,15 +14,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
-    /// Of its normal, counter-clockwise from x, in radians.
+    /// Angle of the normal, counter-clockwise from x. Unit: radians.
     pub angle: f64,
-    /// From the origin, along the normal, in metres.
+    /// Distance from the origin along the normal. Unit: metres.
     pub distance: f64,
 }
 
 impl Manifold for Wall {
     type Dim = U2;
-    /// Its normal, and its distance.
+    /// The normal and the distance.
     type Of<T: Scalar> = Vector3<T>;
     const TANGENT: &'static [&'static str] = &["angle", "distance"];
 
@@ -49,7 +50,7 @@ impl Manifold for Wall {
 register_manifold!("wall", Wall);
 register_quantity!(Wall as Vector3<f64>);
 
-/// The same angle within half a turn to both sides.
+/// Returns the equivalent angle within half a turn of zero.
 fn wrap(angle: f64) -> f64 {
     manifactor::geometry::wrap(angle)
 }

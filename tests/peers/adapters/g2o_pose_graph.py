@@ -1,8 +1,8 @@
-"""g2o on a pose graph. Methods: gn, lm, dogleg; linear solver Eigen's, the one that the package has.
+"""g2o on a pose graph. Methods: gn, lm, dogleg, with Eigen's linear solver, the only one in the package.
 
-g2o's residuals are its own: (translation, angle) in the plane, (translation, vector part of the quaternion) in
-space. The vector part is half of the rotation vector, to first order; the information is scaled so that both weigh
-rotations alike, else g2o would seek another minimum.
+g2o defines its residuals as (translation, angle) in the plane, and (translation, vector part of the
+quaternion) in space. The vector part is half of the rotation vector, to first order. The information is
+scaled to compensate for that; otherwise g2o would have a different minimum.
 """
 
 import g2opy as g2o

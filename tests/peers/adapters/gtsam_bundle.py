@@ -1,7 +1,9 @@
-"""GTSAM on a bundle adjustment. Methods: lm, ordered by COLAMD; lm+points, with points first, as its own benchmark orders;
-sfm, its optimizer for structure from motion, by the Schur complement. All with what it calls Ceres's defaults for damping.
+"""GTSAM on a bundle adjustment. Methods: lm, ordered by COLAMD; lm+points, with points first, as in its own
+benchmark; sfm, its optimizer for structure from motion, by the Schur complement. All of them use the
+damping that it calls Ceres's defaults.
 
-Nothing holds the gauge: damping does. GTSAM's reader turns cameras about, so that they look along +z with y down.
+The gauge is not fixed; damping handles it. GTSAM's reader rotates cameras, so that they look along +z with
+y down.
 """
 
 import gtsam

@@ -1,7 +1,7 @@
-"""GTSAM on a pose graph. Methods: gn, lm; with a chordal start (LAGO in the plane) chordal+gn, chordal+lm; with METIS's
-ordering in place of COLAMD's metis+gn.
+"""GTSAM on a pose graph. Methods: gn, lm; with a chordal start (LAGO in the plane) chordal+gn, chordal+lm;
+with METIS's ordering instead of COLAMD's metis+gn.
 
-GTSAM cannot hold a variable: the first pose gets a prior at its start, which costs nothing there.
+GTSAM cannot fix a variable: the first pose gets a prior at its initial value, whose cost there is zero.
 """
 
 import gtsam
@@ -15,7 +15,7 @@ def is_spatial(path):
 
 
 def anchored(graph, values, spatial):
-    """The graph with a prior on its first pose."""
+    """Returns the graph with a prior on its first pose."""
     graph = graph.clone()
     first = min(values.keys())
     if spatial:

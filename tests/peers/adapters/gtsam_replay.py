@@ -1,10 +1,12 @@
-"""GTSAM's ISAM2 on a pose graph, pose by pose: relinearizeSkip 10, relinearizeThreshold 0.1, one update for each pose.
+"""GTSAM's ISAM2 on a pose graph, pose by pose: relinearizeSkip 10, relinearizeThreshold 0.1, one update for
+each pose.
 
-A pose comes with all edges to poses before it, and starts where its odometry leads from the estimate of that pose. What is timed
-is the CPU time of the update and of the estimate of the newest pose: ISAM2 computes its step when it is asked for it.
+A pose comes with all edges to earlier poses. Its initial value follows from its odometry and the estimate
+of the previous pose. The timing is the CPU time of the update and of the estimate of the newest pose,
+because ISAM2 computes its step only on request.
 
-usage: gtsam_replay.py FILE.g2o [EVERY]: every so many poses the cost, and that of a batch solve from the estimate; not timed.
-Prints one JSON object.
+usage: gtsam_replay.py FILE.g2o [EVERY]. Every EVERY poses, it reports the cost, and the cost of a batch
+solve from the estimate; these are not timed. Prints one JSON object.
 """
 
 import json
@@ -23,7 +25,7 @@ def is_spatial(path):
 
 
 def steps(edges):
-    """By pose, in order, its edges to poses before it, the odometry first."""
+    """For each pose, in order, its edges to earlier poses, the odometry first."""
     by_pose = {}
     for i in range(edges.size()):
         factor = edges.at(i)

@@ -1,8 +1,9 @@
-"""Ours, as its command line solves: METHOD is a solver's name, or that of a start and one, start+solver.
+"""Our command line as an adapter: METHOD is the name of a solver, or of a start and a solver, start+solver.
 
     manifactor_solve.py BINARY METHOD INPUT OUTPUT MAX_ITERATIONS RELATIVE_COST
 
-This process becomes that of the binary, so that its memory is measured and not ours; the runner reads its report.
+The binary replaces this process, so that its memory is measured and not Python's. The runner reads its
+report.
 """
 
 import os

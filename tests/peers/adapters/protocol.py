@@ -1,9 +1,10 @@
-"""What every adapter is told and tells.
+"""The protocol of all adapters.
 
     adapter METHOD INPUT OUTPUT MAX_ITERATIONS RELATIVE_COST
 
-INPUT has a start for every variable and holds none of them: the adapter holds the first pose. The adapter
-solves, writes its estimate to OUTPUT in the form of INPUT's vertex lines, and prints one JSON object.
+INPUT has an initial value for every variable and fixes none of them: the adapter fixes the first pose. The
+adapter solves, writes its estimate to OUTPUT in the format of INPUT's vertex lines, and prints one JSON
+object.
 """
 
 import json
@@ -28,7 +29,7 @@ class Task:
 
 
 class Stages:
-    """Wall-clock seconds, by stage and in total."""
+    """Wall-clock seconds by stage, and their total."""
 
     def __init__(self):
         self.seconds = {}
@@ -44,7 +45,7 @@ class Stages:
 
 
 def resident_kib():
-    """The most memory held so far, KiB: what an interpreter and its libraries need before any data."""
+    """Peak memory so far in KiB: the memory that an interpreter and its libraries need before any data."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 

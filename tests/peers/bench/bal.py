@@ -1,4 +1,5 @@
-"""Bundle adjustment in BAL's form: P = R X + t, p = -(Px, Py) / Pz, r = f (1 + k1 |p|^2 + k2 |p|^4) p - observed."""
+"""Bundle adjustment in BAL's format: P = R X + t, p = -(Px, Py) / Pz, r = f (1 + k1 |p|^2 + k2 |p|^4) p -
+observed."""
 
 from pathlib import Path
 
@@ -6,7 +7,7 @@ import numpy as np
 
 
 def read(path):
-    """Observations by rows (camera, point, u, v), cameras (n, 9) and points (n, 3)."""
+    """Returns observations by rows (camera, point, u, v), cameras (n, 9) and points (n, 3)."""
     words = np.array(Path(path).read_text().split(), dtype=float)
     cameras, points, observations = map(int, words[:3])
     seen, rest = np.split(words[3:], [4 * observations])
@@ -26,7 +27,7 @@ def rotate(w, x):
 
 
 class BundleReferee:
-    """Estimates are files of the same form; their observations, if they have any, do not count."""
+    """Computes the cost of estimates, which are BAL files too; observations in an estimate are ignored."""
 
     def __init__(self, path):
         self.observed, *_ = read(path)
@@ -40,7 +41,7 @@ class BundleReferee:
         return c[:, 6:7] * (1.0 + rho * (c[:, 7:8] + rho * c[:, 8:9])) * p - self.observed[:, 2:]
 
     def cost(self, path):
-        """None where a variable is missing or not finite."""
+        """Returns the cost, or None if a variable is missing or not finite."""
         _, cameras, points = read(path)
         if len(cameras) <= self.observed[:, 0].max() or len(points) <= self.observed[:, 1].max():
             return None

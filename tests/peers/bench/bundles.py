@@ -1,7 +1,8 @@
-"""Bundle adjustment in BAL's form: a walk around a block of houses, and points of their fronts that several images show.
+"""Bundle adjustment in BAL's format: a walk around a block of houses, and points on their fronts that
+several images show.
 
-A ring of cameras that look inward, at fronts of various distance. Each point is tracked through images next to each other,
-three to twenty of them, as a walking photographer's are; the walk ends where it began.
+A ring of cameras looks inward, at fronts of various distance. Each point is tracked through three to twenty
+neighbouring images, like the images of a walking photographer. The walk ends at its beginning.
 """
 
 import math
@@ -17,7 +18,7 @@ SEED = 7
 
 
 def rotation(w):
-    """The matrix of a rotation vector, by rows."""
+    """Returns the matrix of a rotation vector, by rows."""
     angle = math.sqrt(sum(c * c for c in w))
     a, b = (1.0, 0.5) if angle < 1e-9 else (math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle**2)
     x, y, z = w
@@ -35,7 +36,7 @@ def act(a, v):
 
 
 def rotation_vector(a):
-    """Of a matrix that turns by less than half a turn."""
+    """Returns the rotation vector of a matrix with an angle below half a turn."""
     sine = [(a[2][1] - a[1][2]) / 2.0, (a[0][2] - a[2][0]) / 2.0, (a[1][0] - a[0][1]) / 2.0]
     s = math.sqrt(sum(c * c for c in sine))
     angle = math.atan2(s, (a[0][0] + a[1][1] + a[2][2] - 1.0) / 2.0)
@@ -61,7 +62,7 @@ class Camera:
         return cls(centre, axes, [random.gauss(FOCAL, 10.0), random.gauss(-0.08, 0.01), random.gauss(0.02, 0.005)])
 
     def project(self, point):
-        """Pixels from the image's centre; None where it is not in the image."""
+        """Returns pixels from the image's centre, or None outside of the image."""
         x, y, z = act(self.axes, [p - c for p, c in zip(point, self.centre)])
         if z > -1.0:
             return None
@@ -73,7 +74,8 @@ class Camera:
         return (u, v) if abs(u) < WIDTH / 2.0 and abs(v) < HEIGHT / 2.0 else None
 
     def disturbed(self):
-        """As a reconstruction of little care has it: no distortion known, all else off."""
+        """Returns a rough initial reconstruction: without distortion, and with errors in everything
+        else."""
         centre = [c + d for c, d in zip(self.centre, gauss(0.1))]
         return Camera(centre, product(rotation(gauss(0.015)), self.axes), [FOCAL * random.gauss(1.0, 0.01), 0.0, 0.0])
 
@@ -83,12 +85,13 @@ class Camera:
 
 
 def faces(point, camera):
-    """Whether the front, whose outer side is away from the ring's middle, turns towards the camera."""
+    """Returns True if the front, whose outer side faces away from the ring's middle, faces the camera."""
     return sum(p * (c - p) for p, c in zip(point[:2], camera.centre)) > 0.0
 
 
 def track(per_point, visible):
-    """A run of the cameras that see a point: three at least, so many on average, twenty at most."""
+    """Selects consecutive cameras that see a point: at least three, at most twenty, `per_point` on
+    average."""
     length = 3 + int(random.expovariate(1.0 / max(per_point - 2.5, 0.1)))
     length = min(length, 20, len(visible))
     first = random.randrange(len(visible) - length + 1)
@@ -96,11 +99,11 @@ def track(per_point, visible):
 
 
 def bundle(cameras, points, per_point):
-    """Lines of a BAL file: about `per_point` observations of each point."""
+    """Returns the lines of a BAL file, with about `per_point` observations of each point."""
     random.seed(SEED)
     radius = max(cameras * SPACING / (2.0 * math.pi), SMALLEST)
     ring = [Camera.on_ring(2.0 * math.pi * i / cameras, radius) for i in range(cameras)]
-    # whoever sees a point is among these many neighbours of the camera that it is in front of
+    # cameras that see a point are among this number of neighbours of the camera in front of it
     reach = min(cameras // 2, 16)
     observations, true_points = [], []
     while len(true_points) < points:
@@ -109,7 +112,7 @@ def bundle(cameras, points, per_point):
         distance = radius - house + random.gauss(0.0, 0.2)
         point = [distance * math.cos(angle), distance * math.sin(angle), random.uniform(-2.0, 2.0)]
         nearest = round(angle / (2.0 * math.pi) * cameras)
-        # twice on a small ring, where both ends of the reach are the same camera
+        # duplicate on a small ring, if both ends of the reach are the same camera
         near = dict.fromkeys((nearest + i) % cameras for i in range(-reach, reach + 1))
         visible = [(i, pixel) for i in near if faces(point, ring[i]) and (pixel := ring[i].project(point))]
         if len(visible) < 3:

@@ -1,4 +1,4 @@
-"""docs/benchmarks.md and docs/benchmarks-methods.md, as the benchmark writes them."""
+"""Writes docs/benchmarks.md and docs/benchmarks-methods.md."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ Measured on a machine of the same kind, by hand, and so not in the ratios: SymFo
 sphere2500 0.54 s; it stops M3500 at 339.8 with its default λ), and gtsam-quadrics (a scene of the size of fifty_objects:
 5.3 µs to linearise a box, 1.41 s in all; Ceres there 2.4 µs and 1.05 s).
 """
-# how it is made, and what came out: by an example of our own, which has no peers
+# written by an example of this repository, which has no peers
 AUTO = Path(__file__).resolve().parent.parent / "auto.md"
 
 
@@ -39,7 +39,8 @@ the fastest first.
 
 
 def render(all_measured, stop, machine, solvers, repeat):
-    """By name of the page, its text: what the default solver takes beside the best peer; and every method."""
+    """Returns the text of each page by name: the default solver compared with the best peer, and every
+    method."""
     default, *others = solvers
     page = [
         INTRODUCTION.format(**vars(stop), **machine, repeat=repeat),

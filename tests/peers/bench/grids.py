@@ -1,4 +1,5 @@
-"""Cubes of poses, for growth with size: a walk that snakes through a lattice, and loop closures to neighbours."""
+"""Cubes of poses for growth with size: a walk that snakes through a lattice, and loop closures to
+neighbours."""
 
 import math
 import random
@@ -11,7 +12,7 @@ SEED = 3
 
 
 def snake(side):
-    """Cells of the lattice in the order of the walk, each next to the one before."""
+    """Yields the cells of the lattice in the order of the walk, each a neighbour of the previous one."""
     for z in range(side):
         for row in range(side):
             y = row if z % 2 == 0 else side - 1 - row
@@ -51,10 +52,10 @@ def compose(a, b):
 
 
 def grid(side):
-    """side^3 poses at 1 m, turned at random.
+    """Returns side^3 poses at 1 m, with random orientations.
 
-    The start is off by as much at each pose, whatever the size: odometry alone would be lost in large grids,
-    and growth is to be seen on problems that differ in nothing but size.
+    The error of the initial value is equal at each pose for any size. Odometry alone would drift far away
+    in large grids, but growth has to be measured on problems that differ only in size.
     """
     random.seed(SEED)
     cells = list(snake(side))

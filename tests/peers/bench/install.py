@@ -1,4 +1,4 @@
-"""Peers, by the packages that they have. Whatever cannot be had is left out, and said."""
+"""Installs the peers from their packages. Peers that cannot be installed are left out and reported."""
 
 import os
 import re
@@ -21,7 +21,7 @@ def say(text):
 
 
 def call(command, **options):
-    """Runs a command quietly; None, or its last lines where it fails."""
+    """Runs a command quietly. Returns None, or its last lines if it fails."""
     try:
         ran = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
     except OSError as error:
@@ -31,7 +31,7 @@ def call(command, **options):
 
 
 def python(cache):
-    """The interpreter of a virtual environment with all Python packages."""
+    """Returns the interpreter of a virtual environment with all Python packages."""
     folder = cache / "venv"
     interpreter = folder / "bin" / "python"
     if not interpreter.exists():
@@ -45,7 +45,7 @@ def python(cache):
 
 
 def ours(binary):
-    """The release build of this tree, or the binary given."""
+    """Returns the release build of this tree, or the given binary."""
     if binary is None:
         failed = call(["cargo", "build", "--release", "--package", "manifactor-cli"], cwd=ROOT)
         if failed:
@@ -59,7 +59,7 @@ def our_methods(ours, solvers, interpreter):
     return [Method("manifactor", solver, adapter, ALL, ours=True) for solver in solvers]
 
 
-# on grids, which are there for growth with size, the methods that do best on small ones
+# only the methods that are best on small grids, because grids measure growth with size
 GRIDS = {("gtsam", "gn"), ("gtsam", "metis+gn"), ("ceres", "lm+wide")}
 
 
@@ -84,7 +84,7 @@ def python_peers(interpreter):
 
 
 def ceres(cache):
-    """Our programs on Debian's libceres-dev, with a BLAS that is fast."""
+    """Returns our programs on Debian's libceres-dev, with a fast BLAS."""
     if any(call(["dpkg", "--status", package]) for package in DEBIAN_PACKAGES):
         call(["apt-get", "update"])
         failed = call(["apt-get", "install", "--yes", "--no-install-recommends", *DEBIAN_PACKAGES])
@@ -106,7 +106,7 @@ def ceres(cache):
 
 
 def compiled(program, binary):
-    """The program, built anew where its source is newer; None where that fails."""
+    """Returns the program, rebuilt if its source is newer, or None if that fails."""
     source = HERE / "adapters" / "ceres"
     newest = max(file.stat().st_mtime for file in source.iterdir())
     if not binary.exists() or binary.stat().st_mtime < newest:
@@ -119,7 +119,7 @@ def compiled(program, binary):
 
 
 def crates(cache):
-    """factrs, apex-solver and tiny-solver, in a workspace of their own."""
+    """Builds factrs, apex-solver and tiny-solver in a separate workspace."""
     target = cache / "rust"
     options = {"cwd": HERE / "adapters" / "rust", "env": os.environ | {"CARGO_TARGET_DIR": str(target)}}
     failed = call(["cargo", "build", "--release", "--locked"], **options)
@@ -137,7 +137,7 @@ def peers(cache, interpreter):
 
 
 def versions(interpreter):
-    """Of all packages that are there, in words."""
+    """Returns the versions of all installed packages as text."""
     script = f"import importlib.metadata as m; print(*(f'{{p}} {{m.version(p)}}' for p in {PYTHON_PACKAGES}), sep=', ')"
     python = subprocess.run([interpreter, "-c", script], capture_output=True, text=True, check=False).stdout.strip()
     query = ["dpkg-query", "--show", "--showformat", "Ceres ${Version}", "libceres-dev"]

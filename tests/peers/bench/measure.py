@@ -1,4 +1,4 @@
-"""Methods run in turn, on one core, each in its own process."""
+"""Runs methods in turn, on one core, each in a separate process."""
 
 import json
 import os
@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 
-# for what counts cores by other means than the affinity
+# for libraries that count cores without the affinity
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1"}
 
 
 @dataclass(frozen=True)
 class Stop:
-    """The rule for all: a step that changes the cost by less than this share of it, or so many iterations."""
+    """Stopping rule for all: a step that changes the cost by less than this fraction, or this number of
+    iterations."""
 
     max_iterations: int = 100
     relative_cost: float = 1e-6
@@ -24,7 +25,8 @@ class Stop:
 
 @dataclass
 class Result:
-    """Of one method on one problem; seconds of each run, stages and the rest of the median run."""
+    """Result of one method on one problem: seconds of each run; stages and everything else from the median
+    run."""
 
     method: str
     ours: bool
@@ -39,12 +41,13 @@ class Result:
 
     @property
     def time(self):
-        """Median seconds; None where there is no run that ended by itself."""
+        """Returns the median of the seconds, or None if no run ended by itself."""
         return statistics.median(self.seconds) if self.seconds else None
 
 
 def peak_kib(pid):
-    """Peak resident memory of a process that still runs. wait4 would count what its parent held at the fork."""
+    """Returns the peak resident memory of a running process. wait4 would count the memory of its parent at
+    the fork."""
     try:
         status = Path(f"/proc/{pid}/status").read_text()
     except OSError:
@@ -53,7 +56,8 @@ def peak_kib(pid):
 
 
 def watched(command, core, patience, log):
-    """Runs a command on one core; exit status, peak KiB, seconds that it had to wait for the core or for a file."""
+    """Runs a command on one core. Returns its exit status, its peak KiB, and the seconds that it waited for
+    the core or for a file."""
     began = time.perf_counter()
     pinned = ["taskset", "--cpu-list", str(core), *map(str, command)]
     with open(log, "w") as out, open(f"{log}.err", "w") as err:
@@ -73,7 +77,7 @@ def watched(command, core, patience, log):
 
 
 def report(log):
-    """What an adapter printed; None where it did not get so far."""
+    """Returns the output of an adapter, or None if it is incomplete."""
     try:
         told = json.loads(Path(log).read_text())
     except ValueError:
@@ -84,7 +88,7 @@ def report(log):
 
 
 def of_command_line(told):
-    """The report of our own command line, in an adapter's words."""
+    """Converts the report of our own command line to the format of an adapter."""
     seconds, end = told["seconds"], told["termination"]
     start = told.get("start", {}).get("seconds", 0.0)
     stages = {"start": start} | {name: spent for name, spent in seconds.items() if name != "total"}
@@ -98,13 +102,13 @@ def of_command_line(told):
 
 
 def last_words(log):
-    """Of what a failed adapter said, the last line with a message in it."""
+    """Returns the last line with a message in the output of a failed adapter."""
     lines = [line.strip() for line in Path(f"{log}.err").read_text().splitlines()]
     return next((line for line in reversed(lines) if line and not line.startswith("note:")), "nothing said")
 
 
 def run_once(method, problem_input, folder, stop, core, patience):
-    """One run; its report with peak memory, or a text that says how it failed."""
+    """Runs once. Returns its report with peak memory, or a text with the reason of its failure."""
     output, log = folder / f"estimate{problem_input.suffix}", folder / "report.json"
     output.unlink(missing_ok=True)
     code, peak, waited = watched(method.command(problem_input, output, stop), core, patience, log)
@@ -117,7 +121,8 @@ def run_once(method, problem_input, folder, stop, core, patience):
 
 
 def measure(methods, problem_input, folder, stop, core, repeat, patience):
-    """Results by method. Rounds go through all methods, so that a disturbance meets all alike."""
+    """Returns the results by method. Rounds go through all methods, so that a disturbance affects all of
+    them."""
     runs = {method: [] for method in methods}
     results = {method: Result(method.name, method.ours) for method in methods}
     for round in range(repeat):

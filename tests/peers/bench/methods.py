@@ -1,4 +1,4 @@
-"""Who is compared: each method of each peer, and ours."""
+"""The compared programs: each method of each peer, and ours."""
 
 import json
 import subprocess
@@ -44,18 +44,18 @@ class Ours:
         return [entry["name"] for entry in json.loads(listed.stdout)]
 
     def default_solvers(self):
-        """The one that needs no choice, once there is one."""
+        """Returns the solver that needs no choice, if there is one."""
         return ["auto"] if "auto" in self.solvers() else ["levenberg_marquardt", "gauss_newton"]
 
     def start(self, source, output):
-        """Vertices for a file that has edges only: spanning trees of odometry."""
+        """Returns initial values for a file without vertices: spanning trees of odometry."""
         solve = [self.binary, "solve", source, "--out", output, "--force", "--json"]
         nothing = ["--solver", "gauss_newton", "--set", "solver.stop.max_iterations=0"]
         subprocess.run([*solve, *nothing], capture_output=True, check=False)
         return pose_graph.read(Path(output)).vertices
 
     def begin(self, document, output, data):
-        """Writes the graphs with which a run begins; what was said, in case they are not there."""
+        """Writes the initial graphs of a run; returns the messages, in case the graphs are missing."""
         nothing = ["--set", "solver.type=levenberg_marquardt", "--set", "solver.stop.max_iterations=0"]
         command = [self.binary, "run", document, "--out", output, "--force", "--data", data, *nothing]
         return subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()

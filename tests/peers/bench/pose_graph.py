@@ -1,4 +1,4 @@
-"""Pose graphs in g2o's format, as lines: the one input that all adapters share."""
+"""Pose graphs in g2o's format, as lines: the common input of all adapters."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,12 +14,13 @@ class PoseGraph:
 
     @property
     def ids(self):
-        """Of all poses that edges name."""
+        """Returns the ids of all poses in edges."""
         return {int(i) for edge in self.edges for i in edge[1:3]}
 
 
 def read(path):
-    """Vertices and edges; whatever else the file holds (FIX, parameters) is left to the adapters' convention."""
+    """Reads vertices and edges. All remaining lines (FIX, parameters) are left to the adapters'
+    convention."""
     graph = PoseGraph(spatial=False)
     for line in Path(path).read_text().splitlines():
         words = line.split()
@@ -34,7 +35,8 @@ def read(path):
 
 
 def write(path, graph):
-    """Vertices by number, then edges, fields apart by one space, no other lines: what every reader understands."""
+    """Writes vertices by number, then edges, with fields separated by one space and no additional lines, so
+    that every reader accepts it."""
     tag = "VERTEX_SE3:QUAT" if graph.spatial else "VERTEX_SE2"
     with open(path, "w") as out:
         for number, pose in sorted(graph.vertices.items()):

@@ -1,4 +1,4 @@
-"""The problems, and their inputs: every method gets the same file, with a start for every pose."""
+"""The problems and their inputs: every method gets the same file, with an initial value for every pose."""
 
 import shutil
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Problem:
 
     @property
     def size(self):
-        """What growth is measured against: poses of a grid, cameras of a bundle adjustment."""
+        """Returns the size for growth: poses of a grid, cameras of a bundle adjustment."""
         return self.side**3 or self.cameras
 
 
@@ -67,13 +67,13 @@ def bundle(cameras):
 
 
 def grid(poses):
-    """A cube of about so many poses."""
+    """Returns a cube of about `poses` poses."""
     side = round(poses ** (1.0 / 3.0))
     return Problem(f"grid_{side**3}", "grid", side=side)
 
 
 def prepare(problem, data, folder, ours):
-    """Writes the input; returns why it cannot be had, or None."""
+    """Writes the input. Returns None, or the reason if it is not available."""
     folder.mkdir(parents=True, exist_ok=True)
     if problem.kind == "grid":
         return prepare_grid(problem, folder)

@@ -1,4 +1,5 @@
-"""Results in a file: the last of each method on each problem, so that a benchmark can be run piece by piece."""
+"""Results in a file: the last of each method on each problem, so that a benchmark can be run piece by
+piece."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -17,7 +18,7 @@ class Measured:
 
 
 def add(measured, new):
-    """Keeps what other methods did from the same start."""
+    """Keeps the results of all remaining methods from the same initial value."""
     old = measured.get(new.name)
     if old and old.start == new.start:
         names = [r.method for r in new.results]
@@ -26,7 +27,7 @@ def add(measured, new):
 
 
 def load(path):
-    """By name of the problem."""
+    """Returns the problems by name."""
     if not path.exists():
         return {}
     problems = json.loads(path.read_text())["problems"]

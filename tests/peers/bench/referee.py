@@ -30,7 +30,7 @@ class PoseGraphReferee:
         self.information[:, columns, rows] = numbers[:, width:]
 
     def cost(self, path):
-        """None where a pose is missing or not finite."""
+        """Returns the cost, or None if a pose is missing or not finite."""
         vertices = pose_graph.read(path).vertices
         if not set(self.ids.flat) <= vertices.keys():
             return None

@@ -1,4 +1,4 @@
-"""What the referee judges by, against other ways to say it: python -m unittest bench.referee_test"""
+"""Tests the referee's formulas against equivalent ones: python -m unittest bench.referee_test"""
 
 import unittest
 
@@ -8,7 +8,7 @@ from bench import bal, bundles, lie, scene
 
 
 def exponential(generator):
-    """Of a matrix, by its series."""
+    """Returns the exponential of a matrix, by its series."""
     total, term = np.eye(len(generator)), np.eye(len(generator))
     for n in range(1, 60):
         term = term @ generator / n
@@ -17,7 +17,7 @@ def exponential(generator):
 
 
 def quaternion(rotation):
-    """x y z w, for turns well below half a turn."""
+    """Returns x y z w, for rotations well below half a turn."""
     w = np.sqrt(1.0 + np.trace(rotation)) / 2.0
     skew = rotation - rotation.T
     return np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / (4.0 * w), w
@@ -78,7 +78,7 @@ class Bundles(unittest.TestCase):
         return referee
 
     def test_a_point_is_seen_where_the_formula_says(self):
-        # turned by a quarter about z and moved, the point is at (2, 4, -2): p = (1, 2), |p|^2 = 5
+        # rotated by a quarter turn about z and moved, the point is at (2, 4, -2): p = (1, 2), |p|^2 = 5
         camera = [0.0, 0.0, np.pi / 2.0, 1.0, 1.0, -1.0, 100.0, 0.5, 0.25]
         referee = self.referee([[0, 0, 975.0 - 3.0, 1950.0 + 1.0]])
         residuals = referee.residuals(np.array([camera]), np.array([[3.0, -1.0, -1.0]]))

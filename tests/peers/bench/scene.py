@@ -19,7 +19,7 @@ def poses(values):
 
 
 def weights(factors, rows):
-    """1/sigma by factor and row; zero for rows that are not observed."""
+    """Returns 1/sigma by factor and row; zero for unobserved rows."""
     table = np.zeros((len(factors), rows))
     for row, factor in zip(table, factors):
         noise = factor["noise"]
@@ -29,7 +29,7 @@ def weights(factors, rows):
 
 
 def axes(quadrics):
-    """Semi-axes with their lengths, in the frame of each pose (n, 3, 3), by columns."""
+    """Returns semi-axes with their lengths, in the frame of each pose (n, 3, 3), by columns."""
     rotation = np.stack([rotate(quadrics[0][:, 3:], np.tile(e, (len(quadrics[0]), 1))) for e in np.eye(3)], axis=2)
     return rotation * quadrics[1][:, None, :]
 
@@ -46,7 +46,8 @@ class SceneReferee:
         return [f for f in self.factors if f["factor"]["type"] == kind]
 
     def relative(self, values):
-        """Of priors and odometry: Log(Z^-1 X) and Log(Z^-1 Xi^-1 Xj), rotation first in the noise."""
+        """Returns the residuals of priors and odometry: Log(Z^-1 X) and Log(Z^-1 Xi^-1 Xj), rotation first
+        in the noise."""
         priors, betweens = self.of("prior_se3"), self.of("between_se3")
         prior = Space.between(
             poses([f["factor"]["value"] for f in priors]), poses([values[f["keys"][0]] for f in priors])
@@ -57,7 +58,8 @@ class SceneReferee:
         return log * weights(priors + betweens, 6)
 
     def boxes(self, values):
-        """Of the whole outline, less those measured; zero where an object is not wholly in front of the camera."""
+        """Returns the box of the whole outline minus the measured one; zero if an object is not entirely in
+        front of the camera."""
         factors = self.of("bounding_box")
         cameras = [f["factor"]["camera"] for f in factors]
         quadrics = [values[f["keys"][1]] for f in factors]
@@ -76,7 +78,7 @@ class SceneReferee:
         return np.where(in_front[:, None], r, 0.0) * weights(factors, 4)
 
     def cost(self, path):
-        """None where a variable is missing or not finite."""
+        """Returns the cost, or None if a variable is missing or not finite."""
         values = variables(json.loads(Path(path).read_text()))
         if any(key not in values for f in self.factors for key in f["keys"]):
             return None

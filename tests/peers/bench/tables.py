@@ -1,4 +1,4 @@
-"""What was measured, as tables of Markdown: they read well in a terminal too."""
+"""The results as Markdown tables, which are readable in a terminal too."""
 
 import math
 
@@ -15,14 +15,15 @@ def reaches(result, best):
 
 
 def best_peer(measured):
-    """The fastest that reaches the best known cost, whatever initialisation that takes."""
+    """Returns the fastest peer that reaches the best known cost, with any initialisation."""
     best = best_known(measured)
     reaching = [r for r in measured.results if not r.ours and reaches(r, best)]
     return min(reaching, key=lambda r: r.time, default=None)
 
 
 def ratio(result, measured):
-    """To the best peer's time; None where one of them does not reach the best known cost."""
+    """Returns the ratio to the best peer's time, or None if one of them does not reach the best known
+    cost."""
     peer = best_peer(measured)
     return result.time / peer.time if peer and reaches(result, best_known(measured)) else None
 
@@ -32,23 +33,23 @@ def number(x, form, scale=1.0):
 
 
 def cost(result, best):
-    """✗: not the best known."""
+    """✗ marks a cost above the best known one."""
     return number(result.cost, ".9g") + ("" if reaches(result, best) else " ✗")
 
 
 def milliseconds(result):
-    """~: most runs did not have the core to themselves."""
+    """~ marks times for which most runs did not have a core to themselves."""
     return number(result.time, ".1f", 1e3) + (" ~" if result.disturbed > len(result.seconds) / 2 else "")
 
 
 def table(head, rows):
-    """The first column to the left, the others to the right."""
+    """The first column is left-aligned, all remaining columns are right-aligned."""
     lines = [head, ["---"] + ["---:"] * (len(head) - 1), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def ending(result):
-    """With the method's own account of the cost, where it minimises another."""
+    """The termination, with the method's own cost if it minimises a different one."""
     differs = None not in (result.own_cost, result.cost) and abs(result.own_cost - result.cost) > 1e-5 * result.cost
     own = f"by its own account {result.own_cost:.9g}" if differs else ""
     return "; ".join(part for part in (result.status.replace("|", "/"), own) if part)
@@ -72,7 +73,7 @@ def of_method(result, measured):
 
 
 def of_problem(measured):
-    """All methods on one problem, those that reach the best known cost first, the fastest first."""
+    """All methods on one problem: first those that reach the best known cost, then by time."""
     best = best_known(measured)
     order = sorted(measured.results, key=lambda r: (not reaches(r, best), r.time or math.inf))
     costs = f"Cost at the start {number(measured.start, '.9g')}, best known {number(best, '.12g')}."
@@ -83,7 +84,7 @@ SUMMARY = ["problem", "ours, ms", "cost", "best peer", "ms", "cost", "ours - the
 
 
 def summary(all_measured, solver):
-    """One row a problem: ours against the best peer."""
+    """One row per problem: ours against the best peer."""
     rows = []
     for measured in all_measured:
         best, peer = best_known(measured), best_peer(measured)
@@ -105,7 +106,7 @@ def summary(all_measured, solver):
 
 
 def slope(points):
-    """Of a line through the logarithms, by least squares."""
+    """Slope of a line through the logarithms, by least squares."""
     if len(points) < 2:
         return None
     logs = [(math.log(x), math.log(y)) for x, y in points]
@@ -114,7 +115,7 @@ def slope(points):
 
 
 def growth(all_measured, kind, unit):
-    """Seconds and memory of each method on problems of one kind, and the exponents with which they grow."""
+    """Seconds and memory of each method on problems of one kind, and the exponents of their growth."""
     sizes = sorted((m for m in all_measured if m.kind == kind), key=lambda m: m.size)
     rows = {}
     for measured in sizes:

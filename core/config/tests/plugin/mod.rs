@@ -65,7 +65,7 @@ impl Manifold for Real {
 }
 register_manifold!("real", Real);
 
-/// The second point as seen from the first.
+/// The position of the second point relative to the first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Offset {
@@ -80,7 +80,7 @@ impl Residual for Offset {
 }
 register_factor!("offset", Offset);
 
-/// How far out a point is.
+/// The height of a point.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Height {

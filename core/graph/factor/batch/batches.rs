@@ -1,4 +1,4 @@
-//! The batches of a problem, found by what belongs together.
+//! The batches of a problem, looked up by type of factor.
 use super::Batch;
 use crate::factor::ErasedResidual;
 use crate::loss::Loss;
@@ -14,7 +14,7 @@ pub struct Batches {
 }
 
 impl Batches {
-    /// The place of the batch that such a factor belongs to; a new batch, where it is the first of its kind.
+    /// Returns the index of the batch for a factor of this kind, and adds the batch if it is new.
     pub fn place(
         &mut self,
         residual: &dyn ErasedResidual,
@@ -31,15 +31,15 @@ impl Batches {
         });
         place as usize
     }
-    /// The batches, in the order in which they were made.
+    /// Returns the batches, in the order of their creation.
     pub fn as_slice(&self) -> &[Box<dyn Batch>] {
         &self.all
     }
-    /// The batches, to be changed.
+    /// Returns the batches for modification.
     pub fn as_mut_slice(&mut self) -> &mut [Box<dyn Batch>] {
         &mut self.all
     }
-    /// The batches by themselves.
+    /// Returns the batches by value.
     pub fn into_vec(self) -> Vec<Box<dyn Batch>> {
         self.all
     }

@@ -1,10 +1,10 @@
-//! Factors that leave a batch, and variables that are held from now on.
+//! Removal of factors from a batch, and changes of their fixed variables.
 use super::BatchOf;
 use crate::factor::kernel::Kernel;
 use crate::variable::column::FIXED;
 use std::ops::Range;
 
-/// Has the last factor's list replace that of the `index`-th, where lists stand one after the other: that of factor i ends at
+/// Replaces list `index` by the last list, for lists that are stored one after the next: list i ends at
 /// `ends[i]`.
 fn swap_list(ends: &mut Vec<u32>, index: usize, mut replace: impl FnMut(Range<usize>, Range<usize>)) {
     let begin = |i: usize| if i == 0 { 0 } else { ends[i - 1] as usize };
@@ -18,7 +18,7 @@ fn swap_list(ends: &mut Vec<u32>, index: usize, mut replace: impl FnMut(Range<us
     }
 }
 
-/// `list[gone] ← list[moved]`, of which the second is the list's end, and goes.
+/// Replaces `list[gone]` by `list[moved]`, the end of the list, which is removed.
 fn swap<T: Copy>(list: &mut Vec<T>, gone: Range<usize>, moved: Range<usize>) {
     let last: Vec<T> = list.drain(moved).collect();
     let end = gone.end.min(list.len());
@@ -28,7 +28,8 @@ fn swap<T: Copy>(list: &mut Vec<T>, gone: Range<usize>, moved: Range<usize>) {
 }
 
 impl<F: Kernel> BatchOf<F> {
-    /// The last factor takes the place of the `index`-th; returns its place in the graph, `None` where it was the last.
+    /// Removes factor `index` and moves the last factor to its position. Returns the graph index of the
+    /// moved factor, or `None` if the removed factor was the last.
     pub(super) fn swap_remove(&mut self, index: usize) -> Option<usize> {
         if index >= self.factors.len() {
             return None;
@@ -57,7 +58,7 @@ impl<F: Kernel> BatchOf<F> {
         self.entries.get(index).map(|entry| *entry as usize)
     }
 
-    /// What is held of a factor's variables from now on.
+    /// Sets the fixed variables and directions of a factor.
     pub(super) fn set_held(&mut self, index: usize, starts: &[u32], held: &[u32]) {
         let range = Self::range(&self.ends, index);
         if self.held.is_empty() && held.iter().any(|h| *h != 0) {

@@ -1,4 +1,4 @@
-//! The passes over a batch: chunk by chunk, by one thread or several, with the same bits.
+//! Passes over a batch, chunk by chunk. Results are bitwise identical for any number of threads.
 use super::threads::join;
 use super::{BatchOf, Evaluation};
 use crate::algebra::{Block, Dimension, Matrix};
@@ -8,16 +8,17 @@ use crate::variable::column::Columns;
 use nalgebra::U1;
 use pulp::{Simd, WithSimd};
 
-/// Factors in a chunk: one virtual call of a loss, and one task of a thread, serves this many.
+/// Factors per chunk: the unit of one virtual call of a loss, and of one thread task.
 pub(super) const CHUNK: usize = 16;
-/// Factors that threads evaluate at a time, while one of them adds those before them.
+/// Factors that threads evaluate in parallel, while one thread adds those of the previous window.
 const WINDOW: usize = 64 * CHUNK;
-/// Seconds that a pass has to take for threads to be worth waking up; none where tests are to see them at work.
+/// Duration in seconds above which a pass runs on several threads. Waking them has a cost. Zero in debug
+/// builds, so that tests cover the threads.
 const PARALLEL: f64 = if cfg!(debug_assertions) { 0.0 } else { 2e-3 };
-/// What costs take of a linearization's time, about.
+/// Duration of a cost evaluation, as an approximate share of a linearization.
 pub(super) const COST: f64 = 0.2;
 
-/// Room for one chunk.
+/// Buffers for one chunk.
 #[derive(Clone)]
 pub(super) struct Work<F: Kernel> {
     pub(super) r: [Matrix<F::Dim, U1>; CHUNK],
@@ -38,7 +39,7 @@ impl<F: Kernel> Work<F> {
 }
 
 impl<F: Kernel> BatchOf<F> {
-    /// Whitened residuals, Jacobians and robust weights of the chunk that begins at `first`.
+    /// Computes whitened residuals, Jacobians and robust weights of the chunk that begins at `first`.
     #[inline(always)]
     pub(super) fn evaluate(
         &self,
@@ -67,7 +68,8 @@ impl<F: Kernel> BatchOf<F> {
         work.evaluation = Evaluation { cost, inactive, left: 0, not_finite };
     }
 
-    /// The factor that makes the cost of a chunk not finite; the one that costs the most where only their sum is not.
+    /// Returns the factor that makes the cost of a chunk infinite or NaN. If only the sum overflows,
+    /// returns the factor with the largest cost.
     fn find_not_finite(&self, first: usize, active: &[bool], work: &Work<F>) -> Option<usize> {
         let cost = |k: usize| {
             let squared = work.r[k].as_slice().iter().map(|x| x * x).sum();
@@ -79,7 +81,8 @@ impl<F: Kernel> BatchOf<F> {
         Some(self.entries[first + k] as usize)
     }
 
-    /// Squared norms into weights, and ½ Σ ρ: one virtual call. Inactive factors have norm 0.
+    /// Replaces squared norms by weights and returns ½ Σ ρ, in one virtual call. Inactive factors have norm
+    /// 0.
     #[inline(always)]
     pub(super) fn weigh(&self, first: usize, squared: &mut [f64], active: &[bool]) -> f64 {
         let cost = match self.weights.get(first..first + squared.len()) {
@@ -94,7 +97,7 @@ impl<F: Kernel> BatchOf<F> {
         cost
     }
 
-    /// Squared norms into the loss's weights, and ½ Σ ρ.
+    /// Replaces squared norms by the weights of the loss. Returns ½ Σ ρ.
     #[inline(always)]
     pub(super) fn robust(&self, first: usize, squared: &mut [f64]) -> f64 {
         match &self.losses {
@@ -103,18 +106,19 @@ impl<F: Kernel> BatchOf<F> {
         }
     }
 
-    /// As `robust`, each factor `weights` times. A loss sums up what it is shown: show it one at a time.
+    /// Like `robust`, with each factor multiplied by its weight. One call per factor, since a loss returns
+    /// the sum of its costs.
     fn reweigh(&self, first: usize, squared: &mut [f64], weights: &[f64]) -> f64 {
         let one = |(k, (s, weight)): (usize, (&mut f64, &f64))| {
             let cost = self.robust(first + k, std::slice::from_mut(s));
             *s *= weight;
-            // a factor that does not count may be as far off as it likes
+            // with weight zero, an infinite cost must not turn into NaN
             if *weight == 0.0 { 0.0 } else { weight * cost }
         };
         squared.iter_mut().zip(weights).enumerate().map(one).sum()
     }
 
-    /// ‖whitened residual‖²; `None` where the factor is not defined.
+    /// Returns ‖whitened residual‖²; `None` if the factor is undefined.
     #[inline(always)]
     pub(super) fn squared(&self, columns: F::Columns<'_>, i: usize) -> Option<f64> {
         let x = self.factors[i].load(columns, &self.index[Self::range(&self.ends, i)]);
@@ -157,12 +161,12 @@ impl<F: Kernel> BatchOf<F> {
         out
     }
 
-    /// Factors of the n-th chunk.
+    /// Returns the number of factors in the n-th chunk.
     pub(super) fn chunk(&self, n: usize) -> usize {
         CHUNK.min(self.factors.len() - n * CHUNK)
     }
 
-    /// The costs of chunks `first..`, by threads.
+    /// Computes the costs of the chunks from `first` on, by threads.
     pub(super) fn chunk_costs(&self, columns: F::Columns<'_>, first: usize, costs: &mut [Evaluation]) {
         if costs.len() <= 1 {
             costs
@@ -177,7 +181,7 @@ impl<F: Kernel> BatchOf<F> {
         });
     }
 
-    /// Evaluates the chunks of `active`, the first of which begins at the factor `first`, by threads.
+    /// Evaluates the chunks of `active`, which begin at factor `first`, by threads.
     fn evaluate_chunks(
         &self,
         columns: F::Columns<'_>,
@@ -197,7 +201,7 @@ impl<F: Kernel> BatchOf<F> {
         });
     }
 
-    /// Returns whether threads are worth it for this share of a linearization's work.
+    /// Returns whether threads pay off for this share of a linearization's work.
     pub(super) fn in_parallel(&self, share: f64) -> bool {
         share * self.alone > PARALLEL && rayon::current_num_threads() > 1
     }
@@ -218,7 +222,7 @@ impl<F: Kernel> BatchOf<F> {
         total
     }
 
-    /// Some factors only, by one thread: neighbours among them share a chunk.
+    /// Linearizes the listed factors on one thread; neighbours share a chunk.
     pub(super) fn linearize_listed(
         &mut self,
         indices: &[u32],
@@ -239,7 +243,8 @@ impl<F: Kernel> BatchOf<F> {
         total
     }
 
-    /// Evaluated by threads, added by one in order: the same sums as alone.
+    /// Threads evaluate the factors, and one thread adds them in order. The sums are the same as on a
+    /// single thread.
     pub(super) fn linearize_together(
         &self,
         columns: F::Columns<'_>,
@@ -281,7 +286,8 @@ impl<F: Kernel> BatchOf<F> {
     }
 }
 
-/// Ascending places as stretches of neighbours that fit into a chunk: the first of each, and how many they are.
+/// Splits ascending indices into runs of consecutive ones that fit into a chunk. Yields the first index and
+/// the length of each run.
 pub(super) fn runs(indices: &[u32]) -> impl Iterator<Item = (usize, usize)> {
     let mut rest = indices;
     std::iter::from_fn(move || {
@@ -293,8 +299,8 @@ pub(super) fn runs(indices: &[u32]) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
-/// Whitens residuals and Jacobians of a chunk; the weights become squared norms. As [`Add`], a type of its own to be
-/// compiled for wide registers: in a closure, it would not be.
+/// Whitens residuals and Jacobians of a chunk, and replaces its weights by squared norms. A type rather
+/// than a closure, like [`Add`], so that it is compiled for wide registers.
 struct Whiten<'a, F: Kernel> {
     batch: &'a BatchOf<F>,
     first: usize,
@@ -329,7 +335,7 @@ impl<F: Kernel> WithSimd for Whiten<'_, F> {
     }
 }
 
-/// Adds the parts of a chunk to H and g.
+/// Adds the contributions of a chunk to H and g.
 struct Add<'a, 'b, F: Kernel> {
     batch: &'a BatchOf<F>,
     first: usize,
@@ -355,7 +361,7 @@ impl<F: Kernel> WithSimd for Add<'_, '_, F> {
     }
 }
 
-/// Zeroes the columns of directions that are held.
+/// Sets the columns of fixed directions to zero.
 #[inline(always)]
 fn hold<R: Dimension>(held: u32, block: &mut [f64]) {
     for (c, column) in block.chunks_exact_mut(R::N).enumerate() {

@@ -1,14 +1,15 @@
-//! The one place where batches meet the thread pool: rayon is compiled here once, and not for each type of factor.
+//! The interface of batches to the thread pool: rayon is compiled once here instead of once per factor
+//! type.
 
-/// A task that threads may take from one another.
+/// A task that idle threads may steal.
 pub(super) type Task<'a> = &'a mut (dyn FnMut() + Send);
 
-/// Runs both tasks, at the same time where a thread is idle.
+/// Runs both tasks, in parallel if a thread is idle.
 pub(super) fn join(a: Task<'_>, b: Task<'_>) {
     rayon::join(a, b);
 }
 
-/// Runs a task on a thread of the pool, so that each [`join`] within it need not go there.
+/// Runs a task on a thread of the pool, so that each [`join`] in it is already inside the pool.
 pub(super) fn enter(task: Task<'_>) {
     rayon::scope(|_| task());
 }

@@ -1,4 +1,4 @@
-//! One variable without its comma is no tuple.
+//! One variable without its comma is not a tuple.
 #![allow(unused_imports)]
 #[path = "toy/number.rs"]
 mod number;

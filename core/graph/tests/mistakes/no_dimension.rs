@@ -1,4 +1,4 @@
-//! A plain number is no dimension.
+//! A plain number is not a dimension.
 #![allow(unused_imports)]
 #[path = "toy/number.rs"]
 mod number;

@@ -1,4 +1,4 @@
-//! What is registered has no residual.
+//! The registered type has no residual.
 #![allow(unused_imports)]
 #[path = "toy/number.rs"]
 mod number;

@@ -1,4 +1,4 @@
-//! f64 is no variable.
+//! f64 is not a variable.
 #![allow(unused_imports)]
 #[path = "toy/number.rs"]
 mod number;

@@ -1,4 +1,4 @@
-//! A constant of f64 meets a dual number.
+//! A constant of type f64 is mixed with a dual number.
 #![allow(unused_imports)]
 #[path = "toy/number.rs"]
 mod number;

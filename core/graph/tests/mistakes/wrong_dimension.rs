@@ -1,4 +1,4 @@
-//! Two rows are promised, one is returned.
+//! The residual declares two rows and returns one.
 #![allow(unused_imports)]
 #[path = "toy/number.rs"]
 mod number;

@@ -1,11 +1,11 @@
-//! One change of the model, and what it touches.
+//! One change of the model, and the variables and factors that it touches.
 use crate::model::Model;
 use manifactor_graph::{FactorEntry, Resolved};
 
-/// A change of the model; each has one that takes it back.
+/// A change of the model. Each change has an inverse.
 #[derive(Debug, Clone)]
 pub(in crate::session) enum Change {
-    /// An outlier, or what may be one, is inserted without being taken in.
+    /// If `rejected`, the factor is inserted as a rejected one.
     Insert {
         number: u32,
         entry: Box<FactorEntry>,
@@ -37,20 +37,20 @@ pub(in crate::session) enum Change {
 pub(in crate::session) struct Touched {
     /// Variables whose blocks of H have changed.
     pub(in crate::session) variables: Vec<u32>,
-    /// Factors that are to be linearized.
+    /// Factors to linearize.
     pub(in crate::session) factors: Vec<u32>,
-    /// Factors that were taken out; some may be back.
+    /// Removed factors. Some may have been inserted again.
     pub(in crate::session) removed: Vec<u32>,
-    /// Variables that may have lost what determined them, or have gained it.
+    /// Variables that may have become determined or undetermined.
     pub(in crate::session) doubtful: Vec<u32>,
-    /// Variables of which other directions are held now.
+    /// Variables whose held directions have changed.
     pub(in crate::session) held: Vec<u32>,
-    /// Whether variables that are damped take another step.
+    /// True if damped variables take another step.
     pub(in crate::session) steps: bool,
 }
 
 impl Touched {
-    /// Notes that a factor says something else now.
+    /// Records that a factor has changed.
     pub(in crate::session) fn change(&mut self, model: &Model, factor: u32) {
         self.factors.push(factor);
         for v in model.factor(factor).into_iter().flat_map(|factor| factor.variables()) {
@@ -61,7 +61,7 @@ impl Touched {
 }
 
 impl Change {
-    /// Makes the change; returns the one that takes it back.
+    /// Applies the change and returns its inverse.
     pub(in crate::session) fn apply(self, model: &mut Model, touched: &mut Touched) -> Option<Self> {
         match self {
             Self::Insert { number, entry, resolved, weight, rejected } => {

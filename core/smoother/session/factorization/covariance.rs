@@ -1,4 +1,4 @@
-//! Covariances from the fronts at hand: along paths of the tree, without a factorization.
+//! Covariances from the stored fronts along paths of the tree, without a new factorization.
 use super::Factorization;
 use crate::elimination_tree::{Couplings, NONE};
 use crate::model::Model;
@@ -6,31 +6,31 @@ use manifactor_graph::Key;
 use nalgebra::DMatrix;
 use std::cmp::Reverse;
 
-/// Why there is no covariance.
+/// Error of a covariance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CovarianceError {
-    /// A variable that is not there.
+    /// A key without a variable.
     #[error("there is no variable `{key}`")]
     NoVariable {
-        /// What was asked for.
+        /// The key of the call.
         key: Key,
     },
-    /// A variable that waits for factors to determine it.
+    /// A parked variable, which its factors do not determine yet.
     #[error("the covariance of `{key}` is infinite: its factors do not determine it yet")]
     Parked {
         /// The variable.
         key: Key,
     },
-    /// A direction that nothing constrains, on which the variables depend.
+    /// A direction that no factor constrains, and on which the variables depend.
     #[error("the covariance is infinite: nothing constrains `{key}.{direction}`; add a prior, or fix it")]
     Undetermined {
-        /// A variable that can move.
+        /// The variable of the direction.
         key: Key,
-        /// How: name of the tangent direction.
+        /// Name of the tangent direction.
         direction: &'static str,
     },
-    /// A covariance that is too large for a number.
+    /// A covariance that overflows.
     #[error("the covariance of `{key}` overflows; scale the noise of its factors")]
     Overflow {
         /// The variable.
@@ -39,7 +39,7 @@ pub enum CovarianceError {
 }
 
 impl Factorization {
-    /// The joint covariance of variables; see [`Session::covariance`](crate::Session::covariance).
+    /// Returns the joint covariance of variables; see [`Session::covariance`](crate::Session::covariance).
     pub(in crate::session) fn covariance(
         &self,
         model: &Model,
@@ -48,7 +48,7 @@ impl Factorization {
         if let Some(v) = variables.iter().find(|v| model.is_parked(**v)) {
             return Err(CovarianceError::Parked { key: model.place(*v).key.clone() });
         }
-        // Σᵢⱼ = (L⁻¹eᵢ)ᵀ(L⁻¹eⱼ), and such a column is zero but on the path from its front to the root
+        // Σᵢⱼ = (L⁻¹eᵢ)ᵀ(L⁻¹eⱼ); such a column is zero except on the path from its front to the root
         let path = self.path(model, variables);
         for step in &path.steps {
             if let Some((v, direction)) = self.fronts.open(step.front).first() {
@@ -68,7 +68,8 @@ impl Factorization {
         }
     }
 
-    /// The joint covariance of variables, with directions held that no factor constrains: a gauge, as a rule.
+    /// Returns the joint covariance of variables. Directions that no factor constrains are held; usually this
+    /// is a gauge.
     pub(in crate::session) fn gauged_covariance(&self, model: &Model, variables: &[u32]) -> DMatrix<f64> {
         self.along(model, &self.path(model, variables), variables)
     }
@@ -86,7 +87,7 @@ impl Factorization {
         DMatrix::from_fn(columns.len(), columns.len(), |r, c| dot(r.max(c), r.min(c)))
     }
 
-    /// The fronts on the way from variables to their roots.
+    /// Returns the fronts on the paths from variables to their roots.
     fn path(&self, model: &Model, variables: &[u32]) -> Path {
         let mut fronts = vec![];
         for v in variables {
@@ -99,7 +100,7 @@ impl Factorization {
             let depth = fronts.len();
             (first..depth).for_each(|i| fronts[i].0 = depth - i);
         }
-        // children before parents; which place in memory a front has depends on history, its variables do not
+        // children before parents; front numbers depend on history, so fronts are sorted by their variables
         fronts.sort_unstable_by_key(|(depth, f)| (Reverse(*depth), self.tree.fronts[*f as usize].lowest));
         fronts.dedup();
         let mut path = Path::default();
@@ -122,7 +123,7 @@ impl Factorization {
         path
     }
 
-    /// L⁻¹e along the path, e for one direction of a variable.
+    /// Returns L⁻¹e along the path, with the unit vector e of one direction of a variable.
     fn column(&self, path: &Path, variable: u32, direction: usize) -> Vec<f64> {
         let mut x = vec![0.0; path.scalars];
         x[path.first(variable) as usize + direction] = 1.0;
@@ -150,7 +151,7 @@ impl Factorization {
 #[derive(Default)]
 struct Path {
     steps: Vec<Step>,
-    /// The first scalar of each variable on the path; and the step of each front. Both ascend.
+    /// The first scalar of each variable on the path, and the step of each front. Both ascend.
     first: Vec<(u32, u32)>,
     of_front: Vec<(u32, u32)>,
     scalars: usize,
@@ -159,13 +160,13 @@ struct Path {
 /// A front on a path.
 struct Step {
     front: u32,
-    /// Its first scalar on the path, and where its rows have theirs, with their dimensions.
+    /// Its first scalar on the path, and the first scalar and dimension of each of its rows.
     first: u32,
     rows: Vec<(u32, u32)>,
 }
 
 impl Path {
-    /// The first scalar of a variable on the path; 0 for one that is held.
+    /// Returns the first scalar of a variable on the path; 0 for a held variable.
     fn first(&self, variable: u32) -> u32 {
         let place = self.first.binary_search_by_key(&variable, |(v, _)| *v);
         place.map_or(0, |place| self.first[place].1)

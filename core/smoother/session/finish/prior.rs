@@ -1,5 +1,5 @@
-//! A linear prior as factors of a batch: r = √λ Vᵀ δ + Vᵀg/√λ, with H = V diag(λ) Vᵀ and δ the step from the point that it
-//! was made at.
+//! A linear prior as factors of a batch: r = √λ Vᵀ δ + Vᵀg/√λ, with H = V diag(λ) Vᵀ and the step δ from the
+//! linearization point of the prior.
 use crate::model::Prior;
 use manifactor_graph::__private::typetag;
 use manifactor_graph::{
@@ -10,12 +10,12 @@ use serde::Serialize;
 use std::any::{Any, TypeId};
 use std::sync::Arc;
 
-/// Rows of a factor: a few, so that no zeros are put behind them.
+/// Rows per factor: few, so that no padding with zeros is needed.
 const ROWS: usize = 9;
 
-/// Eigenvalues below this share of the largest are rounding.
+/// Eigenvalues below this share of the largest one are rounding error.
 const RANK: f64 = 1e-13;
-/// Half the difference that the chart's derivative is taken over.
+/// Half of the difference for the derivative of the chart.
 const DIFFERENCE: f64 = 1e-6;
 
 /// Some rows of a prior.
@@ -24,12 +24,12 @@ struct Rows {
     points: Arc<[Box<dyn Variable>]>,
     types: Arc<[TypeId]>,
     dimensions: Arc<[usize]>,
-    /// Rows × scalars, and the residual at the points.
+    /// Rows × scalars (`root`), and the residual at the points (`offset`).
     root: DMatrix<f64>,
     offset: DVector<f64>,
 }
 
-/// It lives as long as a batch solve, and is never written.
+/// A linear prior that exists only during a batch solve and is never saved.
 #[derive(Debug, Serialize)]
 struct BatchPrior {
     #[serde(skip)]
@@ -43,7 +43,7 @@ impl Factor for BatchPrior {
     }
 }
 
-/// The factors of a prior; `points` are those of its variables.
+/// Returns the factors of a prior. `points` are the linearization points of its variables.
 pub(super) fn factors(prior: &Prior, points: Vec<Box<dyn Variable>>) -> Vec<Arc<dyn Factor>> {
     let n = prior.g.len();
     let mut h = DMatrix::zeros(n, n);
@@ -61,7 +61,7 @@ pub(super) fn factors(prior: &Prior, points: Vec<Box<dyn Variable>>) -> Vec<Arc<
     {
         rows.push((vector * value.sqrt(), vector.dot(&g) / value.sqrt()));
     }
-    // what it costs at its least is a row that nothing moves
+    // its minimal cost becomes a constant row
     let least_cost = prior.constant - 0.5 * rows.iter().map(|(_, offset)| offset * offset).sum::<f64>();
     rows.push((DVector::zeros(n), (2.0 * least_cost.max(0.0)).sqrt()));
     let types = points.iter().map(|point| point.erased().type_id()).collect();
@@ -83,7 +83,7 @@ pub(super) fn factors(prior: &Prior, points: Vec<Box<dyn Variable>>) -> Vec<Arc<
 }
 
 impl Rows {
-    /// The variables as such.
+    /// Casts the variables to their trait.
     fn cast<'a>(&self, variables: &[&'a dyn Any]) -> Vec<&'a dyn Variable> {
         let types = self.types.iter().zip(variables);
         types.filter_map(|(id, variable)| (as_variable(*id)?.cast)(*variable)).collect()

@@ -1,4 +1,4 @@
-//! The factors that may be outliers, and their limits. The model knows which of them are rejected.
+//! Candidates for outliers, and their limits. The model stores which of them are rejected.
 use crate::model::Model;
 use crate::saved::Suspect;
 use std::collections::{BTreeMap, BTreeSet};
@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The limits of a factor that may be an outlier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::session) struct Candidate {
-    /// ‖r‖² of an inlier stays below: the χ² quantile for its rows.
+    /// Upper limit of ‖r‖² for an inlier: the χ² quantile for its rows.
     pub(in crate::session) bound: f64,
-    /// Nats by which the factor alone may narrow down its variables.
+    /// Largest information gain of this factor without confirmation by a second one. Unit: nats.
     pub(in crate::session) gain: f64,
     /// The update that rejected it last.
     pub(in crate::session) since: usize,
@@ -39,17 +39,17 @@ impl OutlierCandidates {
         self.candidates.contains_key(&factor)
     }
 
-    /// All candidates, ascending.
+    /// Returns all candidates, ascending.
     pub(in crate::session) fn iter(&self) -> impl Iterator<Item = (u32, Candidate)> {
         self.candidates.iter().map(|(f, candidate)| (*f, *candidate))
     }
 
-    /// Returns whether a factor is a candidate, and counts.
+    /// Returns whether a factor is a candidate that counts.
     pub(in crate::session) fn counts(&self, model: &Model, factor: u32) -> bool {
         self.contains(factor) && !model.is_rejected(factor)
     }
 
-    /// The bound of a candidate; infinite for other factors.
+    /// Returns the bound of a candidate; infinite for other factors.
     pub(in crate::session) fn bound(&self, factor: u32) -> f64 {
         self.candidates.get(&factor).map_or(f64::INFINITY, |candidate| candidate.bound)
     }
@@ -63,19 +63,19 @@ impl OutlierCandidates {
         self.candidates.remove(&factor);
     }
 
-    /// Notes the update that rejects a candidate.
+    /// Records the update that rejects a candidate.
     pub(in crate::session) fn note_rejection(&mut self, factor: u32, update: usize) {
         if let Some(candidate) = self.candidates.get_mut(&factor) {
             candidate.since = update;
         }
     }
 
-    /// Variables that have moved since the last test.
+    /// Returns the variables that have moved since the last test.
     pub(in crate::session) fn shaken(&self) -> &BTreeSet<u32> {
         &self.shaken
     }
 
-    /// Notes variables that have moved, if there are candidates.
+    /// Records variables that have moved, if there are candidates.
     pub(in crate::session) fn shake(&mut self, variables: impl IntoIterator<Item = u32>) {
         if !self.is_empty() {
             self.shaken.extend(variables);
@@ -87,7 +87,7 @@ impl OutlierCandidates {
         std::mem::take(&mut self.shaken)
     }
 
-    /// Restores variables that have moved.
+    /// Restores the variables that have moved.
     pub(in crate::session) fn restore_shaken(&mut self, shaken: BTreeSet<u32>) {
         self.shaken.extend(shaken);
     }
@@ -97,7 +97,7 @@ impl OutlierCandidates {
         self.shaken.remove(&variable);
     }
 
-    /// A candidate as it is saved.
+    /// Returns a candidate in its saved form.
     pub(in crate::session) fn saved(&self, model: &Model, factor: u32) -> Option<Suspect> {
         let Candidate { bound, gain, since } = self.get(factor)?;
         Some(Suspect { bound, gain, since: model.is_rejected(factor).then_some(since) })

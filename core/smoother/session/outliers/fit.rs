@@ -1,25 +1,26 @@
-//! The cost of factors beside the information that the smoother has.
+//! The cost of rejected factors, given the information of the smoother.
 use crate::elimination_tree::Couplings;
 use crate::model::Model;
 use crate::session::factorization::Factorization;
 use crate::session::steps::Steps;
 use nalgebra::{DMatrix, DVector};
 
-/// Steps of Gauss-Newton at most: the first is the innovation's, others follow what is not linear.
+/// Largest number of Gauss-Newton steps. The first one gives the innovation, the next ones correct for
+/// nonlinearity.
 const STEPS: usize = 10;
-/// Halvings of such a step.
+/// Largest number of halvings of such a step.
 const HALVINGS: usize = 5;
 
-/// Information of factors beside that of the smoother.
+/// Cost and information of rejected factors, given the information of the smoother.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Surprise {
     /// min Σ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ.
     pub(super) square: f64,
-    /// ½ ln det(I + HΣ): by how many nats they narrow down where their variables are.
+    /// ½ ln det(I + HΣ): information gain of the factors on their variables. Unit: nats.
     pub(super) gain: f64,
 }
 
-/// The model at the estimate, where rejected factors are evaluated.
+/// The model at the estimate, for the evaluation of rejected factors.
 pub(super) struct Fit<'a> {
     pub(super) model: &'a mut Model,
     pub(super) steps: &'a Steps,
@@ -27,7 +28,7 @@ pub(super) struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    /// ‖r‖² of a rejected factor at the estimate; `None` where it is not defined or finite there.
+    /// Returns ‖r‖² of a rejected factor at the estimate; `None` if it is not defined or not finite there.
     pub(super) fn square(&mut self, factor: u32) -> Option<f64> {
         let variables = self.look_at(&[factor]);
         let zeros = DVector::zeros(variables.iter().map(|v| self.model.dim(*v)).sum());
@@ -36,8 +37,9 @@ impl Fit<'_> {
         square
     }
 
-    /// min Σ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ over the variables of some rejected factors, of which Σ is the joint covariance. `None` where
-    /// that cannot be told: a variable is parked, nothing constrains one of its directions, or a factor is not defined.
+    /// Returns min Σ‖r(x ⊕ δ)‖² + δᵀΣ⁻¹δ over the variables of some rejected factors, with their joint
+    /// covariance Σ. Returns `None` if a variable is parked, no factor constrains one of its directions, or a
+    /// factor is not defined.
     pub(super) fn surprise(&mut self, factors: &[u32]) -> Option<Surprise> {
         let variables = self.look_at(factors);
         let is_open = |v: &u32| self.model.is_parked(*v) || self.factorization.is_open(*v);
@@ -54,7 +56,7 @@ impl Fit<'_> {
     fn descend(&mut self, factors: &[u32], variables: &[u32], square: f64) -> Option<Surprise> {
         let sigma = self.factorization.gauged_covariance(self.model, variables);
         let n = sigma.nrows();
-        // δ = Σy throughout: no inverse of Σ, which need not have one, and δᵀΣ⁻¹δ = yᵀδ
+        // δ = Σy throughout: this needs no inverse of Σ, which may be singular, and δᵀΣ⁻¹δ = yᵀδ
         let (mut least, mut y, mut gain) = (square, DVector::zeros(n), 0.0);
         for _ in 0..STEPS {
             let delta = &sigma * &y;
@@ -83,7 +85,7 @@ impl Fit<'_> {
         Some(Surprise { square: least, gain })
     }
 
-    /// The sum of ‖r‖² of factors at a step from the estimate, where they are left linearized.
+    /// Returns the sum of ‖r‖² of factors at a step from the estimate. The factors stay linearized there.
     fn square_at(&mut self, factors: &[u32], variables: &[u32], step: &DVector<f64>) -> Option<f64> {
         let mut first = 0;
         for v in variables {
@@ -99,7 +101,8 @@ impl Fit<'_> {
         (is_defined && evaluation.not_finite.is_none() && square.is_finite()).then_some(square)
     }
 
-    /// The variables of some rejected factors, ascending. These are told what is held of them, as they hang on none.
+    /// Returns the variables of some rejected factors, ascending. Passes the held directions to the factors
+    /// first, because rejected factors are not connected to their variables.
     fn look_at(&mut self, factors: &[u32]) -> Vec<u32> {
         factors.iter().for_each(|f| self.model.hold_in(*f));
         let all = factors.iter().filter_map(|f| self.model.factor(*f)).flat_map(|f| f.variables());

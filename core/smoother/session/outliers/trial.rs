@@ -1,8 +1,9 @@
 //! Trials of rejected factors: all of them count for a while, with weights that separate the consistent ones.
 //!
-//! Shares follow the scale-invariant graduated kernel of riSAM (McGann, Rogers and Kaess, *Robust Incremental Smoothing and
-//! Mapping*, ICRA 2023): ρ = ½c²r² / (c² + r^2μ), with μ from 0, where it is a quadratic, to 1, where it is Geman and
-//! McClure's. The outcome stays where it lowers the truncated cost ½ Σ min(‖r‖², c²); otherwise all goes back.
+//! Shares follow the scale-invariant graduated kernel of riSAM (McGann, Rogers and Kaess, *Robust Incremental
+//! Smoothing and Mapping*, ICRA 2023): ρ = ½c²r² / (c² + r^2μ). μ grows from 0, a quadratic, to 1, the kernel
+//! of Geman and McClure. The outcome is accepted if it lowers the truncated cost ½ Σ min(‖r‖², c²). Otherwise
+//! everything is restored.
 use super::super::Session;
 use super::super::changes::{Change, Touched};
 use super::fit::Surprise;
@@ -12,22 +13,24 @@ use crate::report::Report;
 use manifactor_graph::Values;
 use std::collections::BTreeSet;
 
-/// Factors that were rejected last, which may bear out a new one.
+/// Number of factors, rejected most recently, that may confirm a new one.
 const RECENT: usize = 8;
-/// Two that fit each other may cost together by this share more than one of them: a prior on tangent vectors bends.
+/// Two factors that agree may cost this share more than the costlier one alone, because a prior on tangent
+/// vectors is only approximate.
 const BENT: f64 = 0.02;
-/// Such factors cost alike: the one at least this share of the other.
+/// Two factors that agree have similar costs: the smaller is at least this share of the larger.
 const ALIKE: f64 = 0.5;
-/// A factor that costs no more than this times its bound is tried though no other bears it out.
+/// A factor is tried without confirmation if its cost is at most this multiple of its bound.
 const NEAR: f64 = 3.0;
-/// Rounds after the last μ, until no factor changes sides.
+/// Rounds after the last μ, until no factor is rejected or readmitted.
 const ROUNDS: usize = 4;
-/// Steps at most after each change of sides, until nothing has left the region of its linearization.
+/// Largest number of steps after each change, until all variables are within the region of their
+/// linearization.
 const STEPS: usize = 6;
-/// Shares that differ by less are the same.
+/// Shares that differ by less count as equal.
 const SAME: f64 = 0.02;
 
-/// A trial: the rejected factors that are tried, what takes the changes back, and the factors that count by a share.
+/// A trial: the rejected factors under test, the changes that undo it, and the factors with a reduced share.
 struct Trial<'a> {
     factors: &'a [u32],
     undo: Vec<Change>,
@@ -35,7 +38,8 @@ struct Trial<'a> {
 }
 
 impl Session {
-    /// Tries the one of the factors just rejected that another bears out best, together with that.
+    /// Tries the newly rejected factor that a second rejected factor confirms best, together with that one. A
+    /// factor that fails by little is tried alone.
     pub(super) fn try_rejected(&mut self, failing: &[(u32, Surprise)], report: &mut Report) {
         let mut best: Option<(f64, Vec<u32>)> = None;
         for (f, surprise) in failing {
@@ -56,8 +60,8 @@ impl Session {
         }
     }
 
-    /// Of the factors that were rejected last, the one that fits best where a factor is taken to be right, if any does and that
-    /// narrows it down; and what it costs then, by its bound.
+    /// Returns the recently rejected factor that confirms `factor` best, with its additional cost as a share
+    /// of its bound. It must fit and add little information if `factor` is taken to be right.
     fn bearing_out(&mut self, factor: u32, surprise: &Surprise) -> Option<(u32, f64)> {
         let others = self.model.rejected().iter().filter(|f| **f != factor);
         let mut recent: Vec<(usize, u32)> =
@@ -69,12 +73,12 @@ impl Session {
             let Some(Candidate { bound, gain, .. }) = self.candidates.get(other) else { continue };
             let Some(alone) = self.fit().surprise(&[other]) else { continue };
             let (less, most) = (alone.square.min(surprise.square), alone.square.max(surprise.square));
-            // the same fault of the map costs them about as much
+            // one error of the map costs both of them a similar amount
             if less < ALIKE * most && most > bound {
                 continue;
             }
             let Some(both) = self.fit().surprise(&[factor, other]) else { continue };
-            // less than nothing: a fit that has found no minimum
+            // below -bound, the fit has not found a minimum
             let more = both.square - most;
             let fits = (-bound..=bound + BENT * most).contains(&more) && both.gain - surprise.gain <= gain;
             if fits && best.is_none_or(|(_, least)| more / bound < least) {
@@ -84,8 +88,8 @@ impl Session {
         best
     }
 
-    /// Lets factors count, and decides anew between them and those that they contradict. Where that is no better, all goes
-    /// back.
+    /// Lets factors count, and decides again between them and the factors that they contradict. If the cost
+    /// does not fall enough, everything is restored.
     fn try_factors(&mut self, factors: &[u32], report: &mut Report) {
         report.trials += 1;
         let (before, old) = (self.truncated_cost(), self.estimates());
@@ -106,7 +110,7 @@ impl Session {
                     _ => {}
                 }
             }
-            // what this update has rejected was never out for those who read its report
+            // factors that this update both rejected and readmitted are not reported
             let told = std::mem::take(&mut report.rejected);
             let (back, out): (Vec<_>, Vec<_>) = told.into_iter().partition(|f| readmitted.contains(f));
             readmitted.retain(|f| !back.contains(f));
@@ -123,7 +127,7 @@ impl Session {
         self.candidates.restore_shaken(shaken);
     }
 
-    /// ½ Σ min(‖r‖², c²), c² being the bound of a factor that is rejected.
+    /// Returns the truncated cost ½ Σ min(‖r‖², c²). A rejected factor contributes its bound c².
     fn truncated_cost(&mut self) -> f64 {
         let bounds: f64 = self.model.rejected().iter().map(|f| self.candidates.bound(*f)).sum();
         self.cost() + 0.5 * bounds
@@ -162,7 +166,7 @@ impl Session {
         Ok(())
     }
 
-    /// The factors that may be wrong, count, and lie where something has moved.
+    /// Returns the candidates that count and belong to the trial or have a moved variable.
     fn around(&self, trial: &Trial<'_>) -> Vec<u32> {
         let mut around = self.model.factors_of(&self.candidates.shaken().iter().copied().collect::<Vec<_>>());
         around.extend(trial.factors.iter().chain(&trial.attenuated));
@@ -172,21 +176,21 @@ impl Session {
         around
     }
 
-    /// ‖r‖² of a factor that counts, whatever its share.
+    /// Returns ‖r‖² of a factor that counts, without its share.
     fn full_square(&mut self, factor: u32) -> f64 {
         let share = self.model.factor(factor).map_or(1.0, |factor| factor.share);
         2.0 * self.steps.cost_of(&mut self.model, &[factor]).cost / share
     }
 
-    /// The derivative of ρ by ½r².
+    /// Returns the share of a factor, which is the derivative of ρ with respect to ½r².
     fn share(&mut self, factor: u32, mu: f64) -> f64 {
         let (square, c2) = (self.full_square(factor), self.candidates.bound(factor));
         let power = square.powf(mu);
-        // above zero, so that the cost can be told from the share of it
+        // above zero, because the full cost is computed from the share of it
         f64::max(1e-12, c2 * (c2 + (1.0 - mu) * power) / (c2 + power).powi(2))
     }
 
-    /// Makes changes of what counts and by what share, and takes a step from there.
+    /// Applies changes and shares, and takes steps from there.
     fn change_sides(
         &mut self,
         trial: &mut Trial<'_>,
@@ -213,7 +217,7 @@ impl Session {
             if !self.steady(report) && !self.settle(report) {
                 return Err(Failed);
             }
-            // what is far out says nothing of who is right
+            // as long as variables are outside of their regions, costs do not show which factors are right
             if !self.queue.waiting().iter().any(|v| self.is_out(*v)) {
                 break;
             }
@@ -222,7 +226,7 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a trial back: what counted counts again, and the estimate is what it was.
+    /// Undoes a trial: restores the factors that counted, and the estimate.
     fn go_back(&mut self, trial: Trial<'_>, old: &Values, report: &mut Report) {
         let mut touched = Touched::default();
         for f in &trial.attenuated {

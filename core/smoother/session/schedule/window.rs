@@ -1,4 +1,4 @@
-//! The variables that a window has no room for any more, by their number or by the time when they came.
+//! Variables that leave the window, by their number or by the time of their insertion.
 use super::Schedule;
 use crate::error::ChangeError;
 use crate::model::Model;
@@ -7,32 +7,34 @@ use manifactor_graph::Key;
 use manifactor_graph::checked::Positive;
 use std::collections::{BTreeSet, VecDeque};
 
-/// A variable that a window holds.
+/// A variable in the window.
 #[derive(Debug, Clone, Copy)]
 struct Held {
     variable: u32,
-    /// When it came among all variables: its number is used again.
+    /// Rank in the order of insertion among all variables. It identifies the variable, because its number can
+    /// be reused.
     born: u64,
-    /// When it came by the clock of the caller; a window by poses does not look at it.
+    /// Time of insertion by the clock of the caller. A window by poses ignores it.
     time: f64,
 }
 
-/// The clock of the caller, and the variables that a window holds.
+/// The clock of the caller, and the variables in the window.
 #[derive(Debug, Clone, Default)]
 pub(in crate::session) struct SlidingWindow {
-    /// The time that was set last, by the updates that were made.
+    /// The last time that was set, as of the last update.
     time: Option<f64>,
     /// The oldest first.
     held: VecDeque<Held>,
 }
 
 impl SlidingWindow {
-    /// The time that was set last, by the updates that were made.
+    /// Returns the last time that was set, as of the last update.
     pub(in crate::session) fn time(&self) -> Option<f64> {
         self.time
     }
 
-    /// The variables that leave as the window has no room for them; `leaving` leave anyway.
+    /// Returns the variables that exceed the window. Variables of `leaving` are marginalized anyway and do
+    /// not count.
     fn overflow(&mut self, span: Span, model: &Model, leaving: &[u32]) -> Vec<u32> {
         self.held.retain(|held| {
             let place = model.place(held.variable);
@@ -51,7 +53,7 @@ impl SlidingWindow {
 }
 
 impl Schedule {
-    /// Checks a time that is to be set after `pending`, the one that was set since the last update.
+    /// Checks a new time. `pending` is the time that was set since the last update.
     pub(in crate::session) fn check_time(&self, pending: Option<f64>, time: f64) -> Result<(), ChangeError> {
         let last = pending.or(self.window.time);
         if !time.is_finite() || last.is_some_and(|last| time < last) {
@@ -60,7 +62,7 @@ impl Schedule {
         Ok(())
     }
 
-    /// The time at which a variable comes that is pushed now; 0 if no window needs it.
+    /// Returns the insertion time of a variable that is pushed now; 0 if no window needs it.
     pub(in crate::session) fn time_of_new(&self, pending: Option<f64>) -> Result<f64, ChangeError> {
         match pending.or(self.window.time) {
             None if self.seconds().is_some() => Err(ChangeError::NoTime),
@@ -68,12 +70,12 @@ impl Schedule {
         }
     }
 
-    /// Sets the time, if an update brings one.
+    /// Sets the time, if an update has one.
     pub(in crate::session) fn set_time(&mut self, time: Option<f64>) {
         self.window.time = time.or(self.window.time);
     }
 
-    /// How far a window by seconds reaches back.
+    /// Returns the length of a window by seconds.
     fn seconds(&self) -> Option<Positive> {
         match self.settings.window.as_ref()?.span {
             Span::Seconds(seconds) => Some(seconds),
@@ -81,21 +83,22 @@ impl Schedule {
         }
     }
 
-    /// Adds a variable to the window, unless its type is kept.
+    /// Adds a variable to the window, unless its type always stays.
     pub(in crate::session) fn hold(&mut self, model: &Model, variable: u32, time: f64) {
         if self.leaves(model, variable) {
             self.window.held.push_back(Held { variable, born: model.place(variable).born, time });
         }
     }
 
-    /// Returns whether a variable is of a type that leaves a window.
+    /// Returns whether a variable has a type that leaves the window.
     fn leaves(&self, model: &Model, variable: u32) -> bool {
         let Some(window) = &self.settings.window else { return false };
         let name = model.point(variable).map_or("", |point| point.typetag_name());
         !window.keep.iter().any(|keep| keep.as_str() == name)
     }
 
-    /// The variables that leave at the end of an update: those of `asked`, and those that the window has no room for.
+    /// Returns the variables to marginalize at the end of an update: the variables of `asked`, and the ones
+    /// that exceed the window.
     pub(in crate::session) fn leaving(&mut self, model: &Model, asked: &[Key]) -> Vec<u32> {
         let mut leaving: Vec<u32> = asked.iter().filter_map(|key| model.variable(key.as_str())).collect();
         if let Some(window) = &self.settings.window {
@@ -106,7 +109,7 @@ impl Schedule {
         leaving
     }
 
-    /// The window, to be restored if variables cannot leave.
+    /// Returns the window, which is restored if variables cannot be marginalized.
     pub(in crate::session) fn window(&self) -> &SlidingWindow {
         &self.window
     }
@@ -116,7 +119,7 @@ impl Schedule {
         self.window = window;
     }
 
-    /// The bits of the times of all variables that a window by seconds holds, the oldest first.
+    /// Returns the insertion times of all variables in a window by seconds, as bits, the oldest first.
     pub(in crate::session) fn times(&self) -> Vec<u64> {
         match self.seconds() {
             Some(_) => self.window.held.iter().map(|held| held.time.to_bits()).collect(),
@@ -124,7 +127,7 @@ impl Schedule {
         }
     }
 
-    /// Restores a saved window. Returns whether these can be the times of the variables in the model.
+    /// Restores a saved window. Returns whether the times are valid for the variables in the model.
     pub(in crate::session) fn load_times(&mut self, model: &Model, now: Option<u64>, times: &[u64]) -> bool {
         let now = now.map(f64::from_bits);
         self.window.time = now;

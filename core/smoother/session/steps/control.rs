@@ -1,30 +1,33 @@
-//! The cost at the estimate, and shorter steps where it has risen.
+//! The cost at the estimate, and shorter steps if it has risen.
 use super::Steps;
 use crate::model::Model;
 use manifactor_graph::batch::Evaluation;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 
-/// Halvings of a step.
+/// Largest number of halvings of a step.
 const HALVINGS: usize = 6;
-/// The least damping of a variable, as a share of the largest entry of its diagonal of H; and by how much it grows.
+/// Smallest damping of a variable, as a share of the largest entry of its diagonal of H, and the factor by
+/// which it grows.
 const LEAST_DAMPING: f64 = 1e-3;
 const STRONGER: f64 = 10.0;
-/// What becomes of it each time that the variable is linearized anew.
+/// Factor by which each relinearization of the variable reduces the damping.
 const WEAKER: f64 = 0.1;
-/// Damping that is as good as none, as a share of that entry. It stays where a direction has less of H than that: an axis that has all
-/// but vanished has next to no derivative, and without damping its steps would be as long as ever.
+/// Damping that has almost no effect, as a share of that entry. It stays if a direction has less of H than
+/// this. An axis that has almost vanished has nearly no derivative, and its steps would be long again without
+/// damping.
 const WEAK: f64 = 1e-5;
-/// A rise of the cost by less than this share of it is rounding, or what was not passed on.
+/// A smaller rise, as a share of the cost, is rounding error or the effect of changes that were not
+/// propagated.
 const RISE: f64 = 1e-3;
 
 impl Steps {
-    /// The steps before the last pass, of the variables that it has moved.
+    /// Returns the steps before the last pass, for the variables that it has moved.
     pub(in crate::session) fn before(&self, model: &Model) -> impl Iterator<Item = (u32, &[f64])> {
         self.moved.iter().map(|(v, first)| (*v, &self.before[*first..*first + model.blocks.dim(*v)]))
     }
 
-    /// Returns whether the factors around some variables cost more than with these steps.
+    /// Returns whether the factors around some variables cost more now than with these steps.
     pub(in crate::session) fn has_risen(
         &mut self,
         model: &mut Model,
@@ -47,7 +50,8 @@ impl Steps {
         }
     }
 
-    /// Halves the last step until it lowers the cost of the factors around. Returns the number of halvings.
+    /// Halves the last step until it no longer raises the cost of the surrounding factors. Returns the number
+    /// of halvings.
     pub(in crate::session) fn shorten(&mut self, model: &mut Model) -> usize {
         let (factors, before, after) = self.last_step(model);
         if !rises(&before, &after) {
@@ -67,7 +71,8 @@ impl Steps {
         HALVINGS
     }
 
-    /// The factors around the variables that the last pass has moved, and their cost before and after it.
+    /// Returns the factors around the variables that the last pass has moved, and their cost before and after
+    /// it.
     pub(in crate::session) fn last_step(&mut self, model: &mut Model) -> (Vec<u32>, Evaluation, Evaluation) {
         let moved: Vec<u32> = self.moved().collect();
         let mut factors = model.factors_of(&moved);
@@ -79,7 +84,7 @@ impl Steps {
         (factors, before, after)
     }
 
-    /// Exchanges the steps of the last pass and those before it.
+    /// Exchanges the steps of the last pass with the ones before it.
     fn exchange_steps(&mut self, model: &Model) {
         for (v, first) in &self.moved {
             let range = model.blocks.range(*v);
@@ -88,12 +93,12 @@ impl Steps {
         }
     }
 
-    /// The cost of factors at the estimate.
+    /// Returns the cost of factors at the estimate.
     pub(in crate::session) fn cost_of(&self, model: &mut Model, factors: &[u32]) -> Evaluation {
         self.at_estimate(model, factors, |model, delta| model.cost(factors, Some(delta)))
     }
 
-    /// Evaluates the model while the trial points of these factors' variables are at the estimate.
+    /// Evaluates the model while the trial points of the factors' variables are at the estimate.
     pub(in crate::session) fn at_estimate<T>(
         &self,
         model: &mut Model,
@@ -112,7 +117,7 @@ impl Steps {
         result
     }
 
-    /// Damps some variables more.
+    /// Increases the damping of some variables.
     pub(in crate::session) fn damp(&mut self, model: &mut Model, variables: &[u32]) {
         for v in variables {
             let least = LEAST_DAMPING * largest(model, *v);
@@ -121,7 +126,7 @@ impl Steps {
         }
     }
 
-    /// Damps less those variables that are linearized anew; what they were damped by.
+    /// Decreases the damping of relinearized variables. Returns their previous damping.
     pub(in crate::session) fn relax(&mut self, model: &mut Model, variables: &[u32]) -> Vec<(u32, f64)> {
         let damped = variables.iter().filter(|v| self.damped.contains(v));
         let before: Vec<(u32, f64)> = damped.map(|v| (*v, model.blocks.damping(*v))).collect();
@@ -140,17 +145,17 @@ impl Steps {
 
 fn rises(before: &Evaluation, after: &Evaluation) -> bool {
     let is_lower = after.cost <= before.cost * (1.0 + RISE);
-    // not a number is not lower either
+    // also true if the cost is NaN
     after.left > before.left || !is_lower
 }
 
-/// The largest entry of a variable's diagonal of H.
+/// Returns the largest diagonal entry of H of a variable.
 fn largest(model: &Model, variable: u32) -> f64 {
     let precision = model.blocks.precision(variable).iter().copied().fold(0.0, f64::max);
     precision * precision
 }
 
-/// The smallest entry of those directions that are not held.
+/// Returns the smallest diagonal entry of H of the directions that are not held.
 fn smallest(model: &Model, variable: u32) -> f64 {
     let held = model.place(variable).held;
     let precision = model.blocks.precision(variable).iter().enumerate();

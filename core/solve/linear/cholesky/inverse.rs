@@ -1,24 +1,24 @@
-//! Entries of the inverse where the factor has entries: selected inversion.
+//! Selected inversion: the entries of the inverse in the pattern of the factor.
 //!
-//! Takahashi, Fagan and Chin (1973), by supernodes: from the root down, each front takes what it needs of the
-//! inverse from its parent's.
+//! The method of Takahashi, Fagan and Chin (1973), by supernodes. From the root down, each front reads the
+//! entries of the inverse that it needs from its parent.
 use crate::linear::cholesky::Cholesky;
 use crate::linear::cholesky::structure::Structure;
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-/// H⁻¹ at the entries that the factor of H has, in panels like the factor's.
+/// H⁻¹ in the pattern of H's factor, in panels like the factor's.
 pub(crate) struct SelectedInverse<'a> {
     structure: &'a Structure,
     panels: Vec<f64>,
-    /// By column: its node.
+    /// The node of each column.
     node_of: Vec<u32>,
 }
 
 impl Cholesky {
-    /// The inverse of the matrix that was last factorized, at the entries of its factor; `None` where there is no
-    /// memory for it.
+    /// Returns the inverse of the last factorized matrix in the pattern of its factor; `None` if there is
+    /// no memory.
     pub(crate) fn selected_inverse(&self) -> Option<SelectedInverse<'_>> {
         let structure = &self.structure;
         let mut panels = crate::linear::cholesky::zeros(structure.values)?;
@@ -26,7 +26,7 @@ impl Cholesky {
         for (n, node) in structure.nodes.iter().enumerate() {
             node_of.extend(std::iter::repeat_n(n as u32, node.width));
         }
-        // children of each node, and for each node in waiting the inverse at its rows below
+        // children of each node; and for each pending node, the inverse at its rows below
         let mut children: Vec<Vec<usize>> = vec![];
         let mut open: Vec<usize> = vec![];
         for (n, node) in structure.nodes.iter().enumerate() {
@@ -59,8 +59,8 @@ impl Cholesky {
     }
 }
 
-/// A front's columns of the inverse, from its factor and the inverse at its rows below (Σ₂₂):
-/// Y = L₂₁L₁₁⁻¹, Σ₂₁ = −Σ₂₂Y, Σ₁₁ = L₁₁⁻ᵀL₁₁⁻¹ − YᵀΣ₂₁.
+/// Computes a front's columns of the inverse, from its factor and the inverse at its rows below (Σ₂₂): Y =
+/// L₂₁L₁₁⁻¹, Σ₂₁ = −Σ₂₂Y, Σ₁₁ = L₁₁⁻ᵀL₁₁⁻¹ − YᵀΣ₂₁.
 fn invert(l: MatRef<'_, f64>, below: MatRef<'_, f64>, mut to: MatMut<'_, f64>) {
     let width = l.ncols();
     let (l11, l21) = l.split_at_row(width);
@@ -74,7 +74,7 @@ fn invert(l: MatRef<'_, f64>, below: MatRef<'_, f64>, mut to: MatMut<'_, f64>) {
 }
 
 impl SelectedInverse<'_> {
-    /// Entry (i, j); `None` where the factor has none.
+    /// Returns entry (i, j); `None` if it is not in the pattern.
     pub(crate) fn get(&self, i: usize, j: usize) -> Option<f64> {
         let (i, j) = (i.max(j), i.min(j));
         let node = &self.structure.nodes[*self.node_of.get(j)? as usize];
@@ -94,7 +94,8 @@ mod tests {
     use nalgebra::DMatrix;
     use proptest::prelude::*;
 
-    /// A positive definite matrix with such blocks, by its lower triangle in the layout's order and densely.
+    /// Makes a positive definite matrix for a layout, as the values of its lower triangle and as a dense
+    /// matrix.
     fn matrix(layout: &Layout, seed: u64) -> (Vec<f64>, DMatrix<f64>) {
         let n = layout.dim();
         let mut state = seed;
@@ -155,7 +156,7 @@ mod tests {
 
     #[test]
     fn large_fronts_and_long_chains_agree_with_the_dense_matrix() {
-        // every block with every other: one front, which is eliminated by faer
+        // all pairs of blocks coupled: a single front, which faer eliminates
         let all: Vec<_> = (0..40).flat_map(|a| (0..a).map(move |b| (a, b))).collect();
         agrees(&[6; 40], all, 1);
         agrees(&[3; 60], (1..60).map(|i| (i - 1, i)).collect(), 2);
@@ -166,7 +167,7 @@ mod tests {
 
     #[test]
     fn fronts_that_take_updates_as_they_come_agree_with_the_dense_matrix() {
-        // as in bundle adjustment: a row of cameras, and many points that three neighbours see
+        // as in bundle adjustment: a row of cameras, and many points with three neighbouring views each
         let (cameras, points) = (8, 150);
         let dims: Vec<usize> = [vec![5; cameras], vec![2; points]].concat();
         let seen = |p: u32| (0..3).map(move |k| (p % (cameras as u32 - 2) + k, cameras as u32 + p));

@@ -1,23 +1,27 @@
-//! Dense kernels for fronts: small ones here, where a call costs more than the work; large ones by faer.
+//! Dense kernels for fronts. Small fronts use the kernels here, because a call would cost more than the
+//! work; large ones use faer.
 use crate::linear::cholesky::large::{self, Scratch};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Columns that are eliminated together, and columns of a product that are summed up in registers.
+/// Number of columns that are eliminated together, and columns of a product that are accumulated in
+/// registers.
 const COLUMNS: usize = 4;
-/// Multiplications from which a front counts as large.
+/// Multiplications above which a front counts as large.
 const LARGE: usize = 1 << 24;
-/// From so many multiplications on, and so many for each of its entries, threads share an update. Where there are fewer,
-/// it takes longer to bring the entries together again. Tests are to see it in small problems too.
+/// Threads share an update from this number of multiplications on, and from this number per entry of the
+/// update. Below these, collecting the entries takes longer than the threads save. Debug builds use small
+/// limits, so that tests cover small problems too.
 const SHARED: (usize, usize) = if cfg!(debug_assertions) { (1 << 14, 4) } else { (1 << 21, 48) };
-/// Columns of an update that a thread takes at a time.
+/// Columns of an update per thread task.
 const SHARE: usize = 8 * COLUMNS;
 
-/// Factorizes the first `width` columns of a front: L into `panel`, and what they subtract from the others, −L₂₁L₂₁ᵀ,
-/// into the lower triangle of `update`, or onto what is there already where it is not to `REPLACE` it. Both column-major; above their diagonals, they hold garbage afterwards.
+/// Factorizes the first `width` columns of a front. Writes L to `panel`. Writes −L₂₁L₂₁ᵀ to the lower
+/// triangle of `update`, or adds it if `REPLACE` is not set. Both are column-major. Entries above their
+/// diagonals are garbage afterwards.
 ///
 /// # Errors
-/// The column whose pivot is not positive.
+/// The column with a pivot that is not positive.
 #[inline(always)]
 pub fn eliminate<S: Simd, const REPLACE: bool>(
     simd: S,
@@ -50,7 +54,8 @@ pub fn eliminate<S: Simd, const REPLACE: bool>(
     Ok(())
 }
 
-/// Some columns of an update, from the `first` on. Each entry is a sum of its own: the same whichever thread has its column.
+/// Some columns of an update, from `first` on. Each entry is a separate sum, so the result does not depend
+/// on the distribution of columns to threads.
 struct Update<'a, const REPLACE: bool> {
     panel: &'a [f64],
     width: usize,
@@ -73,7 +78,7 @@ impl<const REPLACE: bool> WithSimd for Update<'_, REPLACE> {
     }
 }
 
-/// Adds the columns of a child's update that are columns of its parent's panel: row i of the child's is row
+/// Adds the columns of a child's update that belong to the panel of its parent. Row i of the update is row
 /// `places[i]` of the parent's front.
 #[inline(always)]
 pub(crate) fn assemble_panel(from: &[f64], places: &[u32], panel: &mut [f64], width: usize) {
@@ -87,7 +92,7 @@ pub(crate) fn assemble_panel(from: &[f64], places: &[u32], panel: &mut [f64], wi
     }
 }
 
-/// Adds the other columns of a child's update to the update of its parent.
+/// Adds the remaining columns of a child's update to the update of its parent.
 #[inline(always)]
 pub(crate) fn assemble_update(from: &[f64], places: &[u32], update: &mut [f64], below: usize, width: usize) {
     let inside = places.partition_point(|place| (*place as usize) < width);
@@ -97,7 +102,7 @@ pub(crate) fn assemble_update(from: &[f64], places: &[u32], update: &mut [f64], 
     }
 }
 
-/// Adds a column to one whose entry i is in row i + `first` of the front.
+/// Adds a column to column `to`, whose entry i is in row i + `first` of the front.
 #[inline(always)]
 fn add_column(column: &[f64], places: &[u32], to: &mut [f64], first: usize) {
     let (at, last) = (places[0] as usize - first, places[places.len() - 1] as usize - first);
@@ -108,14 +113,14 @@ fn add_column(column: &[f64], places: &[u32], to: &mut [f64], first: usize) {
     }
 }
 
-/// Factorizes a few columns from row `first` on, which is the diagonal of the first of them.
+/// Factorizes several columns from row `first` on, which is the diagonal of the first column.
 #[inline(always)]
 fn factorize_columns(columns: &mut [f64], height: usize, first: usize) -> Result<(), usize> {
     for c in 0..columns.len() / height {
         let (column, right) = columns[c * height..].split_at_mut(height);
         let column = &mut column[first + c..];
         let pivot = column[0];
-        // not a number is not positive either
+        // rejects NaN too
         if !(pivot > 0.0 && pivot < f64::INFINITY) {
             return Err(c);
         }
@@ -130,9 +135,9 @@ fn factorize_columns(columns: &mut [f64], height: usize, first: usize) -> Result
     Ok(())
 }
 
-/// C ← C − A Bᵀ, or C ← −A Bᵀ to `REPLACE` it, for up to [`COLUMNS`] columns of C, where A are the rows from
-/// `rows.0` on of a matrix of `height` rows, and B as many rows as C has columns, from `rows.1` on. `to` begins at
-/// C's first entry.
+/// C ← C − A Bᵀ, or C ← −A Bᵀ if `REPLACE` is set, for up to [`COLUMNS`] columns of C. A has the rows from
+/// `rows.0` on of a matrix with `height` rows. B has one row per column of C, from `rows.1` on. `to` begins
+/// at the first entry of C.
 #[inline(always)]
 fn product<S: Simd, const REPLACE: bool>(
     simd: S,
@@ -176,7 +181,7 @@ fn product_columns<S: Simd, const REPLACE: bool, const C: usize>(
     }
 }
 
-/// R registers of rows by C columns.
+/// Computes a tile of R registers of rows by C columns.
 #[inline(always)]
 fn tile<S: Simd, const REPLACE: bool, const R: usize, const C: usize>(
     simd: S,
@@ -207,7 +212,7 @@ fn tile<S: Simd, const REPLACE: bool, const R: usize, const C: usize>(
     }
 }
 
-/// Rows that do not fill a register.
+/// Computes the rows that do not fill a register.
 #[inline(always)]
 fn tail<S: Simd, const REPLACE: bool, const C: usize>(
     simd: S,
@@ -233,7 +238,7 @@ fn tail<S: Simd, const REPLACE: bool, const C: usize>(
     }
 }
 
-/// x ← L⁻¹ x for the panel's columns, and what it takes from the rows below, into `below`.
+/// x ← L⁻¹ x for the panel's columns. Writes the subtrahend for the rows below to `below`.
 #[inline(always)]
 pub(crate) fn solve_lower(panel: &[f64], x: &mut [f64], below: &mut [f64]) {
     let (width, height) = (x.len(), x.len() + below.len());
@@ -246,7 +251,7 @@ pub(crate) fn solve_lower(panel: &[f64], x: &mut [f64], below: &mut [f64]) {
     }
 }
 
-/// x ← L⁻ᵀ (x − L₂ᵀ below) for the panel's columns, where L₂ are its rows below.
+/// x ← L⁻ᵀ (x − L₂ᵀ below) for the panel's columns; L₂ are its rows below.
 #[inline(always)]
 pub(crate) fn solve_upper(panel: &[f64], x: &mut [f64], below: &[f64]) {
     let (width, height) = (x.len(), x.len() + below.len());

@@ -1,6 +1,7 @@
 //! Large fronts: faer's dense kernels, on blocks that threads share.
 //!
-//! Blocks have the same size for any number of threads, and so all sums the same order.
+//! The size of the blocks does not depend on the number of threads, and so neither does the order of the
+//! sums.
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{
     LltError, LltRegularization, cholesky_in_place, cholesky_in_place_scratch,
@@ -11,12 +12,12 @@ use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 use faer::{Accum, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-/// Columns that are eliminated together, and columns of an update that are one task.
+/// Number of columns that are eliminated together, and columns of an update per task.
 const COLUMNS: usize = 128;
-/// Rows of eliminated columns that are one task.
+/// Rows of eliminated columns per task.
 const ROWS: usize = 256;
 
-/// Room for faer's kernels.
+/// Working memory of faer's kernels.
 pub struct Scratch(MemBuffer);
 
 impl std::fmt::Debug for Scratch {
@@ -26,7 +27,7 @@ impl std::fmt::Debug for Scratch {
 }
 
 impl Scratch {
-    /// For fronts of up to so many columns.
+    /// Allocates memory for fronts of up to `width` columns.
     pub fn new(width: usize) -> Self {
         let room = cholesky_in_place_scratch::<f64>(width.min(COLUMNS), Par::Seq, Default::default());
         Self(MemBuffer::new(room))
@@ -94,7 +95,7 @@ fn accumulate<const REPLACE: bool>() -> Accum {
     if REPLACE { Accum::Replace } else { Accum::Add }
 }
 
-/// The lower triangle of C ← C − A Aᵀ, or C ← −A Aᵀ to `REPLACE` it.
+/// C ← C − A Aᵀ, or C ← −A Aᵀ if `REPLACE` is set; lower triangle only.
 fn square<const REPLACE: bool>(c: MatMut<'_, f64>, a: MatRef<'_, f64>) {
     triangular::matmul(
         c,

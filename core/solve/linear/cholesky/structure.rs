@@ -1,4 +1,4 @@
-//! What a factor will look like: supernodes, their rows, and where each entry goes.
+//! Structure of a factor: supernodes, their rows, and the position of each entry.
 //!
 //! ```text
 //!            width
@@ -10,33 +10,34 @@
 //!            panel    below²
 //! ```
 //!
-//! Columns of the factor with the same rows below them are a supernode; its dense panel of columns, and the
-//! dense update that it passes on to its parent, make up a front (multifrontal method: Duff and Reid, 1983; Liu,
-//! 1992).
+//! Adjacent columns of the factor with equal rows below them form a supernode. Its dense panel of columns,
+//! together with the dense update for its parent, is a front. The method is multifrontal (Duff and Reid,
+//! 1983; Liu, 1992).
 use crate::linear::elimination::{Pattern, ROOT, Tree};
 use std::ops::Range;
 
-/// Structure of a factor, for a matrix whose blocks are in a postordered order of elimination.
+/// Structure of a factor, for a matrix with blocks in a postordered elimination order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Structure {
     pub nodes: Vec<Node>,
     /// Rows of all supernodes below their columns, ascending.
     pub rows: Vec<u32>,
-    /// By entry of `rows`: its place in the parent's front.
+    /// For each entry of `rows`, its row in the parent's front.
     pub places: Vec<u32>,
-    /// By entry of the matrix: its place in the panel of its node.
+    /// For each entry of the matrix, its position in the panel of its node.
     pub scatter: Vec<u32>,
-    /// Number of values of the factor, with the room above the diagonals of its panels.
+    /// Number of values of the factor, including the unused entries above the diagonals of its panels.
     pub values: usize,
-    /// Number of values that updates need at most at a time, of nodes on even and on odd levels.
+    /// Largest number of simultaneously stored update values, of nodes on even and on odd levels.
     pub updates: [usize; 2],
-    /// Fronts to be opened before a node, by the node and the front's own: those that take updates as they come.
+    /// Early fronts, which receive updates one by one: the node before which a front is created, and the
+    /// front's node.
     pub early: Vec<(u32, u32)>,
-    /// Multiplications and additions of a factorization.
+    /// Number of multiplications and additions of a factorization.
     pub flops: f64,
 }
 
-/// A supernode. Its panel is column-major, `height` × `width`; its update square, of `below` rows.
+/// A supernode. Its panel is column-major, `height` × `width`; its update is square, with `below` rows.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Node {
     /// Its first column.
@@ -45,22 +46,22 @@ pub(crate) struct Node {
     pub width: usize,
     /// Number of rows below its columns.
     pub below: usize,
-    /// Where its panel begins in the values of the factor.
+    /// Start of its panel in the values of the factor.
     pub panel: usize,
-    /// Where its rows begin.
+    /// Start of its rows in `Structure::rows`.
     pub rows: usize,
     /// Entries of the matrix in its columns.
     pub entries: Range<usize>,
-    /// Number of children, which are the last nodes before it that have no parent yet.
+    /// Number of children: the last nodes before it that have no parent yet.
     pub children: usize,
-    /// The node that takes its update; [`ROOT`] for those without.
+    /// The node that receives its update; [`ROOT`] for a root.
     pub parent: u32,
-    /// Whether it takes its children's updates one by one, as they come, and not all when its turn has come.
+    /// Whether it receives the updates of its children one by one instead of all at its own elimination.
     pub early: bool,
-    /// Distance from its root. Updates of even and of odd levels are on two stacks, so that a parent's can be
-    /// made while those of its children are there.
+    /// Distance from its root. Updates of even and of odd levels are on two stacks, so that a parent's
+    /// update can be written while its children's updates still exist.
     pub level: u32,
-    /// Where its update is on its stack until its parent has taken it.
+    /// Position of its update on its stack.
     pub update: usize,
 }
 
@@ -74,8 +75,9 @@ impl Node {
 }
 
 impl Structure {
-    /// Of a matrix with this lower triangle: by blocks, with the first scalar of each block and one past the
-    /// last, and by scalars, in compressed columns. A `dense` one is a single supernode.
+    /// Computes the structure for a lower triangle. It is given by blocks, with the first scalar of each
+    /// block and one past the last; and by scalars, in compressed columns. A `dense` structure is a single
+    /// supernode.
     pub(crate) fn new(
         blocks: Pattern<'_>,
         start: &[u32],
@@ -90,16 +92,16 @@ impl Structure {
         structure
     }
 
-    /// Bytes of a factorization.
+    /// Returns the memory of a factorization in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         8 * (self.values + self.updates[0] + self.updates[1]) as u64
     }
 
-    /// Nodes with their rows.
+    /// Creates the nodes and their rows.
     fn allocate(&mut self, blocks: Pattern<'_>, start: &[u32], groups: &[Group], col_ptr: &[usize]) {
         let mut seen = vec![ROOT; blocks.len()];
         let mut block_rows: Vec<u32> = vec![];
-        // block rows of the nodes that have no parent yet
+        // block rows of the nodes without a parent so far
         let mut open: Vec<(u32, Range<usize>)> = vec![];
         self.rows.reserve_exact(groups.iter().map(|group| group.below).sum());
         self.nodes.reserve_exact(groups.len());
@@ -141,7 +143,7 @@ impl Structure {
             };
             self.values += node.height() * width;
             let (m, k) = (node.height() as f64, width as f64);
-            // Σ over the columns of the square of what is at and below the diagonal
+            // sum over the columns of the squared number of entries at and below the diagonal
             self.flops += k * m * m - k * k * m + k * k * k / 3.0;
             self.nodes.push(node);
             open.push((group.parent, begin..block_rows.len()));
@@ -152,8 +154,8 @@ impl Structure {
         self.open_early();
     }
 
-    /// Finds the fronts whose children's updates would take much more room than they do themselves: of a camera
-    /// that sees thousands of points, say. They have to be there before their first descendant.
+    /// Finds the early fronts: fronts whose children's updates would need much more memory than the front,
+    /// as of a camera with thousands of points. They must exist before their first descendant.
     fn open_early(&mut self) {
         let mut first: Vec<u32> = (0..self.nodes.len() as u32).collect();
         let mut waiting = vec![0_usize; self.nodes.len()];
@@ -172,7 +174,8 @@ impl Structure {
         self.early.sort_unstable_by_key(|(begin, n)| (*begin, std::cmp::Reverse(*n)));
     }
 
-    /// Where rows are in their parent's front, entries of the matrix in panels, and updates on their stacks.
+    /// Computes the positions of rows in parent fronts, of matrix entries in panels, and of updates on
+    /// their stacks.
     fn place(&mut self, col_ptr: &[usize], row_idx: &[u32]) {
         self.places = vec![0; self.rows.len()];
         self.scatter = vec![0; row_idx.len()];
@@ -223,10 +226,10 @@ impl Structure {
     }
 }
 
-/// A front is opened early if the updates of its children take this many times its room.
+/// A front is early if the updates of its children need this many times its memory.
 const EARLY: usize = 2;
 
-/// A supernode before its rows are known.
+/// A supernode whose rows are not known yet.
 struct Group {
     /// Block columns `first..end`.
     first: usize,
@@ -235,17 +238,17 @@ struct Group {
     /// Scalar columns, and rows below them.
     width: usize,
     below: usize,
-    /// Zeros that merging has put into the panel.
+    /// Number of zeros in the panel that were added by merging.
     zeros: usize,
 }
 
-/// All block columns as one group.
+/// Returns all block columns as one group.
 fn whole(start: &[u32]) -> Vec<Group> {
     let (end, width) = (start.len() - 1, start[start.len() - 1] as usize);
     vec![Group { first: 0, end, parent: ROOT, width, below: 0, zeros: 0 }]
 }
 
-/// Block columns in groups with the same rows.
+/// Groups block columns with equal rows.
 fn groups(blocks: Pattern<'_>, start: &[u32]) -> Vec<Group> {
     let dim = |b: usize| (start[b + 1] - start[b]) as usize;
     let tree = Tree::new(blocks, dim);
@@ -267,16 +270,16 @@ fn groups(blocks: Pattern<'_>, start: &[u32]) -> Vec<Group> {
     groups
 }
 
-/// Returns whether fewer and larger supernodes are worth zeros: relaxed amalgamation (Ashcraft and Grimes, 1989). The shares
-/// are those that took the least time on pose graphs in the plane and in space.
+/// Returns whether a merge into a larger supernode is worth its zeros: relaxed amalgamation (Ashcraft and
+/// Grimes, 1989). The limits gave the shortest times on 2D and 3D pose graphs.
 fn worth_merging(width: usize, zeros: usize, entries: usize) -> bool {
     let share = zeros as f64 / entries as f64;
     width <= 6 || (width <= 36 && share < 0.2) || (width <= 72 && share < 0.05) || share < 0.01
 }
 
-/// Merges groups into the parent whose columns follow theirs.
+/// Merges groups into the parent if its columns follow directly.
 fn merge(mut groups: Vec<Group>) -> Vec<Group> {
-    // the group that each has become a part of, and that before it which is left
+    // for each group, the group that it was merged into, and the remaining group before it
     let mut into: Vec<u32> = (0..groups.len() as u32).collect();
     let mut before: Vec<usize> = (0..groups.len()).map(|g| g.wrapping_sub(1)).collect();
     let find = |into: &[u32], mut g: u32| {

@@ -1,19 +1,19 @@
-//! Subtrees of supernodes that can be factorized at the same time.
+//! Subtrees of supernodes that can be factorized in parallel.
 use crate::linear::cholesky::structure::Structure;
 use std::ops::Range;
 
-/// Largest share of the work that one subtree has, so that several threads have about as much to do.
+/// Largest share of the total work in one subtree, so that the work divides evenly among several threads.
 const LARGEST: f64 = 1.0 / 12.0;
-/// Smallest share that is worth a task.
+/// Smallest share of the total work that is worth a task.
 const SMALLEST: f64 = 1.0 / 400.0;
 
-/// Smallest share of all work that has to be saved by it, as threads have to meet.
+/// Smallest share of the total work that parallelism must save, because threads have to synchronize.
 const SAVED: f64 = 0.05;
-/// Work that a value costs which a subtree hands on: it has left the caches when its parent takes it.
+/// Work per value of an update that a subtree passes on, because the value has left the caches by then.
 const HANDED_ON: f64 = 20.0;
 
-/// Disjoint ranges of nodes, each a whole subtree, whose root is its last; the others are above them, or small. None,
-/// if more threads would save almost nothing.
+/// Returns disjoint ranges of nodes. Each is a whole subtree with the root as its last node. The remaining
+/// nodes are above these, or in small subtrees. Empty if more threads would save almost nothing.
 pub(crate) fn subtrees(structure: &Structure, threads: usize) -> Vec<Range<usize>> {
     let n = structure.nodes.len();
     let (mut work, mut begin, mut parent) = (vec![0.0; n], vec![0; n], vec![None; n]);

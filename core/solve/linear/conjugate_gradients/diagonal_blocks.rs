@@ -1,19 +1,18 @@
-//! Small dense blocks.
+//! Small dense diagonal blocks and their Cholesky factors.
 use crate::linear::NotPositiveDefinite;
 
-/// Blocks on the diagonal of a matrix, and their Cholesky factors, each in place of its block: lower triangles,
-/// column-major.
+/// Diagonal blocks of a matrix, overwritten by their Cholesky factors: lower triangles, column-major.
 #[derive(Debug)]
 pub(crate) struct DiagonalBlocks {
-    /// By block: its first scalar, and one past the last.
+    /// First scalar of each block, and one past the last.
     first: Vec<usize>,
-    /// By block: where its values begin.
+    /// Start of each block's values.
     at: Vec<usize>,
     values: Vec<f64>,
 }
 
 impl DiagonalBlocks {
-    /// Blocks that begin at these scalars; one past the last closes the list.
+    /// Allocates blocks that begin at these scalars; the last entry is one past the end.
     pub(crate) fn new(first: &[usize]) -> Self {
         let sizes = first.windows(2).map(|w| (w[1] - w[0]).pow(2));
         let mut at = vec![0];
@@ -32,13 +31,13 @@ impl DiagonalBlocks {
         &mut self.values[self.at[b]..self.at[b + 1]]
     }
 
-    /// Makes a block its factor.
+    /// Replaces a block by its Cholesky factor.
     pub(crate) fn factorize(&mut self, b: usize) -> Result<(), NotPositiveDefinite> {
         let n = self.dim(b);
         let a = self.block_mut(b);
         for c in 0..n {
             let pivot = a[c * n + c];
-            // not a number is not positive either
+            // rejects NaN too
             if !(pivot > 0.0 && pivot < f64::INFINITY) {
                 return Err(NotPositiveDefinite);
             }
@@ -55,7 +54,7 @@ impl DiagonalBlocks {
         Ok(())
     }
 
-    /// x ← L⁻¹ x, of one block.
+    /// x ← L⁻¹ x, for one block.
     pub(crate) fn solve_lower(&self, b: usize, x: &mut [f64]) {
         let n = self.dim(b);
         let l = &self.values[self.at[b]..self.at[b + 1]];

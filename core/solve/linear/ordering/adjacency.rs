@@ -1,21 +1,21 @@
-//! Which blocks are coupled, as a graph.
+//! Couplings of blocks, as a graph.
 
-/// The rest of a graph counts as dense once it has this many times the couplings of the whole.
+/// The rest of a graph counts as dense once it has this multiple of the couplings of the whole graph.
 const DENSE: usize = 32;
 
-/// An undirected graph with weights, in compressed rows; no loops, no repeated edges.
+/// An undirected graph with weights, in compressed rows, without loops or repeated edges.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Adjacency {
     pub ptr: Vec<u32>,
     pub neighbours: Vec<u32>,
-    /// By entry of `neighbours`.
+    /// Weight of each entry of `neighbours`.
     pub edge_weights: Vec<u32>,
-    /// By vertex.
+    /// Weight of each vertex.
     pub weights: Vec<u32>,
 }
 
 impl Adjacency {
-    /// Of edges (a, b < a), sorted and without repeats, between vertices of these weights.
+    /// Builds a graph from edges (a, b < a), sorted and without repeats, and the weights of its vertices.
     pub(crate) fn new(weights: Vec<u32>, edges: &[(u32, u32)]) -> Self {
         let n = weights.len();
         let mut ptr = vec![0; n + 1];
@@ -26,7 +26,7 @@ impl Adjacency {
         (0..n).for_each(|i| ptr[i + 1] += ptr[i]);
         let mut next = ptr.clone();
         let mut neighbours = vec![0; ptr[n] as usize];
-        // first the smaller neighbours of each vertex, then the larger, both in order
+        // first the smaller neighbours of each vertex, then the larger ones, both in order
         for &(a, b) in edges {
             neighbours[next[a as usize] as usize] = b;
             next[a as usize] += 1;
@@ -50,7 +50,7 @@ impl Adjacency {
         &self.neighbours[self.row(v)]
     }
 
-    /// Neighbours, and the weights of the edges to them.
+    /// Returns the neighbours of a vertex with the weights of the edges to them.
     pub(crate) fn edges(&self, v: usize) -> impl Iterator<Item = (usize, u32)> {
         let range = self.row(v);
         let weights = &self.edge_weights[range.clone()];
@@ -61,7 +61,7 @@ impl Adjacency {
         self.weights.iter().map(|w| u64::from(*w)).sum()
     }
 
-    /// All vertices, breadth first.
+    /// Returns all vertices, breadth first.
     pub(crate) fn breadth_first(&self) -> Vec<usize> {
         let mut order = Vec::with_capacity(self.len());
         let mut seen = vec![false; self.len()];
@@ -82,7 +82,7 @@ impl Adjacency {
         order
     }
 
-    /// The same graph, edges of equal weight, with vertex `order[i]` as its vertex i.
+    /// Returns a renumbered graph with unit edge weights; vertex `order[i]` becomes vertex i.
     pub(crate) fn permuted(&self, order: &[usize]) -> Self {
         let mut rank = vec![0; self.len()];
         order.iter().enumerate().for_each(|(i, v)| rank[*v] = i as u32);
@@ -98,7 +98,7 @@ impl Adjacency {
         graph
     }
 
-    /// Of these vertices (ascending), and the edges between them.
+    /// Returns the subgraph of these vertices (ascending).
     pub(crate) fn induced(&self, part: &[usize]) -> Self {
         let mut place = vec![u32::MAX; self.len()];
         part.iter().enumerate().for_each(|(i, v)| place[*v] = i as u32);
@@ -114,13 +114,14 @@ impl Adjacency {
         graph
     }
 
-    /// The rest of a graph (ascending) once other vertices are eliminated: what touches the same part of them becomes
-    /// coupled. Where that is most of it, the couplings are left out: no order of a dense rest is better than another.
+    /// Returns the rest of a graph (ascending) after the elimination of vertices. Remaining vertices become
+    /// coupled if they touch a common connected part of the eliminated ones. If most of the rest becomes
+    /// coupled, the couplings are omitted: all orders of a dense rest are equally good.
     pub(crate) fn without(&self, eliminated: &[usize], rest: &[usize]) -> Self {
         const NONE: u32 = u32::MAX;
         let mut place = vec![NONE; self.len()];
         rest.iter().enumerate().for_each(|(i, v)| place[*v] = i as u32);
-        // connected parts of what is eliminated, and what is left around each
+        // connected parts of the eliminated vertices, and the remaining vertices around each part
         let mut part_of = vec![NONE; self.len()];
         let mut around: Vec<Vec<u32>> = vec![];
         for &root in eliminated {
@@ -174,8 +175,9 @@ impl Adjacency {
         graph
     }
 
-    /// Pairs of vertices as one each, and by vertex which one: each with that unmatched neighbour to which the edge
-    /// weighs most (heavy-edge matching: Karypis and Kumar, 1998).
+    /// Merges pairs of vertices. Returns the coarse graph, and for each vertex its coarse vertex. Each
+    /// vertex is paired with the unmatched neighbour of the heaviest edge (heavy-edge matching: Karypis and
+    /// Kumar, 1998).
     pub(crate) fn coarsen(&self) -> (Self, Vec<u32>) {
         let n = self.len();
         let mut by_degree: Vec<u32> = (0..n as u32).collect();
@@ -193,7 +195,7 @@ impl Adjacency {
             members.push([v, partner]);
         }
         let mut graph = Self { ptr: vec![0], ..Self::default() };
-        // where the edge to a vertex is, if it belongs to the row at hand
+        // position of the edge to a vertex, if it belongs to the current row
         let mut at = vec![usize::MAX; members.len()];
         for (c, &[a, b]) in members.iter().enumerate() {
             let begin = graph.neighbours.len();
@@ -236,7 +238,7 @@ mod tests {
 
     #[test]
     fn a_rest_that_would_be_dense_is_not_written_down() {
-        // a path, each of whose vertices has a leaf: eliminated, it couples all leaves
+        // a path with a leaf at each vertex: eliminating the path couples all leaves
         let n = 2000;
         let mut edges: Vec<_> = (1..n).map(|v| (v, v - 1)).collect();
         edges.extend((0..n).map(|v| (n + v, v)));

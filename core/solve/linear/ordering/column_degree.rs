@@ -4,11 +4,11 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::colamd;
 
-/// An order of elimination of the vertices: of the columns of a matrix with a row for each edge.
-/// `None` where there is no memory for it.
+/// Returns an elimination order of the vertices, as the columns of a matrix with one row per edge. `None`
+/// if there is no memory.
 pub(crate) fn column_degree(graph: &Adjacency) -> Option<Vec<usize>> {
     let n = graph.len();
-    // by vertex: its edges, each numbered where its larger end lists it
+    // for each vertex its edges, numbered in the list of their larger end
     let mut rows: Vec<Vec<usize>> = vec![vec![]; n];
     let mut edges = 0;
     for v in 0..n {

@@ -1,4 +1,5 @@
-//! Nested dissection: split a graph by few vertices, order both sides, the separator last (George, 1973).
+//! Nested dissection: split a graph by a small separator, order both sides, then the separator (George,
+//! 1973).
 use super::adjacency::Adjacency;
 use super::minimum_degree;
 use super::separator::{self, SEPARATOR};
@@ -6,10 +7,10 @@ use super::separator::{self, SEPARATOR};
 /// Pieces of at most this many vertices are ordered by minimum degree.
 const PIECE: usize = 120;
 
-/// An order of elimination of the vertices; `None` where there is no memory for it.
+/// Returns an elimination order of the vertices; `None` if there is no memory.
 pub(crate) fn nested_dissection(graph: &Adjacency) -> Option<Vec<usize>> {
     let mut order = Vec::with_capacity(graph.len());
-    // pieces to be ordered, the last first, with the vertices that they are of the whole
+    // pieces to be ordered, the last first, each with its vertices in the whole graph
     let mut pieces = vec![Piece::Split(graph.clone(), (0..graph.len()).collect())];
     while let Some(piece) = pieces.pop() {
         let (graph, of) = match piece {
@@ -37,8 +38,8 @@ pub(crate) fn nested_dissection(graph: &Adjacency) -> Option<Vec<usize>> {
 }
 
 enum Piece {
-    /// A graph, and what its vertices are of the whole.
+    /// A graph, and its vertices in the whole graph.
     Split(Adjacency, Vec<usize>),
-    /// Vertices of the whole, in order.
+    /// Vertices of the whole graph, in order.
     Ordered(Vec<usize>),
 }

@@ -4,7 +4,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::amd;
 
-/// An order of elimination of the vertices; `None` where there is no memory for it.
+/// Returns an elimination order of the vertices; `None` if there is no memory.
 pub(crate) fn minimum_degree(graph: &Adjacency) -> Option<Vec<usize>> {
     let n = graph.len();
     let (mut order, mut inverse) = (vec![0_u32; n], vec![0_u32; n]);

@@ -1,26 +1,27 @@
-//! Small sets of vertices that split a graph into two parts of similar weight.
+//! Separators: small sets of vertices that split a graph into two parts of similar weight.
 //!
-//! Multilevel (Karypis and Kumar, *A fast and high quality multilevel scheme for partitioning irregular graphs*, 1998):
-//! shrink the graph, split the small one by growing a part of it, and refine the separator on the way back (Fiduccia
-//! and Mattheyses, 1982, on vertices: Ashcraft and Liu, 1997).
+//! The method is multilevel (Karypis and Kumar, *A fast and high quality multilevel scheme for partitioning
+//! irregular graphs*, 1998). It coarsens the graph, splits the coarse graph by growing one part, and
+//! refines the separator on the way back. Refinement follows Fiduccia and Mattheyses, 1982, and for
+//! vertices Ashcraft and Liu, 1997.
 use super::adjacency::Adjacency;
 use std::collections::BinaryHeap;
 
-/// Mark of the vertices of a separator; the two sides are 0 and 1.
+/// Mark of separator vertices; the two sides are 0 and 1.
 pub(crate) const SEPARATOR: u8 = 2;
 
 /// Graphs of at most this many vertices are not coarsened further.
 const SMALL: usize = 80;
-/// How often a small graph is split, each time from another vertex.
+/// Number of splits of a small graph, each grown from a different vertex.
 const TRIES: usize = 8;
-/// Most that a side may have of the whole.
+/// Largest share of the total weight on one side.
 const LARGEST: f64 = 0.6;
-/// Most passes of a refinement.
+/// Maximum number of passes of a refinement.
 const PASSES: usize = 4;
 /// A pass ends after this many moves without improvement.
 const PATIENCE: usize = 40;
 
-/// By vertex: side 0 or 1, or [`SEPARATOR`]. No edge leads from one side to the other.
+/// Returns for each vertex its side, 0 or 1, or [`SEPARATOR`]. No edge connects the two sides.
 pub(crate) fn separate(graph: &Adjacency) -> Vec<u8> {
     let mut levels: Vec<(Adjacency, Vec<u32>)> = vec![];
     loop {
@@ -46,7 +47,7 @@ pub(crate) fn separate(graph: &Adjacency) -> Vec<u8> {
     sides
 }
 
-/// The best of several splits of a small graph.
+/// Returns the best of several splits of a small graph.
 fn split(graph: &Adjacency) -> Vec<u8> {
     let n = graph.len();
     let candidates = (0..TRIES.min(n)).map(|i| {
@@ -57,7 +58,8 @@ fn split(graph: &Adjacency) -> Vec<u8> {
     candidates.min_by_key(|(score, _)| *score).map(|(_, sides)| sides).unwrap_or_default()
 }
 
-/// Side 0 grown from a vertex, breadth first, until it has half the weight; what it touches is the separator.
+/// Grows side 0 from a vertex, breadth first, until it has half the weight. The vertices that it touches
+/// are the separator.
 fn grown(graph: &Adjacency, from: usize) -> Vec<u8> {
     let half = graph.total_weight() / 2;
     let mut sides = vec![1; graph.len()];
@@ -85,7 +87,7 @@ fn grown(graph: &Adjacency, from: usize) -> Vec<u8> {
             }
         }
     }
-    // what has been reached but not taken
+    // vertices that were reached but not added to side 0
     queue[next..].iter().for_each(|v| sides[*v] = SEPARATOR);
     sides
 }
@@ -94,18 +96,18 @@ fn grown(graph: &Adjacency, from: usize) -> Vec<u8> {
 struct State<'a> {
     graph: &'a Adjacency,
     sides: Vec<u8>,
-    /// Of side 0, side 1 and the separator.
+    /// Weights of side 0, side 1 and the separator.
     weights: [u64; 3],
-    /// By vertex: what its neighbours on side 0 and on side 1 weigh, and those in the separator. Kept up to date, as to add
-    /// them up anew for each gain takes cubic time on a dense graph.
+    /// For each vertex, the weights of its neighbours on side 0, on side 1 and in the separator. Updated
+    /// incrementally, because recomputing them for each gain takes cubic time on a dense graph.
     around: Vec<[u64; 3]>,
     largest: u64,
-    /// Edges that were looked at, and moves that were put into heaps.
+    /// Number of visited edges, and of moves pushed to heaps.
     #[cfg(test)]
     work: usize,
 }
 
-/// How much lighter the separator gets by a move; the vertex; the side that it goes to.
+/// A move: the decrease of the separator's weight, the vertex, and its new side.
 type Move = (i64, u32, u8);
 
 impl<'a> State<'a> {
@@ -132,13 +134,15 @@ impl<'a> State<'a> {
         }
     }
 
-    /// What is to be small: first the excess of a side, then the separator, then the difference of the sides.
+    /// Returns the objective to minimize: first the excess weight of a side, then the separator, then the
+    /// difference of the sides.
     fn score(&self) -> (u64, u64, u64) {
         let [a, b, separator] = self.weights;
         (a.max(b).saturating_sub(self.largest), separator, a.abs_diff(b))
     }
 
-    /// How much lighter the separator gets when a vertex of it goes to a side, and draws in its neighbours beyond.
+    /// Returns the decrease of the separator's weight if a vertex of it moves to `side`, and its neighbours
+    /// across join the separator.
     fn gain(&self, v: usize, side: u8) -> i64 {
         i64::from(self.graph.weights[v]) - self.around[v][1 - side as usize] as i64
     }
@@ -168,7 +172,8 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Moves each vertex once at most, uphill too, and goes back to the best that it has seen; whether that is better.
+    /// Moves each vertex at most once, even if that makes the split worse, and returns to the best state on
+    /// the way. Returns whether that is an improvement.
     fn pass(&mut self) -> bool {
         let before = self.score();
         let (mut best, mut best_at) = (before, 0);
@@ -181,7 +186,7 @@ impl<'a> State<'a> {
             }
         }
         let mut drawn: Vec<usize> = vec![];
-        // by vertex: the last move that made a move of it to the same side gain more
+        // for each vertex, the last move that increased its gain on that side
         let mut gained = vec![0; self.sides.len()];
         let mut in_vain = 0;
         while in_vain < PATIENCE {
@@ -193,7 +198,8 @@ impl<'a> State<'a> {
             let beyond = self.graph.neighbours(v).iter().map(|u| *u as usize);
             drawn.extend(beyond.filter(|u| self.sides[*u] == 1 - side));
             drawn.iter().for_each(|u| self.assign(*u, SEPARATOR, &mut log));
-            // they may move on, and their neighbours in the separator draw in fewer
+            // the new separator vertices may move on, and their separator neighbours now pull in fewer
+            // vertices
             let is_open = |u: usize| self.sides[u] == SEPARATOR && !locked[u];
             for &u in &drawn {
                 if is_open(u) {
@@ -221,8 +227,8 @@ impl<'a> State<'a> {
         best < before
     }
 
-    /// The best move of those that leave no side too heavy. Gains in the heaps may be out of date: too large ones are
-    /// put back, too small ones are there again.
+    /// Returns the best move that leaves no side too heavy. Gains in the heaps may be outdated. If a gain
+    /// is too large, the corrected one is pushed. If it is too small, a newer entry exists already.
     fn next(&self, heaps: &mut [BinaryHeap<Move>; 2], locked: &[bool]) -> Option<Move> {
         let mut top: [Option<Move>; 2] = [None; 2];
         for side in [0, 1] {
@@ -240,7 +246,7 @@ impl<'a> State<'a> {
                     continue;
                 }
                 let weight = self.weights[side] + u64::from(self.graph.weights[vertex]);
-                // to the lighter side always
+                // a move to the lighter side is always allowed
                 if weight <= self.largest || self.weights[side] < self.weights[1 - side] {
                     top[side] = Some((gain, v, to));
                 }

@@ -1,4 +1,4 @@
-//! Other starts, where the given values lead nowhere.
+//! Search from further starts, if the given values lead to no minimum.
 use super::watch::{InDomain, Pause, Watch};
 use super::{Auto, DAMPING};
 use crate::observer::Observer;
@@ -16,20 +16,20 @@ use std::cmp::Ordering;
 use std::sync::OnceLock;
 use std::time::Instant;
 
-/// Damping of the first step where next to none has been tried.
+/// Damping of the first step after negligible damping has failed.
 const REFUSED: Positive = Positive::literal(1e-5);
 
-/// Values to begin with.
+/// Initial values of a solve.
 pub(crate) struct Point {
     pub inactive: usize,
     pub cost: f64,
     pub values: Values,
-    /// Damping of the first step, from where full ones have been tried.
+    /// Damping of the first step, if full steps have failed from these values.
     pub damping: Option<Positive>,
 }
 
-/// The registered starts, with their defaults, but for the values as they are given. Made once: small graphs are solved in
-/// less time than it takes to make them.
+/// Returns the registered starts with their defaults, except `given`. Created once, because solving a small
+/// graph takes less time than creating them.
 fn registered() -> &'static [Box<dyn Start>] {
     static REGISTERED: OnceLock<Vec<Box<dyn Start>>> = OnceLock::new();
     REGISTERED.get_or_init(|| {
@@ -38,10 +38,10 @@ fn registered() -> &'static [Box<dyn Start>] {
     })
 }
 
-/// What the registered starts have to offer.
+/// Returns the initial values of all registered starts that apply.
 pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> Vec<Point> {
     let mut point = |start: &dyn Start| {
-        // one that does not apply has nothing to offer
+        // a start that does not apply is skipped
         let values = start.start(graph, values).ok()?;
         problem.set_values(&values).ok()?;
         let at = problem.linearize();
@@ -51,7 +51,7 @@ pub(crate) fn starts(graph: &Graph, values: &Values, problem: &mut Problem) -> V
     registered().iter().filter_map(|start| point(&**start)).collect()
 }
 
-/// Returns whether a start doubts the minimum that the problem is in.
+/// Returns whether a registered start doubts the current minimum.
 pub(super) fn is_doubted(graph: &Graph, problem: &Problem) -> bool {
     if registered().is_empty() {
         return false;
@@ -61,8 +61,8 @@ pub(super) fn is_doubted(graph: &Graph, problem: &Problem) -> bool {
 }
 
 impl Auto {
-    /// Solves from other starts, and goes on from where a solve has paused, in the order of their costs, until one leads
-    /// to a minimum.
+    /// Solves from further starts, and continues a paused solve, in ascending order of their costs, until
+    /// one leads to a minimum.
     pub(super) fn search(
         &self,
         (graph, values): (&Graph, &Values),
@@ -72,7 +72,7 @@ impl Auto {
     ) -> Outcome {
         let clock = Instant::now();
         let mut best = problem.values();
-        // of two alike, where it is already
+        // the paused solve comes first, so that it wins a tie
         let mut points = Vec::from_iter(here(watch, &outcome, &best));
         points.extend(starts(graph, values, problem));
         points.sort_by(|a, b| {
@@ -82,7 +82,7 @@ impl Auto {
         outcome.times.other += looking;
         outcome.times.total += looking;
         watch.sleep();
-        // a rival of a minimum is dropped once it has cost more than that
+        // a start that competes with a known minimum gets at most the iterations that the minimum took
         let is_rival = is_minimum(&outcome.termination);
         let bounded = self.at_most(if is_rival { outcome.iterations } else { usize::MAX });
         for point in points {
@@ -100,7 +100,7 @@ impl Auto {
             }
         }
         if !watch.stopped && !is_minimum(&outcome.termination) {
-            // steps within a trust region have no damping that is the same for all directions
+            // last attempt: a trust region does not damp all directions equally
             problem.model.put(values);
             let dogleg = Dogleg { stop: self.stop.clone(), linear: self.linear.clone(), ..Dogleg::default() };
             let next = dogleg.descend(problem, watch);
@@ -116,14 +116,15 @@ impl Auto {
         outcome
     }
 
-    /// The same with a bound on its iterations.
+    /// Returns a copy of the solver with a bound on its iterations.
     fn at_most(&self, iterations: usize) -> Self {
         let mut bounded = self.clone();
         bounded.stop.max_iterations = iterations.min(self.stop.max_iterations);
         bounded
     }
 
-    /// From a good start full steps are there in a few, where damping creeps along narrow valleys.
+    /// Solves from a start, with full steps first: from a good start a few suffice, while damped steps
+    /// creep along narrow valleys.
     fn solve_from(&self, point: &Point, problem: &mut Problem, observer: &mut dyn Observer) -> Outcome {
         if let Some(damping) = point.damping {
             return self.damped(damping, problem, observer);
@@ -141,12 +142,12 @@ impl Auto {
     }
 }
 
-/// Returns whether a solve has ended at a minimum, of all variables or of those that a factor touches.
+/// Returns whether a solve ended at a minimum, of all variables or of those with an active factor.
 pub(super) fn is_minimum(termination: &Termination) -> bool {
     matches!(termination, Termination::Converged { .. } | Termination::Indeterminate(_))
 }
 
-/// Where a solve has paused, to go on from.
+/// Returns the point at which a solve was paused.
 fn here(watch: &Watch<'_>, outcome: &Outcome, values: &Values) -> Option<Point> {
     let damping = match watch.pause? {
         _ if outcome.termination != Termination::Interrupted => return None,

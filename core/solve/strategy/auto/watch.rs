@@ -1,37 +1,38 @@
-//! Seeing early that a solve leads nowhere.
+//! Early detection of a solve that leads to no minimum.
 use crate::observer::Observer;
 use crate::outcome::IterationRecord;
 use std::ops::ControlFlow;
 
-/// A solve that has not settled after so many steps is worth asking the other starts, which takes as long as one or two
-/// of them: from a fair start, full steps are there in fewer.
+/// Iterations after which further starts are tried, which takes about as long as one or two iterations.
+/// From a fair start, full steps need fewer.
 const PATIENCE: usize = 10;
-/// A rise by this share of the cost at the beginning is rounding.
+/// A rise of the cost below this share of the initial cost is rounding.
 const ROUNDING: f64 = 1e-9;
-/// A step that raises the cost leads on all the same, if the next is at most this share of its length: Newton's method
-/// converges, though the cost does not show it (monotonicity tests: Deuflhard, *Newton methods for nonlinear problems*,
-/// 2004). From poor starts of public graphs, it is 0.25 to 1.1; where the weights alone are uneven, 0.05.
+/// A solve continues after a step that raises the cost if the next step has at most this share of its
+/// length. Then Newton's method converges although the cost does not show it (monotonicity tests:
+/// Deuflhard, *Newton methods for nonlinear problems*, 2004). The measured ratio is 0.25 to 1.1 from poor
+/// starts of public graphs, and 0.05 if only the weights are uneven.
 const CONTRACTION: f64 = 0.1;
 
-/// Why a solve was paused.
+/// Reason for pausing a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Pause {
-    /// A step of this length has raised the cost.
+    /// A step of this length raised the cost.
     Rise { step: f64 },
-    /// A step has left the domain of a factor.
+    /// A step left the domain of a factor.
     Undefined,
-    /// It takes long. The damping of its last step.
+    /// The solve takes many iterations. `damping` is that of its last step.
     Long { damping: f64 },
 }
 
-/// Pauses a solve where another start may do better, or where who watches asks for it.
+/// Pauses a solve if a further start may do better, and stops it if the observer requests so.
 pub(super) struct Watch<'a> {
     observer: &'a mut dyn Observer,
-    /// The cost at the beginning.
+    /// The initial cost.
     initial: Option<f64>,
-    /// Most that the next step may be long.
+    /// Upper bound for the length of the next step.
     longest: f64,
-    /// Whether it may still pause.
+    /// Whether it may still pause a solve.
     is_awake: bool,
     pub pause: Option<Pause>,
     pub stopped: bool,
@@ -43,12 +44,12 @@ impl<'a> Watch<'a> {
         Self { observer, initial: None, longest, is_awake: true, pause: None, stopped: false }
     }
 
-    /// Goes on after a step of this length: the next has to be much shorter.
+    /// Continues after a step of this length; the next one must be much shorter.
     pub(super) fn expect_shorter_than(&mut self, step: f64) {
         (self.pause, self.longest) = (None, CONTRACTION * step);
     }
 
-    /// Lets solves go on to their ends from now on.
+    /// Disables pausing, so that solves run to their end.
     pub(super) fn sleep(&mut self) {
         (self.is_awake, self.pause) = (false, None);
     }
@@ -85,7 +86,8 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Ends a solve by full steps once one leaves the domain of a factor: halved until it does not, it leads anywhere.
+/// Ends a solve with full steps once a step leaves the domain of a factor, because halved steps may lead
+/// anywhere.
 pub(super) struct InDomain<'a> {
     pub observer: &'a mut dyn Observer,
     pub has_left: bool,

@@ -1,9 +1,9 @@
-//! What is written down of a solve: a record of each step, and an account of all.
+//! Records of the steps of a solve, and its outcome.
 use super::{Descent, Step};
 use crate::outcome::{IterationRecord, Outcome, Stall, Termination, Undetermined};
 
 impl Descent<'_> {
-    /// Keeps a record of the step that was tried last, and shows it to the observer.
+    /// Records the last trial step, and passes it to the observer.
     pub fn record(&mut self, step: &Step, accepted: bool) {
         let defined = self.trial.left == 0 && self.trial.cost.is_finite();
         let record = IterationRecord {
@@ -23,14 +23,15 @@ impl Descent<'_> {
         self.history.push(record);
     }
 
-    /// The account of the solve, with what nothing constrains at the estimate, which takes a factorization.
+    /// Returns the outcome of the solve, including the undetermined direction at the estimate, which takes
+    /// a factorization.
     pub fn end(mut self, termination: Termination) -> Outcome {
         let looks = self.iterations > 0 && !self.interrupted && self.at.not_finite.is_none();
         let open = looks.then(|| self.problem.undetermined()).flatten();
         self.account(termination, open)
     }
 
-    /// The account of the solve, with what is known to be open.
+    /// Returns the outcome of the solve, with the given undetermined direction.
     pub(crate) fn account(
         &mut self,
         termination: Termination,
@@ -46,7 +47,7 @@ impl Descent<'_> {
             _ => None,
         };
         let termination = match (&untouched, termination) {
-            // a minimum, but not of what these variables are
+            // a minimum, but these variables are undetermined
             (
                 Some(untouched),
                 Termination::Converged { .. } | Termination::Stalled { reason: Stall::Jump },

@@ -1,8 +1,8 @@
-//! The best estimate so far, for solvers whose steps may raise the cost.
+//! The best estimate so far, for solvers with steps that may raise the cost.
 use super::Descent;
 use manifactor_graph::column::Columns;
 
-/// The best estimate so far, for solvers whose steps may raise the cost.
+/// The best estimate so far, for solvers with steps that may raise the cost.
 pub(crate) struct Best {
     cost: f64,
     columns: Columns,
@@ -18,7 +18,7 @@ impl Best {
             self.columns.clone_from(descent.problem.model.columns());
         }
     }
-    /// Goes back to the best estimate, where that is not the last.
+    /// Restores the best estimate, unless it is the last one.
     pub(crate) fn restore(self, descent: &mut Descent<'_>) {
         if self.cost < descent.at.cost || !descent.at.cost.is_finite() {
             descent.problem.model.restore(self.columns);

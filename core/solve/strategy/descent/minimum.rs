@@ -1,48 +1,50 @@
-//! Whether an ending is a minimum of the cost, and a way on if it is a maximum, a saddle or a singular point.
+//! Test for a minimum of the cost, and escape from a maximum, a saddle or a singular point.
 //!
-//! The gradient vanishes at all of these, and so do the steps of every solver. JᵀJ cannot tell them apart: the curvature of
-//! the cost is JᵀJ + Σ r ∇²r, and only the second term can be negative.
+//! The gradient vanishes at all of these, and so does the step of every solver. JᵀJ cannot distinguish
+//! them: the curvature of the cost is JᵀJ + Σ r ∇²r, and only the second term can be negative.
 use super::Descent;
 use crate::linear::system::{dot, norm};
 use crate::outcome::{Termination, Tolerance};
 use manifactor_graph::checked::NotNegative;
 use nalgebra::DMatrix;
 
-/// Most ways on in one solve.
+/// Maximum number of escapes in one solve.
 const ESCAPES: usize = 10;
-/// Share of a standard deviation by which the test moves a variable.
+/// Step of the test, as a share of a variable's standard deviation.
 const SHARE: f64 = 0.1;
-/// Most that the test moves a variable, in the units of its tangent.
+/// Maximum step of the test, in tangent units.
 const MOST: f64 = 0.05;
-/// The same for a direction in which no factor has a slope.
+/// Step of the test along a flat direction, without a slope of any factor, in tangent units.
 const UNKNOWN: f64 = 1e-3;
 /// Share of a factor's cost below which its second difference is rounding.
 const ROUNDING: f64 = 1e-8;
-/// Share of the test's step for differences of gradients.
+/// Step for differences of gradients, as a share of the step of the test.
 const DIFFERENCE: f64 = 1e-2;
-/// Most products with the Hessian.
+/// Maximum number of products with the Hessian.
 const PRODUCTS: usize = 12;
-/// Curvature, as a share of JᵀJ's, above which a minimum is not in doubt.
+/// Smallest curvature, as a share of JᵀJ's, above which the test accepts the minimum.
 const SOUND: f64 = 0.5;
-/// Directions without a slope that are tried one by one.
+/// Maximum number of flat directions that are tried one by one.
 const FLAT: usize = 32;
-/// Shares of the diagonal that make JᵀJ positive definite: the least that will do.
+/// Shares of the diagonal that are added to JᵀJ; the first that makes it positive definite is used.
 const SHIFTS: [f64; 3] = [1e-10, 1e-6, 1e-3];
-/// Share of the largest entry of the diagonal that counts as the least.
+/// Lower bound of diagonal entries, as a share of the largest one.
 const FLOOR: f64 = 1e-9;
-/// Solves that are to end roughly, such as the inner ones of graduated non-convexity, are not tested.
+/// Relative tolerance above which a solve is not tested, such as the inner solves of graduated
+/// non-convexity.
 const ROUGH: f64 = 1e-4;
 
-/// What a probe of all factors on both sides of the estimate has found.
+/// Result of probing all factors on both sides of the estimate.
 struct Probe {
-    /// Unknowns of factors whose own curvature is negative.
+    /// Unknowns of factors with negative curvature.
     bent: Vec<bool>,
-    /// Whether a factor is not defined at the estimate, and defined on both sides of it.
+    /// Whether a factor is undefined at the estimate, but defined on both sides of it.
     is_singular: bool,
 }
 
 impl Descent<'_> {
-    /// Leaves a point at which the solve has ended although the cost falls beside it. Whether it has: the solve then goes on.
+    /// Leaves a point at which the solve has ended although the cost is lower nearby. Returns whether it
+    /// did, so that the solve continues.
     pub(crate) fn leave_stationary_point(&mut self, termination: &Termination) -> bool {
         let Termination::Converged { reason } = termination else { return false };
         let is_zero = *reason == Tolerance::AbsoluteCost && self.at.inactive == 0;
@@ -76,12 +78,12 @@ impl Descent<'_> {
         found
     }
 
-    /// A step for each unknown, a tenth of its standard deviation, with the noise scaled to fit the residuals: the same for
-    /// any unit of the noise.
+    /// Returns a step for each unknown: a tenth of its standard deviation, with the noise scaled to fit the
+    /// residuals. It does not depend on the noise's unit.
     fn probe_steps(&self) -> Vec<f64> {
         let rows: u32 = self.problem.model.factors.iter().map(|factor| factor.rows).sum();
         let fit = (2.0 * self.at.cost / f64::from(rows.max(1))).sqrt();
-        // factors that take no part have no say in how good the fit is
+        // with inactive factors, the residuals do not show how good the fit is
         let fit = if self.at.inactive > 0 { fit.max(1.0) } else { fit };
         let step = |(i, d): (usize, &f64)| {
             let wave = ((i * 7919 % 104_729) as f64 + 1.0).sin();
@@ -93,12 +95,12 @@ impl Descent<'_> {
         steps
     }
 
-    /// Unknowns on which no whitened and weighted residual depends to first order.
+    /// Returns the unknowns on which no whitened and weighted residual depends to first order.
     fn flat_unknowns(&self) -> impl Iterator<Item = usize> {
         self.problem.system.diagonal().enumerate().filter(|(_, d)| **d == 0.0).map(|(i, _)| i)
     }
 
-    /// Second differences of each factor's cost.
+    /// Computes the second difference of each factor's cost.
     fn probe(&mut self, steps: &[f64]) -> Probe {
         let model = &mut self.problem.model;
         let (mut here, mut ahead, mut behind) = (vec![], vec![], vec![]);
@@ -129,8 +131,9 @@ impl Descent<'_> {
         probe
     }
 
-    /// A direction of negative curvature, if there is one: the Lanczos method in the metric of JᵀJ, in which all of a good
-    /// minimum's curvatures are close to one. Begins at the unknowns of factors with negative curvature.
+    /// Returns a direction of negative curvature, if there is one. Uses the Lanczos method in the metric of
+    /// JᵀJ, in which all curvatures of a good minimum are close to one. Begins at the unknowns of factors
+    /// with negative curvature.
     fn bent_direction(&mut self, steps: &[f64], bent: &[bool]) -> Option<Vec<f64>> {
         let largest = self.problem.system.largest();
         let floor = if largest > 0.0 { FLOOR * largest } else { 1.0 };
@@ -145,7 +148,8 @@ impl Descent<'_> {
         found
     }
 
-    /// The search itself, with JᵀJ + `shift` factorized. Leaves the linearization of another point.
+    /// Runs the Lanczos method, with JᵀJ + `shift` factorized. Leaves the problem linearized at a different
+    /// point.
     fn lanczos(&mut self, steps: &[f64], bent: &[bool], shift: &[f64]) -> Option<Vec<f64>> {
         let gradient = self.problem.system.g.clone();
         let metric = self.problem.system.h.clone();
@@ -161,7 +165,7 @@ impl Descent<'_> {
         let mut products: Vec<Vec<f64>> = vec![];
         let mut found = None;
         while basis.len() < PRODUCTS.min(steps.len()) {
-            // twice is enough (Parlett)
+            // orthogonalizing twice is enough (Parlett)
             for (vector, image) in basis.iter().zip(&images).chain(basis.iter().zip(&images)) {
                 let along = dot(&next, image);
                 next.iter_mut().zip(vector).for_each(|(x, v)| *x -= along * v);
@@ -184,7 +188,7 @@ impl Descent<'_> {
             let least = eigen.eigenvalues.imin();
             tracing::debug!(products = products.len(), least = eigen.eigenvalues[least], "curvature");
             if eigen.eigenvalues[least] < 0.0 {
-                // the better the direction, the longer the way down along it
+                // no early exit: a better direction allows a longer descent along it
                 let mut direction = vec![0.0; steps.len()];
                 for (vector, share) in basis.iter().zip(eigen.eigenvectors.column(least).iter()) {
                     direction.iter_mut().zip(vector).for_each(|(d, v)| *d += share * v);
@@ -201,7 +205,8 @@ impl Descent<'_> {
         found
     }
 
-    /// The Hessian of the cost times a direction, by a difference of gradients; `None` where that is not finite.
+    /// Returns the product of the cost's Hessian and a direction, by a difference of gradients; `None` if
+    /// that is not finite.
     fn hessian_product(&mut self, direction: &[f64], steps: &[f64], gradient: &[f64]) -> Option<Vec<f64>> {
         let share = shortest(direction, steps)?;
         let step: Vec<f64> = direction.iter().map(|d| DIFFERENCE * share * d).collect();
@@ -215,7 +220,8 @@ impl Descent<'_> {
         (there.not_finite.is_none() && norm(&product).is_finite()).then_some(product)
     }
 
-    /// Goes along a direction, or against it, as long as the cost falls; whether it does by more than the tolerance.
+    /// Moves along a direction, forward or backward, as long as the cost falls. Returns whether it falls by
+    /// more than the tolerance.
     fn go_down(&mut self, direction: &[f64]) -> bool {
         let steps = self.probe_steps();
         let Some(share) = shortest(direction, &steps) else { return false };
@@ -237,7 +243,7 @@ impl Descent<'_> {
         self.at.not_finite.is_none()
     }
 
-    /// The cost beside the estimate, if all factors that take part are defined and finite there.
+    /// Returns the cost next to the estimate, if all active factors are defined and finite there.
     fn cost_beside(&mut self, direction: &[f64], size: f64) -> Option<f64> {
         let step: Vec<f64> = direction.iter().map(|d| size * d).collect();
         let there = self.problem.try_step(&step);
@@ -252,7 +258,7 @@ impl Descent<'_> {
     }
 }
 
-/// By how much a direction may be multiplied so that no unknown moves by more than its step.
+/// Returns the largest multiple of a direction for which no unknown moves by more than its step.
 fn shortest(direction: &[f64], steps: &[f64]) -> Option<f64> {
     let moving = direction.iter().zip(steps).filter(|(d, s)| **d != 0.0 && **s != 0.0);
     let share = moving.map(|(d, s)| (s / d).abs()).fold(f64::INFINITY, f64::min);

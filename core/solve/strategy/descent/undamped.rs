@@ -1,18 +1,18 @@
-//! Steps without damping, for solvers that take none: with next to none where something is open.
+//! Undamped steps, with minimal damping if a direction is undetermined.
 use super::{Descent, Step};
 use crate::inspect::null_space::undetermined;
 use crate::linear::system::dot;
 use crate::outcome::Undetermined;
 
-/// What is added to the diagonal of H where it cannot be factorized, as shares of it: the least that will do.
+/// Damping for an H that cannot be factorized, as shares of its diagonal; the first that suffices is used.
 const SHARES: [f64; 4] = [1e-10, 1e-8, 1e-6, 1e-3];
-/// Entries of the diagonal below this share of the largest count as this share.
+/// Lower bound of diagonal entries, as a share of the largest one.
 const FLOOR: f64 = 1e-9;
 
 impl Descent<'_> {
-    /// Factorizes H; whether that was possible. Where nothing constrains a direction, as in a graph without a prior,
-    /// just enough is added to its diagonal: the step then leaves that direction alone, and the outcome names it. See
-    /// `docs/decisions/undetermined.md`.
+    /// Factorizes H. Returns whether it succeeded. With an undetermined direction, as in a graph without a
+    /// prior, minimal damping is added to the diagonal. The step then does not move along that direction,
+    /// and the outcome reports it. See `docs/decisions/undetermined.md`.
     pub(super) fn factorize_undamped(&mut self) -> bool {
         if !self.is_open {
             let done = self.factorize(None);
@@ -30,8 +30,8 @@ impl Descent<'_> {
         })
     }
 
-    /// Returns whether a step without damping promises next to nothing: then it is not the damping that makes steps small.
-    /// Leaves that step in `step`.
+    /// Returns whether an undamped step predicts almost no decrease, so that damping is not the reason for
+    /// small steps. Leaves that step in `step`.
     pub(crate) fn is_at_rest(&mut self, step: &mut Step) -> bool {
         self.at.not_finite.is_none()
             && !self.is_steep()
@@ -39,7 +39,8 @@ impl Descent<'_> {
             && self.is_small(step.predicted)
     }
 
-    /// Returns whether a step without any damping promises more than this share of the cost. Leaves that step in `step`.
+    /// Returns whether an undamped step predicts a decrease of more than this share of the cost. Leaves
+    /// that step in `step`.
     pub(crate) fn promises(&mut self, step: &mut Step, share: f64) -> bool {
         let can_step =
             self.at.not_finite.is_none() && self.factorize(None) && self.newton_step(&mut step.delta);
@@ -47,7 +48,8 @@ impl Descent<'_> {
         can_step && step.predicted > share * self.at.cost
     }
 
-    /// At the end of a solve by such steps: what is open at the estimate, where something was on the way.
+    /// Returns the undetermined direction at the end of a solve with undamped steps, if there was one on
+    /// the way.
     pub(crate) fn open_direction(&mut self) -> Option<Undetermined> {
         let looks = self.is_open && !self.interrupted && self.at.not_finite.is_none();
         looks.then(|| undetermined(self.problem, true, 0.0)).flatten()

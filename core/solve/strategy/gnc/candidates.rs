@@ -1,4 +1,4 @@
-//! Which factors may be outliers.
+//! Selection of the factors that may be outliers.
 use crate::problem::{FactorPlace, Problem};
 use manifactor_graph::{VariableIndices, catalogue};
 use schemars::JsonSchema;
@@ -6,13 +6,14 @@ use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 use std::collections::HashMap;
 
-/// The factors that may be outliers. All others are trusted, and keep their full weight.
+/// The factors that may be outliers. All remaining factors are trusted, and keep their full weight.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Candidates {
-    /// Factors that couple variables, except odometry: the only factor between variables of one type that follow one another in
-    /// the order of the values. If there are several between the same variables, all of them are candidates, since any may be a
-    /// wrong loop closure. Priors and other factors of a single variable are trusted.
+    /// Factors that couple variables, except odometry: the only factor between consecutive variables of one
+    /// type, in the order of the values. If there are several between the same variables, all of them are
+    /// candidates, since any may be a wrong loop closure. Priors and other factors of a single variable are
+    /// trusted.
     #[default]
     LoopClosures,
     /// Every factor.
@@ -25,7 +26,7 @@ pub enum Candidates {
 #[schemars(with = "String")]
 pub struct FactorType(String);
 
-/// A name that no factor has.
+/// The error for a name without a factor.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no factor `{0}`; see `manifactor list factors`")]
 pub struct UnknownFactor(String);
@@ -47,14 +48,14 @@ impl From<FactorType> for String {
 }
 
 impl FactorType {
-    /// The name.
+    /// Returns the name.
     pub fn as_str(&self) -> &str {
         &self.0
     }
 }
 
 impl Candidates {
-    /// By factor: whether it is a candidate.
+    /// Returns for each factor whether it is a candidate.
     pub(crate) fn of(self, problem: &Problem) -> Vec<bool> {
         let mut connections: HashMap<VariableIndices, usize> = HashMap::new();
         for factor in problem.model.factors.iter().filter(|factor| factor.variables.len() > 1) {
@@ -74,7 +75,7 @@ impl Candidates {
     }
 }
 
-/// Returns whether variables are of one type and follow one another, as those of odometry do.
+/// Returns whether variables are of one type and consecutive, like the variables of odometry.
 ///
 /// A variable is given by its column, one for each type, and its position among the variables of that type.
 pub fn is_sequential(variables: impl IntoIterator<Item = (usize, u64)>) -> bool {

@@ -1,4 +1,4 @@
-//! The outer loop: weights from costs, an estimate from weights.
+//! The outer loop, which alternates between weights and estimates.
 use super::Gnc;
 use crate::observer::{Observer, Quiet};
 use crate::outcome::Termination;
@@ -12,28 +12,28 @@ use manifactor_graph::checked::{NotNegative, Positive};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-/// Most rounds until the weights stay; two or three are the rule.
+/// Maximum number of rounds until the weights converge; usually two or three.
 const ROUNDS: usize = 10;
-/// Thresholds for keeping a factor in the search for other minima, as multiples of the inlier bound.
+/// Thresholds for keeping a factor in the search for further minima, as multiples of the inlier bound.
 const SHARES: [f64; 5] = [1.0, 0.1, 0.03, 10.0, 100.0];
-/// Share of a cost by which another has to be lower to be so by more than what solves leave open.
+/// Relative decrease above which a cost counts as lower, beyond the tolerance of the solves.
 const LESS: f64 = 1e-5;
-/// A weight below this is as good as none, where another start is looked for.
+/// Weight below which a factor is omitted in the search for starts.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// A graduated solve under way.
+/// A graduated solve in progress.
 pub(super) struct Graduation<'a> {
     gnc: &'a Gnc,
     problem: &'a mut Problem,
-    /// For other starts than the estimate; without it there are none.
+    /// The graph, for further starts; without it, only the estimate is used.
     graph: Option<&'a Graph>,
     observer: &'a mut dyn Observer,
-    /// By factor: what an inlier may cost; `None` for those that are trusted.
+    /// Inlier bound of each factor; `None` for trusted factors.
     bounds: Vec<Option<f64>>,
-    /// By factor: what it costs at the estimate.
+    /// Cost of each factor at the estimate.
     costs: Vec<f64>,
     weights: Vec<f64>,
-    /// For weights that change again: no more exact than they are.
+    /// Solver for intermediate weights, which need no exact solution.
     inner: LevenbergMarquardt,
     outcome: Option<Outcome>,
 }
@@ -72,7 +72,8 @@ impl<'a> Graduation<'a> {
         outcome
     }
 
-    /// From the cost in which all factors count to the robust one; breaks where there is no going on.
+    /// Graduates from the cost with all factors to the robust one. Breaks if a solve fails or is
+    /// interrupted.
     fn graduate(&mut self) -> ControlFlow<Box<Outcome>> {
         self.step()?;
         let excess = (0..self.costs.len()).filter_map(|i| self.excess(i));
@@ -84,7 +85,7 @@ impl<'a> Graduation<'a> {
             control = if open { self.gnc.cost.next(mu, self.gnc.step.get()) } else { None };
         }
         self.settle()?;
-        // what fits has other minima near by, where an outlier was made to fit or an inlier was not
+        // look for better minima nearby, in case an outlier was kept or an inlier rejected
         let mut shares = SHARES.iter();
         let mut share = shares.next();
         while let Some(now) = share {
@@ -94,8 +95,8 @@ impl<'a> Graduation<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Another estimate, from the factors that cost less than this share of the inlier bound; whether it has a lower robust
-    /// cost, else the estimate stays.
+    /// Computes an estimate from the factors with a cost below this share of the inlier bound. Keeps it and
+    /// returns `true` if it has a lower robust cost.
     fn settle_from(&mut self, share: f64) -> ControlFlow<Box<Outcome>, bool> {
         let within =
             |me: &Self, share: f64| (0..me.costs.len()).filter(|i| me.excess(*i) <= Some(share)).count();
@@ -119,7 +120,7 @@ impl<'a> Graduation<'a> {
         ControlFlow::Continue(improved)
     }
 
-    /// An estimate for the weights: the better one of those that the last estimate and a start lead to.
+    /// Computes an estimate for the current weights: the better result of the last estimate and a start.
     fn step(&mut self) -> ControlFlow<Box<Outcome>> {
         let cost = self.solve()?;
         self.begin_elsewhere(cost);
@@ -127,7 +128,8 @@ impl<'a> Graduation<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Weights of the robust cost itself and their estimate, in turn, until the same factors are kept.
+    /// Alternates between the weights of the robust cost and an estimate for them, until the inliers stay
+    /// the same.
     fn settle(&mut self) -> ControlFlow<Box<Outcome>> {
         let kept = |me: &Self| (0..me.costs.len()).map(|i| me.excess(i) <= Some(1.0)).collect::<Vec<_>>();
         self.problem.factor_costs(&mut self.costs);
@@ -143,7 +145,7 @@ impl<'a> Graduation<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Solves with the weights as they are; the cost that is reached.
+    /// Solves with the current weights. Returns the final cost.
     fn solve(&mut self) -> ControlFlow<Box<Outcome>, f64> {
         let next = self.inner.descend(self.problem, self.observer);
         let outcome = self.account(next);
@@ -155,7 +157,7 @@ impl<'a> Graduation<'a> {
         ControlFlow::Continue(cost)
     }
 
-    /// The account of the solve so far and of the next part of it.
+    /// Adds the next part of the solve to the outcome so far.
     fn account(&mut self, next: Outcome) -> Outcome {
         match self.outcome.take() {
             Some(outcome) => outcome.then(next, true),
@@ -163,8 +165,8 @@ impl<'a> Graduation<'a> {
         }
     }
 
-    /// Solves with the weights as they are from the best of the registered starts; whether that leads to less than
-    /// `cost`, else the estimate stays. Here a start sees what outliers there are by their small weights.
+    /// Solves with the current weights from the best registered start. Keeps the result and returns `true`
+    /// if its cost is below `cost`. The starts get the weights, and so the outliers, by way of the noise.
     fn begin_elsewhere(&mut self, cost: f64) -> bool {
         let Some(graph) = self.graph else { return false };
         let mut weighed = graph.clone();
@@ -172,7 +174,7 @@ impl<'a> Graduation<'a> {
         weighed.factors_mut().retain_mut(|entry| {
             let weight = weights.next().copied().unwrap_or(1.0);
             if weight < 1.0 && weight > NEGLIGIBLE {
-                // noise at the limits of f64 stays as it is
+                // noise at the limits of f64 stays unchanged
                 entry.noise = entry.noise.weighted(weight).unwrap_or_else(|_| entry.noise.clone());
             }
             weight > NEGLIGIBLE
@@ -191,7 +193,7 @@ impl<'a> Graduation<'a> {
         false
     }
 
-    /// What a factor costs by what an inlier may; `None` for one that is trusted.
+    /// Returns the cost of a factor, as a multiple of its inlier bound; `None` for a trusted factor.
     fn excess(&self, factor: usize) -> Option<f64> {
         self.bounds[factor].map(|bound| self.costs[factor] / bound)
     }
@@ -211,7 +213,7 @@ impl<'a> Graduation<'a> {
         (0..self.costs.len()).map(one).sum()
     }
 
-    /// The factors that cost more than an inlier may.
+    /// Returns the factors with a cost above their inlier bound.
     fn rejected(&self) -> Vec<Rejected> {
         let beyond = |i: &usize| self.excess(*i).is_some_and(|u| u > 1.0);
         let one = |factor: usize| Rejected {

@@ -1,17 +1,18 @@
-//! Settings that have a domain.
+//! Settings with a domain.
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 manifactor_graph::number! {
-    /// A number between 0 and 1, neither of them.
+    /// A number strictly between 0 and 1.
     pub Probability: "a probability above 0 and below 1", |p| p > 0.0 && p < 1.0, { "exclusiveMinimum": 0, "exclusiveMaximum": 1 };
-    /// A factor above 1.
+    /// A growth factor of at least 1.01.
     pub Growth: "a finite factor of at least 1.01", |x| x >= 1.01 && x < f64::INFINITY, { "minimum": 1.01 };
 }
 
 impl Probability {
-    /// The squared norm that as many standard normal numbers as there are `rows` stay below with this probability.
+    /// Returns the χ² quantile: the squared norm of `rows` standard normal numbers is below it with this
+    /// probability.
     pub fn chi_squared(self, rows: usize) -> f64 {
-        // with the number of rows above zero there is a distribution
+        // the distribution exists, since the number of rows is positive
         ChiSquared::new(rows.max(1) as f64).map_or(f64::INFINITY, |chi| chi.inverse_cdf(self.get()))
     }
 }

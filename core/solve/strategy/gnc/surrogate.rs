@@ -1,6 +1,6 @@
-//! The family of costs that leads from a convex one to the robust one, and the weights of each.
+//! The surrogate costs, which lead from a convex cost to the robust one, and their weights.
 //!
-//! Throughout u is what a factor costs by what an inlier may cost: u = ‖r‖²/c².
+//! u is the cost of a factor divided by its inlier bound: u = ‖r‖²/c².
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,16 +18,16 @@ pub enum Truncation {
 use Truncation::{GemanMcclure, TruncatedLeastSquares};
 
 impl Truncation {
-    /// The first μ, where the worst factor has u = `worst`; `None` where nothing has to be graduated.
+    /// Returns the first μ, for a worst factor with u = `worst`; `None` if no graduation is necessary.
     pub(super) fn first(self, worst: f64) -> Option<f64> {
         match self {
-            // remark 5 of the paper: convex as far as the worst
+            // remark 5 of the paper: convex up to the worst factor
             TruncatedLeastSquares => Some(2.0 * worst - 1.0).filter(|d| *d > 0.0).map(f64::recip),
             GemanMcclure => Some(2.0 * worst).filter(|mu| *mu > 1.0),
         }
     }
 
-    /// The next μ, `step` times nearer to the robust cost; `None` where that is reached.
+    /// Returns the next μ, `step` times closer to the robust cost; `None` once that is reached.
     pub(super) fn next(self, mu: f64, step: f64) -> Option<f64> {
         match self {
             TruncatedLeastSquares => Some(mu * step).filter(|mu| *mu < self.last()),
@@ -35,8 +35,8 @@ impl Truncation {
         }
     }
 
-    /// The μ of the robust cost itself. For least squares that are truncated it is infinite; here the surrogate
-    /// differs within a millionth of u = 1 only.
+    /// Returns the μ of the robust cost. It is infinite for truncated least squares. The finite value here
+    /// changes the cost only within a millionth of u = 1.
     pub(super) fn last(self) -> f64 {
         match self {
             TruncatedLeastSquares => 1e6,
@@ -44,7 +44,7 @@ impl Truncation {
         }
     }
 
-    /// The weight that the surrogate of this μ gives to a factor: equations 12 and 14.
+    /// Returns the weight of a factor for this μ: equations 12 and 14.
     pub(super) fn weight(self, mu: f64, u: f64) -> f64 {
         match self {
             TruncatedLeastSquares if u <= mu / (mu + 1.0) => 1.0,
@@ -54,7 +54,7 @@ impl Truncation {
         }
     }
 
-    /// The robust cost.
+    /// Returns the robust cost.
     pub(super) fn rho(self, u: f64) -> f64 {
         match self {
             TruncatedLeastSquares => u.min(1.0),
@@ -100,7 +100,7 @@ mod tests {
         #[test]
         fn the_schedule_leads_from_almost_all_of_the_worst_to_the_end(cost in both(), worst in 1.0..1e9f64) {
             let mut mu = cost.first(worst);
-            // both begin with a positive second derivative in √u everywhere
+            // at the start, the second derivative in √u is positive everywhere
             prop_assert!(mu.is_some_and(|mu| cost.weight(mu, worst) > 0.0));
             let mut steps = 0;
             while let Some(now) = mu {

@@ -78,7 +78,7 @@ impl Residual for Apart {
 }
 register_factor!("toy_apart", Apart);
 
-/// Nonlinear, to give threads something to disagree about: distance less `by`.
+/// Distance minus `by`. Nonlinear, so that threads could produce different results.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Distance {
     pub by: f64,
@@ -109,7 +109,7 @@ impl Residual for Centre {
 }
 register_factor!("toy_centre", Centre);
 
-/// r = ln x - ln to: nothing for x ≤ 0.
+/// r = ln x - ln to; undefined for x ≤ 0.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Logarithm {
     pub to: f64,
@@ -126,7 +126,7 @@ impl Residual for Logarithm {
 }
 register_factor!("toy_logarithm", Logarithm);
 
-/// r = (x, 0/0) wherever x is negative, with no word about it.
+/// r = √x, which is NaN for negative x, without `is_defined`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Careless {}
 impl Residual for Careless {
@@ -175,7 +175,7 @@ impl Residual for WrongSign {
 }
 register_factor!("toy_wrong_sign", WrongSign);
 
-/// r = x + 1, and not a number from 0 on downwards, with no word about it.
+/// r = x + 1, and NaN for x ≤ 0, without `is_defined`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct Cliff {}
 impl Residual for Cliff {
@@ -188,7 +188,7 @@ impl Residual for Cliff {
 }
 register_factor!("toy_cliff", Cliff);
 
-/// r = 500 (x − from) / y − pixel: a camera on the x axis that looks along y, nothing behind it.
+/// r = 500 (x − from) / y − pixel: a camera on the x axis that looks along y. Undefined behind it.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct View {
     pub from: f64,

@@ -1,4 +1,4 @@
-//! What a batch adds to H and g is what the factor's own Jacobian says, whitened and weighed.
+//! The terms of a batch in H and g equal those of the factor's own Jacobian, with noise and weights.
 use crate::dynamic::Chain;
 use crate::toy::{Area, SOUND, Spot, Spread};
 use manifactor_graph::batch::Member;
@@ -9,8 +9,8 @@ use manifactor_graph::{Factor, Noise, Variable};
 use nalgebra::{DMatrix, DVector};
 use std::any::TypeId;
 
-/// A factor in a problem of its own: where each variable (of two dimensions) begins, and which of its
-/// directions are held.
+/// A factor in a small problem, with the first scalar of each two-dimensional variable and its held
+/// directions.
 struct Setup<'a> {
     factor: &'a dyn Factor,
     spots: Vec<Spot>,
@@ -21,7 +21,7 @@ struct Setup<'a> {
 }
 
 impl<'a> Setup<'a> {
-    /// Everything free, in order.
+    /// Creates a setup with all variables free, in order.
     fn new(factor: &'a dyn Factor, count: usize) -> Self {
         let spots = (0..count).map(|i| Spot([0.3 * i as f64 - 0.5, 0.2 + 0.1 * i as f64].into()));
         Self {
@@ -43,7 +43,7 @@ impl<'a> Setup<'a> {
         self.starts.iter().filter(|s| **s != FIXED).map(|s| *s as usize + 2).max().unwrap_or(0)
     }
 
-    /// H, g and the cost, by the batch.
+    /// Computes H, g and the cost by the batch.
     fn by_batch(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
         let n = self.size();
         // entry (i, j) of the packed lower triangle
@@ -81,7 +81,7 @@ impl<'a> Setup<'a> {
         (h, g.into(), evaluation.cost)
     }
 
-    /// The same from one dense Jacobian.
+    /// Computes H, g and the cost from one dense Jacobian.
     fn by_hand(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
         let linearization = self.factor.erased().linearize(&self.variables()).unwrap();
         let w = self.noise.whitener(self.rows()).unwrap().matrix(self.rows());
@@ -154,7 +154,7 @@ fn held_directions_have_empty_columns() {
 
 #[test]
 fn any_number_of_variables_adds_all_its_pairs() {
-    // beyond eight the blocks are allocated
+    // more than eight variables need allocated blocks
     for count in [1, 2, 3, 8, 11] {
         let mut setup = Setup::new(&Spread {}, count);
         setup.check();
@@ -170,7 +170,7 @@ fn any_number_of_variables_adds_all_its_pairs() {
 
 #[test]
 fn rows_and_variables_by_number_add_the_same() {
-    // from one row to the most; beyond eight variables the lists are allocated
+    // from one row to the largest number; more than eight variables need allocated lists
     for count in 2..=10 {
         let (chain, loss) = (Chain::from(count), Cauchy::new(0.5).unwrap());
         let mut setup = Setup { loss: Some(&loss), ..Setup::new(&chain, count) };

@@ -1,11 +1,11 @@
-//! A factor whose rows and variables are known at run time only.
+//! A factor whose numbers of rows and variables are only known at run time.
 use crate::toy::Spot;
 use manifactor_graph::{Dynamic, DynamicBlocks, DynamicResidual, ErasedResidual, Factor};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::any::{Any, TypeId};
 
-/// Of each of so many spots, but the last, the product with the next: a · b.
+/// The products a · b of each spot with the next one.
 #[derive(Debug, Clone)]
 pub(crate) struct Products {
     types: Vec<TypeId>,

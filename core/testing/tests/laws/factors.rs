@@ -1,4 +1,4 @@
-//! Each flaw of a factor breaks the Jacobian law, with a message that leads to it.
+//! Each flaw of a factor breaks the Jacobian law, with a message that names the flaw.
 use crate::dynamic::Chain;
 use crate::toy::*;
 use manifactor_graph::catalogue::find;
@@ -46,7 +46,7 @@ fn a_block_that_is_not_written_is_found() {
 #[test]
 fn a_wrong_seed_is_found_by_differences() {
     let (a, b) = spots::<DOUBLED_SEED>();
-    // the analytic Jacobian is right, the automatic one is not
+    // the analytic Jacobian is right, the automatic one is wrong
     let error = jacobian_law(&Area::<SOUND, DOUBLED_SEED> { area: 0.5 }, &[&a, &b]).unwrap_err();
     assert!(matches!(error, LawError::Jacobian { direction: "y", .. }), "{error}");
 }
@@ -70,7 +70,7 @@ fn nothing_to_check_is_said() {
 #[test]
 fn what_changes_the_residual_is_no_invariance() {
     let ((a, b), factor) = (spots::<SOUND>(), Area::<SOUND> { area: 0.5 });
-    // shearing b along a leaves the area
+    // shearing b along a does not change the area
     let sheared = Spot::<SOUND>(b.0 + a.0 * 3.0);
     assert_eq!(invariance_law(&factor, &[&a, &b], &[&a, &sheared]), Ok(()));
     let error = invariance_law(&factor, &[&a, &b], &[&a, &Spot::<SOUND>([3.0, 4.1].into())]).unwrap_err();
@@ -119,7 +119,7 @@ fn the_catalogue_is_enough_to_check_a_type() {
     assert_eq!(factor_law(factor("spread"), 32).unwrap().defined, 32);
     assert!(manifold_law(find("variable", "spot").unwrap(), 32).unwrap().seed_error < Some(1e-9));
     documentation_law(factor("area")).unwrap();
-    // the flawed ones share a doc comment, whose example names another
+    // the flawed factors share a doc comment, and its example names a different factor
     let error = documentation_law(factor("area_of_wrong_sign")).unwrap_err().to_string();
     let expected = "factor `area_of_wrong_sign`: its example has no table with type = \"area_of_wrong_sign\"";
     assert_eq!(error, expected);

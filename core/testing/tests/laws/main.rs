@@ -1,4 +1,4 @@
-//! The laws find what is broken, and the graph core keeps its word, on toy variables and factors.
+//! Tests on toy variables and factors: the laws find each flaw, and the graph core keeps its contracts.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic too")]
 mod batch;
 mod dynamic;

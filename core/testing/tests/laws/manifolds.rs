@@ -1,4 +1,4 @@
-//! Each flaw of a manifold breaks the law that is about it.
+//! Each flaw of a manifold breaks the corresponding law.
 use crate::toy::*;
 use manifactor_testing::strategies::vector;
 use manifactor_testing::{LawError, manifold_laws};

@@ -1,4 +1,4 @@
-//! All forms of a noise whiten alike, and what is no noise is refused.
+//! All forms of a noise model whiten consistently, and invalid noise models are rejected.
 use manifactor_graph::Noise;
 use manifactor_graph::noise::NoiseError;
 use nalgebra::DMatrix;

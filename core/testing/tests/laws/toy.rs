@@ -1,4 +1,4 @@
-//! Variables and factors that are right, and the same with one flaw each.
+//! Correct variables and factors, and variants with one flaw each.
 use manifactor_graph::{
     Jacobians, Jet, JetOf, Lifted, Manifold, Many, Refs, Residual, Scalar, register_factor,
     register_manifold, register_quantity,
@@ -83,8 +83,8 @@ register_manifold!("infinite_spot", Spot<INFINITE>);
 register_quantity!(Spot<SOUND> as Vector2<f64>);
 register_quantity!(Spot<DOUBLED_SEED> as Vector2<f64>);
 
-/// Twice the area of a triangle with the origin, and the first spot's distance from an axis; with the
-/// flaw `F`, on spots with the flaw `S`.
+/// Twice the area of a triangle with the origin, and the distance of the first spot from an axis. The factor
+/// has the flaw `F`, and its spots have the flaw `S`.
 ///
 /// The second row ignores the second variable.
 ///
@@ -130,7 +130,7 @@ register_factor!("area_with_other_residual", Area<OTHER_RESIDUAL>);
 register_factor!("area_that_is_never_defined", Area<NEVER_DEFINED>);
 register_factor!("area_of_spots_with_doubled_seed", Area<SOUND, DOUBLED_SEED>);
 
-/// Spread of any number of spots about the origin: Σ ‖xᵢ‖² weighed by the position i + 1.
+/// Spread of any number of spots around the origin: Σ ‖xᵢ‖² with the weight i + 1.
 ///
 /// ```toml
 /// factor = { type = "spread" }
@@ -150,7 +150,7 @@ impl Residual for Spread {
 }
 register_factor!("spread", Spread);
 
-/// A residual that is another beyond x = 2.
+/// A residual that changes its formula beyond x = 2.
 ///
 /// ```toml
 /// factor = { type = "step" }

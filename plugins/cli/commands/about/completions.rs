@@ -1,11 +1,11 @@
-//! `manifactor completions` and `manifactor man`: what shells and readers of manuals want to know of the command line.
+//! `manifactor completions` and `manifactor man`: shell completions and manual pages.
 use crate::failure::Failure;
 use crate::output;
 use crate::status::Status;
 use clap::{Args, Command};
 use clap_complete::{Shell, generate};
 
-/// Print a script by which a shell completes commands and flags.
+/// Print a script that completes commands and flags in a shell.
 ///
 /// For bash: manifactor completions bash > ~/.local/share/bash-completion/completions/manifactor
 #[derive(Debug, Args)]
@@ -15,7 +15,7 @@ pub(crate) struct Completions {
     shell: Shell,
 }
 
-/// Print the manual page of the program or of one of its commands: manifactor man > manifactor.1
+/// Print the manual page of the program or of one command: manifactor man > manifactor.1
 #[derive(Debug, Args)]
 pub(crate) struct Man {
     /// The command. Default: the program.
@@ -23,7 +23,7 @@ pub(crate) struct Man {
 }
 
 impl Completions {
-    /// For this command line.
+    /// Prints the completions of this command line.
     pub(crate) fn run(&self, mut program: Command) -> Status {
         let mut script = vec![];
         generate(self.shell, &mut program, "manifactor", &mut script);
@@ -33,9 +33,9 @@ impl Completions {
 }
 
 impl Man {
-    /// Of this command line.
+    /// Prints the manual page of this command line or of one of its commands.
     pub(crate) fn run(&self, mut program: Command) -> Result<Status, Failure> {
-        // flags that all commands have are known once it is built
+        // global flags reach the subcommands only after `build`
         program.build();
         let command = match &self.command {
             None => program,

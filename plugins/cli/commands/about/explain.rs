@@ -1,4 +1,4 @@
-//! `manifactor explain`: what a name in a config means.
+//! `manifactor explain`: the meaning of a name in a config.
 use crate::failure::Failure;
 use crate::output;
 use crate::output::text::{self, Table};
@@ -11,12 +11,12 @@ use manifactor::graph::catalogue::{self, Entry};
 use manifactor::graph::invariance::invariances_of;
 use serde_json::json;
 
-/// Explain a name: what it means, its fields and their defaults, an example.
+/// Explain a name: its meaning, its fields with their defaults, and an example.
 #[derive(Debug, Args)]
 pub(crate) struct Explain {
-    /// Any name that `manifactor list` prints.
+    /// A name that `manifactor list` prints.
     name: String,
-    /// Print JSON: its docs and its JSON Schema.
+    /// Print JSON: the docs and the JSON Schema.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -71,7 +71,7 @@ fn explain(entry: &Entry) -> String {
     out
 }
 
-/// The docs without their line breaks, and without the example, which is shown apart.
+/// Returns the docs without line breaks and without the example, which has its own section.
 fn prose(docs: &str) -> String {
     let mut paragraphs = Vec::new();
     for (i, part) in docs.split("```").enumerate() {

@@ -1,4 +1,4 @@
-//! `manifactor list`: what can be named in a config.
+//! `manifactor list`: the names that a config can use.
 use crate::failure::Failure;
 use crate::output;
 use crate::output::text::Table;
@@ -9,7 +9,7 @@ use manifactor::config::nearest;
 use manifactor::graph::catalogue;
 use serde_json::json;
 
-/// List what can be named in a config: factors, variables, losses, solvers, sources and more.
+/// List the names that a config can use: factors, variables, losses, solvers, sources and more.
 #[derive(Debug, Args)]
 pub(crate) struct List {
     /// One kind only, such as `factors`.
@@ -17,7 +17,7 @@ pub(crate) struct List {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Print the config reference of all that is linked, as Markdown: `docs/config.md`.
+    /// Print the config reference of everything that is linked, as Markdown (docs/config.md).
     #[arg(long, conflicts_with_all = ["json", "kind"])]
     markdown: bool,
 }
@@ -51,7 +51,7 @@ impl List {
     }
 }
 
-/// The kind that is meant by `factor` or `factors`.
+/// Returns the kind for its singular or plural, such as `factor` or `factors`.
 fn known(kind: &str) -> Result<&'static str, Failure> {
     let mut kinds: Vec<&'static str> = catalogue::all().iter().map(|e| e.kind).collect();
     kinds.dedup();

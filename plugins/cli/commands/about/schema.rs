@@ -8,25 +8,25 @@ use manifactor::config::Definitions;
 use manifactor::slam::schema::{experiment_root, rules_root, run_root};
 use serde_json::{Value, json};
 
-/// Print the JSON Schema of a document, for editors to complete and check by.
+/// Print the JSON Schema of a document, with which editors complete and check it.
 #[derive(Debug, Args)]
 pub(crate) struct Schema {
-    /// Which kind of document.
+    /// The kind of document.
     #[arg(value_enum, default_value = "any")]
     document: Document,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Document {
-    /// Any of them.
+    /// Any kind of document.
     Any,
-    /// A literal graph: what `solve` takes.
+    /// A literal graph, the input of `solve`.
     Graph,
-    /// A run: what `run` takes.
+    /// A run, the input of `run`.
     Run,
-    /// A run over a grid of settings: what `experiment` takes.
+    /// A run over a grid of settings, the input of `experiment`.
     Experiment,
-    /// A file of semantic rules, which runs name.
+    /// A file of semantic rules, which a run refers to.
     Rules,
 }
 

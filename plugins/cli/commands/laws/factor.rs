@@ -1,4 +1,4 @@
-//! `manifactor check-factor`: whether a factor keeps the laws, before a solver meets it.
+//! `manifactor check-factor`: checks whether a factor keeps its laws before a solver uses it.
 use super::linked;
 use crate::failure::Failure;
 use crate::input::choice::named;
@@ -11,30 +11,33 @@ use manifactor::testing::{FactorCheck, Subject};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Check a factor: its Jacobian against differences, what it leaves free, its kinks, and what is stated of it.
+/// Check a factor: its Jacobian against finite differences, its free directions, its kinks and its declared
+/// properties.
 ///
-/// At random points: around the example in its docs or the values of a graph, wherever its manifolds' strategies draw, at
-/// their singular points and near them. Where a law is broken, the worst entry is shown with its variable and direction,
-/// at the simplest point that was found, as a graph that `--config` takes; `--json` has the points of the worst entry and of
-/// the kinks of a sound factor, too. Exit code 1 where a law is broken.
+/// The points are random: around the example in the docs or around the values of a graph, from the sampling
+/// strategies of the manifolds, and at and near their singular points. For a broken law, the worst entry is
+/// shown with its variable and direction, at the simplest point that was found, as a graph that --config
+/// accepts. With --json, the points of the worst entry and of the kinks are included for a sound factor
+/// too. The exit code is 1 if a law is broken.
 #[derive(Debug, Args)]
 pub(crate) struct CheckFactor {
-    /// The factor, one of `manifactor list factors`; all factors of the graph, if not given.
+    /// The factor, one of `manifactor list factors`. Default with --config: all factors of the graph.
     #[arg(required_unless_present = "config")]
     name: Option<String>,
-    /// A literal graph: its factors, with their parameters, around its values.
+    /// A literal graph whose factors are checked, with their parameters, around its values.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// The factor's parameters, those of the example in its docs if not given: '{ "up": [0, 0, 1] }'.
+    /// The parameters of the factor, such as '{ "up": [0, 0, 1] }'. Default: those of the example in its
+    /// docs.
     #[arg(long, value_name = "JSON", conflicts_with = "config")]
     parameters: Option<String>,
-    /// How many points are drawn.
+    /// Number of random points.
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     points: u32,
-    /// Where the random numbers begin: the same seed draws the same points.
+    /// Seed of the random numbers; the same seed gives the same points.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Print JSON: everything that was found.
+    /// Print JSON: all results.
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -57,7 +60,7 @@ impl CheckFactor {
         Ok(if holds { Status::Done } else { Status::Broken })
     }
 
-    /// By name, with the parameters of the command line or of its docs.
+    /// Returns the factor `name`, with the parameters of the command line or of its docs.
     fn alone(&self, name: &str) -> Result<Subject, Failure> {
         let entry = linked("factor", name, "register_factor!(…)")?;
         let Some(text) = &self.parameters else { return Subject::example(entry).map_err(Failure::input) };
@@ -70,7 +73,7 @@ impl CheckFactor {
     }
 }
 
-/// The factors of a graph, each different one once, around the graph's values.
+/// Returns the distinct factors of a graph, around the graph's values.
 fn in_graph(path: &std::path::Path, name: Option<&str>) -> Result<Vec<Subject>, Failure> {
     let document = Document::open(path)?;
     let (graph, values) = read_graph(&document)?;

@@ -1,4 +1,4 @@
-//! `manifactor check-manifold`: whether a type of variables keeps the laws, before a factor meets it.
+//! `manifactor check-manifold`: checks whether a type of variables keeps its laws before a factor uses it.
 use super::linked;
 use crate::failure::Failure;
 use crate::output;
@@ -6,21 +6,23 @@ use crate::status::Status;
 use clap::Args;
 use manifactor::testing::ManifoldCheck;
 
-/// Check a type of variables: that `retract` and `local` undo each other, `seed` against differences, and its document.
+/// Check a type of variables: that `retract` and `local` are inverse, `seed` against finite differences,
+/// and its document.
 ///
-/// At random pairs of points: around the example in its docs, near it and far from it, wherever its registered strategy draws,
-/// and at its singular points. Exit code 1 where a law is broken; the two points and the tangent vector are shown.
+/// The pairs of points are random: around the example in its docs, close together and far apart, from its
+/// registered strategy, and at its singular points. If a law is broken, the two points and the tangent
+/// vector are shown and the exit code is 1.
 #[derive(Debug, Args)]
 pub(crate) struct CheckManifold {
     /// The type, one of `manifactor list variables`.
     name: String,
-    /// How many pairs of points are drawn.
+    /// Number of random pairs of points.
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     points: u32,
-    /// Where the random numbers begin: the same seed draws the same points.
+    /// Seed of the random numbers; the same seed gives the same points.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Print JSON: everything that was found.
+    /// Print JSON: all results.
     #[arg(long)]
     pub(crate) json: bool,
 }

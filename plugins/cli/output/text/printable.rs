@@ -1,20 +1,21 @@
-//! What others wrote, fit for a terminal: titles, keys and names of files may hold control characters, and a terminal
-//! obeys those.
+//! Makes foreign text safe for a terminal: titles, keys and file names may hold control characters, which a
+//! terminal obeys.
 use std::borrow::Cow;
 use std::fmt::Write;
 
-/// Control characters (C0 but for line breaks, DEL, C1) as escapes: `\u{1b}`.
+/// Escapes control characters except for line breaks (C0, DEL, C1) as `\u{1b}`.
 pub(crate) fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| is_obeyed(c) && c != '\n')
 }
 
-/// The same on one line, for names in tables and sentences: line breaks are escaped too.
+/// Escapes control characters and line breaks, for names in tables and sentences.
 pub(crate) fn on_one_line(text: &str) -> Cow<'_, str> {
     escaped(text, is_obeyed)
 }
 
-/// Returns whether a terminal obeys a character: control characters, and those that change the direction of the text around them, so
-/// that it reads as something else (Boucher and Anderson, *Trojan Source*, 2021).
+/// Returns whether a terminal obeys a character. These are the control characters, and those that change
+/// the direction of text so that it looks like different text (Boucher and Anderson, *Trojan Source*,
+/// 2021).
 fn is_obeyed(c: char) -> bool {
     const DIRECTIONS: [char; 12] = [
         '\u{61c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}',
@@ -23,21 +24,21 @@ fn is_obeyed(c: char) -> bool {
     c.is_control() || DIRECTIONS.contains(&c)
 }
 
-/// The same, and not without end: for messages that quote what they found.
+/// Escapes control characters and limits the length, for messages that quote the input.
 pub(crate) fn shortened(text: &str) -> String {
-    /// Bytes that are shown.
+    /// Longest text that is shown. Unit: bytes.
     const MOST: usize = 2000;
     let end = text.char_indices().map(|(at, _)| at).find(|at| *at > MOST).unwrap_or(text.len());
     let more = if end < text.len() { "…" } else { "" };
     printable(text.get(..end).unwrap_or_default()).into_owned() + more
 }
 
-/// A JSON document, in which the serializer leaves DEL and C1 as they are; they only occur in its texts.
+/// Escapes DEL and C1 in a JSON document. The serializer keeps them, and they only occur in strings.
 pub(crate) fn json(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
-            // writing to a text cannot fail
+            // writing to a String cannot fail
             c if is_obeyed(c) && u32::from(c) >= 0x7f => _ = write!(out, "\\u{:04x}", u32::from(c)),
             c => out.push(c),
         }
@@ -45,7 +46,8 @@ pub(crate) fn json(text: &str) -> String {
     out
 }
 
-/// The text of a document that is shown around a mistake, byte for byte as long, so that places stay where they are.
+/// Replaces control characters in a document that is shown around an error. The length in bytes is kept, so
+/// positions stay valid.
 pub(crate) fn same_length(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text.chars().peekable();
@@ -75,7 +77,7 @@ fn escaped(text: &str, hidden: fn(char) -> bool) -> Cow<'_, str> {
 mod tests {
     use super::*;
 
-    /// Clears the screen, by C0 and by C1, rings, rubs out, and goes back to the start of the line.
+    /// Clears the screen by C0 and by C1, rings the bell, deletes, and returns to the start of the line.
     const NASTY: &str = "a\u{1b}[2J\u{9b}2J\u{7}\u{7f}\rb\nc";
 
     #[test]

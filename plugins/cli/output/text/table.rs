@@ -1,14 +1,14 @@
-//! Tables for people, at any width from 60 columns on: no number and no name is ever broken.
+//! Tables for any width from 60 columns on; no number and no name is ever broken.
 //!
-//! A table of numbers that is too wide keeps its columns, in an order of its own, as long as they fit, and says which it
-//! leaves out. A table of words breaks the lines of its last column. Where that is not enough, rows are turned: a name, and
-//! below it what it has, a line each.
+//! A table of numbers that is too wide keeps the columns of highest priority that fit, and lists the hidden
+//! ones. A table of words wraps its last column. If that is not enough, rows are turned: a name, and below
+//! it one line for each cell.
 use super::{on_one_line, width, wrapped};
 use unicode_width::UnicodeWidthStr;
 
-/// Between two columns.
+/// Space between two columns.
 const GAP: usize = 2;
-/// A last column of words that is narrower than this is not read with pleasure.
+/// Smallest readable width of a last column of words.
 const NARROW: usize = 24;
 
 /// A table whose cells are [fit for a terminal](on_one_line).
@@ -19,7 +19,8 @@ pub(crate) struct Table {
 }
 
 enum Kind {
-    /// Columns but the first, in the order in which they are kept; how many have names, and stand to the left.
+    /// All columns except the first, by decreasing priority, and the number of left-aligned columns with
+    /// names.
     Numbers {
         kept_first: Vec<usize>,
         names: usize,
@@ -28,19 +29,20 @@ enum Kind {
 }
 
 impl Table {
-    /// Numbers to the right: all columns but the first, which has names. The first are kept where there is no room for all.
+    /// Creates a table of right-aligned numbers; the first column has names. If space is short, the left
+    /// columns have priority.
     pub(crate) fn of_numbers(header: &[&str]) -> Self {
         let kept_first = (1..header.len()).collect();
         Self { kind: Kind::Numbers { kept_first, names: 1 }, ..Self::of_words(header) }
     }
 
-    /// Words, all to the left; the last column has sentences.
+    /// Creates a table of left-aligned words; the last column has sentences.
     pub(crate) fn of_words(header: &[&str]) -> Self {
         let header = header.iter().map(|cell| on_one_line(cell).into_owned()).collect();
         Self { header, rows: vec![], kind: Kind::Words }
     }
 
-    /// The same, with columns that are kept before all others, in this order.
+    /// Gives the columns `names` the highest priority, in this order.
     pub(crate) fn keeping(mut self, names: &[&str]) -> Self {
         if let Kind::Numbers { kept_first, .. } = &mut self.kind {
             let rank = |column: &usize| {
@@ -51,7 +53,7 @@ impl Table {
         self
     }
 
-    /// The same, where the first so many columns have names.
+    /// Sets the number of left-aligned columns with names.
     pub(crate) fn naming(mut self, columns: usize) -> Self {
         if let Kind::Numbers { names, .. } = &mut self.kind {
             *names = columns;
@@ -65,12 +67,12 @@ impl Table {
         self.rows.push(cells.collect());
     }
 
-    /// The table, as wide as the terminal is.
+    /// Formats the table for the width of the terminal.
     pub(crate) fn text(&self) -> String {
         self.at(width())
     }
 
-    /// The table at a width, without blanks at the ends of its lines.
+    /// Formats the table for a width, without trailing spaces.
     pub(crate) fn at(&self, width: usize) -> String {
         let lines = match &self.kind {
             Kind::Numbers { kept_first, names } => self.numbers(kept_first, *names, width),
@@ -84,7 +86,7 @@ impl Table {
         row.get(column).map_or("", String::as_str)
     }
 
-    /// The lines of a column's header: its unit below its name.
+    /// The two header lines of a column: its name and its unit.
     fn head(&self, column: usize) -> [&str; 2] {
         let name = Self::cell(&self.header, column);
         name.split_once(" (")
@@ -102,7 +104,7 @@ impl Table {
         cells.max().unwrap_or(0).max(head)
     }
 
-    /// `None`, where not even the first column of numbers fits beside the names.
+    /// Returns `None` if not even the first column of numbers fits next to the names.
     fn numbers(&self, kept_first: &[usize], names: usize, width: usize) -> Option<Vec<String>> {
         let mut shown = vec![0];
         let mut taken = self.column_width(0);
@@ -143,7 +145,7 @@ impl Table {
         Some(lines)
     }
 
-    /// `None`, where too little is left for the last column.
+    /// Returns `None` if the last column would be too narrow.
     fn words(&self, width: usize) -> Option<Vec<String>> {
         let last = self.header.len().saturating_sub(1);
         let widths: Vec<usize> = (0..last).map(|column| self.column_width(column)).collect();
@@ -169,7 +171,7 @@ impl Table {
         Some(lines)
     }
 
-    /// Row by row: its name, and below it each of its cells behind the name of its column.
+    /// Formats each row as its name, and below it each cell after the name of its column.
     fn turned(&self, width: usize) -> Vec<String> {
         let widest = self.header.iter().skip(1).map(|name| name.width()).max().unwrap_or(0);
         let mut lines = vec![];

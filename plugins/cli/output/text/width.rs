@@ -1,9 +1,9 @@
-//! How wide a line may be.
+//! The width of a line.
 use std::sync::LazyLock;
 
-/// Where nobody says how wide: a terminal as it comes.
+/// Width if neither COLUMNS nor the terminal has a value: the usual width of a terminal.
 const USUAL: usize = 80;
-/// Tables are not made for less.
+/// Smallest width of a table.
 const LEAST: usize = 60;
 
 static WIDTH: LazyLock<usize> = LazyLock::new(|| {
@@ -12,12 +12,12 @@ static WIDTH: LazyLock<usize> = LazyLock::new(|| {
     columns(asked.or_else(terminal))
 });
 
-/// Columns that a line may take: those that COLUMNS names, else those of the terminal, else 80; at least 60.
+/// Width of a line: from COLUMNS, else from the terminal, else 80; at least 60. Unit: columns.
 pub(crate) fn width() -> usize {
     *WIDTH
 }
 
-/// 0 is what terminals say that do not know.
+/// A terminal that does not know its width reports 0.
 fn columns(known: Option<usize>) -> usize {
     known.filter(|width| *width > 0).unwrap_or(USUAL).max(LEAST)
 }

@@ -1,4 +1,4 @@
-//! Graphs as g2o files.
+//! Writes graphs as g2o files.
 use crate::error::FormatError;
 use crate::pose_graph::record::exchange_halves;
 use crate::text::write_text;
@@ -9,23 +9,23 @@ use nalgebra::DMatrix;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
-/// What g2o cannot express, and was left out.
+/// Parts of a graph that g2o cannot express and that were omitted.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Omitted {
-    /// Factors, by the name of their type, for which g2o has no line.
+    /// Factors without an equivalent in g2o, by type name.
     pub factors: BTreeMap<&'static str, usize>,
-    /// Variables, by the name of their type: what is neither a pose nor a point.
+    /// Variables that are neither poses nor points, by type name.
     pub variables: BTreeMap<&'static str, usize>,
-    /// Robust losses; their factors are written without.
+    /// Robust losses; their factors are written without a loss.
     pub losses: usize,
-    /// Variables of which some directions are held; they are written as free.
+    /// Variables with some directions held; they are written as free.
     pub partly_fixed: Vec<Key>,
-    /// Numbers that vertices got, where the keys are not all `x<id>` for poses and `l<id>` for points.
+    /// New vertex numbers, if the keys are not all `x<id>` for poses and `l<id>` for points.
     pub renamed: Vec<(Key, u64)>,
 }
 
 impl Omitted {
-    /// In words, what was left out.
+    /// Returns the omitted parts as text.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = omitted("g2o", &self.variables, &self.factors);
         if self.losses > 0 {
@@ -43,10 +43,10 @@ impl Omitted {
     }
 }
 
-/// The g2o text of a graph, and what could not be written.
+/// Returns the g2o text of a graph, and the parts that could not be written.
 ///
-/// Numbers have all their digits: values, measurements and information read back bit for bit where the
-/// noise is an information matrix, and to rounding where it is another form.
+/// Numbers are written with all digits. Values, measurements and information read back bit for bit if the
+/// noise is an information matrix, otherwise up to rounding.
 pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
     let mut writer = Writer { ids: HashMap::new(), text: String::new(), omitted: Omitted::default() };
     writer.number(values);
@@ -70,7 +70,7 @@ pub fn format(graph: &Graph, values: &Values) -> (String, Omitted) {
     (writer.text, writer.omitted)
 }
 
-/// Writes a graph as g2o file, and returns what could not be written.
+/// Writes a graph as a g2o file, and returns the parts that could not be written.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -93,11 +93,11 @@ fn downcast<F: 'static>(entry: &FactorEntry) -> Option<&F> {
     Factor::erased(&*entry.factor).as_any().downcast_ref()
 }
 
-/// The number in a key of this reader's own making.
+/// Returns the number in a key that this crate's reader generated.
 fn own_number(key: &Key, variable: &dyn Variable) -> Option<u64> {
     let is_pose = value::<Se2>(variable).is_some() || value::<Se3>(variable).is_some();
     let number = key.as_str().strip_prefix(if is_pose { 'x' } else { 'l' })?;
-    // `x+1` and `x007` would come back as another key
+    // `x+1` and `x007` would be read back with a different key.
     number.parse().ok().filter(|id: &u64| id.to_string() == number)
 }
 
@@ -115,7 +115,7 @@ impl Writer {
     fn line(&mut self, tag: &str, ids: &[u64], numbers: &[f64]) {
         self.text += tag;
         let ids = ids.iter().map(u64::to_string);
-        // Debug has all digits, and exponents for what is very small or large
+        // Debug writes all digits, with exponents for very small or large numbers.
         for field in ids.chain(numbers.iter().map(|x| format!("{x:?}"))) {
             self.text.push(' ');
             self.text += &field;
@@ -146,7 +146,7 @@ impl Writer {
         }
     }
 
-    /// `None` where g2o has no such edge.
+    /// Writes a binary edge; `None` if g2o has no such edge.
     fn edge(&mut self, entry: &FactorEntry) -> Option<()> {
         let [a, b] = entry.keys.as_slice() else { return None };
         let ids = [*self.ids.get(a)?, *self.ids.get(b)?];
@@ -167,7 +167,7 @@ impl Writer {
             let numbers = [f.position.as_slice(), &upper_triangle(&information(entry, 3)?)].concat();
             self.line("EDGE_SE3_TRACKXYZ", &[ids[0], ids[1], 0], &numbers);
         } else if let Some(f) = downcast::<BearingRange2>(entry) {
-            // a range that was measured as well has no line
+            // A factor whose range was measured as well has no equivalent.
             let bearing = (entry.noise.observed()? == [true, false]).then(|| f.measured())?;
             let information = entry.noise.information_matrix(2).ok()?.get((0, 0)).copied()?;
             self.line("EDGE_BEARING_SE2_XY", &ids, &[bearing.y.atan2(bearing.x), information]);
@@ -178,7 +178,7 @@ impl Writer {
         Some(())
     }
 
-    /// A measurement in the frame of the world; `None` where g2o has no such line.
+    /// Writes a measurement in the world frame; `None` if g2o has no such line.
     fn absolute(&mut self, entry: &FactorEntry) -> Option<()> {
         let [key] = entry.keys.as_slice() else { return None };
         let id = *self.ids.get(key)?;
@@ -205,7 +205,8 @@ impl Writer {
     }
 }
 
-/// `None` where some rows are not observed: no matrix of full rank says that.
+/// Returns the information matrix; `None` if some rows are not observed, as a matrix of full rank cannot
+/// express that.
 fn information(entry: &FactorEntry, rows: usize) -> Option<DMatrix<f64>> {
     let all = entry.noise.observed().is_none_or(|o| o.iter().all(|o| *o));
     entry.noise.information_matrix(rows).ok().filter(|_| all)

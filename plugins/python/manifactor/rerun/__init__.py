@@ -1,4 +1,5 @@
-"""Runs and sessions in the viewer rerun: `report.to_rerun()`, `session.to_rerun()`. Needs `manifactor[rerun]`."""
+"""Runs and sessions in the rerun viewer: `report.to_rerun()`, `session.to_rerun()`. Needs
+`manifactor[rerun]`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How poses, objects, cameras and boxes are drawn: the same for a run as for a session."""
+"""Drawing of poses, objects, cameras and boxes, shared by runs and sessions."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
-#: The timeline of the frames' seconds, and that of the steps of a solve or the updates of a session.
+#: The timelines: the timestamps of the frames, and the steps of a solve or the updates of a session.
 TIME, ITERATION = "time", "iteration"
-#: By what is shown.
+#: Colours by meaning.
 COLOURS = {"estimate": (31, 119, 180), "initial": (255, 127, 14), "odometry": (160, 160, 160), "truth": (44, 160, 44)}
 
 
 def recording(path: str | os.PathLike[str] | None, name: str) -> Any:
-    """A recording that goes to a file, or to a viewer that is started."""
+    """Returns a recording that writes to a file, or to a viewer that it starts."""
     made = rr.RecordingStream(name)
     if path is not None:
         made.save(os.fspath(path))
@@ -32,7 +32,7 @@ def trajectory(translation: ArrayLike, which: str = "estimate") -> Any:
 
 
 def pose(translation: ArrayLike, rotation: ArrayLike) -> Any:
-    """A frame in the world: its origin, shape (3,), and its unit quaternion (x, y, z, w)."""
+    """A pose in the world: its origin, shape (3,), and its unit quaternion (x, y, z, w)."""
     return rr.Transform3D(translation=translation, quaternion=rr.Quaternion(xyzw=rotation))
 
 
@@ -42,7 +42,7 @@ def points(positions: ArrayLike) -> Any:
 
 
 def pinhole(camera: Mapping[str, Any]) -> Any:
-    """A camera with the fields that documents have."""
+    """A camera with the fields of a document."""
     matrix = [[camera["fx"], camera.get("skew", 0.0), camera["cx"]], [0, camera["fy"], camera["cy"]], [0, 0, 1]]
     return rr.Pinhole(
         image_from_camera=matrix,
@@ -53,7 +53,8 @@ def pinhole(camera: Mapping[str, Any]) -> Any:
 
 
 def boxes(bounds: Sequence[ArrayLike], names: Sequence[str]) -> Any:
-    """Boxes in an image by xmin, ymin, xmax, ymax in pixels; none of them takes away those of the frame before."""
+    """Boxes in an image as xmin, ymin, xmax, ymax. Unit: pixels. If there are none, the boxes of the
+    previous frame disappear."""
     array = np.asarray(bounds, dtype=float).reshape(-1, 4)
     return rr.Boxes2D(array=array, array_format=rr.Box2DFormat.XYXY, labels=names)
 

@@ -17,17 +17,19 @@ from .drawing import ITERATION, TIME
 
 Array = NDArray[np.float64]
 
-#: Factors with a `box` of an image and its `camera`, between a pose and an object.
+#: Types of factors between a pose and an object, with fields `box` and `camera`.
 BOXES = ("bounding_box", "tangent_planes")
 
 
 class Live:
-    """Logs what a session comes to, after each update: `push` and `update` here in place of the session's own.
+    """Logs the state of a session after each update; call `push` and `update` of this object instead of the
+    session's.
 
-    Below an entity of the recording's name there are the newest pose (`camera`, with its pinhole and the boxes that it saw, where
-    there are factors of boxes), the line through all poses, also through those that have left (`estimate/trajectory`), objects as
-    ellipsoids (`objects/estimate`), points (`points`), and the figures of each update: `cost`, and `latency`, the seconds that
-    the update itself took. Timelines are `iteration`, the number of the update, and `time`, where `update` is given seconds.
+    The entities below the recording's name are the newest pose (`camera`, with its pinhole and boxes if
+    there are factors of boxes), the line through all poses, including removed ones (`estimate/trajectory`),
+    objects as ellipsoids (`objects/estimate`), points (`points`), and the figures of each update: `cost`,
+    and `latency`, the duration of the update in seconds. The timelines are `iteration`, the number of the
+    update, and `time`, if `update` is called with seconds.
     """
 
     def __init__(self, session: Session, path: str | os.PathLike[str] | None, name: str, every: int) -> None:
@@ -36,14 +38,14 @@ class Live:
         self.session, self.every, self.updates = session, every, 0
         self.recording = drawing.recording(path, name)
         self._at = rr.escape_entity_path_part(name)
-        #: Each pose where it was last seen, shape (3,), by key.
+        #: Last known position of each pose by key, shape (3,).
         self._path: dict[str, Array] = {}
-        #: Objects and their boxes, by the pose that saw them, since the map was last shown.
+        #: Objects and their boxes by the pose that saw them, since the map was last drawn.
         self._seen: dict[str, list[tuple[str, list[float]]]] = {}
         self._camera: dict[str, Any] | None = None
 
     def push(self, graph: Graph, values: Values) -> list[FactorId]:
-        """As `Session.push`; boxes of the graph are shown with the next update."""
+        """Like `Session.push`; boxes of the graph are shown after the next update."""
         ids = self.session.push(graph, values)
         if any(name in BOXES for name in graph.types()):
             for number in range(len(graph)):
@@ -55,7 +57,8 @@ class Live:
         return ids
 
     def update(self, seconds: float | None = None) -> dict[str, Any]:
-        """As `Session.update`, and logs what it came to. `seconds` is the stamp of the frame, on the timeline `time`."""
+        """Like `Session.update`, but logs the result too. `seconds` is the timestamp of the frame on the
+        timeline `time`."""
         begun = time.perf_counter()
         account = self.session.update()
         latency = time.perf_counter() - begun
@@ -73,7 +76,7 @@ class Live:
         return account
 
     def close(self) -> None:
-        """Writes what is on its way, and ends the recording."""
+        """Writes pending data, and ends the recording."""
         self.recording.flush()
         self.recording.disconnect()
 
@@ -113,7 +116,8 @@ class Live:
 
 
 def in_space(columns: dict[str, tuple[list[str], dict[str, Array]]]) -> tuple[list[str], Array, Array] | None:
-    """Poses as keys, positions, shape (n, 3), and unit quaternions, shape (n, 4): those of a plane lie in z = 0."""
+    """Poses as keys, positions, shape (n, 3), and unit quaternions, shape (n, 4). 2D poses lie in the plane
+    z = 0."""
     if "se3" in columns:
         keys, fields = columns["se3"]
         return keys, fields["translation"], fields["rotation"]
@@ -126,5 +130,5 @@ def in_space(columns: dict[str, tuple[list[str], dict[str, Array]]]) -> tuple[li
 
 
 def lifted(positions: Array) -> Array:
-    """Positions of a plane, shape (n, 2), with z = 0; those in space, shape (n, 3), as they are."""
+    """Extends 2D positions, shape (n, 2), by z = 0; 3D positions, shape (n, 3), are unchanged."""
     return np.pad(positions, [(0, 0), (0, 3 - positions.shape[1])])

@@ -24,7 +24,7 @@ def show(report: Report, path: str | os.PathLike[str] | None, name: str) -> None
 
 
 def log(recording: Any, variant: Variant) -> None:
-    """Logs one variant below an entity of its name."""
+    """Logs one variant below an entity with its name."""
     record = variant.record
     at = rr.escape_entity_path_part(variant.name)
     up = np.asarray(record["up"], dtype=float)

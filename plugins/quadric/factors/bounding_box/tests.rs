@@ -17,12 +17,13 @@ fn camera() -> Camera {
     Camera::new([525.0, 525.0, 320.0, 240.0], 640, 480).unwrap()
 }
 
-/// A ball in front of a camera at the origin.
+/// A ball, given in the frame of a camera at the origin.
 fn ball(centre: [f64; 3], radius: f64) -> DualQuadric {
     DualQuadric { pose: Se3::new(So3::identity(), centre.into()), semi_axes: Vector3::repeat(radius) }
 }
 
-/// By side: whether the end of the outline is seen, cut off, or the border takes its place.
+/// Kind of each side: 0 if the end of the outline is visible, 1 if it is cut off, 2 if the side is the
+/// border.
 fn what_ends(factor: &BoundingBoxFactor, pose: &Se3, quadric: &DualQuadric) -> Option<[u8; 4]> {
     let sides = factor.sides(&Ellipsoid::seen(pose, quadric))?;
     Some(sides.map(|side| match side {
@@ -32,7 +33,8 @@ fn what_ends(factor: &BoundingBoxFactor, pose: &Se3, quadric: &DualQuadric) -> O
     }))
 }
 
-/// Differences cross a kink where steps of that length change what a side ends at.
+/// Returns whether steps of this length change the kind of a side, so that finite differences would cross a
+/// kink.
 fn near_a_kink(factor: &BoundingBoxFactor, pose: &Se3, quadric: &DualQuadric, step: f64) -> bool {
     let here = what_ends(factor, pose, quadric);
     [step, -step].into_iter().any(|h| {
@@ -45,7 +47,7 @@ fn jacobian_law(model: BoxModel) {
     check(any_view(), |(camera, pose, quadric)| {
         let factor = factor(camera, model);
         let mut law = JacobianLaw { step: 1e-3, ..JacobianLaw::default() };
-        // a difference of huge numbers has few digits
+        // Differences of huge numbers have few accurate digits.
         let outline = Ellipsoid::seen(&pose, &quadric).outline(&camera);
         let digits_lost = 1.0 + outline.xx.max(outline.yy).sqrt() / 300.0;
         law.analytic *= digits_lost;
@@ -74,7 +76,7 @@ fn moving_the_world_changes_nothing() {
         let factor = factor(camera, BoxModel::Truncated);
         match invariance_law(&factor, &[&pose, &quadric], &[&motion.compose(&pose), &moved]) {
             Ok(()) | Err(LawError::NotDefined { .. }) => Ok(()),
-            // rounding in poses is magnified by the focal length, and more so close to the camera
+            // Rounding in poses is magnified by the focal length, and more so close to the camera.
             Err(_) if !well_in_front(&pose, &quadric) => Ok(()),
             broken => broken,
         }
@@ -143,7 +145,7 @@ fn an_object_off_the_front_has_no_box() {
 
 #[test]
 fn just_in_front_is_finite() {
-    // the nearest point at a millionth of the distance
+    // The nearest point is at a millionth of the distance.
     let quadric = ball([0.0, 0.0, 1.0], 1.0 - 1e-6);
     let factor = factor(camera(), BoxModel::Standard);
     assert!(factor.is_defined((&Se3::identity(), &quadric)));
@@ -171,7 +173,7 @@ fn whether_it_is_defined_is_decided_alike_everywhere() {
 
 #[test]
 fn a_box_cut_by_the_border_does_not_pull() {
-    // the ball's right side is far outside of the image
+    // The right side of the ball is far outside the image.
     let quadric = ball([3.0, 0.0, 5.0], 1.0);
     let pose = Se3::identity();
     let mut factor = factor(camera(), BoxModel::Truncated);
@@ -191,7 +193,7 @@ fn a_box_cut_by_the_border_does_not_pull() {
 fn a_side_at_the_border_stops_there() {
     let (pose, quadric) = (Se3::identity(), ball([0.4, 0.0, 2.0], 0.3));
     let whole = factor(camera(), BoxModel::Standard).predict(&pose, &quadric).unwrap();
-    // the focal length that puts the right end of the outline this far off the border
+    // Focal length that puts the right end of the outline this far outside the border.
     let focal = |off: f64| 525.0 * (320.0 + off) / (whole.xmax - 320.0);
     for (off, moves) in [(-1e-9, true), (1e-9, false)] {
         let factor = factor(Camera { fx: focal(off), ..camera() }, BoxModel::Truncated);
@@ -209,7 +211,7 @@ fn a_side_at_the_border_stops_there() {
 #[test]
 fn an_object_that_leaves_the_image_leaves_the_truncated_factor() {
     let (pose, factor) = (Se3::identity(), factor(camera(), BoxModel::Truncated));
-    // the image ends at x/z = 320/525; sideways until less than a pixel is left
+    // The image ends at x/z = 320/525. Moves sideways until less than a pixel is left.
     let mut last = 640.0;
     let mut seen = true;
     for step in 0..2000 {
@@ -225,7 +227,7 @@ fn an_object_that_leaves_the_image_leaves_the_truncated_factor() {
         }
     }
     assert!(!seen && last < 2.0, "{last} px of it were left");
-    // a speck that is wholly inside is less than a pixel, and counts
+    // A speck that is completely inside counts, although it is smaller than a pixel.
     assert!(factor.is_defined((&pose, &ball([0.0, 0.0, 10.0], 0.001))));
 }
 

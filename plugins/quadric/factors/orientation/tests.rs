@@ -9,11 +9,11 @@ use std::f64::consts::FRAC_PI_2;
 fn up() -> impl Strategy<Value = Direction> {
     direction().prop_map(|v| Direction::new(v.into_inner()).unwrap())
 }
-/// Off the kink of |m · up|.
+/// Quadrics away from the kink of |m · up|.
 fn leaning() -> impl Strategy<Value = (Direction, DualQuadric)> {
     (up(), unequal_quadric()).prop_filter("at the kink", |(up, q)| q.major_axis().dot(up).abs() > 1e-4)
 }
-/// Tilts of 0 and of next to nothing, of any size, of nearly a right angle.
+/// Tilts of zero, of almost zero, of any size, and of nearly a right angle.
 fn any_tilt() -> impl Strategy<Value = f64> {
     prop_oneof![Just(0.0), 1e-9..1e-6, 0.0..1.5f64, Just(FRAC_PI_2 - 1e-4), Just(FRAC_PI_2 + 1e-3), Just(3.0)]
 }
@@ -62,7 +62,7 @@ fn equal_semi_axes_take_the_first_and_stay_finite() {
         assert_eq!(factor.erased().is_defined(&[&round]), Some(true));
         let l = factor.erased().linearize(&[&round]).unwrap();
         assert!(l.residual.iter().chain(l.jacobians[0].iter()).all(|x| x.is_finite()));
-        // the others lead as soon as they are longer: a jump, and nothing worse
+        // A different axis leads as soon as it is longer: the residual jumps, but stays finite.
         let step = nalgebra::SVector::<f64, 9>::from_fn(|i, _| if i == 8 { 1e-9 } else { 0.0 });
         let other = factor.erased().residual(&[&round.retract(&step)]).unwrap();
         assert!(other.iter().all(|x| x.is_finite()));
@@ -104,7 +104,7 @@ fn the_kink_has_the_derivative_of_one_side() {
     let kink = Factor::erased(&HorizontalOrientation::default()).linearize(&[&flat]).unwrap();
     assert_eq!(kink.residual[0], 0.0);
     let smooth = Factor::erased(&HorizontalOrientationSmooth::default()).linearize(&[&flat]).unwrap();
-    // the x axis rises as the object turns about -y
+    // The x axis rises as the object turns about -y.
     assert_eq!(smooth.jacobians[0][(0, 1)], -1.0);
     assert_eq!(kink.jacobians[0], -&smooth.jacobians[0]);
 }

@@ -1,4 +1,4 @@
-//! Problems of some size that need no data: poses on a sphere, and poses that see quadrics.
+//! Larger problems without data files: poses on a sphere, and poses that measure quadrics.
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
 use manifactor_geometry::{Between, Prior, Se3, So3};
 use manifactor_graph::loss::Huber;
@@ -6,7 +6,7 @@ use manifactor_graph::{Graph, Key, Manifold, Noise, Values};
 use manifactor_quadric::{BoundingBox, BoundingBoxFactor, BoxModel, Camera, DualQuadric, QuadricPrior};
 use nalgebra::{Matrix3, SVector, Vector3};
 
-/// Something off zero, different for each place.
+/// A nonzero offset, different for each place.
 pub fn jitter<const N: usize>(place: usize, size: f64) -> SVector<f64, N> {
     SVector::from_fn(|row, _| size * ((place * N + row) as f64 * 7.13 + 1.0).sin())
 }
@@ -15,14 +15,15 @@ pub fn camera() -> Camera {
     Camera::new([525.0, 520.0, 320.0, 240.0], 640, 480).unwrap()
 }
 
-/// A camera at `eye` that looks at `target`.
+/// A camera at `eye`, facing `target`.
 pub fn looking(eye: Vector3<f64>, target: Vector3<f64>) -> Se3 {
     let z = (target - eye).normalize();
     let x = z.cross(&Vector3::z()).normalize();
     Se3::new(So3::from_matrix(&Matrix3::from_columns(&[x, z.cross(&x), z])), eye)
 }
 
-/// Rings of poses up a sphere, each tied to the next and to the one a ring above, measured and begun a little off.
+/// Rings of poses on a sphere, each connected to the next pose and the one a ring above, with errors in
+/// measurements and initial values.
 pub fn sphere(rings: usize, around: usize) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let n = rings * around;
@@ -44,7 +45,8 @@ pub fn sphere(rings: usize, around: usize) -> (Graph, Values) {
     (graph, values)
 }
 
-/// Poses on a circle around quadrics, with odometry, boxes that are off by pixels, and weak priors on the quadrics.
+/// Poses on a circle around quadrics, with odometry, boxes with errors of a few pixels, and weak priors on
+/// the quadrics.
 pub fn desk(poses: usize, quadrics: usize) -> (Graph, Values) {
     let (mut graph, mut values) = (Graph::new(), Values::new());
     let things: Vec<DualQuadric> = (0..quadrics)

@@ -1,4 +1,4 @@
-//! Whether an object is two.
+//! Splitting: one object that is two.
 use super::super::{Map, Move};
 use super::Likelihood;
 use super::fit::{Belief, Fitted, fit, squared_error};
@@ -10,19 +10,19 @@ use manifactor_quadric::Camera;
 use manifactor_recording::class::Aliases;
 use manifactor_recording::sequence::ObjectId;
 
-/// Of so many objects it is asked in a frame, at most.
+/// Objects that are checked per frame, at most.
 const LOOKS: usize = 4;
-/// Rounds of putting boxes to the one or the other, and fitting both.
+/// Rounds that alternate between assigning boxes to two ellipsoids and fitting both.
 const ROUNDS: usize = 6;
 
-/// One of two that an object may be: an ellipsoid, and the sightings that it explains better than the other.
+/// One half of an object that may be two: an ellipsoid and the sightings that it explains better.
 struct Part {
     belief: Belief,
     fitted: Fitted,
     sightings: Vec<Sighting>,
 }
 
-/// What an ellipsoid is fitted with.
+/// Camera, class aliases and settings for fits.
 struct Fitter<'a> {
     camera: &'a Camera,
     aliases: &'a Aliases,
@@ -30,8 +30,8 @@ struct Fitter<'a> {
 }
 
 impl Tracker {
-    /// Makes two of objects that turn out to be two: looks at those that were seen in this frame and have many more boxes than when they
-    /// were looked at last.
+    /// Splits objects that turn out to be two. Checks the objects that were seen in this frame and have many
+    /// more boxes than at their last check.
     pub(super) fn divide(&mut self, frame: usize, map: &dyn Map) -> Vec<Move> {
         let due = self.tracks.iter_mut().enumerate();
         let due = due.filter_map(|(t, track)| track.is_doubtful(frame).then_some(t));
@@ -60,7 +60,8 @@ impl Tracker {
 }
 
 impl Fitter<'_> {
-    /// The two that an object is: one ellipsoid does not explain its boxes, two do, and these are not in one place.
+    /// Returns two parts if one ellipsoid does not explain the boxes of the object, two do, and these are not
+    /// in one place.
     fn parts(&self, track: &Track) -> Option<[Part; 2]> {
         let all = track.sightings.all();
         if self.is_good(&track.fitted, all, 1.0) {
@@ -91,8 +92,9 @@ impl Fitter<'_> {
         (are_good && !a.fitted.is_where(&b.fitted)).then_some(parts)
     }
 
-    /// All boxes of an object, put to the one or the other of two: the one with more of them, or that an earlier map has, first. `None`, where
-    /// one of them has too few, or both are one thing of no simple shape.
+    /// Assigns all boxes of an object to one of two parts. For an object of a prior map, the half nearest to
+    /// it there comes first, otherwise the half with more boxes. `None` if one half has too few boxes, or
+    /// both belong to one object of a complex shape.
     fn halves(&self, track: &Track, [a, b]: [Part; 2], map: &dyn Map) -> Option<[Track; 2]> {
         let is_of_first = |seen: &Seen| {
             let seen = map.pose(seen.frame()).map(|pose| seen.from(pose));
@@ -110,12 +112,13 @@ impl Fitter<'_> {
             halves.swap(0, 1);
         }
         let is_firm = halves.iter().all(|half| half.boxes.len() >= FIRM);
-        // what would be united as one thing of no simple shape is not divided
+        // merging tolerates more for a complex shape: do not split halves that it would unite at once
         let factor = if alike(&halves[0], &halves[1]) > SAME { LOOSER } else { 1.0 };
         (is_firm && !self.is_good(&track.fitted, track.sightings.all(), factor)).then_some(halves)
     }
 
-    /// An ellipsoid of its own for some sightings, about as far away as another, fitted from a start or from the first of them.
+    /// Fits an ellipsoid to some sightings, from `start` or from the first of them. The assumed distance is
+    /// that of `like`.
     fn part(&self, like: &Fitted, start: Option<Fitted>, sightings: Vec<Sighting>) -> Option<Part> {
         let first = sightings.first()?;
         let depth = (like.quadric.centroid() - first.world_from_camera.translation).norm();
@@ -129,7 +132,7 @@ impl Fitter<'_> {
         squared_error(&fitted.quadric, seen, self.camera, &self.settings.noise())
     }
 
-    /// Returns whether an ellipsoid explains boxes as well as merging asks for, or that many times less well.
+    /// Returns whether an ellipsoid explains boxes within the limit of merging, multiplied by `times`.
     fn is_good(&self, fitted: &Fitted, sightings: &[Sighting], times: f64) -> bool {
         let rows: usize = sightings.iter().map(Sighting::rows).sum();
         let errors: f64 = sightings.iter().map(|seen| self.error(fitted, seen)).sum();
@@ -138,7 +141,7 @@ impl Fitter<'_> {
 }
 
 impl Part {
-    /// What is of another now: an object of these boxes.
+    /// Creates a track from the boxes of one half. It keeps the id and the schedule of the original track.
     fn track(self, of: &Track, boxes: Vec<Seen>, aliases: &Aliases) -> Track {
         let mut track = Track {
             sightings: Sightings::of(self.sightings),
@@ -160,7 +163,8 @@ mod tests {
     use manifactor_graph::checked::Positive;
     use std::collections::BTreeSet;
 
-    /// Tells a tracker that all boxes are of one object: every third is at `x`, the others in the middle. Returns the boxes that were moved.
+    /// Feeds a tracker with boxes of one object: every third box is at `x`, the rest in the middle. Returns
+    /// the frames of moved boxes, and the ids of one box at each place.
     fn moved(x: f64) -> (BTreeSet<usize>, Vec<Option<ObjectId>>) {
         // no frame is old enough for a second look
         let settings = Likelihood { second_look_s: Positive::literal(1e9), ..Likelihood::default() };

@@ -1,7 +1,7 @@
-//! An ellipsoid fitted to boxes from known poses, from the first box on.
+//! Fit of an ellipsoid to boxes from known poses, from the first box on.
 //!
-//! One box says where an object is but for its depth. What is not known yet is held by a weak prior: a depth that is usual here,
-//! axes of about the same length, a rotation not far from that of the first camera.
+//! One box determines an object except for its depth. A weak prior constrains the rest: the usual depth of
+//! the scene, axes of similar length, and a rotation close to that of the first camera.
 use super::sightings::Sighting;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Manifold, Residual};
@@ -12,75 +12,76 @@ use nalgebra::{Cholesky, SMatrix, SVector, Vector3, Vector4};
 type Matrix9 = SMatrix<f64, 9, 9>;
 type Vector9 = SVector<f64, 9>;
 
-/// How far boxes are off.
+/// Noise of boxes and of the measurements that come with them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BoxNoise {
-    /// In pixels.
+    /// Standard deviation of a side, in pixels.
     pub px: f64,
-    /// As a part of width and height.
+    /// Standard deviation of a side, relative to width and height.
     pub of_size: f64,
-    /// Of what is measured besides.
+    /// Noise of further measurements of a detection.
     pub others: Errors,
 }
 
-/// What is believed of an object beside its boxes.
+/// Prior of an object, independent of its later boxes.
 #[derive(Debug, Clone)]
 pub(super) enum Belief {
-    /// What the first box says.
+    /// From the first box.
     Seen(FirstSight),
-    /// What an earlier map says.
+    /// From a prior map.
     Known {
-        /// Its ellipsoid there.
+        /// Ellipsoid in the prior map.
         quadric: DualQuadric,
-        /// W with WᵀW = Σ⁻¹.
+        /// Square root W of the information, WᵀW = Σ⁻¹.
         root: Box<Matrix9>,
     },
 }
 
-/// What is believed of an object after its first box.
+/// Prior of an object from its first box.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FirstSight {
-    /// Its ellipsoid, if it were as far away as objects usually are.
+    /// Ellipsoid at the assumed distance.
     quadric: DualQuadric,
-    /// From where it was seen.
+    /// Camera centre of the first box.
     eye: Vector3<f64>,
-    /// How far away that is, in metres.
+    /// Assumed distance from the camera, in metres.
     distance: f64,
-    /// Standard deviation of the distance's logarithm.
+    /// Standard deviation of the logarithm of the distance.
     spread: f64,
 }
 
-/// An ellipsoid, and how well it is known.
+/// An ellipsoid with its covariance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fitted {
     pub quadric: DualQuadric,
-    /// By the tangent of the quadric.
+    /// In the tangent space of the quadric.
     pub covariance: Matrix9,
 }
 
 impl Fitted {
-    /// Returns whether one of two has its centre in the other.
+    /// Returns whether one of two ellipsoids contains the centre of the other.
     pub(super) fn is_where(&self, other: &Self) -> bool {
         let (own, others) = (&self.quadric, &other.quadric);
         own.contains(&others.centroid()) || others.contains(&own.centroid())
     }
 }
 
-/// Standard deviation of the logarithm of an axis beside the first box and the distance.
+/// Standard deviation of the logarithm of a semi-axis, relative to the one from the first box and the
+/// distance.
 const SHAPE: f64 = 0.5;
 /// Standard deviation of the rotation, in radians.
 const TURN: f64 = 0.5;
-/// Steps of a fit, at most.
+/// Maximum number of steps of a fit.
 const STEPS: usize = 8;
-/// It ends where a step gains less than this part of the cost.
+/// The fit ends when a step reduces the cost by less than this share.
 const ENOUGH: f64 = 1e-3;
-/// Squares beyond this count less and less.
+/// Squared scale of Cauchy's loss: squared residuals beyond it are down-weighted.
 const WIDTH: f64 = 9.0;
-/// What a box costs that the ellipsoid cannot have.
+/// Cost of a box if the ellipsoid has no projection in its image.
 const LOST: f64 = 40.0;
 
 impl BoxNoise {
-    /// Standard deviations of the sides.
+    /// Returns the standard deviations of the sides.
     pub(super) fn deviations(&self, b: &BoundingBox) -> Vector4<f64> {
         let (x, y) = (self.px.hypot(self.of_size * b.width()), self.px.hypot(self.of_size * b.height()));
         Vector4::new(x, y, x, y)
@@ -88,7 +89,8 @@ impl BoxNoise {
 }
 
 impl Belief {
-    /// Of an object that was seen once, believed to be at this depth in metres, by a standard deviation of its logarithm.
+    /// Returns the prior of an object seen once, at `depth` metres, with the standard deviation `spread` of
+    /// its logarithm.
     pub(super) fn new(seen: &Sighting, camera: &Camera, depth: f64, spread: f64) -> Self {
         let b = &seen.bounding_box;
         let ray = camera.ray(b.centre());
@@ -101,15 +103,15 @@ impl Belief {
         Self::Seen(FirstSight { quadric, eye, distance: (centre - eye).norm(), spread })
     }
 
-    /// Of an object that is known as well as this.
+    /// Returns the prior of an object with the mean and covariance of an estimate.
     pub(super) fn known(fitted: &Fitted) -> Self {
         let information = Cholesky::new(fitted.covariance).map(|factor| factor.inverse());
         let root = information.and_then(Cholesky::new).map(|factor| factor.l().transpose());
-        // what is read of a file has a covariance that is positive definite
+        // a covariance that was read from a file is positive definite
         Self::Known { quadric: fitted.quadric, root: Box::new(root.unwrap_or_else(Matrix9::identity)) }
     }
 
-    /// The ellipsoid that it begins with.
+    /// Returns the ellipsoid that a fit starts from.
     pub(super) fn first(&self) -> DualQuadric {
         match self {
             Self::Seen(first) => first.quadric,
@@ -117,7 +119,7 @@ impl Belief {
         }
     }
 
-    /// Rows of the belief and their derivatives.
+    /// Returns the residual of the prior and its Jacobian.
     fn rows(&self, quadric: &DualQuadric) -> (Vector9, Matrix9) {
         match self {
             Self::Seen(first) => first.rows(quadric),
@@ -131,11 +133,11 @@ impl Belief {
 }
 
 impl FirstSight {
-    /// Distance, three axes, three of the rotation; two rows stay empty.
+    /// Returns the residual of the distance, three semi-axes and three angles. The last two rows are zero.
     fn rows(&self, quadric: &DualQuadric) -> (Vector9, Matrix9) {
         let away = quadric.centroid() - self.eye;
         let log = (away.norm().max(1e-6) / self.distance).ln();
-        // the translation steps in the ellipsoid's own frame
+        // the tangent of the translation is in the frame of the ellipsoid
         let by_place = quadric.pose.rotation.inverse().act(&away) / away.norm_squared().max(1e-12);
         let turn = self.quadric.pose.rotation.between(&quadric.pose.rotation).log();
         let (mut r, mut j) = (Vector9::zeros(), Matrix9::zeros());
@@ -154,17 +156,17 @@ impl FirstSight {
     }
 }
 
-/// The box of an ellipsoid, with the derivatives of its sides by the tangents of the pose and of the ellipsoid.
+/// The predicted box of an ellipsoid, with the Jacobians of its sides by pose and ellipsoid.
 pub(super) struct Predicted {
     pub bounding_box: BoundingBox,
     pub by_pose: SMatrix<f64, SIDES, 6>,
     pub by_quadric: SMatrix<f64, SIDES, 9>,
 }
 
-/// Sides of a box.
+/// Number of sides of a box.
 pub(super) const SIDES: usize = 4;
 
-/// Predicts a box; `None` where nothing of the object is in the image.
+/// Predicts the box of an ellipsoid; `None` if no part of it is in the image.
 pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Option<Predicted> {
     let nothing = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 0.0, ymax: 0.0 };
     let factor = BoundingBoxFactor { bounding_box: nothing, camera: *camera, model: BoxModel::Truncated };
@@ -177,7 +179,7 @@ pub(super) fn predict(pose: &Se3, quadric: &DualQuadric, camera: &Camera) -> Opt
     Some(Predicted { bounding_box, by_pose: jacobians.0, by_quadric: jacobians.1 })
 }
 
-/// The ellipsoid that fits best, reached from `start`; `None` where it is not determined.
+/// Fits an ellipsoid by damped Gauss-Newton steps from `start`; `None` if the data do not determine it.
 pub(super) fn fit(
     belief: &Belief,
     start: DualQuadric,
@@ -207,7 +209,7 @@ pub(super) fn fit(
     covariance.iter().all(|x| x.is_finite()).then_some(Fitted { quadric, covariance })
 }
 
-/// The normal equations of an ellipsoid.
+/// Cost and normal equations of the fit of an ellipsoid.
 struct System {
     cost: f64,
     gradient: Vector9,
@@ -241,13 +243,13 @@ impl System {
 }
 
 impl Predicted {
-    /// Predicted less measured sides.
+    /// Returns the predicted minus the measured sides.
     pub(super) fn error(&self, b: &BoundingBox) -> Vector4<f64> {
         Vector4::from(self.bounding_box.bounds()) - Vector4::from(b.bounds())
     }
 }
 
-/// The errors of a detection in standard deviations: Σr², Jᵀr and JᵀJ over its box and its other measurements.
+/// The whitened residuals of a detection, summed over its box and further measurements: Σr², Jᵀr and JᵀJ.
 struct Whitened {
     square: f64,
     gradient: Vector9,
@@ -255,7 +257,7 @@ struct Whitened {
 }
 
 impl Whitened {
-    /// `None` if the ellipsoid has no box there.
+    /// Returns `None` if the ellipsoid has no box in this image.
     fn new(quadric: &DualQuadric, seen: &Sighting, camera: &Camera, noise: &BoxNoise) -> Option<Self> {
         let predicted = predict(&seen.world_from_camera, quadric, camera)?;
         let mut all = Self { square: 0.0, gradient: Vector9::zeros(), h: Matrix9::zeros() };
@@ -281,7 +283,7 @@ impl Whitened {
     }
 }
 
-/// The square of a detection's errors in standard deviations, which counts less and less where it is large.
+/// Returns the squared whitened residual of a detection under Cauchy's loss.
 pub(super) fn squared_error(
     quadric: &DualQuadric,
     seen: &Sighting,
@@ -302,7 +304,7 @@ mod tests {
         Camera { fx: 500.0, fy: 500.0, cx: 320.0, cy: 240.0, skew: 0.0, width: 640, height: 480 };
     const NOISE: BoxNoise = BoxNoise { px: 2.0, of_size: 0.02, others: Errors { depth: 0.03 } };
 
-    /// A camera at x metres to the right that looks ahead.
+    /// A camera that is `x` metres to the right and looks straight ahead.
     fn seen(x: f64, frame: usize, quadric: &DualQuadric) -> Sighting {
         let world_from_camera = Se3 { translation: Vector3::x() * x, ..Se3::identity() };
         let bounding_box = predict(&world_from_camera, quadric, &CAMERA).unwrap().bounding_box;
@@ -353,7 +355,7 @@ mod tests {
             let step = Vector9::from_fn(|i, _| if i == c { 1e-6 } else { 0.0 });
             let (up, down) = (belief.rows(&at.retract(&step)).0, belief.rows(&at.retract(&-step)).0);
             let numeric = (up - down) / 2e-6;
-            // the rotation's log is linearized at the start, which is near
+            // the log of the rotation is linearized at the start, which is close
             let tolerance = if c < 3 { 0.1 } else { 1e-5 };
             assert!((numeric - j.column(c)).norm() < tolerance * (1.0 + numeric.norm()), "{c}");
         }

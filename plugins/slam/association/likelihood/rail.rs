@@ -1,4 +1,4 @@
-//! What tests look at: things in a row, from a rail.
+//! Test scene: objects in a row, seen from a rail.
 use super::fit::predict;
 use crate::Map;
 use manifactor_geometry::Se3;
@@ -21,7 +21,7 @@ impl Map for Rail {
     }
 }
 
-/// The box of something at `x`, 2 m away.
+/// Returns the box of an object at `x`, 2 m away.
 pub(super) fn seen(frame: usize, x: f64, class: &str) -> Detection {
     let pose = Se3 { translation: Vector3::new(x, 0.0, 2.0), ..Se3::identity() };
     let quadric = DualQuadric { pose, semi_axes: Vector3::new(0.1, 0.15, 0.1) };

@@ -1,17 +1,17 @@
-//! Frames are looked at once more, by what is known a while later.
+//! Second look: frames are assigned once more with later knowledge.
 use super::super::{Associator, Image, Map, Merge, Move};
 use super::track::Seen;
 use super::tracker::Tracker;
 use manifactor_recording::sequence::{Detection, ObjectId};
 
-/// A frame that is to be looked at once more, and what its boxes are called.
+/// A frame that waits for its second look, with the current objects of its detections.
 #[derive(Debug)]
 pub(super) struct Past {
     frame: usize,
     timestamp: f64,
-    /// Those boxes that have a name: a detector that has gone mad draws others without end.
+    /// Only the detections with an object. This bounds the memory if a detector floods the frame.
     detections: Vec<Detection>,
-    /// Their places in the frame.
+    /// Their indices in the frame.
     places: Vec<usize>,
     names: Vec<Option<ObjectId>>,
 }
@@ -29,12 +29,12 @@ impl Past {
         Image { frame: self.frame, timestamp: self.timestamp, detections: &self.detections }
     }
 
-    /// Takes note of a merge.
+    /// Applies a merge.
     pub(super) fn rename(&mut self, Merge { from, into }: Merge) {
         self.names.iter_mut().filter(|name| **name == Some(from)).for_each(|name| *name = Some(into));
     }
 
-    /// Takes note of a move.
+    /// Applies a move.
     pub(super) fn put(&mut self, moved: &Move) {
         if self.frame == moved.frame
             && let Ok(i) = self.places.binary_search(&moved.place)
@@ -45,7 +45,7 @@ impl Past {
 }
 
 impl Tracker {
-    /// Looks once more at frames that are old enough by now, and moves boxes that turn out to show another object.
+    /// Takes a second look at all frames that are old enough, and moves boxes that show a different object.
     pub(super) fn look_again(&mut self, now: f64, map: &dyn Map) -> Vec<Move> {
         let (mut all, until) = (vec![], now - *self.settings.second_look_s);
         while let Some(past) = self.past.pop_front_if(|past| past.timestamp <= until) {
@@ -65,7 +65,7 @@ impl Tracker {
         all
     }
 
-    /// Moves boxes of a frame, which may change places.
+    /// Moves boxes of a frame. All are removed first, since two of them may swap objects.
     fn move_boxes(&mut self, all: &[Move]) {
         let taken: Vec<Option<Seen>> = all.iter().map(|moved| self.take_box(moved)).collect();
         for (moved, taken) in all.iter().zip(taken) {
@@ -80,7 +80,8 @@ impl Tracker {
         self.tracks.retain(|track| !(left(track.id) && track.boxes.is_empty() && !track.is_known()));
     }
 
-    /// Takes a box from its object; of twins, one was taken in.
+    /// Removes a box from its object. Returns `None` if the object did not keep the box, because it has a
+    /// twin in the frame.
     fn take_box(&mut self, moved: &Move) -> Option<Seen> {
         let track = self.tracks.iter_mut().find(|track| track.id == moved.from)?;
         track.vote(&moved.detection.scores, &self.aliases, -1.0);

@@ -1,4 +1,4 @@
-//! Boxes of an object that say the most about its ellipsoid.
+//! The most informative boxes of an object.
 use super::super::Map;
 use super::fit::SIDES;
 use manifactor_geometry::Se3;
@@ -6,38 +6,38 @@ use manifactor_quadric::BoundingBox;
 use manifactor_recording::measurement::Quantities;
 use nalgebra::Vector3;
 
-/// A box, and from where it was seen.
+/// A box with the camera pose that it was seen from.
 #[derive(Debug, Clone)]
 pub(super) struct Sighting {
     pub frame: usize,
     pub world_from_camera: Se3,
     pub bounding_box: BoundingBox,
-    /// What is measured besides the box.
+    /// Further measurements of the detection.
     pub quantities: Quantities,
 }
 
 impl Sighting {
-    /// How many numbers it measures.
+    /// Returns the number of residual rows.
     pub(super) fn rows(&self) -> usize {
         SIDES + self.quantities.rows()
     }
 }
 
-/// A few sightings from all sides, the last among them.
+/// A few sightings from different sides, including the latest.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sightings(Vec<Sighting>);
 
-/// How many are kept.
+/// Maximum number of sightings.
 const KEPT: usize = 24;
-/// A sighting says something new from another direction, in radians,
+/// Change of direction at which a sighting is new information, in radians.
 const ANGLE: f64 = 0.03;
-/// from another distance, as a part of it,
+/// Logarithmic change of the distance at which a sighting is new information.
 const DISTANCE: f64 = 0.1;
-/// or so many frames later, when the detector errs in another way.
+/// Number of frames after which a sighting is new information, because the detector errs differently by then.
 const FRAMES: usize = 30;
 
 impl Sightings {
-    /// These, in order of frames.
+    /// Creates the set from sightings in the order of frames.
     pub(super) fn of(all: Vec<Sighting>) -> Self {
         Self(all)
     }
@@ -46,7 +46,8 @@ impl Sightings {
         &self.0
     }
 
-    /// Adds one of an object that is there. The one before stays if it says something new beside all others.
+    /// Adds a sighting of an object at `centre`. The previous one stays only if it adds information to the
+    /// rest.
     pub(super) fn add(&mut self, sighting: Sighting, centre: &Vector3<f64>) {
         if let Some((last, rest)) = self.0.split_last() {
             let from = |s: &Sighting| s.world_from_camera.translation - centre;
@@ -64,19 +65,19 @@ impl Sightings {
         self.thin(centre);
     }
 
-    /// Leaves out that of a frame.
+    /// Removes the sighting of a frame.
     pub(super) fn remove(&mut self, frame: usize) {
         self.0.retain(|sighting| sighting.frame != frame);
     }
 
-    /// Those of both.
+    /// Returns the sightings of both, in the order of frames.
     pub(super) fn and(&self, others: &Self) -> Self {
         let mut all: Vec<Sighting> = self.0.iter().chain(&others.0).cloned().collect();
         all.sort_by_key(|sighting| sighting.frame);
         Self(all)
     }
 
-    /// Leaves out those that are seen in nearly the same direction as one before or after.
+    /// Removes the sightings whose direction differs least from a neighbour, until few enough remain.
     pub(super) fn thin(&mut self, centre: &Vector3<f64>) {
         while self.0.len() > KEPT {
             let from = |i: usize| self.0[i].world_from_camera.translation - centre;
@@ -89,7 +90,7 @@ impl Sightings {
         }
     }
 
-    /// Takes over the poses as they are estimated now.
+    /// Replaces the poses by their current estimates.
     pub(super) fn renew(&mut self, map: &dyn Map) {
         for sighting in &mut self.0 {
             if let Some(pose) = map.pose(sighting.frame) {

@@ -1,4 +1,4 @@
-//! One object, as far as it is known.
+//! The associator's model of one object.
 use super::super::Map;
 use super::Likelihood;
 use super::fit::{Belief, BoxNoise, Fitted, Predicted, SIDES, fit, predict};
@@ -16,59 +16,60 @@ use nalgebra::{
 };
 use std::f64::consts::TAU;
 
-/// An object.
+/// The model of an object: ellipsoid, classes and boxes.
 #[derive(Debug, Clone)]
 pub(super) struct Track {
     pub id: ObjectId,
-    /// Scores of its boxes' best classes.
+    /// Summed score of the best class of each box.
     pub votes: IndexMap<String, f64>,
     pub belief: Belief,
     pub fitted: Fitted,
     pub sightings: Sightings,
-    /// All its boxes, one a frame, in order.
+    /// All its boxes, at most one per frame, in order.
     pub boxes: Vec<Seen>,
-    /// When it was seen last, in seconds.
+    /// Time of the last sighting, in seconds.
     pub seen_at: Option<f64>,
-    /// It is compared with others when it has so many boxes,
+    /// Number of boxes at which it is compared with its neighbours again.
     pub next_look: usize,
-    /// and looked at for being two when it has so many.
+    /// Number of boxes at which it is checked for a split again.
     pub next_doubt: usize,
 }
 
-/// One of an object's boxes.
+/// A box of an object.
 #[derive(Debug, Clone)]
 pub(super) struct Seen {
-    /// In seconds.
+    /// Unit: seconds.
     pub timestamp: f64,
-    /// Its place among the boxes of its frame.
+    /// Index among the detections of its frame.
     pub place: usize,
-    /// With the frame as the map counts it.
+    /// Its frame is the index in the map.
     pub detection: Detection,
 }
 
-/// The box that is expected of an object, and how far its sides may be off.
+/// Predicted box of an object, with the covariance of its sides.
 pub(super) struct Expected<'a> {
     pose: &'a Se3,
     fitted: &'a Fitted,
     settings: &'a Likelihood,
-    /// Variances of the camera's drift: rad², m².
+    /// Variances of the drift of the camera: rad², m².
     drift: Vector6<f64>,
     predicted: Predicted,
-    /// Of the sides, in square pixels.
+    /// Covariance of the sides, in square pixels.
     covariance: SMatrix<f64, SIDES, SIDES>,
 }
 
-/// Where two are is not known where the way between them is known to this part of their sizes only.
+/// Uncertainty of the offset between two objects, relative to their sizes, above which their places count as
+/// unknown.
 const VAGUE: f64 = 0.5;
-/// Boxes that an object has when it is first compared with others.
+/// Boxes of an object at its first comparison with neighbours.
 const FIRST_LOOK: usize = 3;
-/// Boxes that it has when it is first asked whether it is two.
+/// Boxes of an object at its first check for a split.
 const FIRST_DOUBT: usize = 8;
-/// How many times as many it has the next time.
+/// Growth of the number of boxes until the next check.
 const MORE: f64 = 1.3;
 
 impl Track {
-    /// An object that is seen for the first time; `None` where no ellipsoid can be made of it.
+    /// Creates the track of a new object; `None` if the fit of the ellipsoid fails.
     pub(super) fn new(
         id: ObjectId,
         belief: Belief,
@@ -80,7 +81,7 @@ impl Track {
         Some(Self::bare(id, belief, fitted))
     }
 
-    /// An object without boxes.
+    /// Creates a track without boxes.
     pub(super) fn bare(id: ObjectId, belief: Belief, fitted: Fitted) -> Self {
         Self {
             id,
@@ -95,51 +96,52 @@ impl Track {
         }
     }
 
-    /// An object of an earlier map.
+    /// Creates the track of an object of a prior map.
     pub(super) fn known(object: &PriorObject) -> Self {
         let fitted = Fitted { quadric: object.quadric, covariance: object.covariance() };
         let votes = object.classes.sums().clone();
         Self { votes, ..Self::bare(object.id, Belief::known(&fitted), fitted) }
     }
 
-    /// Returns whether an earlier map has it.
+    /// Returns whether the object is part of a prior map.
     pub(super) fn is_known(&self) -> bool {
         matches!(self.belief, Belief::Known { .. })
     }
 
-    /// Returns whether one of two has its centre in the other, and it is known where they are.
+    /// Returns whether one of two objects contains the centre of the other, and both places are known well
+    /// enough.
     pub(super) fn is_where(&self, other: &Self) -> bool {
         self.fitted.is_where(&other.fitted) && self.spread(other) < VAGUE * self.sizes(other)
     }
 
-    /// Standard deviation of the way between the centres of two, in metres.
+    /// Returns the standard deviation of the offset between two centres, in metres.
     pub(super) fn spread(&self, other: &Self) -> f64 {
         (self.place_covariance() + other.place_covariance()).trace().sqrt()
     }
 
-    /// How large two are together, in metres.
+    /// Returns the sum of the sizes of two objects, in metres.
     pub(super) fn sizes(&self, other: &Self) -> f64 {
         self.fitted.quadric.semi_axes.norm() + other.fitted.quadric.semi_axes.norm()
     }
 
-    /// How far away it is, in metres.
+    /// Returns the distance from a camera, in metres.
     pub(super) fn distance(&self, from: &Se3) -> f64 {
         (self.fitted.quadric.centroid() - from.translation).norm()
     }
 
-    /// Standard deviation of its place as a part of its distance.
+    /// Returns the standard deviation of the centre, relative to the distance from the last camera.
     pub(super) fn place_spread(&self) -> f64 {
         let last = self.sightings.all().last();
         let distance = last.map_or(0.0, |last| self.distance(&last.world_from_camera));
         self.place_covariance().trace().sqrt() / distance
     }
 
-    /// Of its centre, in square metres.
+    /// Returns the covariance of the centre, in square metres.
     pub(super) fn place_covariance(&self) -> Matrix3<f64> {
         self.fitted.covariance.fixed_view::<3, 3>(3, 3).into_owned()
     }
 
-    /// Counts a box's class so many times: once, or takes it back.
+    /// Adds the class of a box, with weight `times`: 1 adds it, -1 takes it back.
     pub(super) fn vote(&mut self, scores: &ClassScores, aliases: &Aliases, times: f64) {
         if let Some((class, score)) = scores.best() {
             let votes = self.votes.entry(aliases.canonical(class)).or_default();
@@ -147,13 +149,14 @@ impl Track {
         }
     }
 
-    /// The share of a class in all votes; 1 where there are none.
+    /// Returns the share of a class among all votes; 1 without votes.
     pub(super) fn share(&self, class: &str) -> f64 {
         let all: f64 = self.votes.values().sum();
         if all > 0.0 { self.votes.get(class).copied().unwrap_or_default() / all } else { 1.0 }
     }
 
-    /// The box that it should have, seen from here after so many seconds; `None` where it is not seen.
+    /// Predicts the box seen from `pose`, `seconds` after the last sighting; `None` if the object is not
+    /// visible.
     pub(super) fn expected<'a>(
         &'a self,
         seconds: f64,
@@ -173,13 +176,13 @@ impl Track {
         Some(Expected { pose, fitted, settings, drift, predicted, covariance })
     }
 
-    /// Intersection over union of a box with that of its ellipsoid.
+    /// Returns the intersection over union of a box with the projection of the ellipsoid.
     pub(super) fn overlap(&self, sighting: &Sighting, camera: &Camera) -> f64 {
         let predicted = predict(&sighting.world_from_camera, &self.fitted.quadric, camera);
         predicted.map_or(0.0, |predicted| predicted.bounding_box.iou(&sighting.bounding_box))
     }
 
-    /// Takes a box in. Where the fit fails, the ellipsoid stays as it was.
+    /// Adds a box. If the fit fails, the ellipsoid stays unchanged.
     pub(super) fn see(&mut self, seen: Seen, pose: Se3, map: &dyn Map, camera: &Camera, noise: &BoxNoise) {
         self.seen_at = Some(seen.timestamp);
         self.sightings.renew(map);
@@ -188,13 +191,13 @@ impl Track {
         self.fit_again(camera, noise);
     }
 
-    /// Fits the ellipsoid to the sightings, from where it is.
+    /// Fits the ellipsoid to the sightings, from the current one.
     pub(super) fn fit_again(&mut self, camera: &Camera, noise: &BoxNoise) {
         let fitted = fit(&self.belief, self.fitted.quadric, self.sightings.all(), camera, noise);
         self.fitted = fitted.unwrap_or(self.fitted);
     }
 
-    /// Returns whether it is time to compare it with others: its name, and the time is put off.
+    /// Returns the id if a comparison with the neighbours is due, and schedules the next one.
     pub(super) fn is_due(&mut self, frame: usize) -> Option<ObjectId> {
         let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_look;
         is_due.then(|| {
@@ -203,7 +206,7 @@ impl Track {
         })
     }
 
-    /// Returns whether it is time to ask if it is two, and the time is put off.
+    /// Returns whether a check for a split is due, and schedules the next one.
     pub(super) fn is_doubtful(&mut self, frame: usize) -> bool {
         let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_doubt;
         if is_due {
@@ -226,7 +229,7 @@ impl Seen {
         self.detection.frame
     }
 
-    /// The same, seen from there.
+    /// Returns the sighting with the given camera pose.
     pub(super) fn from(&self, world_from_camera: Se3) -> Sighting {
         let Detection { frame, bounding_box, ref quantities, .. } = self.detection;
         Sighting { frame, world_from_camera, bounding_box, quantities: quantities.clone() }
@@ -234,18 +237,18 @@ impl Seen {
 }
 
 impl Expected<'_> {
-    /// The box alone.
+    /// Returns the predicted box without further measurements.
     pub(super) fn bounding_box(&self) -> &BoundingBox {
         &self.predicted.bounding_box
     }
 
-    /// -2 ln of the density of a detection: d² + ln det 2πS over its box and its other measurements.
+    /// Returns -2 ln of the density of a detection: d² + ln det 2πS over its box and its other measurements.
     pub(super) fn cost(&self, b: &BoundingBox, quantities: &Quantities) -> f64 {
         let error = self.predicted.error(b);
         if quantities.is_empty() {
             return cost(&error, self.covariance);
         }
-        // all together: the sides depend on the object's place as the others do
+        // jointly, since box sides and further measurements depend on the same object and pose
         let mut innovations = vec![];
         for measurement in quantities.iter() {
             let Some(innovation) = measurement.innovation(self.pose, &self.fitted.quadric) else {
@@ -279,7 +282,7 @@ impl Expected<'_> {
     }
 }
 
-/// d² + ln det 2πS.
+/// Returns d² + ln det 2πS.
 fn cost<N: Dim>(error: &OVector<f64, N>, covariance: OMatrix<f64, N, N>) -> f64
 where
     DefaultAllocator: Allocator<N> + Allocator<N, N>,

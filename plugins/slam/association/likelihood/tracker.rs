@@ -1,4 +1,4 @@
-//! All objects: boxes are put to them, and they learn from boxes.
+//! The tracker of all objects: assigns detections, and learns from them.
 use super::super::{Associator, Image, Learned, Map, best_assignment};
 use super::Likelihood;
 use super::fit::Belief;
@@ -13,31 +13,33 @@ use manifactor_recording::sequence::{Detection, ObjectId};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Boxes of a frame that are looked at, those of the highest scores: a detector that draws more has gone mad.
+/// Maximum number of boxes per frame; those with the highest scores are used. It bounds the time if a
+/// detector floods the frame.
 const BOXES: usize = 200;
-/// An object of fewer boxes is forgotten when it was not seen for a while.
+/// Number of boxes below which an object is forgotten when it is not seen for `PATIENCE`.
 pub(super) const FIRM: usize = 3;
-/// That while, in seconds.
+/// Time without a sighting after which such an object is forgotten, in seconds.
 const PATIENCE: f64 = 10.0;
-/// So many such objects are kept at most.
+/// Maximum number of such objects.
 const WAITING: usize = 500;
-/// Where a run begins in an earlier map is known as well as after so many seconds without seeing any of it.
+/// Age of the last sighting of prior objects at the start of a run, in seconds. It sets the uncertainty of
+/// the start pose in the prior map.
 const AT_LARGE: f64 = 30.0;
-/// Objects whose place is known to this part of their distance tell how far away things are.
+/// Relative uncertainty of the place, below which an object contributes to the usual depth.
 const KNOWN: f64 = 0.15;
 
-/// All objects.
+/// The models of all objects.
 #[derive(Debug)]
 pub(super) struct Tracker {
     pub settings: Likelihood,
     pub camera: Camera,
     pub aliases: Aliases,
-    /// Those of an earlier map come first, by number.
+    /// Sorted by id at the front: the objects of a prior map.
     pub tracks: Vec<Track>,
     pub next: u32,
-    /// When objects of an earlier map were seen last, as it were, in seconds.
+    /// Nominal time of the last sighting of prior objects, in seconds.
     began: Option<f64>,
-    /// Frames that are looked at once more.
+    /// Frames that wait for their second look.
     pub past: VecDeque<Past>,
 }
 
@@ -47,7 +49,7 @@ impl Associator for Tracker {
         let mut next = (self.next..).map(ObjectId);
         for i in best_scores(image.detections) {
             if names[i].is_none() {
-                // new ones have twins as well
+                // new objects have twins too
                 names[i] = self.twin(image.detections, &names, i).or_else(|| next.next());
             }
         }
@@ -80,7 +82,7 @@ impl Associator for Tracker {
             self.tracks[t].vote(&one.detection.scores, &self.aliases, 1.0);
             seen.push((t, one));
         }
-        // of twins the one that fits best
+        // keep the twin that fits best
         seen.sort_by(|(a, x), (b, y)| {
             let fits = |t: usize, seen: &Seen| self.tracks[t].overlap(&seen.from(pose), &self.camera);
             a.cmp(b).then_with(|| fits(*b, y).total_cmp(&fits(*a, x)))
@@ -104,7 +106,7 @@ impl Associator for Tracker {
 }
 
 impl Tracker {
-    /// No object but those of an earlier map.
+    /// Creates a tracker with the objects of the prior map.
     pub(super) fn new(
         settings: Likelihood,
         camera: Camera,
@@ -117,20 +119,20 @@ impl Tracker {
         Self { settings, camera, aliases, tracks, next, began: None, past: VecDeque::new() }
     }
 
-    /// How many objects are those of an earlier map.
+    /// Returns the number of objects of the prior map.
     pub(super) fn known(&self) -> usize {
         self.tracks.partition_point(Track::is_known)
     }
 
-    /// The place of an object, if it is there.
+    /// Returns the index of an object.
     pub(super) fn place(&self, id: ObjectId) -> Option<usize> {
-        // an earlier map may have very many
+        // binary search, because a prior map may be large
         let (known, own) = self.tracks.split_at(self.known());
         let of_map = known.binary_search_by_key(&id, |track| track.id).ok();
         of_map.or_else(|| Some(known.len() + own.iter().position(|track| track.id == id)?))
     }
 
-    /// The known objects of boxes.
+    /// Assigns known objects to the boxes of a frame.
     fn put(&self, image: &Image<'_>, map: &dyn Map) -> Vec<Option<ObjectId>> {
         let mut names = vec![None; image.detections.len()];
         let Some(pose) = map.pose(image.frame) else { return names };
@@ -148,8 +150,8 @@ impl Tracker {
         names
     }
 
-    /// What there is to gain by putting boxes to objects instead of new ones, as (row, column, gain), and the objects of
-    /// the columns.
+    /// Returns the gain of each known object over a new one, as (row, column, gain), and the objects of the
+    /// columns.
     pub(super) fn gains(
         &self,
         image: &Image<'_>,
@@ -186,17 +188,17 @@ impl Tracker {
         (gains, tracks)
     }
 
-    /// The class of a box.
+    /// Returns the class of a box.
     pub(super) fn class(&self, detection: &Detection) -> Option<String> {
         detection.scores.best().map(|(class, _)| self.aliases.canonical(class))
     }
 
-    /// The likelihood that a box of an object has a class.
+    /// Returns the likelihood that a box of an object has a class.
     pub(super) fn class_likelihood(&self, track: &Track, class: Option<&str>) -> f64 {
         self.settings.likelihood(class.map_or(1.0, |class| track.share(class)))
     }
 
-    /// The name of the box that is nearly the same, if there is one.
+    /// Returns the object of the most similar box with an object, if the overlap is large enough.
     fn twin(&self, detections: &[Detection], names: &[Option<ObjectId>], i: usize) -> Option<ObjectId> {
         let own = &detections[i].bounding_box;
         let named = detections
@@ -207,10 +209,10 @@ impl Tracker {
         near.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
     }
 
-    /// The place of an object, which may begin with this sighting.
+    /// Returns the index of an object, and creates it from this sighting if it is new.
     fn track(&mut self, id: ObjectId, first: &Sighting, depth: f64) -> Option<usize> {
         self.place(id).or_else(|| {
-            // how well a measured depth is known is said by the sighting
+            // the sighting carries the uncertainty of a measured depth
             let depth = first.quantities.depth().unwrap_or(depth);
             let belief = Belief::new(first, &self.camera, depth, *self.settings.depth_spread);
             self.tracks.push(Track::new(id, belief, first, &self.camera, &self.settings.noise())?);
@@ -218,7 +220,8 @@ impl Tracker {
         })
     }
 
-    /// How far away objects are from here, as far as is known: the median.
+    /// Returns the median distance of the objects whose place is known; the setting `depth` while there are
+    /// too few.
     fn usual_depth(&self, pose: &Se3) -> f64 {
         let known = self.tracks.iter().filter(|track| track.place_spread() < KNOWN);
         let mut depths: Vec<f64> = known.map(|track| track.distance(pose)).collect();
@@ -226,7 +229,8 @@ impl Tracker {
         if depths.len() < FIRM { *self.settings.depth } else { depths[depths.len() / 2] }
     }
 
-    /// Forgets objects that are seen too rarely, and those that are seen least lately where there are too many such.
+    /// Forgets objects with too few boxes that were not seen for a while, and the longest unseen if there are
+    /// too many.
     fn forget(&mut self, now: f64) -> Vec<ObjectId> {
         let is_firm = |track: &Track| track.boxes.len() >= FIRM || track.is_known();
         let doubtful = self.tracks.iter().filter(|track| !is_firm(track));
@@ -238,7 +242,7 @@ impl Tracker {
     }
 }
 
-/// The boxes that are looked at, in order.
+/// Returns the indices of the boxes that are used, in order.
 pub(super) fn best_scores(detections: &[Detection]) -> Vec<usize> {
     let mut all: Vec<usize> =
         (0..detections.len()).filter(|i| detections[*i].bounding_box.has_area()).collect();

@@ -1,4 +1,4 @@
-//! Whether two objects are one.
+//! Merging: two objects that are one.
 use super::super::Merge;
 use super::Likelihood;
 use super::fit::{Fitted, fit, squared_error};
@@ -8,41 +8,46 @@ use super::tracker::Tracker;
 use manifactor_quadric::Camera;
 use manifactor_recording::sequence::ObjectId;
 
-/// Two objects that are one.
+/// The result of merging two objects.
 struct Union {
     track: Track,
-    /// Mean square of the errors of its sides, in their standard deviations, of the worse of the two.
+    /// Mean squared residual of the box sides, in units of their variances: the larger of the values of both
+    /// objects.
     error: f64,
 }
 
-/// Objects that are seen in one frame are two: of the frames of the one with fewer, this share is forgiven.
+/// Two objects visible in one frame are distinct. This share of the frames of the object with fewer boxes is
+/// tolerated.
 const TOGETHER: f64 = 0.05;
-/// How many standard deviations the places of two that are one may lie apart, beyond their sizes.
+/// Distance of the centres at which two objects may still be one, in standard deviations. Their sizes are
+/// added to it.
 const APART: f64 = 3.0;
-/// Objects whose classes are less alike than this need to fit better,
+/// Similarity of classes below which the limit is divided by `STRICTER`.
 const ALIKE: f64 = 0.1;
-/// by this factor;
+/// Divides `merge_error` for objects of different classes.
 const STRICTER: f64 = 1.4;
-/// those whose classes are more alike than this, and of which one has its centre in the other, where there is room for one, need to fit less well,
+/// Similarity of classes above which the limit is multiplied by `LOOSER`, if one object contains the centre
+/// of the other and both places are known well enough.
 pub(super) const SAME: f64 = 0.5;
-/// by this factor: what has no simple shape has boxes that no ellipsoid explains.
+/// Multiplies `merge_error` for objects of one class in one place: no ellipsoid explains all boxes of a
+/// complex shape.
 pub(super) const LOOSER: f64 = 2.0;
 
-/// Of so many objects it is asked in a frame, at most, whether they are the same as others,
+/// Objects per frame that are compared with their neighbours, at most.
 const LOOKS: usize = 20;
-/// of which so many are looked at, those that are nearest.
+/// Nearest neighbours that each object is compared with.
 const NEIGHBOURS: usize = 8;
 
 impl Tracker {
-    /// Makes one of objects that turn out to be one: looks at those that were seen in this frame and have many more boxes than when
-    /// they were looked at last.
+    /// Merges objects that turn out to be one. Considers the objects that were seen in this frame and have
+    /// many more boxes than at their last check.
     pub(super) fn merge(&mut self, frame: usize) -> Vec<Merge> {
         let due = self.tracks.iter_mut().filter_map(|track| track.is_due(frame));
         let due: Vec<ObjectId> = due.take(LOOKS).collect();
         due.into_iter().filter_map(|id| self.merge_one(id)).collect()
     }
 
-    /// Makes one of all objects that turn out to be one.
+    /// Merges all objects that turn out to be one.
     pub(super) fn merge_all(&mut self) -> Vec<Merge> {
         let mut merges = vec![];
         loop {
@@ -55,9 +60,9 @@ impl Tracker {
         }
     }
 
-    /// Makes one of an object and the one that it goes with best, if there is any.
+    /// Merges an object with the neighbour that fits best, if there is one.
     fn merge_one(&mut self, id: ObjectId) -> Option<Merge> {
-        // it may be gone by now
+        // an earlier merge may have removed it
         let own = self.place(id)?;
         let unions = self.neighbours(own).into_iter().filter_map(|other| {
             let (one, two) = (&self.tracks[own], &self.tracks[other]);
@@ -73,9 +78,9 @@ impl Tracker {
         Some(merge)
     }
 
-    /// The objects that may be the same as this one, the nearest first.
+    /// Returns the objects that may be merged with this one, nearest first.
     fn neighbours(&self, own: usize) -> Vec<usize> {
-        // two objects of an earlier map are two: only those that it does not have are compared with one of it
+        // objects of a prior map are distinct: one of them is compared only with objects outside of that map
         let first = if self.tracks[own].is_known() { self.known() } else { 0 };
         let others = (first..self.tracks.len()).filter(|other| *other != own);
         let near = others.filter_map(|other| Some((other, gap(&self.tracks[own], &self.tracks[other])?)));
@@ -85,8 +90,8 @@ impl Tracker {
     }
 }
 
-/// How far apart two are that may be one, as a part of their sizes and of how well they are known; `None`, where they are too far apart,
-/// or were seen side by side.
+/// Returns the distance of two objects relative to their sizes and uncertainties; `None` if they are too far
+/// apart or were visible side by side.
 fn gap(one: &Track, two: &Track) -> Option<f64> {
     let apart = (one.fitted.quadric.centroid() - two.fitted.quadric.centroid()).norm();
     let gap = apart / (one.sizes(two) + APART * one.spread(two));
@@ -94,15 +99,16 @@ fn gap(one: &Track, two: &Track) -> Option<f64> {
     (gap <= 1.0 && together() <= TOGETHER * one.boxes.len().min(two.boxes.len()) as f64).then_some(gap)
 }
 
-/// The object that two are, with the name of the one that an earlier map has, or that has more boxes, if one ellipsoid explains all boxes.
+/// Merges two objects if one ellipsoid explains all boxes. Keeps the id of the object from the prior map,
+/// else of the one with more boxes.
 fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Option<Union> {
     let rank = |track: &Track| (track.is_known(), track.boxes.len());
     let (more, fewer) = if rank(one) >= rank(two) { (one, two) } else { (two, one) };
     let (noise, mut sightings) = (settings.noise(), more.sightings.and(&fewer.sightings));
-    // the boxes of one may look like outliers from the other
+    // start from both ellipsoids, since boxes of one object may look like outliers from the other
     let starts = [more, fewer].into_iter().filter_map(|start| {
         let mut fitted = start.fitted;
-        // from the ellipsoid of one it may be a long way to that of both
+        // the way from the ellipsoid of one object to the common one may be long
         for _ in 0..2 {
             fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
         }
@@ -143,12 +149,12 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
     Some(Union { track, error })
 }
 
-/// How much the classes of two have in common, from 0 to 1 (Bhattacharyya).
+/// Returns the similarity of the class distributions, from 0 to 1 (Bhattacharyya coefficient).
 pub(super) fn alike(one: &Track, two: &Track) -> f64 {
     one.votes.keys().map(|class| (one.share(class) * two.share(class)).sqrt()).sum()
 }
 
-/// How many frames two have in common.
+/// Returns the number of frames that show both objects.
 fn common(one: &[Seen], two: &[Seen]) -> usize {
     let has = |seen: &&Seen| two.binary_search_by_key(&seen.frame(), Seen::frame).is_ok();
     one.iter().filter(has).count()

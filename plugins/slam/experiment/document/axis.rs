@@ -1,35 +1,35 @@
-//! What an experiment varies.
+//! Axes of an experiment.
 use manifactor_config::{Errors, Fault, Field, Node, Place, Placed, Table, Value, deserialize_with};
 use manifactor_mapping::settings::run_document::Declared;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 
-/// Columns of the table that change together, and the ways they do.
+/// Columns of the table that change together, and their possible values.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
     pub(super) columns: Vec<Column>,
     pub(super) options: Vec<Choice>,
 }
 
-/// A column of the table, and where it is named.
+/// A column of the table, and the position of its name in the document.
 #[derive(Debug, Clone)]
 pub(super) struct Column {
     pub(super) name: String,
     pub(super) place: Place,
 }
 
-/// One way to set the columns of an axis.
+/// One choice of values for the columns of an axis.
 #[derive(Debug, Clone)]
 pub(super) struct Choice {
-    /// As tables show it, by column.
+    /// Labels in tables, by column.
     pub(super) labels: Vec<String>,
     pub(super) place: Place,
-    /// What is put over the base, by column.
+    /// Settings that replace settings of the base, by column.
     pub(super) sets: Vec<Node>,
 }
 
-/// What is varied: columns with rows of values, or a name with options.
+/// An axis: columns with rows of values, or a name with options.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 pub(super) enum AxisDocument {
@@ -41,10 +41,10 @@ pub(super) enum AxisDocument {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Rows {
-    /// Columns, and the setting that each changes: { seed = "source.seed" }.
+    /// Columns, each with the setting that it changes: { seed = "source.seed" }.
     #[schemars(with = "BTreeMap<String, String>")]
     columns: Node,
-    /// Their values: a list for each row, or the value itself where there is one column.
+    /// Values of the columns: a list for each row, or the value itself if there is only one column.
     #[schemars(with = "Vec<serde_json::Value>")]
     rows: Placed<Vec<Node>>,
 }
@@ -53,10 +53,10 @@ pub(super) struct Rows {
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Options {
-    /// The column.
+    /// Name of the column.
     #[schemars(with = "String")]
     name: Placed<String>,
-    /// Ways to set it.
+    /// Options of the column.
     #[schemars(with = "Vec<Declared>")]
     options: Placed<Vec<Declared>>,
 }
@@ -73,7 +73,7 @@ impl<'de> Deserialize<'de> for AxisDocument {
 }
 
 impl Axis {
-    /// What one of `[[axes]]` says; `None` where that makes no sense, which is reported.
+    /// Reads one of `[[axes]]`. Returns `None` if it is invalid; errors are reported.
     pub(super) fn read(document: AxisDocument, errors: &Errors) -> Option<Self> {
         let (place, axis) = match document {
             AxisDocument::Rows(rows) => (rows.rows.place.clone(), Self::of_rows(rows, errors)?),
@@ -87,7 +87,7 @@ impl Axis {
         Some(axis)
     }
 
-    /// One column, each option with a name.
+    /// Creates an axis with one column and a name for each option.
     pub(super) fn of_options(column: Column, options: Vec<Declared>) -> Self {
         let choice = |Declared { name: Placed { place, value: name }, set, .. }| Choice {
             labels: vec![name],
@@ -115,7 +115,7 @@ impl Axis {
     }
 }
 
-/// A row: a value for each column, or the value itself where there is one column.
+/// Reads a row: a value for each column, or the value itself if there is only one column.
 fn choice(row: Node, paths: &[String], errors: &Errors) -> Option<Choice> {
     let place = row.place.clone();
     let values = match row.value {
@@ -133,7 +133,7 @@ fn choice(row: Node, paths: &[String], errors: &Errors) -> Option<Choice> {
     Some(Choice { labels, place, sets })
 }
 
-/// `a.b.c` and a value as tables within tables.
+/// Returns nested tables for a path `a.b.c` and a value.
 fn nested(path: &str, value: Node) -> Node {
     path.rsplit('.').fold(value, |node, key| {
         let place = node.place.clone();
@@ -142,11 +142,11 @@ fn nested(path: &str, value: Node) -> Node {
     })
 }
 
-/// A value as a table shows it.
+/// Returns the label of a value in tables.
 fn label(value: &Node) -> String {
     match &value.value {
         Value::String(text) => text.clone(),
-        // as it is written: 0.1 and 1e-1 are two labels
+        // labels follow the notation: 0.1 and 1e-1 are two labels
         _ => value.place.text().split_whitespace().collect::<Vec<_>>().join(" "),
     }
 }

@@ -1,4 +1,4 @@
-//! Mistakes in axes that would make an experiment say less than it seems to.
+//! Checks for mistakes in axes that would make an experiment misleading.
 use super::axis::{Axis, Choice, Column};
 use crate::measures::measure_names;
 use indexmap::IndexMap;
@@ -6,7 +6,7 @@ use manifactor_config::{Diagnostic, Errors, Fault, Node, Place, Value};
 use manifactor_metrics::Alignment;
 use std::collections::{HashMap, HashSet};
 
-/// Columns that the tables have besides the axes and the measures.
+/// Columns of the tables besides axes and measures.
 const OWN: [&str; 15] = [
     "status",
     "reason",
@@ -25,8 +25,8 @@ const OWN: [&str; 15] = [
     "relative",
 ];
 
-/// Checks that each column has a name of its own, each choice of an axis is another, and each setting is varied by one
-/// column only.
+/// Checks that each column has a unique name, that the choices of an axis differ, and that only one column
+/// varies a setting.
 pub(super) fn axes(axes: &[Axis], errors: &Errors) {
     columns(axes, errors);
     axes.iter().for_each(|axis| repeated(axis, errors));
@@ -47,7 +47,7 @@ fn columns(axes: &[Axis], errors: &Errors) {
     }
 }
 
-/// Trials of two choices that are the same are one trial, and would be counted as two.
+/// Reports equal choices: their trials are one trial, but would be counted twice.
 fn repeated(axis: &Axis, errors: &Errors) {
     let (mut values, mut labels) = (HashMap::new(), HashMap::new());
     for choice in &axis.options {
@@ -66,9 +66,9 @@ fn repeated(axis: &Axis, errors: &Errors) {
     }
 }
 
-/// The same text for values that are the same: `1`, `0x1` and `1.0`.
+/// Returns equal text for equal values: `1`, `0x1` and `1.0`.
 fn canonical(node: &Node) -> String {
-    // all whole numbers that an f64 has are i64 below this
+    // below this limit every whole f64 is an i64
     const WHOLE: f64 = 9e18;
     match &node.value {
         Value::Null => "null".to_owned(),
@@ -89,10 +89,10 @@ fn canonical(node: &Node) -> String {
     }
 }
 
-/// A column, by its axis and its place in it; a later one is put over an earlier one.
+/// A column, by its axis and its index in the axis. A later column replaces settings of an earlier one.
 type Owner = (usize, usize);
 
-/// Of two columns that set one key, the first has no effect.
+/// Reports two columns that set one key, because the first has no effect.
 fn overlapping(axes: &[Axis], errors: &Errors) {
     let mut keys: IndexMap<(Vec<&str>, Owner), &Place> = IndexMap::new();
     for (i, axis) in axes.iter().enumerate() {
@@ -110,7 +110,7 @@ fn overlapping(axes: &[Axis], errors: &Errors) {
     let mut told: HashSet<[Owner; 2]> = HashSet::new();
     let mut above: Option<(&[&str], Owner, &Place)> = None;
     for ((path, owner), place) in &keys {
-        // a key is followed by those within it
+        // keys are sorted: a key is followed by the keys within it
         match above.filter(|(outer, ..)| path.starts_with(outer)) {
             None => above = Some((path, *owner, place)),
             Some((_, other, _)) if other == *owner => {}
@@ -132,7 +132,7 @@ fn overlapping(axes: &[Axis], errors: &Errors) {
     }
 }
 
-/// Visits the paths of all values that are no tables.
+/// Visits the paths of all values that are not tables.
 fn leaves<'a>(node: &'a Node, path: &mut Vec<&'a str>, visit: &mut impl FnMut(&[&'a str], &'a Place)) {
     let Value::Table(table) = &node.value else { return visit(path, &node.place) };
     for (key, field) in table.iter() {
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
     use manifactor_config::{Document, Format};
 
-    /// What is wrong with these axes; nothing, where they are right.
+    /// Returns the errors of these axes; empty if they are valid.
     fn wrong(text: &str) -> String {
         let document = Document::parse("sweep.toml", text, Format::Toml).unwrap();
         let errors = Errors::new();

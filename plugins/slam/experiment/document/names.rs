@@ -1,4 +1,4 @@
-//! Names in a summary that stand for nothing.
+//! Checks of the names in a summary.
 use super::SummarySettings;
 use super::axis::Axis;
 use crate::measures::{measure_names, measure_names_in_words};
@@ -8,18 +8,18 @@ use manifactor_metrics::Alignment;
 use manifactor_run::output::report::alignment_name;
 use std::collections::HashSet;
 
-/// The names in a `[summary]`.
+/// Names in a `[summary]`.
 pub(super) struct Names<'a> {
     pub(super) settings: &'a SummarySettings,
-    /// The table, where there is one.
+    /// The table, if there is one.
     pub(super) written: Option<&'a Node>,
-    /// Where it is, or would be.
+    /// Position of the table, or of the document if there is no table.
     pub(super) place: Place,
     pub(super) errors: &'a Errors,
 }
 
 impl Names<'_> {
-    /// Checks that all columns, values and metrics exist, each named once.
+    /// Checks that all columns, values and metrics exist, and that none is listed twice.
     pub(super) fn check(&self, axes: &[Axis]) {
         self.columns(axes);
         self.metrics();
@@ -90,7 +90,7 @@ impl Names<'_> {
         }
     }
 
-    /// Checks that some trial is compared with the truth in the way that each metric needs.
+    /// Checks that at least one trial uses the alignment that each metric needs.
     pub(super) fn check_alignments(&self, trials: &[Trial]) {
         if trials.is_empty() {
             return;
@@ -113,7 +113,7 @@ impl Names<'_> {
         self.errors.report(self.place_of(field, &name), Fault::UnknownName { what, name, known });
     }
 
-    /// Where a field of the summary names something; last, where it does so twice.
+    /// Returns the position at which a field of the summary names something; for duplicates the last one.
     fn place_of(&self, field: &str, name: &str) -> Place {
         let Some(Value::Table(table)) = self.written.map(|node| &node.value) else {
             return self.place.clone();
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
     use manifactor_config::{Document, Format};
 
-    /// What is wrong with a summary over the columns `seed` and `model`; nothing, where it is right.
+    /// Returns the errors of a summary over the columns `seed` and `model`; empty if it is valid.
     fn wrong(summary: &str) -> String {
         let text = format!(
             "axes = [{{ columns = {{ seed = 'a', model = 'b' }}, rows = [[1, 'x'], [2, 'y']] }}]\nsummary = {{ {summary} }}"

@@ -1,13 +1,14 @@
-//! One of several parts of an experiment, for a process of its own, on any machine.
+//! Shards: parts of an experiment that run in separate processes, on any machine.
 //!
-//! A shard has every N-th trial, a folder of its own beside that of the experiment, and a journal there. The experiment
-//! itself begins with what its shards have done; its tables are those of a single run.
+//! A shard has every N-th trial, a separate folder beside the experiment's folder, and a log in it. The
+//! experiment itself begins with the trials that its shards have finished. Its tables are equal to the tables
+//! of a single run.
 use super::Experiment;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// The folder of all shards, by that of their experiment: `out/sweep.shards`.
+/// Returns the folder of all shards of an experiment: `out/sweep.shards`.
 fn beside(output: &Path) -> PathBuf {
     let name = output.file_name().unwrap_or(OsStr::new("experiment"));
     output.with_file_name([name, OsStr::new(".shards")].join(OsStr::new("")))
@@ -16,13 +17,13 @@ fn beside(output: &Path) -> PathBuf {
 /// The K-th of N parts, written `K/N`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
-    /// From 1.
+    /// Number of the part, from 1.
     number: usize,
-    /// How many there are.
+    /// Number of all parts.
     of: usize,
 }
 
-/// A text that is no shard.
+/// Error for a text that is not a shard.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("expected K/N, the K-th of N parts, such as 2/8; got `{0}`")]
 pub struct NoShard(String);
@@ -39,7 +40,7 @@ impl FromStr for Shard {
 }
 
 impl Experiment {
-    /// Keeps one part of the trials, whose results go to a folder of its own.
+    /// Keeps one part of the trials. Its results go to a separate folder.
     pub fn keep(&mut self, Shard { number, of }: Shard) {
         let mut place = 0..;
         self.trials.retain(|_| place.next().is_some_and(|i| i % of == number - 1));
@@ -47,7 +48,7 @@ impl Experiment {
     }
 }
 
-/// The folders of an experiment's shards, by name.
+/// Returns the folders of an experiment's shards, sorted by name.
 pub(crate) fn folders(output: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(beside(output)).into_iter().flatten();
     let mut folders: Vec<_> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();

@@ -4,30 +4,32 @@ use manifactor_graph::checked::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[summary]`: what is averaged, and what is compared with what.
+/// `[summary]`: means over trials, and comparisons with a baseline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SummarySettings {
-    /// Columns whose values are kept apart.
+    /// Columns that distinguish groups of trials.
     pub by: Vec<String>,
-    /// A column and one of its values: each other value is compared with it, over trials that are alike in all other
-    /// columns.
+    /// A column and one of its values, the baseline. Every further value is compared with it, over pairs of
+    /// trials that are equal in all remaining columns.
     #[schemars(with = "std::collections::HashMap<String, String>")]
     pub baseline: IndexMap<String, String>,
-    /// Trials that are alike in these columns are drawn together; each alone, where none is named.
+    /// Trials with equal values in these columns form a cluster and are resampled together. Default: each
+    /// trial is a cluster.
     pub clusters: Vec<String>,
-    /// What is averaged: columns of measures.
+    /// Metrics to average: columns of measures.
     #[schemars(extend("description" = described()))]
     pub metrics: Vec<String>,
-    /// A column in `by` whose values stand side by side in `summary.md`: a column of the table for each, metric by metric.
+    /// A column in `by` whose values are side by side in `summary.md`: each metric has one column of the
+    /// table for each value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub across: Option<String>,
-    /// A column of numbers in `by` that reports draw the metrics over.
+    /// A numeric column in `by` that is the horizontal axis of the metrics in reports.
     pub curve: Option<String>,
-    /// How often trials are drawn anew. At most a million: with that many the ends of an interval are settled to a
+    /// Number of bootstrap resamples. At most a million, at which the ends of an interval are accurate to a
     /// thousandth of its width.
     pub resamples: Count<0, 1_000_000>,
-    /// Of the random numbers that they are drawn by.
+    /// Seed of the resampling.
     pub seed: u64,
 }
 
@@ -46,13 +48,13 @@ impl Default for SummarySettings {
     }
 }
 
-/// The description of `metrics`, with all names.
+/// Returns the description of `metrics`, with all names.
 fn described() -> String {
     format!("What is averaged: columns of measures. They are {}.", measure_names_in_words())
 }
 
 impl SummarySettings {
-    /// The column whose values are compared, and the one they are compared with.
+    /// Returns the column whose values are compared, and the value of the baseline.
     pub fn compared(&self) -> Option<(&str, &str)> {
         self.baseline.first().map(|(column, value)| (column.as_str(), value.as_str()))
     }

@@ -1,9 +1,9 @@
-//! The table of an experiment as Markdown, for `summary.md`.
+//! Table of an experiment as Markdown, for `summary.md`.
 use super::{Group, Summary};
 use indexmap::{IndexMap, IndexSet};
 
 impl Summary {
-    /// A table of means for people, with the difference from the baseline behind each that is compared.
+    /// Returns a table of means for people. A compared mean is followed by its difference from the baseline.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let (header, rows) = match &self.across {
@@ -17,13 +17,13 @@ impl Summary {
             + &rows.iter().map(|row| line(row)).collect::<String>()
     }
 
-    /// Names of the columns of [`rows`](Self::rows).
+    /// Returns the names of the columns of [`rows`](Self::rows).
     pub fn header(&self) -> Vec<String> {
         let counts = ["trials", "failed", "not converged"].map(str::to_owned);
         self.columns.iter().cloned().chain(counts).chain(self.metrics.clone()).collect()
     }
 
-    /// A row for each group, for people: means, and behind each the difference from the baseline.
+    /// Returns a row for each group, for people: means, each followed by its difference from the baseline.
     pub fn rows(&self) -> impl Iterator<Item = Vec<String>> {
         self.groups.iter().map(|group| {
             let counts = [group.trials, group.failed, group.not_converged].map(|n| n.to_string());
@@ -32,7 +32,8 @@ impl Summary {
         })
     }
 
-    /// Header and rows, without the numbers of trials that failed or did not converge where there is none.
+    /// Returns header and rows. The numbers of failed and unconverged trials are left out if they are all
+    /// zero.
     fn without_zeros(&self) -> (Vec<String>, Vec<Vec<String>>) {
         let counts = self.columns.len() + 1;
         let all_well = self.groups.iter().all(|group| group.failed + group.not_converged == 0);
@@ -46,8 +47,8 @@ impl Summary {
         (kept(self.header()), self.rows().map(kept).collect())
     }
 
-    /// Header and rows with the values of one column beside each other, metric by metric. A group with trials that failed, or ended without
-    /// a minimum, has their number behind.
+    /// Returns header and rows with the values of one column side by side, for each metric. The number of
+    /// trials that failed or did not converge follows the mean of their group.
     fn side_by_side(&self, column: &str) -> (Vec<String>, Vec<Vec<String>>) {
         let place = self.columns.iter().position(|name| name == column);
         let (mut values, mut rows): (IndexSet<&str>, IndexMap<Vec<&str>, Vec<&Group>>) = Default::default();
@@ -87,14 +88,14 @@ impl Summary {
 }
 
 impl Group {
-    /// A mean, and the difference from the baseline.
+    /// Returns a mean, followed by its difference from the baseline.
     fn cell(&self, metric: &str) -> String {
         let mean = self.means.get(metric).map_or("-".to_owned(), |mean| rounded(mean.mean));
         self.comparisons.get(metric).map_or(mean.clone(), |c| format!("{mean} ({c})"))
     }
 }
 
-/// Four digits that count, and no more than five behind the point.
+/// Formats with four significant digits, and at most five decimals.
 fn rounded(x: f64) -> String {
     let before = if x == 0.0 { 0 } else { x.abs().log10().floor().clamp(-9.0, 9.0) as i32 };
     format!("{x:.*}", (3 - before).clamp(0, 5) as usize)

@@ -1,15 +1,15 @@
-//! All trials that are done, in the order of the experiment.
+//! Tables of all finished trials, in the order of the experiment.
 use crate::document::Experiment;
 use crate::journal::TrialLog;
 use crate::trial::{TrialOutcome, TrialRecord};
 use indexmap::IndexSet;
 use manifactor_formats::table::{Column, Table};
 
-/// A row for each trial that is done: its columns, `status` (`failed`, or how the solve ended), the `reason` of a
-/// failure, and every measure that any trial has.
+/// Returns a row for each finished trial: its columns, `status` (`failed`, or the termination of the solve),
+/// the `reason` of a failure, and every measure that any trial has.
 ///
-/// The order is that of the experiment, and no time is in it: it is the same however often the experiment was
-/// interrupted, and whatever number of threads it ran on.
+/// The rows have the order of the experiment and contain no times. The table is therefore independent of
+/// interruptions and of the number of threads.
 pub fn trials_table(experiment: &Experiment, journal: &TrialLog) -> Table {
     let records: Vec<&TrialRecord> = records(experiment, journal).collect();
     let measures: IndexSet<&str> =
@@ -27,7 +27,7 @@ pub fn trials_table(experiment: &Experiment, journal: &TrialLog) -> Table {
     Table { columns }
 }
 
-/// How long each trial took, in seconds.
+/// Returns the duration of each trial in seconds.
 pub(crate) fn times_table(experiment: &Experiment, journal: &TrialLog) -> Table {
     let records: Vec<&TrialRecord> = records(experiment, journal).collect();
     let mut columns = labels(experiment, &records);
@@ -36,7 +36,7 @@ pub(crate) fn times_table(experiment: &Experiment, journal: &TrialLog) -> Table 
     Table { columns }
 }
 
-/// The trials that are done, in the order of the experiment.
+/// Returns the finished trials in the order of the experiment.
 pub(super) fn records<'a>(
     experiment: &'a Experiment,
     journal: &'a TrialLog,
@@ -52,7 +52,7 @@ fn labels(experiment: &Experiment, records: &[&TrialRecord]) -> Vec<(String, Col
 }
 
 impl TrialOutcome {
-    /// `failed`, or how the solve ended.
+    /// Returns `failed`, or the termination of the solve.
     pub fn status(&self) -> &str {
         match self {
             Self::Solved { termination, .. } => termination,
@@ -60,7 +60,7 @@ impl TrialOutcome {
         }
     }
 
-    /// Why it failed; nothing, where it did not.
+    /// Returns the reason of a failure; empty if the trial did not fail.
     pub fn reason(&self) -> &str {
         match self {
             Self::Solved { .. } => "",
@@ -68,7 +68,7 @@ impl TrialOutcome {
         }
     }
 
-    /// What is measured, in order.
+    /// Returns the measures in order.
     pub fn measures(&self) -> impl Iterator<Item = (&str, f64)> {
         let measures = match self {
             Self::Solved { measures, .. } => Some(measures),
@@ -77,7 +77,7 @@ impl TrialOutcome {
         measures.into_iter().flatten().map(|(name, value)| (name.as_str(), *value))
     }
 
-    /// One measure; `None` where it is not known.
+    /// Returns one measure; `None` if it is unknown.
     pub fn measure(&self, name: &str) -> Option<f64> {
         match self {
             Self::Solved { measures, .. } => measures.get(name).copied(),

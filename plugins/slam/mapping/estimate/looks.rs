@@ -1,4 +1,4 @@
-//! How often objects were there to be seen, and were seen.
+//! Opportunities to detect each object, and the detections among them.
 use crate::estimate::{Estimate, Landmark};
 use crate::mapping::measurements::{Measured, ObjectBox};
 use manifactor_geometry::Se3;
@@ -8,31 +8,33 @@ use manifactor_recording::sequence::ObjectId;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-/// Another look begins where an object is seen from another direction, in radians,
+/// Change of the viewing direction at which a new opportunity begins, in radians.
 const ANGLE: f64 = 0.1;
-/// or so many seconds later, when the detector errs in another way.
+/// Time after which a new opportunity begins, in seconds: the detector errs differently by then.
 const SECONDS: f64 = 1.0;
-/// An object of which others in front of it cover more than this share of its outline is hidden.
+/// An object is occluded if a nearer object covers more than this share of its outline.
 const HIDDEN: f64 = 0.2;
-/// It is too far away to be seen where its outline is smaller than this part of the smallest box that it ever had, both by the roots of
-/// their areas.
+/// An object is too far away to be detected if its outline is smaller than this share of its smallest box so
+/// far. Both sizes are square roots of areas.
 const FAR: f64 = 0.5;
 
-/// It should be seen again from where it was seen: from no other direction than this, in radians.
+/// An object should be detected again from viewing directions within this angle of an earlier detection, in
+/// radians.
 const NEAR: f64 = 0.26;
 
-/// The looks at an object.
+/// Opportunities to detect an object.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Looked {
     /// All looks.
     pub all: Looks,
-    /// Those that began until it was seen last.
+    /// Opportunities that began before the last detection.
     pub before: Looks,
-    /// Those since then from where it was seen; from anywhere, where no view says.
+    /// Later opportunities from a direction with an earlier detection. All later ones if the object has no
+    /// detections.
     pub since: usize,
 }
 
-/// The looks at an object so far, of which the last goes on.
+/// Opportunities so far. The last one continues.
 #[derive(Default)]
 struct Counted {
     looked: Looked,
@@ -41,7 +43,7 @@ struct Counted {
 }
 
 impl Counted {
-    /// Begins another look.
+    /// Starts a new opportunity.
     fn look(&mut self, views: &[ObjectBox], sight: &Sight) {
         self.looked.all.expected += 1;
         let is_near = || self.seen_from.iter().any(|seen| seen.angle(&sight.from) < NEAR);
@@ -53,7 +55,7 @@ impl Counted {
         self.is_seen = false;
     }
 
-    /// Notes that the object is seen in the look that goes on.
+    /// Records a detection in the current opportunity.
     fn see(&mut self, from: Vector3<f64>) {
         if !self.is_seen {
             self.looked.all.seen += 1;
@@ -64,7 +66,7 @@ impl Counted {
     }
 }
 
-/// The looks at each mapped object, by where it and the camera are estimated to be.
+/// Returns the opportunities to detect each mapped object, from the estimated poses and objects.
 pub fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Looked> {
     let measured = |id: ObjectId| estimate.mapping.measurements.object(id);
     let expected = |landmark: &Landmark<'_>| {
@@ -88,23 +90,24 @@ pub fn looks(estimate: &Estimate, border: f64) -> BTreeMap<ObjectId, Looked> {
     all.into_iter().map(|(id, counted)| (id, counted.looked)).collect()
 }
 
-/// A frame in which an object is there to be seen.
+/// A frame with a visible object.
 #[derive(Debug, Clone, Copy)]
 pub struct Sight {
     /// The object.
     pub id: ObjectId,
     /// Number of the frame.
     pub frame: usize,
-    /// The camera.
+    /// Pose of the camera.
     pub pose: Se3,
-    /// The camera, from the object's centre.
+    /// Vector from the centre of the object to the camera.
     from: Vector3<f64>,
-    /// Whether it is another look, and not the one that goes on.
+    /// True if a new opportunity begins here.
     pub begins: bool,
 }
 
-/// Tells of all sights of objects from frames, each with its time stamp in seconds and its pose. An object is there to be seen where all of its outline is
-/// in the image, `border` pixels from its sides, about as large at least as it was seen before, and nothing that is mapped hides it.
+/// Calls `tell` for each visible object of each frame (index, timestamp in seconds, pose). An object counts
+/// as visible if its whole outline is at least `border` pixels inside the image, it is not much smaller than
+/// its smallest box, and no mapped object occludes it.
 pub fn sights(
     objects: &[Expected],
     frames: impl Iterator<Item = (usize, f64, Se3)>,
@@ -112,7 +115,7 @@ pub fn sights(
     border: f64,
     mut tell: impl FnMut(Sight),
 ) {
-    // when the look that goes on began, and from where
+    // start time and first direction of the current opportunity
     let mut looks: BTreeMap<ObjectId, (f64, Vector3<f64>)> = BTreeMap::new();
     for (frame, seconds, pose) in frames {
         for (id, from) in in_view(objects, &pose, camera, border) {
@@ -128,22 +131,23 @@ pub fn sights(
     }
 }
 
-/// An object that may be there to be seen.
+/// An object that may be visible.
 pub struct Expected {
     id: ObjectId,
     quadric: DualQuadric,
-    /// An outline of less is too small to be seen, in square pixels.
+    /// Smallest outline that counts as visible, in square pixels.
     area: f64,
 }
 
 impl Expected {
-    /// One whose smallest box had this size, in pixels: the root of its area.
+    /// Creates the entry of an object. `least_px` is the size of its smallest box: the square root of the
+    /// area, in pixels.
     pub fn new(id: ObjectId, quadric: DualQuadric, least_px: Option<f64>) -> Self {
         Self { id, quadric, area: (FAR * least_px.unwrap_or_default()).powi(2) }
     }
 }
 
-/// Objects that are there to be seen from a pose, with the directions from which they are.
+/// Returns the objects that are visible from a pose, with the vectors from their centres to the camera.
 fn in_view(objects: &[Expected], pose: &Se3, camera: &Camera, border: f64) -> Vec<(ObjectId, Vector3<f64>)> {
     let nothing = BoundingBox { xmin: 0.0, ymin: 0.0, xmax: 0.0, ymax: 0.0 };
     let factor = BoundingBoxFactor { bounding_box: nothing, camera: *camera, model: BoxModel::Standard };

@@ -1,9 +1,10 @@
-//! Each object fitted alone to its own factors, from several places, with the poses held.
+//! Fit of each object alone to its own factors, from several initial values, with the poses fixed.
 //!
-//! An orientation factor looks at the longest axis only. Where two axes are equally long its cost jumps: there is a
-//! valley for each axis that might be the longest, and the floor of a valley often lies on its edge. A joint solve
-//! stays in the valley where it begins, and one object on an edge stops all others, since each step that crosses the
-//! edge raises the cost. One object alone is nine numbers: all its valleys can be tried.
+//! An orientation factor depends on the longest axis only, so its cost jumps if two axes swap their order.
+//! There is one valley for each axis that might be the longest, and its minimum often lies on the edge. A
+//! joint solve stays in the valley of its initial value. One object on an edge blocks all objects, because
+//! each step across it raises the cost. A single object has only nine parameters, so all valleys can be
+//! tried.
 use crate::mapping::Mapping;
 use indexmap::IndexMap;
 use manifactor_geometry::{Se3, So3};
@@ -13,7 +14,7 @@ use manifactor_quadric::{DualQuadric, SHORTEST};
 use manifactor_solve::{DiagonalLimits, LevenbergMarquardt, Optimizer, Problem, Silent, Stopping};
 use nalgebra::{Rotation3, Vector3};
 
-/// How much longer than the others the longest axis of a start is.
+/// Ratio of the longest axis of an initial value to its other axes.
 const ELONGATION: f64 = 1.5;
 
 /// The objects of a map, each with its factors.
@@ -24,12 +25,12 @@ pub(crate) struct Refiner<'a> {
 }
 
 impl<'a> Refiner<'a> {
-    /// Sorts the factors of a map by object.
+    /// Groups the factors of a map by object.
     pub(crate) fn new(mapping: &'a Mapping) -> Self {
         let mapped = mapping.mapped().map(|object| (object.key.clone(), vec![]));
         let mut objects: IndexMap<Key, Vec<&FactorEntry>> = mapped.collect();
         for entry in mapping.graph.factors() {
-            // one between two objects is a factor of both
+            // a factor between two objects belongs to both
             for key in &entry.keys {
                 if let Some(entries) = objects.get_mut(key) {
                     entries.push(entry);
@@ -39,7 +40,7 @@ impl<'a> Refiner<'a> {
         Self { objects: objects.into_iter().collect(), up: mapping.frame.up }
     }
 
-    /// Puts each object where it costs the least, as far as any of the starts leads there.
+    /// Moves each object to the best minimum that any of the initial values leads to.
     pub(crate) fn refine(&self, values: &mut Values) {
         for (key, entries) in &self.objects {
             if let Ok(start) = values.get::<DualQuadric>(key).copied() {
@@ -50,8 +51,8 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// The quadric among those that several starts lead to that leaves the fewest of its factors undefined, and then costs the
-/// least; `start` itself, where none is better. Other variables are held where `others` has them.
+/// Minimizes from several initial values, with other variables fixed at their values in `others`. Returns the
+/// result with the fewest undefined factors, then the lowest cost. Returns `start` if no result is better.
 pub fn refined(
     key: &Key,
     start: DualQuadric,
@@ -60,7 +61,7 @@ pub fn refined(
     up: Option<Direction>,
 ) -> DualQuadric {
     let (graph, mut values) = alone(key, start, entries.iter().copied(), others);
-    // what cannot be compiled is reported by the joint solve
+    // the joint solve reports a graph that cannot be compiled
     let Ok(mut problem) = Problem::compile(&graph, &values) else { return start };
     let mut best = (rank(&problem), start);
     for candidate in starts(&start, upright(up)) {
@@ -79,7 +80,8 @@ pub fn refined(
     best.1
 }
 
-/// The graph of one object and its factors, where it starts, and the variables that these join it with, which are held.
+/// Returns the graph of one object with its factors and its initial value. The further variables of these
+/// factors are fixed.
 pub(super) fn alone<'a>(
     key: &Key,
     start: DualQuadric,
@@ -100,10 +102,11 @@ pub(super) fn alone<'a>(
     (graph, values)
 }
 
-/// The start itself; a ball; and ellipsoids that are longest along each of these axes.
+/// Returns the initial values: the start itself, a ball, and an ellipsoid elongated along each of the given
+/// axes.
 fn starts(start: &DualQuadric, axes: So3) -> Vec<DualQuadric> {
     let s = start.semi_axes;
-    // the middle one is the least likely to be far off
+    // the middle semi-axis is the one least likely to be far off
     let radius = (s.sum() - s.min() - s.max()).max(SHORTEST);
     let pose = Se3::new(axes, start.centroid());
     let along_axes = |semi_axes| DualQuadric { pose, semi_axes };
@@ -116,14 +119,15 @@ fn starts(start: &DualQuadric, axes: So3) -> Vec<DualQuadric> {
     starts
 }
 
-/// Axes of which one is up.
+/// Returns axes with one of them vertical.
 fn upright(up: Option<Direction>) -> So3 {
     let rotation = Rotation3::rotation_between(&Vector3::z(), &up.unwrap_or_default());
-    // there is none for exactly upside down, which is as good as upright
+    // for exactly upside down the rotation is not unique, and upright axes are as good
     rotation.map_or_else(So3::identity, |rotation| So3::from_matrix(rotation.matrix()))
 }
 
-/// Factors that are not defined, then the cost: a lost factor lowers the cost, and is no gain.
+/// Returns the number of undefined factors, then the cost. An undefined factor lowers the cost, but it is a
+/// loss.
 fn rank(problem: &Problem) -> (usize, f64) {
     let factors = problem.inspect();
     let cost: f64 = factors.iter().map(|factor| factor.cost).sum();
@@ -135,11 +139,11 @@ fn solver() -> LevenbergMarquardt {
     roughly(30, NotNegative::literal(1e-5))
 }
 
-/// Descends until a step lowers the cost by less than this share of it.
+/// Returns a solver that stops when a step lowers the cost by less than this share.
 pub(super) fn roughly(max_iterations: usize, relative_cost: NotNegative) -> LevenbergMarquardt {
     let stop = Stopping { max_iterations, relative_cost, ..Stopping::default() };
-    // damping of one size for all directions: a semi-axis that has all but vanished has next to no derivative, and
-    // damping in proportion to that would let it go
+    // equal damping for all directions: damping in proportion to the Hessian would let a semi-axis vanish,
+    // because the derivatives of a very short one are almost zero
     LevenbergMarquardt {
         diagonal: DiagonalLimits::EVEN,
         initial_lambda: Positive::literal(1e-3),

@@ -1,11 +1,12 @@
-//! Variance components: how large the noise is, estimated from the data that it is in. No ground truth takes part, and what a
-//! document says of the noise does not either.
+//! Variance components: standard deviations of the noise, estimated from the measurements. The estimate uses
+//! neither ground truth nor the standard deviations of the run document.
 //!
-//! The noise of *boxes* is that of their residuals: one of standard deviation σ has variance σ²(1 - h) at the estimate, h its leverage
-//! (Helmert; Förstner, *Ein Verfahren zur Schätzung von Varianz- und Kovarianzkomponenten*, 1979). The noise of *odometry* is the one
-//! that leads to the trajectory which suits objects best that had no part in it.
+//! The noise of *boxes* comes from their residuals. With a standard deviation σ, a residual at the
+//! estimate has the variance σ²(1 - h) with its leverage h (Helmert; Förstner, *Ein Verfahren zur
+//! Schätzung von Varianz- und Kovarianzkomponenten*, 1979). The noise of *odometry* is chosen by
+//! cross-validation: its trajectory has to fit the objects that were left out of the solve.
 //!
-//! The errors of consecutive boxes are correlated. Boxes have a standard deviation that is larger for it.
+//! Errors of consecutive boxes are correlated. The standard deviation of boxes is larger to account for it.
 mod boxes;
 mod components;
 mod correlation;

@@ -7,11 +7,11 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Up is what an accelerometer feels.
+/// The up direction is the mean of accelerometer readings.
 ///
-/// Held still, an accelerometer reads 9.8 m/s² upwards. A hand that holds a camera is never still: readings are turned
-/// into the frame of the odometry by the frame nearest in time, and averaged there, where pushes to and fro cancel
-/// out. The map stays in that frame.
+/// At rest, an accelerometer measures 9.8 m/s² upwards. A hand-held camera is never at rest. So each reading
+/// is rotated into the odometry frame by the pose of the nearest frame. The mean over the window cancels
+/// accelerations back and forth. The map stays in the odometry frame.
 ///
 /// ```toml
 /// gravity = { type = "accelerometer", window = 10.0, camera_from_sensor = [0.0, 0.0, 1.0, 0.0] }
@@ -19,11 +19,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Accelerometer {
-    /// Readings this near in time to the first frame are averaged, in seconds: the longer, the less the pushes count, and
-    /// the more the drift of the odometry.
+    /// Largest time difference to the first frame at which a reading is used. A longer window reduces the
+    /// effect of accelerations and increases the effect of odometry drift. Unit: seconds.
     pub window: NotNegative,
-    /// Rotation from the sensor's frame to the camera's, a unit quaternion (x, y, z, w). The Kinect's of TUM RGB-D
-    /// is half a turn about z, [0, 0, 1, 0].
+    /// Rotation from the sensor frame to the camera frame, as a unit quaternion (x, y, z, w). For the Kinect
+    /// of TUM RGB-D it is half a turn about z: [0, 0, 1, 0].
     pub camera_from_sensor: Quaternion,
 }
 
@@ -79,7 +79,7 @@ impl Gravity for Accelerometer {
 }
 register!(dyn Gravity, "accelerometer", Accelerometer);
 
-/// The frame nearest in time.
+/// Returns the frame nearest in time.
 fn frame_at(frames: &[Frame], timestamp: f64) -> Option<&Frame> {
     let after = frames.partition_point(|frame| frame.timestamp < timestamp);
     let around = frames.get(after.saturating_sub(1)..frames.len().min(after + 1)).unwrap_or_default();

@@ -5,10 +5,10 @@ use manifactor_recording::sequence::Sequence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Up is the z axis of the ground truth.
+/// The up direction is the z axis of the ground truth.
 ///
-/// The ground-truth pose nearest in time to the first frame puts the map into the frame of the ground truth, as
-/// the paper did. An experimenter's choice: a robot has no ground truth.
+/// The ground-truth pose nearest in time to the first frame moves the map into the frame of the ground truth,
+/// as in the paper. Only for experiments, because a robot has no ground truth.
 ///
 /// ```toml
 /// gravity = { type = "ground_truth" }
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GroundTruthPose {
-    /// How near that pose has to be, in seconds.
+    /// Largest time difference between that pose and the first frame. Unit: seconds.
     pub max_time_difference: NotNegative,
 }
 

@@ -4,9 +4,9 @@ use manifactor_recording::sequence::Sequence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Up as the data source knows it; a simulator does, real data seldom do.
+/// The up direction comes from the data source. Simulators provide it, real data seldom do.
 ///
-/// The map stays in the frame of the odometry.
+/// The map stays in the odometry frame.
 ///
 /// ```toml
 /// gravity = { type = "source" }

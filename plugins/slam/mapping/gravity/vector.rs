@@ -4,10 +4,10 @@ use manifactor_recording::sequence::Sequence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Up as a vector in the frame of the odometry.
+/// The up direction is a given vector in the odometry frame.
 ///
-/// The odometry of a camera often begins with the identity: then this is the frame of the first camera, in
-/// which y points down, and a camera that was held level has `up = [0, -1, 0]`.
+/// The odometry of a camera often begins with the identity. Then its frame is the frame of the first camera,
+/// with y down, and a camera held level has `up = [0, -1, 0]`.
 ///
 /// ```toml
 /// gravity = { type = "vector", up = [0.0, -1.0, 0.0] }
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UpVector {
-    /// Up; any length but zero.
+    /// Up direction. Any length except zero.
     pub up: Direction,
 }
 

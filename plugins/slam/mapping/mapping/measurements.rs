@@ -1,7 +1,8 @@
-//! What is measured of each object: its class, and its boxes after the filters.
+//! Measurements of each object: its class, and its boxes after the filters.
 //!
-//! In this order: boxes without area, detections of no object and of low score are left out; the class is fused from all others; boxes cut
-//! by the border are dropped, or lose a side; of several boxes of an object in one frame the last stays.
+//! The filters, in this order: boxes without area, detections without an object and detections with a low
+//! score are skipped. The class is fused from all remaining ones. Boxes cut by the border are dropped or lose
+//! a side. If an object has several boxes in one frame, the last one counts.
 use crate::settings::{Anchor, DetectionSettings, Settings};
 use manifactor_quadric::{BoundingBox, Camera};
 use manifactor_recording::class::Aliases;
@@ -11,52 +12,52 @@ use manifactor_recording::prior_map::PriorObject;
 use manifactor_recording::sequence::{Detection, ObjectId, Sequence};
 use std::sync::Arc;
 
-/// One box of an object.
+/// A box of an object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectBox {
-    /// Place in the sequence's frames.
+    /// Index of the frame in the sequence.
     pub frame: usize,
     /// The box, in pixels.
     pub bounding_box: BoundingBox,
-    /// Which of its sides are the object's own, and not the border's: xmin, ymin, xmax, ymax.
+    /// Sides inside the border, in the order xmin, ymin, xmax, ymax. Only these belong to the object.
     pub inside: [bool; 4],
-    /// What is measured besides the box.
+    /// Further measurements of the detection.
     pub quantities: Quantities,
 }
 
-/// One object.
+/// The measurements of an object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Its number.
+    /// Object id.
     pub id: ObjectId,
-    /// What an earlier map has of it.
+    /// The object in the prior map.
     pub prior: Option<Arc<PriorObject>>,
     fusion: Fusion,
-    /// Detections that are associated with it.
+    /// Number of detections associated with it.
     pub detections: usize,
-    /// Its boxes that are left, one a frame at most, in order of frames.
+    /// Its remaining boxes in the order of frames, at most one per frame.
     pub views: Vec<ObjectBox>,
 }
 
-/// Which boxes a sequence has of which objects.
+/// Measurements of all objects, and counts of unused detections.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Measurements {
-    /// By number.
+    /// Sorted by id.
     pub objects: Vec<Measured>,
-    /// Detections of no object.
+    /// Detections without an object.
     pub unassociated: usize,
     /// Boxes without width or height.
     pub without_area: usize,
-    /// Detections that score too low.
+    /// Detections with a score that is too low.
     pub low_score: usize,
-    /// Boxes that the border cuts, and that were dropped for it.
+    /// Boxes that were dropped because the border cuts them.
     pub cut: usize,
-    /// Boxes that a later one of the same object in the same frame replaces.
+    /// Boxes that a later box of their object in their frame replaced.
     pub duplicates: usize,
 }
 
 impl Measurements {
-    /// Sorts the detections of a sequence by object.
+    /// Groups the detections of a sequence by object.
     pub fn gather(sequence: &Sequence, settings: &Settings) -> Self {
         let mut all = Self::new(settings.anchor());
         for detection in &sequence.detections {
@@ -65,13 +66,13 @@ impl Measurements {
         all
     }
 
-    /// Nothing but what an earlier map has.
+    /// Starts with the objects of the prior map, without detections.
     pub fn new(anchor: Option<Anchor<'_>>) -> Self {
         let known = anchor.map_or(&[][..], |anchor| &anchor.map.objects);
         Self { objects: known.iter().map(Measured::known).collect(), ..Self::default() }
     }
 
-    /// Sorts one detection in.
+    /// Adds a detection to its object.
     pub fn add(
         &mut self,
         detection: &Detection,
@@ -102,7 +103,7 @@ impl Measurements {
         }
     }
 
-    /// Takes a detection back that was taken for one of an object.
+    /// Removes a detection that was assigned to `from`.
     pub fn take_back(
         &mut self,
         detection: &Detection,
@@ -127,22 +128,22 @@ impl Measurements {
         match sifted {
             Sifted::View(view) => match object.views.iter().position(|own| *own == view) {
                 Some(own) => drop(object.views.remove(own)),
-                // another box of its frame has taken its place
+                // a later box of its frame has replaced it
                 None => self.duplicates = self.duplicates.saturating_sub(1),
             },
             _ => self.cut = self.cut.saturating_sub(1),
         }
     }
 
-    /// Forgets an object: its boxes are of none.
+    /// Removes an object; its detections become unassociated.
     pub fn disown(&mut self, id: ObjectId) {
         if let Ok(place) = self.objects.binary_search_by_key(&id, |object| object.id) {
             self.unassociated += self.objects.remove(place).detections;
         }
     }
 
-    /// Gives what is measured of one object to another, and returns the boxes that are new to it: of two boxes in one frame, its own
-    /// stays.
+    /// Merges the measurements of one object into a second one, and returns the boxes that are new to it. If
+    /// both have a box in a frame, the second object keeps its own.
     pub fn merge(&mut self, from: ObjectId, into: ObjectId) -> Vec<ObjectBox> {
         let Ok(place) = self.objects.binary_search_by_key(&from, |object| object.id) else { return vec![] };
         let gone = self.objects.remove(place);
@@ -159,13 +160,13 @@ impl Measurements {
         new
     }
 
-    /// The object of this number.
+    /// Returns the object with this id.
     pub fn object(&self, id: ObjectId) -> Option<&Measured> {
         let place = self.objects.binary_search_by_key(&id, |object| object.id).ok()?;
         self.objects.get(place)
     }
 
-    /// The place of an object, which may be a new one.
+    /// Returns the index of an object, which is created if it is new.
     fn place(&mut self, id: ObjectId) -> usize {
         let place = self.objects.binary_search_by_key(&id, |object| object.id);
         place.unwrap_or_else(|place| {
@@ -174,25 +175,25 @@ impl Measurements {
         })
     }
 
-    /// All boxes that are left.
+    /// Returns the number of boxes after the filters.
     pub fn boxes(&self) -> usize {
         self.objects.iter().map(|object| object.views.len()).sum()
     }
 }
 
-/// What a detection is good for.
+/// The possible uses of a detection.
 pub enum Sifted {
-    /// For nothing: its box has no width or no height.
+    /// None: its box has no width or no height.
     WithoutArea,
-    /// For nothing: it scores too low.
+    /// None: its score is too low.
     LowScore,
-    /// For the class of its object: the border cuts its box.
+    /// Only the class of its object: the border cuts its box.
     Cut,
-    /// For the object's place as well.
+    /// Class and geometry of its object.
     View(ObjectBox),
 }
 
-/// Passes a detection through the filters.
+/// Applies the filters to a detection.
 pub fn sift(detection: &Detection, camera: &Camera, settings: &DetectionSettings) -> Sifted {
     if !detection.bounding_box.has_area() {
         return Sifted::WithoutArea;
@@ -214,18 +215,18 @@ impl Measured {
         Self { id, prior: None, fusion: Fusion::default(), detections: 0, views: vec![] }
     }
 
-    /// One that an earlier map has.
+    /// Creates the entry of an object of the prior map.
     fn known(object: &Arc<PriorObject>) -> Self {
         Self { fusion: object.classes.clone(), prior: Some(object.clone()), ..Self::new(object.id) }
     }
 
-    /// Its box in a frame, if there is one.
+    /// Returns its box in a frame, if there is one.
     pub fn view(&self, frame: usize) -> Option<&ObjectBox> {
         let place = self.views.binary_search_by_key(&frame, |view| view.frame).ok()?;
         self.views.get(place)
     }
 
-    /// Adds a box; whether it takes the place of another of its frame.
+    /// Adds a box. Returns whether it replaces an earlier box of its frame.
     fn see(&mut self, view: ObjectBox) -> bool {
         let place = self.views.binary_search_by_key(&view.frame, |view| view.frame);
         match place {
@@ -235,28 +236,29 @@ impl Measured {
         place.is_ok()
     }
 
-    /// What all its detections took it for.
+    /// Returns the fused class scores of its detections.
     pub fn classes(&self) -> &Fusion {
         &self.fusion
     }
 
-    /// The name of its class; `None` where no detection named one.
+    /// Returns the name of its class; `None` if no detection has one.
     pub fn class_name(&self) -> Option<&str> {
         self.fusion.leading().map(|(name, _)| name)
     }
 
-    /// Its class; `None` where no detection named one.
+    /// Returns its class; `None` if no detection has one.
     pub fn class(&self) -> Option<FusedClass> {
         self.fusion.best()
     }
 
-    /// The smallest size at which it was ever seen, in pixels: the root of a box's area; `None` where that is not known.
+    /// Returns the size of its smallest box, the square root of its area, in pixels. Includes the prior map;
+    /// `None` if unknown.
     pub fn least_px(&self) -> Option<f64> {
         let seen = self.views.iter().map(|view| view.bounding_box.area().sqrt()).filter(|size| *size > 0.0);
         seen.chain(self.prior.as_ref().and_then(|prior| prior.least_px)).reduce(f64::min)
     }
 
-    /// The larger of the standard deviations of the boxes' widths and heights, in pixels; 0 for no box.
+    /// Returns the larger of the standard deviations of box width and height, in pixels; 0 without boxes.
     pub fn box_deviation(&self) -> f64 {
         let of = |size: fn(&BoundingBox) -> f64| {
             let sizes = self.views.iter().map(|view| size(&view.bounding_box));

@@ -1,4 +1,4 @@
-//! Which objects are mapped, and where they begin.
+//! Selection of the objects to map, and their initial values.
 use super::moving_objects;
 use crate::mapping::measurements::{Measured, ObjectBox};
 use crate::settings::{ObjectSettings, Settings};
@@ -8,57 +8,58 @@ use manifactor_quadric::{Camera, DualQuadric};
 use serde::Serialize;
 use std::fmt;
 
-/// Why an object is not mapped.
+/// Reason why an object is not mapped.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Rejection {
     /// Too few boxes passed the filters.
     Views {
-        /// How many did.
+        /// Number of boxes.
         views: usize,
-        /// How many there should be.
+        /// Required number.
         least: usize,
     },
-    /// Its boxes differ too much in size.
+    /// The sizes of its boxes differ too much.
     BoxDeviation {
         /// The larger of the standard deviations of width and height, in pixels.
         deviation_px: f64,
-        /// Where it should be below.
+        /// Upper limit, in pixels.
         limit_px: f64,
     },
-    /// It is seen from one side only.
+    /// The viewing directions differ too little.
     Parallax {
-        /// The largest angle between two views, in degrees.
+        /// Largest angle between two views, in degrees.
         parallax_deg: f64,
-        /// How large it should be.
+        /// Required angle, in degrees.
         least_deg: f64,
     },
-    /// It does not stand still, or one thing after the other passes through its place: by the depths of its boxes within two seconds.
+    /// It moves, or several objects pass through its place in turn, according to the depths of its boxes
+    /// within two seconds.
     Moves {
-        /// How fast, in m/s.
+        /// Speed in m/s.
         speed: f64,
-        /// Twice the log-likelihood ratio of that to standing still.
+        /// Twice the log-likelihood ratio of this motion to standing still.
         evidence: f64,
-        /// What is allowed.
+        /// Upper limit.
         limit: f64,
     },
-    /// Its depths differ too much within two seconds: it is several things.
+    /// Its depths differ too much within two seconds, so it is several objects.
     Scatters {
-        /// Root mean square by which it seems to be elsewhere, as a part of its depth.
+        /// Root mean square scatter of its position, relative to its depth.
         scatter: f64,
-        /// What is allowed.
+        /// Upper limit.
         limit: f64,
     },
-    /// No ellipsoid could be made of its boxes.
+    /// The initialiser found no ellipsoid for its boxes.
     Initialisation {
-        /// What the initialiser says.
+        /// Message of the initialiser.
         message: String,
     },
 }
 
 impl Rejection {
-    /// The setting that would map the object, or what to change in the recording.
+    /// Returns the setting that would map the object, or advice for the recording.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Views { .. } => "`objects.min_views` sets the least number",
@@ -101,7 +102,8 @@ impl fmt::Display for Rejection {
     }
 }
 
-/// The ellipsoid that an object begins with, in the frame of the poses; `at` has the time and pose of a frame.
+/// Returns the initial ellipsoid of an object, in the frame of the poses. `at` returns time and pose of a
+/// frame.
 pub fn start(
     measured: &Measured,
     at: impl Fn(usize) -> Option<StampedPose>,
@@ -121,7 +123,7 @@ pub fn start(
         })
     };
     let views: Vec<View> = measured.views.iter().filter_map(seen).collect();
-    // over all pairs of views, so it is left out where any will do
+    // the parallax compares all pairs of views, so skip it if there is no limit
     let parallax_deg = if *settings.min_parallax_deg > 0.0 { parallax(&views) } else { 0.0 };
     if parallax_deg < *settings.min_parallax_deg {
         return Err(Rejection::Parallax { parallax_deg, least_deg: *settings.min_parallax_deg });
@@ -131,7 +133,8 @@ pub fn start(
     still(measured, &measured.views, at, &camera, *detections.depth_error).map(|()| start)
 }
 
-/// Returns whether an object stands still, as far as the depths of these boxes of it tell; what an earlier map has does.
+/// Checks that an object stands still, according to the depths of these boxes. Objects of the prior map
+/// always pass.
 pub fn still(
     measured: &Measured,
     views: &[ObjectBox],
@@ -145,7 +148,7 @@ pub fn still(
     moving_objects::still(views, at, camera, depth_error)
 }
 
-/// Returns whether an object has boxes enough, and such as one object has; what an earlier map has needs none.
+/// Checks that an object has enough boxes of consistent size. Objects of the prior map always pass.
 pub fn sound(measured: &Measured, settings: &ObjectSettings) -> Result<(), Rejection> {
     if measured.prior.is_some() {
         return Ok(());

@@ -1,6 +1,7 @@
-//! Semantic factors of a map, which may grow: the factors that rules have brought, and the object of each.
+//! Semantic factors of a growing map: the factors from rules, each with its object.
 //!
-//! A stream asks the rules again and again, as objects come and go. A batch asks once, with all objects in view.
+//! A stream applies the rules repeatedly while objects are added and removed. A batch applies them once to
+//! all objects.
 use super::measurements::{Measured, Measurements};
 use super::{Decision, Rejection, as_candidate, object_key};
 use crate::semantics::{Applied, Candidate, Connected, Judge, LeftOut, RuleError, Verdict};
@@ -11,7 +12,7 @@ use manifactor_recording::sequence::ObjectId;
 use manifactor_smoother::FactorId;
 use std::collections::{BTreeMap, HashMap};
 
-/// All semantic factors that count.
+/// All active semantic factors.
 #[derive(Debug, Clone, Default)]
 pub struct Ledger {
     factors: Vec<Ruled>,
@@ -19,20 +20,20 @@ pub struct Ledger {
     left_out: BTreeMap<ObjectId, Vec<LeftOut>>,
 }
 
-/// One of them.
+/// A factor from a semantic rule.
 #[derive(Debug, Clone)]
 pub struct Ruled {
-    /// The object that the rule was applied to.
+    /// Object that the rule was applied to.
     owner: ObjectId,
     applied: Applied,
-    /// As it was made.
+    /// The factor itself.
     pub entry: FactorEntry,
-    /// Its name in the session, once it has one.
+    /// Its id in the smoother, once it is added.
     id: Option<FactorId>,
 }
 
 impl Ledger {
-    /// Asks the rules about some of all objects, and returns the factors that are new.
+    /// Applies the rules to some of all objects, and returns the new factors.
     ///
     /// # Errors
     /// If a rule cannot be applied.
@@ -51,7 +52,7 @@ impl Ledger {
         for owner in about {
             let Some(candidate) = by_key.get(&object_key(*owner)) else { continue };
             let Verdict { entries, applied, left_out } = judge.judge(candidate)?;
-            // of an object that is asked about for the first time, no factor is further in front
+            // an object that is new to the rules has no earlier factors
             let first = if self.left_out.contains_key(owner) { 0 } else { self.factors.len() };
             self.left_out.insert(*owner, left_out);
             for (entry, applied) in entries.into_iter().zip(applied) {
@@ -65,14 +66,15 @@ impl Ledger {
         Ok(&mut self.factors[before..])
     }
 
-    /// Notes the names in the session of those factors that have none yet, in their order.
+    /// Sets the smoother ids of factors without one, in their order.
     pub fn name(&mut self, ids: Vec<FactorId>) {
         for (factor, id) in self.factors.iter_mut().filter(|factor| factor.id.is_none()).zip(ids) {
             factor.id = Some(id);
         }
     }
 
-    /// Forgets the factors of some objects: their names in the session, and the objects that the rules were applied to.
+    /// Removes the factors of some objects. Returns their smoother ids, and the objects that the rules were
+    /// applied to.
     pub fn revoke(&mut self, of: impl Fn(&Key) -> bool) -> (Vec<FactorId>, Vec<ObjectId>) {
         let (mut ids, mut owners) = (vec![], vec![]);
         let connected = &mut self.connected;
@@ -93,12 +95,12 @@ impl Ledger {
         (ids, owners)
     }
 
-    /// Forgets that the rules were asked about an object.
+    /// Makes an object new to the rules again.
     pub fn forget(&mut self, object: ObjectId) {
         self.left_out.remove(&object);
     }
 
-    /// What the rules have for each object.
+    /// Returns the result of the rules for each object.
     fn verdicts(self) -> BTreeMap<ObjectId, Verdict> {
         let mut verdicts: BTreeMap<ObjectId, Verdict> = BTreeMap::new();
         for (owner, left_out) in self.left_out {
@@ -112,7 +114,7 @@ impl Ledger {
         verdicts
     }
 
-    /// The decisions for a batch: rules are asked about those objects that were not asked about before.
+    /// Returns the decisions for a batch. Applies the rules to the objects that are new to them.
     ///
     /// # Errors
     /// If a rule cannot be applied.

@@ -4,104 +4,104 @@ use serde::{Serialize, Serializer};
 use std::fmt;
 use std::path::PathBuf;
 
-/// What a user should know, though nothing failed.
+/// A warning to the user: nothing failed, but the result may be worse than expected.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
-    /// A class of a semantic rule that no object has.
+    /// A semantic rule names a class that no object has.
     ClassWithoutObjects {
-        /// The class, as the rule has it.
+        /// Class name in the rule.
         class: String,
-        /// The rule's factor.
+        /// Factor of the rule.
         factor: String,
-        /// The classes that objects have.
+        /// Classes of the objects.
         seen: Vec<String>,
     },
-    /// A sign of other units, or of another order of numbers.
+    /// The odometry looks like different units or a different order of numbers.
     Implausible {
-        /// Which.
+        /// Description of the problem.
         what: String,
     },
-    /// Detections that the source has and that are not used.
+    /// Detections of the source that are not used.
     Unused {
-        /// How many of what, why, and the remedy.
+        /// Their number and kind, the cause, and the remedy.
         what: String,
     },
-    /// The same, and more of them than is expected: the map is not one of the whole recording.
+    /// More unused detections than expected: the map does not cover the whole recording.
     TooManyUnused {
-        /// How many of what, why, and the remedy.
+        /// Their number and kind, the cause, and the remedy.
         what: String,
-        /// The share that is expected, from 0 to 1.
+        /// Expected share, from 0 to 1.
         allowed: f64,
     },
-    /// Objects that were detected and are not mapped, for one reason.
+    /// Detected objects that are not mapped, for one reason.
     NotMapped {
-        /// The reason, how many objects it holds for, and their keys.
+        /// The reason, with the number and keys of the objects.
         what: String,
-        /// The setting to change.
+        /// Setting to change.
         remedy: &'static str,
     },
-    /// Objects that no box limits in some direction.
+    /// Objects whose size is not limited by boxes in some direction.
     RunAway {
-        /// Their keys and semi-axes.
+        /// Keys and semi-axes of the objects.
         objects: Vec<String>,
     },
-    /// A map without objects.
+    /// The map has no objects.
     NoObjects {
-        /// Objects that were detected.
+        /// Number of detected objects.
         detected: usize,
     },
-    /// Boxes that may be put to wrong objects, and would count in full.
+    /// Data association may assign boxes to wrong objects, and without a loss they have full weight.
     NotRobust,
-    /// Factors that take no part at the end.
+    /// Factors that are undefined at the estimate.
     Inactive {
-        /// How many.
+        /// Number of such factors.
         inactive: usize,
-        /// Of how many.
+        /// Number of all factors.
         factors: usize,
     },
-    /// A solve that ended without a minimum.
+    /// The solve ended without a minimum.
     NotConverged {
-        /// How it ended.
+        /// Termination of the solve.
         termination: String,
     },
-    /// Directions that nothing but damping holds.
+    /// Directions that no factor constrains, only damping.
     Undetermined {
-        /// Which.
+        /// Description of the directions.
         what: String,
     },
-    /// Errors over less than half of the poses.
+    /// Trajectory errors that cover less than half of the poses.
     FewPoses {
-        /// Poses with a true one at their time.
+        /// Poses with a true pose at their time.
         covered: usize,
         /// Poses of the estimate.
         poses: usize,
-        /// Poses of the truth.
+        /// Poses of the ground truth.
         truth: usize,
-        /// Largest difference in time, in seconds.
+        /// Largest time difference, in seconds.
         within: f64,
     },
-    /// An error that grew.
+    /// The error is larger than the error of the odometry.
     WorseThanOdometry {
-        /// The alignment under which it did.
+        /// Alignment of the comparison.
         alignment: String,
-        /// Of the odometry, in metres.
+        /// Error of the odometry, in metres.
         odometry: f64,
-        /// Of the estimate, in metres.
+        /// Error of the estimate, in metres.
         estimate: f64,
     },
-    /// A run that is nowhere in the map that it was to begin with.
+    /// The start pose in the prior map is unknown.
     NotLocated {
-        /// The file of that map.
+        /// File of the prior map.
         file: PathBuf,
     },
-    /// A journal that does not have all frames of its run.
+    /// The journal lacks frames of its run.
     JournalIncomplete(LostFrames),
-    /// Boxes that were to be held out, and took part.
+    /// Boxes could not be held out, and were used.
     NotHeldOut,
-    /// An estimate without the ground truth that it should be compared with.
+    /// The ground truth for the evaluation is missing.
     NotEvaluated {
-        /// Why.
+        /// Cause.
         reason: String,
     },
 }

@@ -6,11 +6,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// The camera keeps its velocity but for white noise on its acceleration; odometry is used to begin with and is not measured.
+/// Constant velocity with white noise on the acceleration. Odometry only provides initial values; it is not a
+/// measurement.
 ///
-/// Each frame has a velocity `v0`, `v1`, … in its own frame as a second variable, and two frames share a `constant_velocity` factor. A
-/// weak prior holds the first velocity near zero. Suits a camera whose odometry is missing or useless, if boxes of several objects
-/// are in most frames.
+/// Each frame has a second variable, the velocity `v0`, `v1`, … in its own frame. A `constant_velocity`
+/// factor connects two consecutive frames, and a weak prior keeps the first velocity near zero. Use it if
+/// odometry is missing or useless and most frames have boxes of several objects.
 ///
 /// ```toml
 /// motion = { type = "constant_velocity", angular_acceleration = 0.5, linear_acceleration = 0.5 }
@@ -18,13 +19,13 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConstantVelocity {
-    /// Density of the noise on the angular acceleration, in rad/s²/√Hz.
+    /// Noise density of the angular acceleration. Unit: rad/s²/√Hz.
     pub angular_acceleration: Positive,
-    /// Density of the noise on the linear acceleration, in m/s²/√Hz.
+    /// Noise density of the linear acceleration. Unit: m/s²/√Hz.
     pub linear_acceleration: Positive,
-    /// Standard deviation of the first angular velocity, in rad/s.
+    /// Standard deviation of the first angular velocity. Unit: rad/s.
     pub first_angular: Positive,
-    /// Standard deviation of the first linear velocity, in m/s.
+    /// Standard deviation of the first linear velocity. Unit: m/s.
     pub first_linear: Positive,
 }
 
@@ -50,7 +51,7 @@ impl ConstantVelocity {
         Ok(FactorEntry { keys, name: None, factor: Arc::new(factor), noise, loss: None })
     }
 
-    /// The prior on the first velocity.
+    /// Returns the prior on the first velocity.
     fn first(&self, step: &Step<'_>) -> Result<FactorEntry, MotionError> {
         let [angular, linear] = [self.first_angular.get(), self.first_linear.get()];
         let noise = Noise::sigmas(&[angular, angular, angular, linear, linear, linear]);
@@ -64,12 +65,12 @@ impl ConstantVelocity {
     }
 }
 
-/// The key of a frame's velocity.
+/// Returns the key of the velocity of a frame.
 fn velocity_key(frame: usize) -> Key {
     Key::indexed("v", frame)
 }
 
-/// The velocity of a frame as it is estimated.
+/// Returns the estimated velocity of a frame.
 fn velocity(step: &Step<'_>, frame: usize) -> Option<Twist> {
     let estimate = (step.estimates)(velocity_key(frame).as_str())?;
     estimate.erased().as_any().downcast_ref::<Twist>().copied()
@@ -78,7 +79,7 @@ fn velocity(step: &Step<'_>, frame: usize) -> Option<Twist> {
 #[typetag::serialize(name = "constant_velocity")]
 impl MotionModel for ConstantVelocity {
     fn predict(&self, step: &Step<'_>, from: &Se3) -> Se3 {
-        // without a velocity yet, odometry is the better guess
+        // before the first velocity exists, odometry is the better prediction
         velocity(step, step.frames[0]).map_or_else(
             || from.compose(&step.odometry.pose),
             |twist| from.compose(&Se3::exp(&(twist.0 * step.seconds))),
@@ -95,7 +96,7 @@ impl MotionModel for ConstantVelocity {
     }
 
     fn factors(&self, step: &Step<'_>) -> Result<Vec<FactorEntry>, MotionError> {
-        // its prior comes with the first velocity
+        // the prior is added together with the first velocity
         let first = velocity(step, step.frames[0]).is_none().then(|| self.first(step));
         first.into_iter().chain([self.entry(step)]).collect()
     }

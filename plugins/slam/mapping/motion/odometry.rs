@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// The odometry's relative pose ties two frames: r = Log(Z⁻¹ Xᵢ⁻¹ Xᵢ₊₁), with the noise and the loss of `[odometry]`.
+/// The relative pose of the odometry connects consecutive frames: r = Log(Z⁻¹ Xᵢ⁻¹ Xᵢ₊₁), with the noise and
+/// the loss of `[odometry]`.
 ///
 /// ```toml
 /// motion = { type = "odometry" }

@@ -1,4 +1,4 @@
-//! From rules and objects to factors, each with its reason.
+//! Application of rules to objects: the factors, each with its reason.
 use super::{Rule, RuleError};
 use manifactor_graph::{Direction, FactorEntry, Key};
 use manifactor_quadric::DualQuadric;
@@ -7,16 +7,16 @@ use manifactor_recording::fusion::FusedClass;
 use serde::Serialize;
 use std::collections::HashSet;
 
-/// An object that rules look at: one that is mapped.
+/// A mapped object that rules are applied to.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// Its key in the graph.
+    /// Key in the graph.
     pub key: Key,
-    /// What it is taken for.
+    /// Class from all detections.
     pub class: Option<FusedClass>,
-    /// Where it begins.
+    /// Initial value.
     pub start: DualQuadric,
-    /// Whether an earlier map has it, with what rules said of it then.
+    /// True if a prior map contains the object. The map already includes the factors of the rules.
     pub known: bool,
 }
 
@@ -26,57 +26,59 @@ impl Candidate {
     }
 }
 
-/// A factor that a rule brought.
+/// A factor that a rule added.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Applied {
-    /// Its type.
+    /// Type of the factor.
     pub factor: String,
-    /// The rule, from 1, in the order of the document.
+    /// Number of the rule in the document, from 1.
     pub rule: usize,
-    /// The variables that it connects, the object first.
+    /// Variables that the factor connects, the object first.
     pub keys: Vec<Key>,
-    /// Why, in words.
+    /// Reason in words.
     pub because: String,
 }
 
-/// A rule that is for an object's class, and does not apply to it.
+/// A rule that names an object's class but does not apply to it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeftOut {
     /// The type of the rule's factor.
     pub factor: String,
-    /// The rule, from 1, in the order of the document.
+    /// Number of the rule in the document, from 1.
     pub rule: usize,
-    /// Why not, in words.
+    /// Reason in words.
     pub because: String,
 }
 
-/// What the rules have for one object.
+/// Result of all rules for one object.
 #[derive(Debug, Clone, Default)]
 pub struct Verdict {
-    /// The factors.
+    /// Factors to add.
     pub entries: Vec<FactorEntry>,
-    /// The same, with reasons.
+    /// The factors that were added, with reasons.
     pub applied: Vec<Applied>,
-    /// Rules that might have applied.
+    /// Rules of the object's class that do not apply.
     pub left_out: Vec<LeftOut>,
 }
 
-/// Applies rules to one object after the other.
+/// Applies rules to one object after another.
 #[derive(Debug)]
 pub(crate) struct Judge<'a> {
     rules: &'a [Rule],
     aliases: &'a Aliases,
     up: Option<Direction>,
-    /// All objects that are mapped.
+    /// All mapped objects.
     objects: Vec<Candidate>,
     connected: Connected,
 }
 
-/// Which objects a rule has connected, by the rule's place: two that are near each other are so from both sides.
+/// Keys of the objects that a rule has connected, with the index of the rule. Two objects are near each other
+/// from both sides, and this set prevents a second factor.
 pub(crate) type Connected = HashSet<(usize, Vec<Key>)>;
 
 impl<'a> Judge<'a> {
-    /// Over all objects that are mapped; `connected` are those that rules have connected before.
+    /// Creates the judge for all mapped `objects`; `connected` contains those that rules have connected
+    /// before.
     pub(crate) fn new(
         rules: &'a [Rule],
         aliases: &'a Aliases,
@@ -87,15 +89,15 @@ impl<'a> Judge<'a> {
         Self { rules, aliases, up, objects, connected }
     }
 
-    /// What it has connected.
+    /// Returns the objects that rules have connected.
     pub(crate) fn into_connected(self) -> Connected {
         self.connected
     }
 
-    /// What all rules have for an object.
+    /// Applies all rules to an object.
     ///
     /// # Errors
-    /// If a rule needs to know up and up is unknown.
+    /// If a rule needs the up direction and it is unknown.
     pub(crate) fn judge(&mut self, object: &Candidate) -> Result<Verdict, RuleError> {
         let mut verdict = Verdict::default();
         for (i, rule) in self.rules.iter().enumerate() {
@@ -121,7 +123,7 @@ impl<'a> Judge<'a> {
         Ok(verdict)
     }
 
-    /// The variables of a rule's factor, with reasons; `Err` has the reason why there are none.
+    /// Returns the variables of a rule's factor with the reasons, or the reason why there is no factor.
     fn keys(&mut self, i: usize, rule: &Rule, object: &Candidate) -> Result<(Vec<Key>, Vec<String>), String> {
         let partners = rule.factor.partners();
         let met = rule.met(object, &self.objects, partners, self.up, self.aliases)?;

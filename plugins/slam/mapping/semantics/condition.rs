@@ -1,4 +1,4 @@
-//! Which objects a rule is for, besides their class: by score, by size, by what is near.
+//! Conditions of a rule besides the class: score, size and nearby objects.
 use super::{ANY, Candidate, Rule};
 use manifactor_graph::Direction;
 use manifactor_graph::checked::{Positive, Share};
@@ -8,16 +8,18 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Another object, near the one that a rule is for; where the rule's factor connects two objects, the other of them.
+/// Second object near the object of a rule. If the rule's factor connects two objects, this is the second
+/// one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Near {
-    /// Its class. Default: any.
+    /// Classes of the second object. Default: any.
     #[serde(default = "any")]
     pub classes: Vec<String>,
-    /// How wide the gap between the two is at most, along the line through their centres, where the solve begins.
+    /// Largest gap between the two objects at their initial values, along the line through their centres.
+    /// Unit: metres.
     pub within_m: Positive,
-    /// Whether its centre has to be the lower one.
+    /// Requires that the second object's centre is below the centre of the first.
     #[serde(default)]
     pub below: bool,
 }
@@ -26,14 +28,14 @@ fn any() -> Vec<String> {
     vec![ANY.to_owned()]
 }
 
-/// Why a rule applies to an object, and which others are near.
+/// Reasons why a rule applies to an object, and the objects near it.
 pub(super) struct Met<'a> {
     pub because: Vec<String>,
     pub others: Vec<&'a Candidate>,
 }
 
 impl Rule {
-    /// Looks at an object among all; `Err` has the condition that does not hold, in words.
+    /// Checks the conditions for an object among all. `Err` describes the condition that fails.
     pub(super) fn met<'a>(
         &self,
         object: &Candidate,
@@ -77,7 +79,8 @@ impl Rule {
 }
 
 impl Near {
-    /// Those of its classes, and lower if they have to be, with the gaps to them, the nearest first.
+    /// Returns the objects of the required classes, and below if required, with their gaps. The nearest comes
+    /// first.
     fn of<'a>(
         &self,
         object: &Candidate,
@@ -111,14 +114,14 @@ impl Near {
     }
 }
 
-/// The gap between two ellipsoids along the line through their centres; negative, where they overlap.
+/// Returns the gap between two ellipsoids along the line through their centres; negative if they overlap.
 fn gap(a: &DualQuadric, b: &DualQuadric) -> f64 {
     let way = b.centroid() - a.centroid();
     let Some(u) = way.try_normalize(1e-12) else { return -a.semi_axes.min() - b.semi_axes.min() };
     way.norm() - radius(a, &u) - radius(b, &u)
 }
 
-/// How far the surface is from the centre in a direction.
+/// Returns the distance from the centre to the surface in a direction.
 fn radius(quadric: &DualQuadric, u: &Vector3<f64>) -> f64 {
     quadric.pose.rotation.inverse().act(u).component_div(&quadric.semi_axes).norm().recip()
 }

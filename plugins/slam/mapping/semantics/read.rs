@@ -6,26 +6,27 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::Path;
 
-/// `semantics` of a run: which objects get which factors.
+/// `semantics` of a run: rules that assign factors to objects.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 pub enum SemanticsDocument {
-    /// The name of a shipped table, or a file.
+    /// Name of a shipped table, or path of a file.
     Named(String),
-    /// Rules.
+    /// List of rules.
     Rules(Vec<Rule>),
 }
 
-/// A file of semantic rules, which runs name: `semantics = "this_file.toml"`.
+/// A file of semantic rules. A run includes it with `semantics = "this_file.toml"`.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RulesDocument {
-    /// Which objects get which factors.
+    /// Rules that assign factors to objects.
     #[schemars(with = "Vec<Rule>")]
     semantics: Vec<Node>,
 }
 
-/// The rules of a run's document. Files are found from `folder`, the document's own; `own` are the variables that it declares.
+/// Reads the rules of a run's document. Paths are relative to `folder`, the folder of the document; `own` has
+/// the variables that the document declares.
 pub(crate) fn read_semantics(
     semantics: Option<&Node>,
     folder: &Path,
@@ -58,7 +59,7 @@ pub(crate) fn read_semantics(
     }
 }
 
-/// Each rule, over the document's own variables; what is wrong is reported and left out.
+/// Reads each rule over the document's own variables. Errors are reported, and the rule is left out.
 fn rules(items: &[Node], own: &Values, errors: &Errors) -> Vec<Rule> {
     let read = |item: &Node| {
         let rule = item.read::<Rule>(errors)?;
@@ -69,7 +70,7 @@ fn rules(items: &[Node], own: &Values, errors: &Errors) -> Vec<Rule> {
 }
 
 impl Rule {
-    /// Returns whether it makes sense as a whole; what does not is reported where it is written.
+    /// Checks that the rule is consistent. Errors are reported at their position.
     fn check(&self, written: &Node, own: &Values, errors: &Errors) -> Option<()> {
         let place = written.field("factor").unwrap_or(written).place.clone();
         self.factor.check(self.with.iter().zip(written.items("with")), &place, own, errors)?;
@@ -103,14 +104,14 @@ fn rules_named(name: &str, folder: &Path, own: &Values) -> Result<Vec<Rule>, Unr
     }
 }
 
-/// The rules of a file that is shipped.
+/// Reads the rules of a shipped file.
 pub(super) fn shipped_rules(name: &str, text: &str) -> Result<Vec<Rule>, Diagnostics> {
     let document = Document::parse(format!("{name}.toml"), text, Format::Toml)?;
     let rules = rules_of(&document, &Values::new())?;
     Ok(rules.into_iter().map(|rule| Rule { shipped: true, ..rule }).collect())
 }
 
-/// The rules of a document with nothing else in it.
+/// Reads the rules of a document that contains nothing else.
 fn rules_of(document: &Document, own: &Values) -> Result<Vec<Rule>, Diagnostics> {
     let errors = Errors::new();
     let read = document.root().read::<RulesDocument>(&errors);

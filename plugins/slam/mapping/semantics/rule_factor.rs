@@ -9,41 +9,41 @@ use serde_json::Value;
 use std::any::TypeId;
 use std::sync::Arc;
 
-/// A factor of an object, and perhaps of others, whose up may be open until gravity is known.
+/// A factor of one or several objects. Its `up` may stay open until gravity is known.
 #[derive(Debug, Clone, Serialize)]
 #[serde(transparent)]
 pub struct RuleFactor {
-    /// As the config has it, so that what it leaves open stays open in a config that is written.
+    /// The factor as the document has it: if `up` is open, a written document leaves it open as well.
     document: Value,
     #[serde(skip)]
     factor: Arc<dyn Factor>,
-    /// The types of its variables.
+    /// Types of the variables.
     #[serde(skip)]
     variables: Vec<TypeId>,
-    /// Rows of its residual, where that is known.
+    /// Rows of the residual, if known.
     #[serde(skip)]
     pub(super) rows: Option<usize>,
 }
 
-/// Why a rule's factor could not be made.
+/// Error while creating the factor of a rule.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RuleError {
-    /// It needs to know up, and up is unknown.
+    /// The factor needs the up direction, which is unknown.
     #[error(
         "the semantic factor `{factor}` needs to know which way is up, and the data source does not say: \
          set `[gravity]`, for example gravity = {{ type = \"vector\", up = [0.0, 0.0, 1.0] }}"
     )]
     NoUp {
-        /// The factor's type.
+        /// Type of the factor.
         factor: String,
     },
-    /// It cannot be one of two possibilities.
+    /// The factor cannot be a component of a mixture.
     #[error("the semantic factor `{factor}` as a mixture: {source}")]
     Mixture {
-        /// The factor's type.
+        /// Type of the factor.
         factor: String,
-        /// Why.
+        /// Reason.
         source: MixtureError,
     },
 }
@@ -62,27 +62,28 @@ impl RuleFactor {
                         as `beside`";
             return Err(ReadError::new(node.place.clone(), Fault::with_help(message, help)));
         }
-        // numbers that are not finite were refused before
+        // the parser has already refused non-finite numbers
         let document = node.to_json().unwrap_or_default();
         Ok(Self { document, factor, variables, rows: signature.rows })
     }
 
-    /// Its type.
+    /// Returns the type of the factor.
     pub fn name(&self) -> &'static str {
         self.factor.typetag_name()
     }
 
-    /// Returns whether it waits for gravity.
+    /// Returns whether the factor needs the up direction and leaves it open.
     pub fn wants_up(&self) -> bool {
         self.factor.with_up(Direction::Z).is_some()
     }
 
-    /// How many objects it connects the object with.
+    /// Returns the number of further objects that the factor connects with the object.
     pub fn partners(&self) -> usize {
         self.variables.iter().filter(|id| **id == TypeId::of::<DualQuadric>()).count().saturating_sub(1)
     }
 
-    /// Its keys: the object and its partners in the places of objects, `with` in those of other variables.
+    /// Returns the keys in the factor's order: the object and its partners for variables that are objects,
+    /// `with` for the remaining variables.
     pub(super) fn keys(&self, object: &Key, partners: &[Key], with: &[Key]) -> Vec<Key> {
         let mut objects = std::iter::once(object).chain(partners);
         let mut others = with.iter();
@@ -92,7 +93,8 @@ impl RuleFactor {
         self.variables.iter().filter_map(key).collect()
     }
 
-    /// Checks that `with` names a variable for each place that is not an object's.
+    /// Checks that `with` names a variable of the right type for each variable of the factor that is not an
+    /// object.
     pub(super) fn check<'a>(
         &self,
         with: impl ExactSizeIterator<Item = (&'a Key, &'a Node)>,
@@ -134,10 +136,10 @@ impl RuleFactor {
         Some(())
     }
 
-    /// The factor itself.
+    /// Returns the factor with the up direction filled in.
     ///
     /// # Errors
-    /// If it needs to know up and up is unknown.
+    /// If the factor needs the up direction and it is unknown.
     pub fn instantiate(&self, up: Option<Direction>) -> Result<Arc<dyn Factor>, RuleError> {
         match (up, self.wants_up()) {
             (None, true) => Err(RuleError::NoUp { factor: self.name().to_owned() }),

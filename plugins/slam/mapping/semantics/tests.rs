@@ -47,7 +47,7 @@ fn the_factor_gets_up_from_gravity() {
     assert!(matches!(rules[1].entry(vec!["q1".into()], None, 1.0), Err(RuleError::NoUp { .. })));
 }
 
-/// The rules of a document, or what is wrong with it.
+/// Returns the rules of a document, or its errors.
 fn read(text: &str) -> Result<Vec<Rule>, String> {
     let document = Document::parse("rules.toml", text, Format::Toml).unwrap();
     let errors = Errors::new();
@@ -65,7 +65,7 @@ fn rules(semantics: &str) -> Result<Vec<Rule>, String> {
     read(&format!("{TABLE}[[semantics]]\n{semantics}"))
 }
 
-/// An object on a line, half a metre long and as wide as high.
+/// Returns an object on a line, half a metre long; its width equals its height.
 fn object(number: usize, class: &str, score: f64, x: f64) -> Candidate {
     let pose = Se3::new(So3::identity(), Vector3::new(x, 0.0, 0.1 * number as f64));
     let class = FusedClass { name: class.into(), score, share: 1.0, others: Default::default() };
@@ -73,7 +73,7 @@ fn object(number: usize, class: &str, score: f64, x: f64) -> Candidate {
     Candidate { key: Key::indexed("q", number), class: Some(class), start, known: false }
 }
 
-/// What a rule has for each of these objects.
+/// Returns the verdict on each of these objects.
 fn judged(semantics: &str, objects: &[Candidate]) -> Vec<Verdict> {
     let (rules, aliases) = (rules(semantics).unwrap_or_else(|e| panic!("{e}")), Aliases::default());
     let mut judge = Judge::new(&rules, &aliases, Some(Direction::Z), objects.to_vec(), Connected::default());
@@ -92,7 +92,7 @@ fn a_score_decides_and_the_reason_has_it() {
     assert_eq!(found.iter().map(|v| v.entries.len()).collect::<Vec<_>>(), [1, 0, 0]);
     assert_eq!(found[0].applied[0].because, "cup, score 0.80 (at least 0.5)");
     assert_eq!(found[1].left_out[0].because, "score 0.40, not at least 0.5");
-    // a rule for other classes is not worth a word
+    // a rule for other classes is not reported
     assert!(found[2].left_out.is_empty());
 }
 
@@ -147,7 +147,7 @@ fn a_doubtful_class_does_not_get_its_factor_at_full_weight() {
     let mut doubtful = object(1, "box", 0.4, 0.0);
     let class = doubtful.class.as_mut().unwrap();
     (class.share, class.others) = (0.6, [("chair".to_owned(), 0.4)].into_iter().collect());
-    // lying: if it is a chair, it is wrong by 10 σ
+    // lying: wrong by 10 σ if it is a chair
     doubtful.start.semi_axes = Vector3::new(0.3, 0.1, 0.1);
     assert!(judged(&rule(""), std::slice::from_ref(&doubtful))[0].entries.is_empty());
     let cost = |share: f64| {
@@ -157,7 +157,7 @@ fn a_doubtful_class_does_not_get_its_factor_at_full_weight() {
         let r = entry.factor.erased().residual(&[&object.start]).unwrap();
         0.5 * r.iter().map(|r| r * r).sum::<f64>()
     };
-    // 50 at full weight; ½ 3² + ln(p / (1 - p)) for being none
+    // 50 at full weight; ½ 3² + ln(p / (1 - p)) if the object is not a chair
     assert!((cost(0.5) - 4.5).abs() < 1e-9);
     assert!((cost(0.4) - 4.5 - (0.4f64 / 0.6).ln()).abs() < 1e-9);
     let because = &judged(&rule("mixture = true"), &[doubtful])[0].applied[0].because;

@@ -7,44 +7,46 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// `[detections]`: which boxes are used, and how.
+/// `[detections]`: selection, noise and loss of the bounding boxes.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DetectionSettings {
-    /// Of a box: xmin, ymin, xmax, ymax, in pixels.
+    /// Noise of the box sides xmin, ymin, xmax, ymax. Unit: pixels.
     #[serde(deserialize_with = "noise_of::<SIDES, _>")]
     pub noise: Noise,
-    /// How much of a large error counts. Default: all of it.
+    /// Robust loss. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<Arc<dyn Loss>>,
-    /// What of an object a box goes around.
+    /// Part of an object that its box encloses: the whole object, or the part inside the image.
     pub model: BoxModel,
-    /// What becomes of a box with sides at the border.
+    /// Treatment of boxes with sides at the image border: drop the box, mask its cut sides, or keep all
+    /// sides.
     pub cut_sides: CutSides,
-    /// Sides this near to the border count as cut, in pixels.
+    /// Sides this close to the image border count as cut. Unit: pixels.
     pub border_px: NotNegative,
-    /// Detections whose best class scores less are left out.
+    /// Detections whose best class has a lower score are ignored.
     pub min_score: Share,
-    /// Standard deviation of depths, where the source has any, as a part of the depth. Default: 0.03.
+    /// Standard deviation of measured depths as a fraction of the depth, if the source has depths. Default:
+    /// 0.03.
     #[serde(skip_serializing_if = "is_usual")]
     pub depth_error: Positive,
 }
 
-/// What becomes of a box that the border of the image cuts.
+/// Treatment of a box that the image border cuts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CutSides {
-    /// It is dropped.
+    /// Drop the box.
     #[default]
     Drop,
-    /// It keeps the sides that are not cut.
+    /// Keep only the sides that are not cut.
     Mask,
-    /// It stays as it is: right with the truncated model.
+    /// Keep the box unchanged. This is correct with the `truncated` model.
     Keep,
 }
 
 impl CutSides {
-    /// Returns whether a box with these of its sides inside of the image is used.
+    /// Returns whether a box is used if these of its sides are inside the image.
     pub fn accepts(self, inside: [bool; 4]) -> bool {
         match self {
             Self::Drop => inside.iter().all(|inside| *inside),
@@ -54,20 +56,20 @@ impl CutSides {
     }
 }
 
-/// Of a depth, as a part of it, where a document does not say.
+/// Default standard deviation of depths, as a fraction of the depth.
 const DEPTH_ERROR: Positive = Positive::literal(0.03);
 
-/// What is as usual is not written: sources without depths have it as well.
+/// The default is not written, because sources without depths have this setting as well.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
 fn is_usual(depth_error: &Positive) -> bool {
     *depth_error == DEPTH_ERROR
 }
 
-/// Rows of a box's residual.
+/// Rows of a box residual.
 const SIDES: usize = 4;
 
 impl DetectionSettings {
-    /// The noise of a box with these of its sides inside of the image.
+    /// Returns the noise of a box with these of its sides inside the image.
     pub fn noise_of(&self, inside: [bool; 4]) -> Noise {
         match self.cut_sides {
             CutSides::Mask if inside.contains(&false) => self.noise.clone().observing(&inside),

@@ -5,18 +5,20 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
-/// `[evaluation]`: what an estimate is compared with: its trajectory with the truth, its map with boxes that it did without.
+/// `[evaluation]`: compares the trajectory with ground truth, and the map with boxes that the estimate did
+/// not use.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EvaluationSettings {
-    /// Ways to bring the estimate into the frame of the truth, each reported; the first in tables.
+    /// Alignments of the estimate to the ground truth. All of them are reported; tables use the first.
     pub alignments: Vec<Alignment>,
-    /// How far apart in time a pose and its truth may be, in seconds.
+    /// Largest time difference between a pose and its ground truth. Unit: seconds.
     pub max_time_difference: NotNegative,
-    /// Over how many frames relative errors are taken.
+    /// Number of frames that relative errors span.
     pub relative_over: NonZeroUsize,
-    /// Boxes that the estimate does without, and which are then predicted by it; for `manifactor run`: `{ share = 0.2 }` of all at
-    /// random, those of the `{ last = 0.2 }` of the frames, or of `{ block = 30 }` frames of each 150. Default: none.
+    /// Boxes that `manifactor run` withholds from the estimate and then predicts: `{ share = 0.2 }` of all
+    /// boxes at random, all boxes of the `{ last = 0.2 }` of the frames at the end, or the last
+    /// `{ block = 30 }` frames of every 150. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub holdout: Option<Holdout>,
 }
@@ -37,7 +39,7 @@ mod tests {
     use crate::settings::run_document::RunDocument;
     use manifactor_config::{Document, Format};
 
-    /// What is wrong with a run with this line.
+    /// Returns the errors of a run with this line.
     fn refused(line: &str) -> String {
         let source = if line.starts_with("source") { "" } else { "source = { type = 'simulated' }" };
         let document = Document::parse("run.toml", format!("{source}\n{line}\n"), Format::Toml).unwrap();

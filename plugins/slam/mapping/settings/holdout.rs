@@ -6,25 +6,26 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
-/// Boxes that the estimate does without, and which are then predicted by it: how good a map is, where no truth is known.
+/// Boxes that the estimate does not use and then predicts. The prediction error measures the quality of a map
+/// without ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Holdout {
-    /// This share of all boxes, drawn at random; others of the same frames take part.
+    /// This share of all boxes, drawn at random. The remaining boxes of the same frames are used.
     Share(Share),
-    /// Those of the last frames, this share of all.
+    /// All boxes of the last frames, this share of all frames.
     Last(Share),
-    /// Those of so many frames in a row, of each five times as many: longer than a detector's errors last.
+    /// The boxes of the last `n` of every 5`n` frames. Choose `n` longer than a detector's errors last.
     Block(NonZeroUsize),
 }
 
-/// Of so many blocks the last is held out.
+/// The last of this many consecutive blocks is held out.
 const BLOCKS: usize = 5;
-/// Of the draw.
+/// Seed of the random draw.
 const SEED: u64 = 1;
 
 impl Holdout {
-    /// Takes the boxes out of a sequence.
+    /// Removes the held-out boxes from a sequence and returns them.
     pub fn take_from(self, sequence: &mut Sequence) -> Vec<Detection> {
         let mut rng = Pcg64::seed_from_u64(SEED);
         let frames = sequence.frames.len();

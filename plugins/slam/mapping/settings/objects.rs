@@ -9,25 +9,26 @@ manifactor_graph::number! {
     pub Degrees: "a number from 0 to 180", |x| x >= 0.0 && x <= 180.0, { "minimum": 0, "maximum": 180 };
 }
 
-/// `[objects]`: which objects are mapped, and where they begin.
+/// `[objects]`: selection and initialization of the mapped objects.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectSettings {
-    /// Objects with fewer boxes are left out.
+    /// Smallest number of boxes of a mapped object.
     pub min_views: usize,
-    /// Objects whose boxes have a standard deviation of width or height of this or more are left out, in pixels:
-    /// as a rule, detections of several things under one number.
+    /// Objects are not mapped if the width or height of their boxes has this standard deviation or more. Such
+    /// boxes usually show several objects under one number. Unit: pixels.
     pub max_box_deviation_px: NotNegative,
-    /// Objects that are seen under a smaller angle between two views are left out, in degrees: their depth is not
-    /// observed.
+    /// Objects are not mapped if the largest angle between two views is smaller, because their depth is not
+    /// observed. Unit: degrees.
     pub min_parallax_deg: Degrees,
-    /// In a stream: an object is placed as soon as it is seen under this angle between two views, in degrees, though not under less
-    /// than `min_parallax_deg`. What is never seen so is tried once more at the end, with all boxes.
+    /// In a stream, an object is initialized as soon as the angle between two views reaches this value, but
+    /// never below `min_parallax_deg`. Objects that never reach it are tried once more at the end, with all
+    /// boxes. Unit: degrees.
     pub birth_parallax_deg: Degrees,
-    /// How an object's first estimate is made of its boxes.
+    /// Method that computes the initial value of an object from its boxes.
     pub initialiser: Arc<dyn Initialiser>,
-    /// How many times, at most, each object is fitted alone to its own factors, from several places, before all is
-    /// solved jointly; 0 for one joint solve and nothing else.
+    /// Largest number of times that each object is fitted alone to its own factors, from several initial
+    /// values, before the joint solve. 0 for the joint solve only.
     pub refinements: usize,
 }
 

@@ -3,20 +3,20 @@ use manifactor_graph::{FactorEntry, Fixed, Graph, Key, Values, Variable};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
-/// `[[variables]]` and `[[factors]]` of a run: a literal graph that is solved with the map, such as the plane of a table
-/// that semantic rules connect objects with. In the frame of the map.
+/// `[[variables]]` and `[[factors]]` of a run: a literal graph that is solved together with the map, in the
+/// map frame. An example is the plane of a table that semantic rules connect with objects.
 #[derive(Debug, Clone, Default)]
 pub struct OwnGraph {
-    /// Factors among the variables, and which of these are held.
+    /// Factors between the variables, and the variables that are held fixed.
     pub graph: Graph,
-    /// The variables, where the solve begins.
+    /// Initial values of the variables.
     pub values: Values,
 }
 
 impl OwnGraph {
     pub(super) fn take(section: &mut Section<'_>) -> Self {
         if !section.has("variables") && !section.has("factors") {
-            // known all the same, where others are misspelt
+            // still registers both names, so that an error about a misspelt field can suggest them
             let _ = (section.take("variables"), section.take("factors"));
             return Self::default();
         }
@@ -29,7 +29,7 @@ impl OwnGraph {
         Self { graph, values }
     }
 
-    /// Variables whose key is one of these prefixes and a number, each with its prefix.
+    /// Returns the variables whose key is one of these prefixes and a number, each with its prefix.
     pub(super) fn numbered(
         &self,
         prefixes: &'static [&'static str],
@@ -38,7 +38,7 @@ impl OwnGraph {
         self.values.iter().filter_map(move |(key, _)| Some((key, prefix(key)?)))
     }
 
-    /// Puts all of it into a graph.
+    /// Adds the variables and factors to a graph.
     pub fn add_to(&self, graph: &mut Graph, values: &mut Values) {
         for (key, value) in self.values.iter() {
             values.insert_boxed(key.clone(), value.erased().clone_box());
@@ -60,7 +60,7 @@ fn is_of_the_map(key: &Key) -> bool {
     ["x", "q"].iter().any(|prefix| is_numbered(key.as_str(), prefix))
 }
 
-/// As documents write it; nothing at all, where there is nothing.
+/// Writes the form of a document; empty lists are left out.
 impl Serialize for OwnGraph {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]

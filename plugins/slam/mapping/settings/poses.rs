@@ -5,28 +5,28 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::sync::Arc;
 
-/// `[odometry]`: r = Log(Z⁻¹ Xᵢ⁻¹ Xᵢ₊₁), rotation before translation.
+/// `[odometry]`: factors r = Log(Z⁻¹ Xᵢ⁻¹ Xᵢ₊₁) between consecutive poses, rotation before translation.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OdometrySettings {
-    /// Of a relative pose: rad, then m.
+    /// Noise of a relative pose, rotation before translation. Unit: rad, m.
     #[serde(deserialize_with = "noise_of::<POSE_ROWS, _>")]
     pub noise: Noise,
-    /// How much of a large error counts. Default: all of it.
+    /// Robust loss. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss: Option<Arc<dyn Loss>>,
 }
 
-/// `[prior]`: r = Log(Z⁻¹ X₀).
+/// `[prior]`: factor r = Log(Z⁻¹ X₀) on the first pose, rotation before translation.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorSettings {
-    /// Of the first pose: rad, then m.
+    /// Noise of the first pose, rotation before translation. Unit: rad, m.
     #[serde(deserialize_with = "noise_of::<POSE_ROWS, _>")]
     pub noise: Noise,
 }
 
-/// Rows of a pose's residual: rotation, translation.
+/// Rows of a pose residual: rotation, translation.
 const POSE_ROWS: usize = 6;
 
 impl Default for OdometrySettings {
@@ -41,12 +41,13 @@ impl Default for PriorSettings {
     }
 }
 
-/// The same σ in each row: a literal that is positive.
+/// Returns noise with equal σ in each row. The literal `sigma` is positive.
 pub(super) fn every_row(sigma: f64) -> Noise {
     Noise::sigma(sigma).unwrap_or_default()
 }
 
-/// A noise that fits residuals of this many rows: what does not is told once, and not for each factor that gets it.
+/// Reads a noise and checks that it fits residuals with this number of rows. The check reports an error once,
+/// instead of once per factor.
 pub(super) fn noise_of<'de, const ROWS: usize, D: Deserializer<'de>>(from: D) -> Result<Noise, D::Error> {
     let noise = Noise::deserialize(from)?;
     noise.whitener(ROWS).map_err(D::Error::custom)?;

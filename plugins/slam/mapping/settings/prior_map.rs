@@ -12,30 +12,35 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// `[prior_map]`: a map that an earlier run has left, which this one begins with.
+/// `[prior_map]`: map of an earlier run, which this run continues.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PriorMapSettings {
-    /// Its file: `map.json` in the folder of a variant.
+    /// The map file: `map.json` in the output folder of a variant.
     pub file: PathBuf,
-    /// The pose of the first camera in the map's frame. `[prior]` says how well it is known: by default to 0.001 rad and 1 mm, so that a start
-    /// that was measured by hand wants a `prior.noise` of its own. Default: it is not known, and found by the objects that are seen.
+    /// Pose of the first camera in the map frame. Its noise is `prior.noise`, by default 0.001 rad and 1 mm;
+    /// set a larger noise for a start that was measured by hand. Default: unknown, found by relocalization
+    /// from the detected objects.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<Se3>,
-    /// How many times as far off its objects may be as their covariances say: a detector's errors last for many frames.
+    /// Factor on the standard deviations of the map's objects. Their covariances assume independent errors,
+    /// but a detector's errors last for many frames.
     #[serde(default = "sigma_scale")]
     pub sigma_scale: Positive,
-    /// How far off they may be besides, in rad and as a part of their size: what is no ellipsoid is another one from each side.
+    /// Additional standard deviation of the map's objects: of the rotation in rad, of the centre as a
+    /// fraction of the mean semi-axis, and of the logarithms of the semi-axes. An object that is not an
+    /// ellipsoid gives a different ellipsoid from each side.
     #[serde(default = "shape_error")]
     pub shape_error: NotNegative,
-    /// How much of a large error of them counts. Default: Cauchy's, as things are moved.
+    /// Robust loss of the factors that hold the map's objects. Default: Cauchy, because objects may have been
+    /// moved.
     #[serde(default = "loss")]
     pub loss: Arc<dyn Loss>,
-    /// What the file says, before it is asked how far that is trusted.
+    /// The map as read, before `sigma_scale` and `shape_error` are applied.
     #[serde(skip)]
     #[schemars(skip)]
     pub map: Arc<PriorMap>,
-    /// Where the file was found, and where the document names it.
+    /// Path of the file that was read, and the position of its name in the document.
     #[serde(skip)]
     #[schemars(skip)]
     pub read_from: Option<Placed<PathBuf>>,
@@ -53,7 +58,7 @@ fn loss() -> Arc<dyn Loss> {
     Arc::new(Cauchy::default())
 }
 
-/// A map, and where a run begins in it.
+/// A map, and the pose of the first camera in it.
 #[derive(Debug, Clone, Copy)]
 pub struct Anchor<'a> {
     /// The map of an earlier run.
@@ -63,7 +68,7 @@ pub struct Anchor<'a> {
 }
 
 impl PriorMapSettings {
-    /// Reads the file, from `folder`; classes in it are called as `aliases` call them.
+    /// Reads the file, relative to `folder`. Its class names are unified by `aliases`.
     pub(super) fn read(
         &mut self,
         folder: &Path,
@@ -88,18 +93,18 @@ impl PriorMapSettings {
         Some(())
     }
 
-    /// The map, where it is known where the run begins in it.
+    /// Returns the map and the start in it, if the start is known.
     pub(super) fn anchor(&self) -> Option<Anchor<'_>> {
         Some(Anchor { map: &self.map, start: self.start? })
     }
 
-    /// An object of the map, known as well as it is trusted. What is written again is the object as it was read: who reads that has a trust
-    /// of its own.
+    /// Returns an object of the map with its covariance enlarged by `sigma_scale` and `shape_error`. Maps are
+    /// written with the covariance that was read, because each reader applies its own settings.
     pub fn trusted(&self, object: &PriorObject) -> PriorObject {
         object.trusted(*self.sigma_scale, *self.shape_error)
     }
 
-    /// The map with its objects as they are trusted.
+    /// Returns the map with the enlarged covariances of all objects.
     pub fn trusted_map(&self) -> PriorMap {
         let objects = self.map.objects.iter().map(|object| Arc::new(self.trusted(object)));
         PriorMap::new(self.map.up, objects.collect())
@@ -107,7 +112,8 @@ impl PriorMapSettings {
 }
 
 impl Anchor<'_> {
-    /// The frame of the map, for an odometry that begins with this frame and knows up as `located` says.
+    /// Returns the frame of the map, for an odometry that begins with the frame `first`. The up direction
+    /// comes from the map, or from `located` if the map has none.
     pub fn frame(&self, first: &Frame, located: MapFrame) -> MapFrame {
         let map_from_odometry = self.start.compose(&first.world_from_camera.inverse());
         let moved = map_from_odometry.compose(&located.map_from_odometry.inverse());
@@ -118,17 +124,17 @@ impl Anchor<'_> {
 }
 
 impl super::Settings {
-    /// The map that was made before, where it is known where the run begins in it.
+    /// Returns the prior map and the start in it, if the start is known.
     pub fn anchor(&self) -> Option<Anchor<'_>> {
         self.prior_map.as_ref().and_then(PriorMapSettings::anchor)
     }
 
-    /// The map that was made before, where it is to be found out where the run begins in it.
+    /// Returns the settings of the prior map if its start is unknown and has to be found by relocalization.
     pub fn unknown_start(&self) -> Option<&PriorMapSettings> {
         self.prior_map.as_ref().filter(|prior| prior.start.is_none())
     }
 
-    /// The same with a start that was found.
+    /// Returns these settings with a start that relocalization found, and its noise.
     pub fn beginning_at(&self, start: Se3, noise: Noise) -> Self {
         let mut settings = self.clone();
         if let Some(prior) = &mut settings.prior_map {

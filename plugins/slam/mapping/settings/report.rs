@@ -2,14 +2,14 @@ use manifactor_graph::checked::Count;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[report]`: what is written besides the usual.
+/// `[report]`: additional output.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReportSettings {
-    /// `covariances.json`: the marginal covariance of each pose and each object, in its tangent space.
+    /// Writes `covariances.json`: the marginal covariance of each pose and each object, in its tangent space.
     pub covariances: bool,
-    /// How many images are drawn with their boxes, measured and estimated; spread over all frames where objects are seen.
-    /// At most 1000: the page of the run holds all of them.
+    /// Number of images that are drawn with measured and estimated boxes, spread over all frames that show
+    /// objects. At most 1000, because the page of the run contains all of them.
     pub images: Count<0, 1000>,
 }
 

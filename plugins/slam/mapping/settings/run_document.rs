@@ -26,40 +26,40 @@ use serde::{Deserialize, Serialize};
 use serde_json::Map;
 use std::path::{Path, PathBuf};
 
-/// A run: one set of settings, or several to compare.
+/// A run: one set of settings, or several variants to compare.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunDocument {
-    /// What it is called in reports.
+    /// Title in reports.
     pub title: String,
-    /// Where its results go. Default: `out/` and the document's name.
+    /// Folder of the results. Default: `out/` followed by the document's name.
     pub output: PathBuf,
-    /// At least one; with the settings that they have in common.
+    /// At least one variant. Each includes the settings that all variants share.
     pub variants: Vec<Variant>,
-    /// The folder from which its files are named.
+    /// Folder that the run's paths are relative to.
     #[serde(skip)]
     pub folder: PathBuf,
 }
 
-/// One way to do a run.
+/// One variant of a run.
 #[derive(Debug, Clone, Serialize)]
 pub struct Variant {
-    /// Its name, one of its own.
+    /// Unique name.
     pub name: String,
-    /// What it does, in a sentence.
+    /// Description in one sentence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub about: Option<String>,
-    /// Its settings, complete.
+    /// Complete settings.
     pub settings: Settings,
 }
 
-/// What a run without variants is called.
+/// Name of the only variant of a document that lists none.
 const ONLY: &str = "estimate";
 
 impl RunDocument {
-    /// Reads a run. Files are found from the folder of the document, or from the one that it names as `folder`.
+    /// Reads a run. Paths are relative to the folder of the document, or to the document's `folder`.
     ///
     /// # Errors
-    /// Everything that is wrong with it, in all variants, each at its place.
+    /// All errors of all variants, each with its position in the document.
     pub fn read(document: &Document) -> Result<Self, Diagnostics> {
         let stem = stem(document, "run");
         let errors = Errors::new();
@@ -74,52 +74,52 @@ impl RunDocument {
     }
 }
 
-/// What a document is called, without its extension.
+/// Returns the name of a document without its extension.
 pub fn stem(document: &Document, otherwise: &str) -> String {
     let stem = Path::new(document.source().name()).file_stem();
     stem.map_or_else(|| otherwise.to_owned(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// What the document of a run says beside the settings.
+/// Fields of a run document besides the settings.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Header {
-    /// What it is called in reports. Default: the document's name.
+    /// Title in reports. Default: the document's name.
     title: Option<String>,
-    /// Where its results go. Default: `out/` and the document's name.
+    /// Folder of the results. Default: `out/` followed by the document's name.
     output: Option<PathBuf>,
-    /// The folder that its paths are relative to. Default: its own.
+    /// Folder that the document's paths are relative to. Default: the folder of the document.
     folder: Option<PathBuf>,
-    /// Ways to do the run, to compare.
+    /// Variants of the run, which are compared.
     pub variants: Vec<Declared>,
 }
 
 impl Header {
     const FIELDS: [&str; 4] = ["title", "output", "folder", "variants"];
 
-    /// The folder from which a run's files are named: what it says, from where it lies.
+    /// Returns the folder that the run's paths are relative to. `folder` itself is relative to the document.
     pub fn folder(&self, document: &Document) -> PathBuf {
         let beside = Path::new(document.source().name()).parent().unwrap_or(Path::new(""));
         self.folder.as_ref().map_or_else(|| beside.to_owned(), |named| beside.join(named))
     }
 }
 
-/// A variant, as it is written.
+/// A variant as the document declares it.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Declared {
-    /// Its name, one of its own.
+    /// Unique name.
     #[schemars(with = "String")]
     pub name: Placed<String>,
-    /// What it does, in a sentence that reports repeat.
+    /// Description in one sentence, repeated in reports.
     pub about: Option<String>,
-    /// Settings of the document that are others here.
+    /// Settings that replace those of the document.
     #[schemars(with = "Option<Map<String, serde_json::Value>>")]
     pub set: Option<Node>,
 }
 
-/// The header of a run's document, and its settings as they are written. What is wrong with the header is reported, and it
-/// is as if nothing had been said.
+/// Splits the document of a run into its header and the unread settings. Errors in the header are reported,
+/// and the default header is used.
 pub fn split(root: &Node, errors: &Errors) -> Option<(Header, Node)> {
     Section::new(root, errors)?.ignore_rest();
     let (mut header, mut settings) = (root.clone(), root.clone());
@@ -132,7 +132,7 @@ pub fn split(root: &Node, errors: &Errors) -> Option<(Header, Node)> {
             errors.report(second.name.place.clone(), Fault::invalid(long));
         }
         let mut earlier = header.variants.iter().take(i);
-        // their folders would be one
+        // both would write to one folder
         if let Some(first) = earlier.find(|first| slug(&first.name) == slug(&second.name)) {
             let (first, second) = (&first.name, &second.name);
             errors.push(Diagnostic::duplicate("variant", second, second.place.clone(), first.place.clone()));
@@ -141,7 +141,7 @@ pub fn split(root: &Node, errors: &Errors) -> Option<(Header, Node)> {
     Some((header, settings))
 }
 
-/// The same folder, wherever a program is run; unchanged if the current folder is unknown.
+/// Returns the absolute path of a folder, or the path unchanged if the current folder is unknown.
 pub fn absolute(folder: &Path) -> PathBuf {
     std::env::current_dir().map_or_else(|_| folder.to_owned(), |at| at.join(folder).components().collect())
 }
@@ -162,7 +162,7 @@ fn read_variants(
     if declared.is_empty() {
         return Some(vec![read(ONLY.to_owned(), None, base)?]);
     }
-    // all of them are read, so that all errors are told at once
+    // reads all variants, so that all errors are reported at once
     let variants = declared.into_iter().map(|variant| {
         let mut node = base.clone();
         if let Some(set) = variant.set {
@@ -174,10 +174,11 @@ fn read_variants(
     variants.into_iter().collect()
 }
 
-/// Bytes of the name of a folder that all file systems take, with room for what is written beside it.
+/// Longest name of a variant's folder, in bytes. File systems accept it, with room for the names of files
+/// beside it.
 const LONGEST: usize = 200;
 
-/// A name as part of a path: letters, digits and hyphens.
+/// Converts a name to a part of a path: letters, digits and hyphens.
 pub fn slug(name: &str) -> String {
     let plain: String =
         name.chars().map(|c| if c.is_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();

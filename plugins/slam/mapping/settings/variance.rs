@@ -3,26 +3,29 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
-/// `[variance_components]`: the noise of odometry and boxes, estimated from the data, whatever `[odometry]` and `[detections]` say of
-/// it.
+/// `[variance_components]`: estimates the noise of odometry and boxes from the data. The estimate replaces
+/// the noise of `[odometry]` and `[detections]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VarianceSettings {
-    /// Most estimates of the noise, each followed by a solve.
+    /// Largest number of rounds. Each round estimates the noise and solves again.
     pub rounds: NonZeroUsize,
-    /// The last round is the one after which no standard deviation changes by more than this share.
+    /// Rounds end when no standard deviation changes by more than this share.
     pub tolerance: NotNegative,
-    /// Which boxes have a noise in common. Noises of several groups are drawn towards each other, as far as chance explains that they differ.
+    /// Boxes that share a noise; with `given`, boxes keep their given noise. The noises of several groups are
+    /// shrunk towards each other, as far as their differences can be due to chance.
     pub boxes: BoxGroups,
-    /// Whether the noise of a box may grow with its width and height.
+    /// Lets the noise of a box grow with its width and height.
     pub size: bool,
-    /// Whether errors of consecutive boxes of an object are taken for correlated, as they are: a detector errs the same
-    /// way in image after image, and no ellipsoid has the outline of a chair. τ such boxes say as much as one alone,
-    /// τ their integrated autocorrelation time, so their standard deviation is √τ times as large.
+    /// Models the errors of consecutive boxes of an object as correlated: a detector makes similar errors in
+    /// image after image, and no ellipsoid has the outline of a chair. If τ is their integrated
+    /// autocorrelation time, τ such boxes carry the information of one, so their standard deviation is √τ
+    /// times as large.
     pub correlation: bool,
-    /// Whether the noise of odometry is estimated; it stays as it is given, otherwise, and with fewer than four objects.
+    /// Estimates the noise of the odometry. The given noise is used otherwise, and with fewer than four
+    /// objects.
     pub odometry: bool,
-    /// Whether odometry may err by turning about what the camera sees, and not only about the camera.
+    /// Models odometry errors that turn about the observed scene, and not only about the camera.
     pub pivot: bool,
 }
 
@@ -41,17 +44,17 @@ impl Default for VarianceSettings {
     }
 }
 
-/// Which boxes have a noise in common.
+/// Groups of boxes that share a noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BoxGroups {
-    /// All.
+    /// All boxes.
     #[default]
     All,
-    /// Those of objects of one class.
+    /// The boxes of all objects of one class.
     Class,
-    /// Those of one object.
+    /// The boxes of one object.
     Object,
-    /// None: the noise of boxes stays as it is given.
+    /// No estimate: boxes keep their given noise.
     Given,
 }

@@ -1,4 +1,4 @@
-//! Objects that are named as they come, and what turns out to be otherwise.
+//! Online data association, with corrections of earlier frames.
 use super::Mapper;
 use super::frame::FrameReport;
 use super::object::{Sights, Tracked};
@@ -15,12 +15,14 @@ use manifactor_recording::sequence::ObjectId;
 use manifactor_smoother::{FactorId, Session};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An object begins again when more of its boxes than this part are others at once.
+/// Share of the boxes of an object that may change at once. Beyond it, the object is removed and initialized
+/// again.
 const OTHERS: f64 = 0.25;
 
-/// What has been estimated so far; of frames that have left the window, as it was when they came.
+/// The current estimate for data association. Poses outside of the window are those at the time of their
+/// frames.
 pub(super) struct Known<'a> {
-    /// The last frame, and its pose.
+    /// Index and pose of the last frame.
     pub newest: (usize, Se3),
     pub live: &'a [StampedPose],
     pub session: &'a Session,
@@ -39,14 +41,14 @@ impl Map for Known<'_> {
 
     fn object(&self, id: ObjectId) -> Option<DualQuadric> {
         let now = self.session.get(object_key(id).as_str()).ok();
-        // the first frame is named before the objects of an earlier map are in the session
+        // the first frame is assigned before the smoother has the objects of the prior map
         now.or_else(|| Some(self.measurements.object(id)?.prior.as_ref()?.quadric))
     }
 }
 
-/// What was corrected, and how all was before.
+/// A correction, with the state before it.
 pub(super) struct Corrected {
-    /// What boxes are called then.
+    /// Object ids after the correction.
     pub names: Names,
     learned: Vec<Learned>,
     before: Before,
@@ -54,13 +56,13 @@ pub(super) struct Corrected {
 }
 
 impl Mapper {
-    /// What has been estimated so far, with a newest frame and its pose.
+    /// Returns the current estimate, with the newest frame and its pose.
     pub(super) fn known(&self, newest: (usize, Se3)) -> Known<'_> {
         Known { newest, live: &self.live, session: &self.session, measurements: &self.measurements }
     }
 
-    /// Corrects what earlier frames were thought to show, where they have taught anything: pushes it, for the next update. What
-    /// comes back is to be [undone](Self::undo) where that fails.
+    /// Pushes pending corrections of earlier frames to the smoother, for the next update. If the update
+    /// fails, the returned correction has to be [undone](Self::undo).
     pub(super) fn correct(&mut self, report: &mut FrameReport) -> Option<Corrected> {
         let learned = std::mem::take(&mut self.pending);
         if learned.is_empty() {
@@ -87,7 +89,7 @@ impl Mapper {
         Some(Corrected { names, learned, before, measurements })
     }
 
-    /// All is again as it was before a correction that could not be taken, and it is tried again with the next frame.
+    /// Restores the state before a failed correction. The correction is tried again with the next frame.
     pub(super) fn undo(&mut self, corrected: Corrected, why: &str, report: &mut FrameReport) {
         let moved = report.moved.drain(..).map(|moved| moved.from);
         let gone = moved.chain(report.merged.drain(..).map(|merge| merge.from)).map(object_key);
@@ -99,19 +101,20 @@ impl Mapper {
         self.pending = corrected.learned;
     }
 
-    /// Counts a box for the object that it shows.
+    /// Moves a detection to a different object in the measurements.
     fn put(&mut self, Move { from, detection, .. }: &Move) {
         let Settings { detections, aliases, .. } = &*self.settings;
         self.measurements.take_back(detection, *from, &self.camera, detections, aliases);
         self.measurements.add(detection, &self.camera, detections, aliases);
         if let Some(object @ Tracked::Withdrawn) = self.objects.get_mut(from) {
-            // it may be one thing without it
+            // without this detection it may be one object
             *object = Tracked::default();
         }
     }
 
-    /// Updates the factors of objects whose boxes have moved. An object begins again if a large share of its boxes changed at once, because its
-    /// place is then that of another: it leaves the map until its next detection. Returns objects that rules had connected with those.
+    /// Updates the factors of objects whose boxes have moved. If a large share of the boxes of an object
+    /// changed at once, its estimate belongs to a different object: it is removed from the map until its next
+    /// detection. Returns the objects that semantic rules connected with removed ones.
     fn put_right(&mut self, all: &[Move], report: &mut FrameReport) -> Vec<ObjectId> {
         let mut changed: BTreeMap<ObjectId, BTreeSet<usize>> = BTreeMap::new();
         for (id, frame) in all.iter().flat_map(|moved| [(moved.from, moved.frame), (moved.into, moved.frame)])
@@ -146,13 +149,14 @@ impl Mapper {
         owners
     }
 
-    /// Returns whether nothing of an object stays when it is taken out of the map, so that it can come back: no pose that it was seen from has left the window.
+    /// Returns whether an object can be removed without a trace, so that it can come back: none of the poses
+    /// with its boxes has left the window.
     pub(super) fn leaves_nothing(&self, id: ObjectId) -> bool {
         let Some(Tracked::Mapped(mapped)) = self.objects.get(&id) else { return true };
         mapped.boxes.iter().all(|(_, factor)| self.session.entry(*factor).is_some())
     }
 
-    /// From where an object is seen that is not in the map.
+    /// Returns the viewing directions of an object outside of the map.
     pub(super) fn sights(&self, id: ObjectId) -> Sights {
         let mut sights = Sights::new();
         for view in self.measured(id).map_or(&[][..], |measured| &measured.views) {
@@ -163,7 +167,7 @@ impl Mapper {
         sights
     }
 
-    /// Forgets an object that is not in the map: its boxes are nobody's.
+    /// Removes an object that is not in the map. Its boxes become unassociated.
     pub(super) fn forget(&mut self, id: ObjectId) {
         if !self.objects.get(&id).is_some_and(Tracked::is_mapped) {
             self.objects.remove(&id);
@@ -171,8 +175,8 @@ impl Mapper {
         }
     }
 
-    /// Gives the boxes of one object to another: in the map, if that is there, or to place it by. Returns objects that rules had connected
-    /// with the one that is no more.
+    /// Merges an object into a second one: adds its boxes to the map if the second one is there, else to its
+    /// tentative track. Returns the objects that semantic rules connected with the removed one.
     fn unite(&mut self, merge: Merge, report: &mut FrameReport) -> Vec<ObjectId> {
         let Merge { from, into } = merge;
         let is_mapped = self.objects.get(&from).is_some_and(Tracked::is_mapped);
@@ -180,7 +184,7 @@ impl Mapper {
         self.objects.remove(&from);
         let mut new = self.measurements.merge(from, into);
         if matches!(self.objects.get(&into), Some(Tracked::Withdrawn)) {
-            // it is another one now
+            // with these boxes the object may be valid
             self.objects.remove(&into);
             new = self.measured(into).map_or(new, |measured| measured.views.clone());
         }
@@ -200,7 +204,7 @@ impl Mapper {
         owners
     }
 
-    /// Pushes boxes of an object that is in the map, as far as their poses are still there.
+    /// Pushes boxes of a mapped object, as far as their poses are in the smoother.
     fn push_boxes(&mut self, id: ObjectId, views: &[ObjectBox], report: &mut FrameReport) {
         let (frames, entries) = self.entries_of(&object_key(id), views);
         let mut graph = Graph::new();

@@ -1,4 +1,4 @@
-//! One frame: its pose and its boxes, then what they change in the map.
+//! Processing of one frame: its pose and boxes, then the changes in the map.
 use super::association::{Corrected, Known};
 use super::object::Tracked;
 use super::{FrameError, Located, Mapper};
@@ -15,57 +15,60 @@ use manifactor_smoother::{ChangeError, FactorId, Report};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What a frame came to.
+/// The result of a frame.
 #[derive(Debug, Clone, Serialize)]
 pub struct FrameReport {
-    /// Counts the frames that were taken, from 0.
+    /// Index among the accepted frames, from 0.
     pub frame: usize,
-    /// In seconds.
+    /// Unit: seconds.
     pub timestamp: f64,
-    /// The pose as it is estimated now, in the map's frame.
+    /// The estimated pose in the map frame.
     pub pose: Se3,
-    /// Where the stream began in a map that was made before, if this frame has shown it: all names are those of that map from now on,
-    /// and poses in its frame. All frames were taken again then, and what this report tells of objects, refusals and updates is of all of them:
-    /// what was told before is of a map that is no more.
+    /// The start pose in the prior map, if this frame led to it. From now on ids and poses are those of the
+    /// prior map. All frames were processed again, so objects, rejections and updates in this report cover
+    /// all frames. Earlier reports refer to a map that was discarded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub located: Option<Located>,
-    /// Boxes that passed the filters.
+    /// Number of boxes that passed the filters.
     pub boxes: usize,
-    /// The object of each box, in the order of the frame's; of a box that was left out, none.
+    /// Object of each box, in the order of the frame; `None` for skipped boxes.
     pub names: Vec<Option<ObjectId>>,
-    /// Objects that were seen too rarely to be any: their boxes are of none.
+    /// Objects that were detected too rarely. Their boxes have no object.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub forgotten: Vec<ObjectId>,
-    /// Boxes of earlier frames that turned out to show other objects, before this one was named.
+    /// Boxes of earlier frames that moved to a different object, before the boxes of this frame were
+    /// assigned.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moved: Vec<Move>,
-    /// Objects that turned out to be others, after that and before this frame was named.
+    /// Objects that were merged, after the moves and before the boxes of this frame were assigned.
     pub merged: Vec<Merge>,
-    /// Objects that came into the map.
+    /// Objects added to the map.
     pub born: Vec<Key>,
-    /// Objects that left it: their boxes turned out to be those of several things, or to be too few, or are others now, and they begin again.
+    /// Objects removed from the map: their boxes belong to several objects, are too few, or changed. They may
+    /// be initialized again.
     pub withdrawn: Vec<Key>,
-    /// Objects that rules were asked about again, as their class has changed.
+    /// Objects whose class changed, so that the semantic rules were applied again.
     pub revised: Vec<Key>,
-    /// What could not be taken, and why.
+    /// Rejected data, with the reasons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub refused: Vec<String>,
-    /// What the session did: once for the frame with what earlier ones have taught, and once more where objects come or go.
+    /// Smoother reports: one for the frame with corrections of earlier frames, a second one if objects are
+    /// added or removed.
     pub updates: Vec<Report>,
 }
 
-/// What a frame shows.
+/// The content of a frame after its pose is added.
 pub(super) struct Seen {
     /// Boxes that passed the filters, by object.
     pub boxes: BTreeMap<ObjectId, ObjectBox>,
-    /// What it has taught of earlier frames.
+    /// Corrections to earlier frames.
     pub learned: Learned,
-    /// Whether up is another than it was.
+    /// True if the up direction changed.
     pub up_moved: bool,
 }
 
 impl Seen {
-    /// No box.
+    /// Returns a frame without boxes.
     pub(super) fn nothing() -> Self {
         Self { boxes: BTreeMap::new(), learned: Learned::default(), up_moved: false }
     }
@@ -91,7 +94,7 @@ impl FrameReport {
         }
     }
 
-    /// Tells what has happened in an earlier frame as well.
+    /// Adds the changes of an earlier frame to the report.
     pub fn tell_after(&mut self, before: Self) {
         fn put<T>(mut first: Vec<T>, last: &mut Vec<T>) {
             first.append(last);
@@ -112,8 +115,8 @@ impl FrameReport {
 }
 
 impl Mapper {
-    /// Takes in a pose, with the boxes of objects that are mapped and what earlier frames have taught: in one update of the session. Where
-    /// that fails, without what they have taught; where that fails as well, the pose alone.
+    /// Adds a pose in one smoother update, together with boxes of mapped objects and corrections of earlier
+    /// frames. If the update fails, tries again without the corrections, then with the pose alone.
     pub(super) fn take_pose(
         &mut self,
         observation: &Observation,
@@ -138,7 +141,7 @@ impl Mapper {
         taken
     }
 
-    /// The same, once the frame has said which way is up.
+    /// Adds a frame, with the up direction already updated.
     fn take_located(
         &mut self,
         observation: &Observation,
@@ -147,7 +150,7 @@ impl Mapper {
     ) -> Result<Seen, FrameError> {
         let (frame, timestamp) = (&observation.frame, observation.frame.timestamp);
         let (graph, values) = self.tied(frame, report)?;
-        // nothing may be pending in the session when a frame is refused
+        // a rejected frame must not leave pending changes in the smoother
         if !report.pose.is_finite() {
             return Err(FrameError::NotFinite { timestamp });
         }
@@ -185,7 +188,8 @@ impl Mapper {
         Ok(seen)
     }
 
-    /// A frame's pose, tied to the last one or to the map's frame; `report` has the prediction.
+    /// Returns the pose of a frame with its factors: to the last frame, or the prior on the first pose. Sets
+    /// the predicted pose in `report`.
     fn tied(&mut self, frame: &Frame, report: &mut FrameReport) -> Result<(Graph, Values), FrameError> {
         let map = self.up.frame().unwrap_or_else(|| MapFrame::of_odometry(None));
         let (mut graph, mut values) = (Graph::new(), Values::new());
@@ -217,8 +221,8 @@ impl Mapper {
         Ok((graph, values))
     }
 
-    /// Updates the session with a frame's boxes beside its pose, `alone`, and what was corrected, which are pushed. Whether the boxes were
-    /// taken.
+    /// Updates the smoother with the boxes of a frame. Its pose, `alone`, and the corrections are already
+    /// pushed. Returns whether the boxes were accepted.
     fn update_with(
         &mut self,
         boxes: &BTreeMap<ObjectId, ObjectBox>,
@@ -265,7 +269,7 @@ impl Mapper {
         Ok(false)
     }
 
-    /// Pushes those boxes of a frame whose objects are mapped. Returns these, and their factors.
+    /// Pushes the boxes of mapped objects of a frame. Returns their objects and factors.
     fn push_boxes_of_frame(
         &mut self,
         boxes: &BTreeMap<ObjectId, ObjectBox>,
@@ -281,7 +285,7 @@ impl Mapper {
         Ok(owners.into_iter().zip(self.session.push(&graph, &Values::new())?).collect())
     }
 
-    /// That rules which need to know up do.
+    /// Checks that no semantic rule lacks the up direction.
     fn check_rules(&self, up: Option<Direction>) -> Result<(), RuleError> {
         let waiting = self.settings.semantics.iter().find(|rule| up.is_none() && rule.factor.wants_up());
         match waiting {
@@ -290,7 +294,8 @@ impl Mapper {
         }
     }
 
-    /// The boxes of a frame that pass the filters, by object; of several boxes of an object the last.
+    /// Returns the boxes of a frame that pass the filters, by object. If an object has several boxes, the
+    /// last one counts.
     fn boxes(&self, named: &[Detection]) -> BTreeMap<ObjectId, ObjectBox> {
         let view = |detection: &Detection| match sift(detection, &self.camera, &self.settings.detections) {
             Sifted::View(view) => Some((detection.object?, view)),

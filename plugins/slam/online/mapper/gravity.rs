@@ -1,15 +1,15 @@
-//! Up, as far as it is known yet.
+//! Online estimate of the up direction.
 use manifactor_mapping::gravity::{GravityError, MapFrame};
 use manifactor_mapping::settings::Settings;
 use manifactor_recording::sequence::{Observation, Opening, Sequence};
 
-/// Up moves by this much, in radians, before factors are made again: half a degree.
+/// Change of the up direction at which factors are created again: half a degree in radians.
 const MOVED: f64 = 0.01;
 
-/// What the way up is found from: the first frames, until it is settled.
+/// The up direction from the first frames, until it is final.
 #[derive(Debug, Clone)]
 pub(super) struct Up {
-    /// What came until now, as far as it is looked at.
+    /// Relevant data of the frames so far.
     seen: Sequence,
     found: Option<MapFrame>,
     is_settled: bool,
@@ -20,17 +20,18 @@ impl Up {
         Self { seen: opening.into_sequence(), found: None, is_settled: false }
     }
 
-    /// The frame of the map; `None` before the first frame.
+    /// Returns the frame of the map; `None` before the first frame.
     pub(super) fn frame(&self) -> Option<MapFrame> {
         self.found
     }
 
-    /// As it is now, to go back if the next frame is refused; `None` once it is settled.
+    /// Returns a copy to restore if the next frame is rejected; `None` once the direction is final.
     pub(super) fn unsettled(&self) -> Option<Self> {
         (!self.is_settled).then(|| self.clone())
     }
 
-    /// Looks at the next frame; whether up is another now, so that factors that know it have to be made again.
+    /// Adds the next frame. Returns whether the up direction changed, so that the factors that use it
+    /// have to be created again.
     pub(super) fn look(
         &mut self,
         observation: &Observation,
@@ -47,7 +48,7 @@ impl Up {
         let anchored = |located| settings.anchor().map_or(located, |anchor| anchor.frame(first, located));
         let found = match (gravity.locate(&self.seen).map(anchored), self.found) {
             (Ok(found), _) => found,
-            // readings may cancel out for a while; what was found before is as good as it gets
+            // readings may cancel out for a while; then the earlier result stays
             (Err(_), Some(before)) => before,
             (Err(error), None) => {
                 self.seen.frames.truncate(frames);
@@ -68,11 +69,11 @@ impl Up {
             (None, None) => 0.0,
             _ => f64::INFINITY,
         };
-        // the last look counts, however little it changes
+        // the last update is used even if the change is small
         if angle < if self.is_settled { f64::EPSILON } else { MOVED } {
             return Ok(false);
         }
-        // poses stay where they are: only the first frame says where the map lies
+        // poses stay unchanged: only the first frame defines the position of the map
         self.found = Some(MapFrame { up: found.up, ..before });
         Ok(true)
     }

@@ -1,4 +1,4 @@
-//! Where a stream is in a map that was made before.
+//! Relocalization of a stream in a prior map.
 use super::Mapper;
 use manifactor_geometry::Se3;
 use manifactor_graph::Noise;
@@ -15,30 +15,31 @@ mod layout;
 use agreement::Agreement;
 use layout::{Layout, Mark};
 
-/// Where a run begins in a map that was made before.
+/// Start pose of a run in a prior map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Located {
-    /// The pose of the first camera in the map's frame.
+    /// Pose of the first camera in the frame of the prior map.
     pub start: Se3,
-    /// How well that is known: rad, then m.
+    /// Noise of the start pose: rad, then m.
     #[serde(skip)]
     pub noise: Noise,
-    /// Objects that are the same: of the run until then, of the map.
+    /// Matched objects: ids in the run, ids in the prior map.
     pub matches: Vec<(ObjectId, ObjectId)>,
-    /// What speaks for it and not for the next best place, in nats.
+    /// Log-likelihood lead over the second best pose, in nats.
     pub lead: f64,
-    /// Mean intersection over union of the boxes of these objects with the outlines of the map's.
+    /// Mean intersection over union of the boxes of matched objects with the projections of the prior
+    /// ellipsoids.
     pub overlap: f64,
-    /// Of what should have been seen of the map until then, the share that was, from 0 to 1.
+    /// Detected share of the prior objects that should be visible so far, from 0 to 1.
     pub seen: f64,
 }
 
-/// Variance of the centre of an object of which it is not known, as a part of its distance squared.
+/// Variance of the centre of an object without a marginal covariance, relative to its squared distance.
 const UNKNOWN: f64 = 0.04;
 
 impl Mapper {
-    /// Where the stream begins in `map`, by the objects that it has mapped, if objects there are known as well as their covariances say; `None`
-    /// as long as that is not clear.
+    /// Finds the start pose in `map` from the mapped objects. The covariances in `map` are used unchanged.
+    /// `None` as long as the result is ambiguous.
     pub fn locate(&self, map: &PriorMap) -> Option<Located> {
         let first = self.pose_of(0)?;
         let marks = self.objects().filter_map(|(measured, quadric)| self.mark(measured, &quadric));

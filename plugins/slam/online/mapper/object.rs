@@ -1,44 +1,44 @@
-//! An object from its first box to its birth, and after.
+//! State of an object, from its first box to the map and beyond.
 use manifactor_geometry::Se3;
 use manifactor_mapping::mapping::measurements::{Measured, ObjectBox};
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_smoother::FactorId;
 use nalgebra::Vector3;
 
-/// What is known of an object besides its boxes.
+/// State of an object.
 #[derive(Debug, Clone)]
 pub(super) enum Tracked {
-    /// It cannot be placed yet.
+    /// A tentative track: the object cannot be initialized yet.
     Waiting(Sights),
-    /// It is in the map.
+    /// The object is in the map.
     Mapped(Mapped),
-    /// It was in the map, and its boxes turned out to be those of several things.
+    /// The object was removed from the map because its boxes belong to several objects.
     Withdrawn,
 }
 
-/// From where an object was seen.
+/// Viewing directions of an object.
 #[derive(Debug, Clone)]
 pub(super) struct Sights {
-    /// Lines of sight, in the map's frame, by the poses at the time.
+    /// Lines of sight in the map frame, from the poses at the time.
     lines: Vec<Vector3<f64>>,
-    /// The smallest cosine between two of them.
+    /// Smallest cosine between two of them.
     cosine: f64,
-    /// Boxes that it had when it was last tried in vain.
+    /// Number of boxes at the last failed initialization.
     tried: usize,
 }
 
 /// An object in the map.
 #[derive(Debug, Clone)]
 pub(super) struct Mapped {
-    /// Where it began.
+    /// Initial value.
     pub start: DualQuadric,
-    /// The factors of its boxes, each with its frame.
+    /// Factors of its boxes, each with its frame.
     pub boxes: Vec<(usize, FactorId)>,
-    /// Its class when rules were last asked.
+    /// Class at the last application of the semantic rules.
     pub class: Option<String>,
 }
 
-/// After a try in vain, the number of boxes grows by this factor before the next.
+/// After a failed initialization, the number of boxes has to grow by this factor before the next attempt.
 const MORE: f64 = 1.2;
 
 impl Default for Tracked {
@@ -48,7 +48,7 @@ impl Default for Tracked {
 }
 
 impl Tracked {
-    /// One that an earlier map has.
+    /// Returns the state of an object of the prior map.
     pub(super) fn known(measured: &Measured) -> Option<Self> {
         let start = measured.prior.as_ref()?.quadric;
         let class = measured.class_name().map(str::to_owned);
@@ -68,7 +68,7 @@ impl Tracked {
 }
 
 impl Sights {
-    /// None yet.
+    /// Returns a set without views.
     pub(super) fn new() -> Self {
         Self { lines: vec![], cosine: 1.0, tried: 0 }
     }
@@ -81,14 +81,14 @@ impl Sights {
         self.lines.push(line);
     }
 
-    /// Returns whether it is worth while to try and place the object: it is seen under this angle, and there is more than at the last
-    /// try.
+    /// Returns whether an initialization is worth an attempt: the parallax is large enough, and there are
+    /// enough new boxes since the last attempt.
     pub(super) fn are_enough(&self, measured: &Measured, degrees: f64) -> bool {
         let angle = self.cosine.clamp(-1.0, 1.0).acos().to_degrees();
         angle >= degrees && measured.views.len() as f64 >= MORE * self.tried as f64
     }
 
-    /// Notes a try in vain, with so many boxes.
+    /// Records a failed initialization with this number of boxes.
     pub(super) fn note_try(&mut self, boxes: usize) {
         self.tried = boxes;
     }

@@ -1,4 +1,4 @@
-//! What the boxes of a frame change in the map: objects that are born or withdrawn, rules that are asked again.
+//! Revision of the map after a frame: adds and removes objects, and applies semantic rules again.
 use super::Mapper;
 use super::frame::{FrameReport, Seen};
 use super::object::{Mapped, Tracked};
@@ -15,27 +15,28 @@ use manifactor_smoother::FactorId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// So many of an object's last boxes are looked at for motion, with each new one.
+/// Number of last boxes of an object that are tested for motion with each new box.
 const LAST: usize = 256;
 
-/// What becomes of an object.
+/// Due change of an object.
 enum Due {
-    /// It is taken out of the map.
+    /// Removal from the map.
     Withdrawal(Rejection),
-    /// It has another class now.
+    /// Change of its class.
     Revision(Option<String>),
-    /// It can be placed.
+    /// Initialization.
     Birth,
 }
 
-/// What a frame changes, as it was before it.
+/// The state before a change.
 pub(super) struct Before {
     objects: BTreeMap<ObjectId, Tracked>,
     ledger: Ledger,
 }
 
 impl Mapper {
-    /// Makes the changes that the boxes of a frame call for: objects that are withdrawn, whose class is another, that are born.
+    /// Applies the changes that follow from the boxes of a frame: removes objects, changes classes, and adds
+    /// objects.
     pub(super) fn revise(&mut self, seen: Seen, report: &mut FrameReport) {
         let Some(pose) = self.pose(report.frame) else { return };
         for (id, view) in &seen.boxes {
@@ -47,7 +48,7 @@ impl Mapper {
         let changed = moved.chain(report.merged.iter().map(|merge| merge.into));
         let mut ids: BTreeSet<ObjectId> =
             seen.boxes.keys().copied().chain(changed.map(|id| self.names.now(id))).collect();
-        // what was taken out just now begins again when it is seen the next time
+        // objects removed in this frame can only come back with their next detection
         ids.retain(|id| !report.withdrawn.contains(&object_key(*id)));
         let due: Vec<(ObjectId, Due)> = ids.iter().filter_map(|id| Some((*id, self.due(*id)?))).collect();
         let is_changed = seen.up_moved || !due.is_empty();
@@ -63,18 +64,18 @@ impl Mapper {
         self.teach(seen.learned, report);
     }
 
-    /// Takes note of what a frame has taught of earlier ones: it is corrected with the next frame.
+    /// Stores corrections to earlier frames, which are applied with the next frame.
     pub(super) fn teach(&mut self, learned: Learned, report: &mut FrameReport) {
         report.forgotten.clone_from(&learned.forgotten);
         if self.pending.is_empty() && learned.is_nothing() {
             learned.forgotten.iter().for_each(|id| self.forget(*id));
         } else {
-            // what is forgotten may have had boxes that move
+            // forgotten objects may have boxes that move
             self.pending.push(learned);
         }
     }
 
-    /// Changes the map; where that fails, all stays as it was.
+    /// Changes the map; restores the previous state if the update fails.
     fn change(&mut self, due: Vec<(ObjectId, Due)>, up_moved: bool, report: &mut FrameReport) {
         let (before, gone) = (self.before(), report.withdrawn.len());
         if up_moved {
@@ -111,7 +112,7 @@ impl Mapper {
         (self.objects, self.ledger) = (objects, ledger);
     }
 
-    /// What the boxes of an object call for, after another one of them.
+    /// Returns the due change of an object after a new box.
     fn due(&self, id: ObjectId) -> Option<Due> {
         let (measured, settings) = (self.measured(id)?, &self.settings.objects);
         match self.objects.get(&id)? {
@@ -136,12 +137,12 @@ impl Mapper {
         }
     }
 
-    /// Takes an object out of the map.
+    /// Removes an object from the map.
     fn withdraw(&mut self, id: ObjectId, rejection: &Rejection, report: &mut FrameReport) {
         let comes_back = matches!(rejection, Rejection::Views { .. }) && self.leaves_nothing(id);
         let owners = self.take_out(id, report);
         if comes_back {
-            // its boxes were those of others; there may be more to come
+            // its boxes moved to different objects, and it may get new ones
             self.objects.insert(id, Tracked::Waiting(self.sights(id)));
         }
         self.ask(&owners, report);
@@ -149,7 +150,8 @@ impl Mapper {
         report.withdrawn.push(object_key(id));
     }
 
-    /// Takes an object out of the map, with all its factors. Returns objects that rules had connected with it.
+    /// Removes an object from the map, with all its factors. Returns the objects that semantic rules
+    /// connected with it.
     pub(super) fn take_out(&mut self, id: ObjectId, report: &mut FrameReport) -> Vec<ObjectId> {
         let key = object_key(id);
         let (mut factors, owners) = self.ledger.revoke(|other| *other == key);
@@ -163,7 +165,8 @@ impl Mapper {
         owners
     }
 
-    /// Asks the rules again about an object whose class has changed, and about those that they connect with it.
+    /// Applies the semantic rules again to an object whose class changed, and to the objects connected with
+    /// it.
     fn ask_again(&mut self, id: ObjectId, class: Option<String>, report: &mut FrameReport) {
         if let Some(Tracked::Mapped(mapped)) = self.objects.get_mut(&id) {
             mapped.class = class;
@@ -176,7 +179,7 @@ impl Mapper {
         report.revised.push(key);
     }
 
-    /// Makes all semantic factors again.
+    /// Creates all semantic factors again.
     fn ask_all_again(&mut self, report: &mut FrameReport) {
         let (ids, owners) = self.ledger.revoke(|_| true);
         self.remove(&ids, report);
@@ -184,7 +187,7 @@ impl Mapper {
         report.revised.extend(owners.into_iter().map(object_key));
     }
 
-    /// Puts an object into the map that can be placed now.
+    /// Initializes an object and adds it to the map.
     fn bear(&mut self, id: ObjectId, report: &mut FrameReport) {
         let Some(measured) = self.measured(id) else { return };
         let started = rejection::start(measured, |i| self.at(i), self.camera, &self.settings);
@@ -203,7 +206,7 @@ impl Mapper {
         };
         self.objects.insert(id, Tracked::Mapped(Mapped { start, boxes, class }));
         report.born.push(object_key(id));
-        // it may be what a rule misses near another
+        // it may be the neighbour that a rule requires
         if self.settings.semantics.iter().any(|rule| rule.near.is_some()) {
             let mapped = self.objects.iter().filter(|(_, object)| object.is_mapped());
             let mapped: Vec<ObjectId> = mapped.map(|(id, _)| *id).collect();
@@ -211,8 +214,8 @@ impl Mapper {
         }
     }
 
-    /// Pushes an object with its boxes and what the rules have for it, fitted alone to these before. Returns where that has led, and
-    /// the boxes' factors.
+    /// Pushes an object with its boxes and its semantic factors, after a fit of the object alone. Returns the
+    /// fitted value, and the factors of the boxes.
     fn push_object(
         &mut self,
         id: ObjectId,
@@ -253,7 +256,7 @@ impl Mapper {
         }
     }
 
-    /// The factors of an object's boxes whose poses are still there, and the frame of each.
+    /// Returns the factors of the boxes whose poses are in the smoother, with their frames.
     pub(super) fn entries_of(&self, key: &Key, views: &[ObjectBox]) -> (Vec<usize>, Vec<FactorEntry>) {
         let there = views.iter().filter(|view| self.pose(view.frame).is_some());
         let entries = there.flat_map(|view| {
@@ -263,7 +266,7 @@ impl Mapper {
         entries.unzip()
     }
 
-    /// The estimates of all variables of some factors, but one.
+    /// Returns the estimates of all variables of some factors, except `but`.
     fn around(&self, entries: &[&FactorEntry], but: &Key) -> Values {
         let mut values = Values::new();
         for key in entries.iter().flat_map(|entry| &entry.keys).filter(|key| *key != but) {
@@ -275,7 +278,7 @@ impl Mapper {
         values
     }
 
-    /// All objects that are mapped, as rules look at them.
+    /// Returns the mapped objects as candidates for semantic rules.
     fn candidates(&self) -> Vec<Candidate> {
         let mapped = self.objects.iter().filter(|(_, object)| object.is_mapped());
         mapped
@@ -286,7 +289,7 @@ impl Mapper {
             .collect()
     }
 
-    /// Asks the rules about some objects, and pushes the factors that are new.
+    /// Applies the semantic rules to some objects, and pushes the new factors.
     pub(super) fn ask(&mut self, about: &[ObjectId], report: &mut FrameReport) {
         let (all, before) = (self.candidates(), self.ledger.clone());
         let up = self.up.frame().and_then(|frame| frame.up);
@@ -310,7 +313,7 @@ impl Mapper {
         }
     }
 
-    /// Removes those factors that are still there.
+    /// Removes the factors that are still in the smoother.
     pub(super) fn remove(&mut self, factors: &[FactorId], report: &mut FrameReport) {
         let there = factors.iter().copied().filter(|id| self.session.entry(*id).is_some());
         let removed = self.session.remove(&there.collect::<Vec<_>>());

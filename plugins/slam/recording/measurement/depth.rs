@@ -1,4 +1,4 @@
-//! The distance of an object along the optical axis.
+//! Distance of an object along the optical axis.
 use super::{Errors, Innovation, Measurement, Rows, UsualDepth};
 use crate::register_measurement;
 use manifactor_geometry::Se3;
@@ -44,7 +44,7 @@ impl Measurement for Depth {
         Some(self.0.get())
     }
 
-    // no allocation: data association asks for every pair of a box and an object
+    // avoids allocations: data association calls it for every pair of a box and an object
     fn innovation(&self, pose: &Se3, object: &DualQuadric) -> Option<Innovation> {
         let mut jacobians = (SMatrix::zeros(), SMatrix::zeros());
         let factor = CentroidDepth { depth: self.0 };

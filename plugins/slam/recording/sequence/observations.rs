@@ -1,7 +1,8 @@
 //! The frames of a sequence, one by one.
 use super::{Detection, Observation, Sequence};
 
-/// The frames of a sequence, as they came. Readings of the accelerometer come with the first frame that is not before them.
+/// Frames of a sequence in order of arrival. A reading of the accelerometer belongs to the first frame at or
+/// after its time.
 pub(crate) struct Observations<S> {
     sequence: S,
     frames: usize,
@@ -28,7 +29,7 @@ impl<S: AsRef<Sequence>> Iterator for Observations<S> {
         let felt = &felt[..felt.partition_point(|reading| reading.timestamp <= frame.timestamp)];
         self.readings += felt.len();
         self.frames += 1;
-        // those of a file belong to no frame: the first one carries them
+        // unused rows of a file belong to no frame; the first frame carries them
         let unused = if self.frames == 1 { sequence.unused.clone() } else { vec![] };
         Some(Observation {
             frame: frame.clone(),
@@ -40,7 +41,7 @@ impl<S: AsRef<Sequence>> Iterator for Observations<S> {
 }
 
 impl Sequence {
-    /// Adds a frame, with its boxes and readings, after all others.
+    /// Appends a frame with its boxes and readings.
     pub fn push(&mut self, observation: Observation) {
         let frame = self.frames.len();
         self.frames.push(observation.frame);

@@ -1,4 +1,4 @@
-//! Frames and detections put together by time.
+//! Frames and detections, matched by time.
 use super::SourceError;
 use crate::measurement::{Depth, Quantities};
 use crate::recording::OBJECTS;
@@ -12,34 +12,36 @@ use manifactor_graph::checked::{NotNegative, Positive, Share};
 use manifactor_quadric::BoundingBox;
 use std::path::Path;
 
-/// Frames, the detections in them, and those that belong to none.
+/// Frames, their detections, and the detections without a frame.
 pub(super) type Matched = (Vec<Frame>, Vec<Detection>, Vec<UnusedDetection>);
 
-/// Detections for which a frame is looked for by time.
+/// Limits for matching detections with frames by time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Matching {
-    /// Largest difference in time, in seconds.
+    /// Largest time difference. Unit: seconds.
     pub within: NotNegative,
-    /// Largest share of the detections that may be without a frame.
+    /// Largest expected share of detections without a frame.
     pub without_pose: Share,
 }
 
-/// A tenth of the detections may be made where the odometry has no pose, as at the beginning of a recording.
+/// Returns the default: a tenth of the detections may lack an odometry pose, as at the beginning of a
+/// recording.
 pub(super) fn a_tenth() -> Share {
     Share::literal(0.1)
 }
 
-/// The default is not written: fingerprints of settings stay.
+/// Returns whether a share is the default, which is not written, so that fingerprints of settings stay the
+/// same.
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
 pub(super) fn is_a_tenth(share: &Share) -> bool {
     *share == a_tenth()
 }
 
-/// Reads odometry and detections; each detection goes to the frame nearest in time, if it is near enough. Others are
-/// left out.
+/// Reads odometry and detections. Each detection is assigned to the frame nearest in time; detections without
+/// a frame near enough are left out.
 ///
 /// # Errors
-/// Files that cannot be read; detections of which none has a frame.
+/// Files that cannot be read, or detections that all lack a frame.
 pub(super) fn read_matched(odometry: &Path, file: &Path, by: Matching) -> Result<Matched, SourceError> {
     let within = *by.within;
     let frames = read_poses(odometry)?.into_iter();
@@ -59,12 +61,12 @@ pub(super) fn read_matched(odometry: &Path, file: &Path, by: Matching) -> Result
         return Err(SourceError::NothingMatches { file, odometry, detections: rows.len(), within, nearest });
     }
     let without = without_frame(&frames, &rows, by);
-    // stable: the order of a file decides between duplicates
+    // stable, so that the order of the file decides between duplicates
     matched.sort_by_key(|detection| detection.frame);
     Ok((frames, matched, without.map(UnusedDetection::WithoutPose).into_iter().collect()))
 }
 
-/// The rows without a frame; `None` if there are none.
+/// Returns a summary of the rows without a frame; `None` if there are none.
 fn without_frame(frames: &[Frame], rows: &[detections::Detection], by: Matching) -> Option<WithoutPose> {
     let Matching { within, without_pose: allowed } = by;
     let away = |row: &detections::Detection| Some((row.timestamp, nearest(frames, row.timestamp)?.1));
@@ -73,7 +75,7 @@ fn without_frame(frames: &[Frame], rows: &[detections::Detection], by: Matching)
     Some(WithoutPose { rows: far.len(), of: rows.len(), allowed: *allowed, within: *within, nearest })
 }
 
-/// The poses of a file; what had to be repaired is logged.
+/// Reads the poses of a file. Repairs are logged.
 fn read_poses(file: &Path) -> Result<Vec<StampedPose>, SourceError> {
     let Trajectory { poses, moved, dropped } = tum::read(file)?;
     let (moved, dropped) = (moved.len(), dropped.len());
@@ -83,7 +85,7 @@ fn read_poses(file: &Path) -> Result<Vec<StampedPose>, SourceError> {
     Ok(poses)
 }
 
-/// The frame nearest in time, and how far it is away, in seconds.
+/// Returns the frame nearest in time, and its distance in seconds.
 fn nearest(frames: &[Frame], timestamp: f64) -> Option<(usize, f64)> {
     let after = frames.partition_point(|frame| frame.timestamp < timestamp);
     let candidates = [after.checked_sub(1), Some(after)].into_iter().flatten();
@@ -94,7 +96,7 @@ fn nearest(frames: &[Frame], timestamp: f64) -> Option<(usize, f64)> {
 fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, SourceError> {
     let scores: ClassScores = match row.class_scores() {
         Ok(scores) => scores.into_iter().collect(),
-        // the reader has checked them
+        // cannot happen: the reader has checked the scores
         Err(_) => ClassScores::single(row.class_name.clone(), row.score),
     };
     Ok(Detection {
@@ -109,7 +111,7 @@ fn detection(frame: usize, row: &detections::Detection) -> Result<Detection, Sou
     })
 }
 
-/// The true objects that are named, or those that lie there, as `simulate` writes them.
+/// Reads the true objects from the named file, or from the file that `simulate` writes, if it exists.
 pub(super) fn read_objects(folder: &Path, named: Option<&Path>) -> Result<Vec<TrueObject>, SourceError> {
     let file = folder.join(named.unwrap_or(Path::new(OBJECTS)));
     if named.is_none() && !file.is_file() {
@@ -126,7 +128,7 @@ pub(super) fn read_objects(folder: &Path, named: Option<&Path>) -> Result<Vec<Tr
     }
 }
 
-/// The ground truth that is named, or the one that lies there.
+/// Reads the ground truth from the named file, or from `groundtruth.txt` if it exists.
 pub(super) fn read_ground_truth(
     folder: &Path,
     named: Option<&Path>,

@@ -10,26 +10,26 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The cameras of TUM RGB-D, 640 × 480; without distortion, as in the paper.
+/// Cameras of TUM RGB-D, 640 × 480, without distortion, as in the paper.
 const PRESETS: [(&str, [f64; 4]); 3] = [
     ("freiburg1", [517.3, 516.5, 318.6, 255.3]),
     ("freiburg2", [520.9, 521.0, 325.1, 249.7]),
     ("freiburg3", [535.4, 539.2, 320.1, 247.6]),
 ];
 
-/// A camera by its numbers or by its name.
+/// A camera by its parameters or by its name.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum CameraChoice {
-    /// `freiburg1`, `freiburg2` or `freiburg3`: those of TUM RGB-D.
+    /// `freiburg1`, `freiburg2` or `freiburg3`: cameras of TUM RGB-D.
     Named(CameraName),
-    /// A pinhole: its parameters, in pixels.
+    /// A pinhole camera by its parameters. Unit: pixels.
     Pinhole(Camera),
-    /// A model by its `type`.
+    /// A camera model by its `type`.
     Model(Arc<dyn AnyCamera>),
 }
 
-/// The cameras of TUM RGB-D.
+/// Cameras of TUM RGB-D.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CameraName {
@@ -41,7 +41,7 @@ pub enum CameraName {
     Freiburg3,
 }
 
-// serde's own for untagged forms would only say that none fits, and not what is wrong with a table's field
+// serde's own untagged enum would only report that no variant fits, and not the error in a field
 impl<'de> Deserialize<'de> for CameraChoice {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         struct Plain(CameraChoice);
@@ -74,7 +74,7 @@ impl<'de> Deserialize<'de> for CameraChoice {
 }
 
 impl CameraChoice {
-    /// The pinhole camera of the rectified image.
+    /// Returns the pinhole camera of the rectified image.
     pub fn pinhole(&self) -> Camera {
         match self {
             Self::Pinhole(camera) => *camera,
@@ -88,7 +88,7 @@ fn preset([fx, fy, cx, cy]: [f64; 4]) -> Camera {
     Camera { fx, fy, cx, cy, skew: 0.0, width: 640, height: 480 }
 }
 
-/// The camera that a folder's name tells.
+/// Returns the camera whose name is part of the folder's name.
 pub(super) fn by_folder(folder: &Path) -> Result<Camera, SourceError> {
     let name = folder.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
     let known = PRESETS.iter().find(|(camera, _)| name.contains(camera));

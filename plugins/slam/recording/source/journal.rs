@@ -1,9 +1,11 @@
-//! Frames on disk as they come, so that a stream that was cut off goes on.
+//! Journal of frames on disk, which lets an interrupted stream continue.
 //!
-//! The journal's key is the fingerprint of the settings; each record is a frame, as the source `json_lines` has it. The same
-//! frames give the same bits: a program that was killed reads them again, and has the map that it had.
+//! The journal's key is the fingerprint of the settings. Each record is a frame in the format of the source
+//! `json_lines`. Equal frames give equal bits: a program that was killed reads the frames again and arrives
+//! at the same map.
 //!
-//! A frame that cannot be written, on a full disk, is mapped all the same. The journal ends there, and the run reports it.
+//! If a frame cannot be written, for example on a full disk, it is still mapped. The journal ends there, and
+//! the run reports it.
 use super::stream::Stream;
 use crate::sequence::Observation;
 use crate::source::{line, parse};
@@ -27,10 +29,12 @@ impl Record for Observation {
     }
 }
 
-/// The frames of a journal, then those of the stream that come after them, which are added to it. A journal that is not there is begun.
+/// Returns the frames of a journal, followed by the new frames of the stream, which are appended to the
+/// journal. If there is no journal, it is created.
 ///
 /// # Errors
-/// A file that cannot be read or written, is a link, or is not the journal of these settings; it is unchanged then.
+/// A file that cannot be read or written, is a link, or is not the journal of these settings. It stays
+/// unchanged.
 pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Stream, JournalError> {
     let (mut journal, before) = Journal::<Observation>::open(path, fingerprint)?;
     let past = before.iter().map(|frame| frame.frame.timestamp).fold(f64::NEG_INFINITY, f64::max);
@@ -43,7 +47,7 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
     let (path, counted) = (path.to_owned(), lost.clone());
     let kept = new.map(move |frame| {
         let frame = frame?;
-        // a journal with a gap would give another map
+        // a journal with a gap would give a different map
         if counted.get().is_some() {
             counted.add(&path, None);
             return Ok(frame);
@@ -57,23 +61,23 @@ pub fn journaled(stream: Stream, path: &Path, fingerprint: &str) -> Result<Strea
     Ok(Stream { opening: stream.opening, observations, past, lost })
 }
 
-/// The frames that a journal could not keep, counted while they come.
+/// Shared count of the frames that a journal could not store.
 #[derive(Debug, Clone, Default)]
 pub struct Lost(Arc<Mutex<Option<LostFrames>>>);
 
-/// Frames that a journal could not keep.
+/// Frames that a journal could not store.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LostFrames {
-    /// The journal.
+    /// Path of the journal.
     pub path: PathBuf,
-    /// How many frames, from the first that could not be written to the end.
+    /// Number of frames, from the first that could not be written to the end.
     pub frames: usize,
-    /// The system's reason.
+    /// Reason from the operating system.
     pub reason: String,
 }
 
 impl Lost {
-    /// Those so far; `None` if all are kept.
+    /// Returns the lost frames so far; `None` if all frames are stored.
     pub fn get(&self) -> Option<LostFrames> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -86,8 +90,8 @@ impl Lost {
     }
 }
 
-/// Adds a frame, and returns it as it will be read: a rotation that is written and read may differ in its last digit. One that is not finite, which
-/// no map takes, cannot be written either.
+/// Appends a frame and returns it as it will be read, because writing and reading a rotation may change its
+/// last digit. A non-finite frame is not written; the map rejects it as well.
 fn keep(journal: &mut Journal<Observation>, frame: &Observation) -> io::Result<Observation> {
     if !(frame.frame.timestamp.is_finite() && frame.frame.world_from_camera.is_finite()) {
         return Ok(frame.clone());

@@ -20,18 +20,19 @@ use std::io::{BufRead, BufReader, Read, stdin};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Frames as lines of JSON, one by one as they come: from standard input, or from a file.
+/// Frames as lines of JSON, read one by one as they arrive: from standard input, or from a file.
 ///
-/// A line has the time, the pose by odometry (from the camera's frame, z forward, to a world of its own choice), and the boxes,
-/// each with a class and its score, or with the scores of several. Optional: the `object` that a box shows; its `depth`, the distance of
-/// the centre along the optical axis in metres, or another registered measurement; accelerometer readings since the line before.
+/// A line contains the time, the odometry pose (from the camera frame, z forward, to a world frame that the
+/// odometry chooses), and the boxes. Each box has a class and its score, or the scores of several classes.
+/// Optional fields: the `object` that a box shows; its `depth`, the distance of the centre along the optical
+/// axis in metres, or another registered measurement; accelerometer readings since the previous line.
 ///
 /// ```json
 /// {"timestamp": 0.1, "pose": {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0]}, "boxes": [{"box": [10.0, 20.0, 90.0, 80.0], "class": "cup", "score": 0.8}]}
 /// ```
 ///
-/// A box that cannot be read is left out and reported; the frame stays. A line that is no frame is left out and reported by
-/// `manifactor online`, and an error in `manifactor run`, which reads all lines first.
+/// A box that cannot be read is skipped and reported; the frame stays. A line that is not a frame is skipped
+/// and reported by `manifactor online`. It is an error in `manifactor run`, which reads all lines first.
 ///
 /// ```toml
 /// source = { type = "json_lines", camera = { fx = 525.0, fy = 525.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
@@ -41,22 +42,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct JsonLines {
     /// The camera.
     pub camera: CameraChoice,
-    /// The file, beside the document. Default: standard input.
+    /// Path of the file, relative to the document. Default: standard input.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// The true trajectory, a file in TUM's format beside the document, where there is one.
+    /// Ground-truth trajectory, if there is one: path of a file in TUM's format, relative to the document.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
-    /// Up in the odometry's frame, where it is known.
+    /// Up direction in the odometry frame, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<Direction>,
 }
 
-/// A frame, as a line has it.
+/// A frame in the form of a line.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Line {
-    /// Seconds.
+    /// Timestamp. Unit: seconds.
     timestamp: f64,
     pose: Se3,
     #[serde(default)]
@@ -65,7 +66,7 @@ struct Line {
     accelerometer: Vec<Reading>,
 }
 
-/// A box; `quantities` has all fields that are none of its own.
+/// A box in the form of a line; `quantities` collects all further fields.
 #[derive(Debug, Serialize, Deserialize)]
 struct LineBox {
     #[serde(rename = "box")]
@@ -100,7 +101,7 @@ fn is_sure(score: &Share) -> bool {
     **score >= 1.0
 }
 
-/// A frame as a line that this source reads, without its end.
+/// Returns a frame as a line for this source, without the line end.
 pub fn line(observation: &Observation) -> String {
     let of_box = |detection: &Detection| {
         let scores: IndexMap<String, f64> = detection.scores.iter().map(|(c, s)| (c.to_owned(), s)).collect();
@@ -130,7 +131,7 @@ pub fn line(observation: &Observation) -> String {
     serde_json::to_string(&line).unwrap_or_default()
 }
 
-/// A frame of such a line.
+/// Reads a frame from such a line.
 pub fn parse(line: &[u8]) -> Result<Observation, String> {
     let read = serde_json::from_slice(line).or_else(|error| match without_infinities(line) {
         Some(text) => serde_json::from_str(&text),
@@ -154,8 +155,9 @@ pub fn parse(line: &[u8]) -> Result<Observation, String> {
     })
 }
 
-/// A line with `null` for each number that is not finite: JSON has none, and other languages write them all the same. `None` if
-/// there is no such number. What needs the number refuses `null`, a box for itself.
+/// Returns the line with `null` in place of each non-finite number; `None` if all numbers are finite. JSON
+/// has no such numbers, but programs in several languages write them. A field that needs a number rejects
+/// `null`; in a box this rejects only the box.
 fn without_infinities(line: &[u8]) -> Option<String> {
     let text = std::str::from_utf8(line).ok()?;
     let (mut out, mut word, mut found) = (String::with_capacity(text.len()), String::new(), false);
@@ -203,18 +205,18 @@ impl LineBox {
     }
 }
 
-/// Standard input is read once.
+/// True once standard input has been read: it can be read only once.
 static READ: AtomicBool = AtomicBool::new(false);
-/// What standard input is called.
+/// Name of standard input in messages.
 const STDIN: &str = "standard input";
-/// Some editors begin a file with it.
+/// Some editors write it at the beginning of a file.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-/// A longer line is no frame, in bytes.
+/// Bytes of the longest line that can be a frame.
 const LONGEST: u64 = 1 << 26;
-/// After so many bytes more without an end of the line, the file is given up.
+/// Reading stops after this many further bytes without a line end.
 const ENDLESS: u64 = 1 << 30;
-/// After so many lines in a row that are no frames, the file is given up: half a minute of a camera at 30 Hz. A device such
-/// as `/dev/urandom`, or a recording of something else, has no frame at all and perhaps no end.
+/// Reading stops after this many consecutive lines that are not frames: half a minute of a camera at 30 Hz. A
+/// device such as `/dev/urandom`, or an unrelated file, may have no frames and no end.
 const UNREADABLE: usize = 1000;
 
 #[typetag::serialize(name = "json_lines")]
@@ -258,24 +260,24 @@ impl JsonLines {
     }
 }
 
-/// The lines of a file, to its end or to where it cannot be read.
+/// Lines of a file, up to its end or to a read error.
 struct Lines {
     file: PathBuf,
     reader: Box<dyn BufRead + Send>,
     line: usize,
     text: Vec<u8>,
-    /// Lines before the next that are no frames, in a row.
+    /// Number of consecutive lines before the next one that are not frames.
     unreadable: usize,
 }
 
 impl Lines {
-    /// Reads the next line; its length, 0 at the end.
+    /// Reads the next line and returns its length, 0 at the end.
     fn read(&mut self) -> std::io::Result<usize> {
         self.line += 1;
         self.text.clear();
         let read = self.reader.by_ref().take(LONGEST).read_until(b'\n', &mut self.text)?;
         if read as u64 == LONGEST && !self.text.ends_with(b"\n") {
-            // the rest of it is not kept; what has no end is no file of lines
+            // skips the rest of the line; a line that never ends is an error
             let skipped = self.reader.by_ref().take(ENDLESS).skip_until(b'\n')?;
             if skipped as u64 == ENDLESS {
                 return Err(std::io::Error::other("there is no end of a line within a gigabyte"));
@@ -287,12 +289,12 @@ impl Lines {
         Ok(read)
     }
 
-    /// No more is read.
+    /// Stops reading.
     fn give_up(&mut self) {
         self.reader = Box::new(std::io::empty());
     }
 
-    /// The frame of the line that was read last.
+    /// Returns the frame of the last line that was read.
     fn frame(&mut self) -> Result<Observation, SourceError> {
         let read = self.parse();
         self.unreadable = if read.is_ok() { 0 } else { self.unreadable + 1 };
@@ -374,7 +376,7 @@ mod tests {
             let stream = source(folder.path(), text).open(&folders).unwrap().unwrap();
             stream.observations.collect()
         };
-        // a frame in between begins the count again
+        // a frame in between resets the count
         let sound = read(&format!("{bad}{good}\n{bad}{good}\n"));
         assert_eq!((sound.len(), sound.iter().filter(|read| read.is_ok()).count()), (2 * UNREADABLE, 2));
         let given_up = read(&format!("{good}\n{bad}{bad}{good}\n"));

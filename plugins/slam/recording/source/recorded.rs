@@ -9,11 +9,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Odometry and detections from files of one's own.
+/// Odometry and detections from the user's own files.
 ///
-/// `folder` is found as that of `tum` is. In it lie `odometry.txt` and `detections.csv`, and where there is one, a
-/// `groundtruth.txt` and `objects.json`: poses `timestamp tx ty tz qx qy qz qw`, boxes by column names, and true objects
-/// as `manifactor simulate` writes them.
+/// `folder` is found in the same way as the `sequence` of `tum`. It contains `odometry.txt` and
+/// `detections.csv`, and optionally `groundtruth.txt` and `objects.json`: poses
+/// `timestamp tx ty tz qx qy qz qw`, boxes by column names, and true objects in the format of
+/// `manifactor simulate`.
 ///
 /// ```toml
 /// source = { type = "recorded", folder = "my_recording", camera = { fx = 320.0, fy = 320.0, cx = 320.0, cy = 240.0, width = 640, height = 480 } }
@@ -21,33 +22,35 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Recorded {
-    /// Where the files are.
+    /// Folder of the files.
     pub folder: PathBuf,
     /// The camera.
     pub camera: CameraChoice,
-    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV: boxes are rectified. Default: none.
+    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV, to rectify
+    /// boxes. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<Distortion>,
-    /// The odometry in the folder.
+    /// Odometry file in the folder.
     #[serde(default = "odometry")]
     pub odometry: PathBuf,
-    /// The detections in the folder.
+    /// Detections file in the folder.
     #[serde(default = "detections")]
     pub detections: PathBuf,
-    /// The ground truth in the folder. Default: `groundtruth.txt`, if there is such a file.
+    /// Ground-truth file in the folder. Default: `groundtruth.txt`, if there is such a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
-    /// The true objects in the folder, in the ground truth's frame. Default: `objects.json`, if there is such a file and a
-    /// ground truth.
+    /// File of true objects in the folder, in the ground-truth frame. Default: `objects.json`, if there is
+    /// such a file and a ground truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objects: Option<PathBuf>,
-    /// Up in the odometry's frame, where it is known.
+    /// Up direction in the odometry frame, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub up: Option<Direction>,
-    /// How far apart in time a detection and its pose may be, in seconds.
+    /// Largest time difference between a detection and its pose. Unit: seconds.
     #[serde(default = "exact")]
     pub max_time_difference: NotNegative,
-    /// Largest expected share of detections without a pose at their time, from 0 to 1. With more, the run ends with exit code 1.
+    /// Largest expected share of detections without a pose at their time, from 0 to 1. If more lack a pose,
+    /// the run ends with exit code 1.
     #[serde(default = "a_tenth", skip_serializing_if = "is_a_tenth")]
     pub max_without_pose: Share,
 }

@@ -1,7 +1,7 @@
-//! Boxes in the rectified image: as a pinhole camera of the same focal lengths would have them.
+//! Rectification of boxes to a pinhole camera of equal focal lengths.
 //!
-//! The outline of an ellipsoid is a conic for a pinhole alone, so everything after a source speaks of the rectified image. A camera
-//! model is known here and nowhere else.
+//! The outline of an ellipsoid is a conic only for a pinhole camera. All code after a source therefore uses
+//! the rectified image, and camera models appear only in this module.
 use super::{CameraChoice, SourceError};
 use crate::sequence::{Detection, Observation, UnusedDetection};
 use manifactor_geometry::{AnyCamera, RadialTangential};
@@ -15,20 +15,20 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Distortion([f64; 5]);
 
-/// The way from the images of a camera to those of its pinhole.
+/// Mapping from the images of a camera to the images of its pinhole camera.
 #[derive(Debug)]
 pub(super) struct Rectification {
     /// The pinhole camera.
     pub(super) camera: Camera,
-    /// The model of the images; `None` if they are the pinhole's.
+    /// Model of the images; `None` if they come from the pinhole camera itself.
     model: Option<Arc<dyn AnyCamera>>,
 }
 
 impl Rectification {
-    /// Of a source's camera, whose lens may have a distortion besides.
+    /// Creates the rectification for a source's camera, with an optional distortion of its lens.
     ///
     /// # Errors
-    /// If a model that has its own distortion is given another.
+    /// If a model that has its own distortion is combined with a second one.
     pub(super) fn new(choice: &CameraChoice, distortion: Option<Distortion>) -> Result<Self, SourceError> {
         match (choice, distortion) {
             (CameraChoice::Model(_), Some(_)) => Err(SourceError::DistortedTwice),
@@ -39,7 +39,7 @@ impl Rectification {
         }
     }
 
-    /// Of a pinhole camera, whose lens may have a distortion.
+    /// Creates the rectification for a pinhole camera, with an optional distortion of its lens.
     pub(super) fn of_pinhole(camera: Camera, distortion: Option<Distortion>) -> Self {
         let model = distortion.map(|Distortion(coefficients)| {
             let model: Arc<dyn AnyCamera> = Arc::new(RadialTangential::new(camera, coefficients));
@@ -62,7 +62,8 @@ impl Rectification {
         Ok(())
     }
 
-    /// Rectifies the boxes of one frame; those without a place in the rectified image are left out and counted.
+    /// Rectifies the boxes of one frame. Boxes without a place in the rectified image are left out and
+    /// reported.
     pub(super) fn apply_to_frame(&self, observation: &mut Observation) {
         let Some(model) = &self.model else { return };
         let timestamp = observation.frame.timestamp;
@@ -85,7 +86,7 @@ impl Rectification {
     }
 }
 
-/// A box whose sides touch its object in their middles, as those of an ellipse do that stands or lies.
+/// Rectifies a box by the midpoints of its sides, where an upright or lying ellipse touches them.
 fn rectified(model: &dyn AnyCamera, seen: &BoundingBox) -> Option<BoundingBox> {
     let [x, y] = [0.5 * (seen.xmin + seen.xmax), 0.5 * (seen.ymin + seen.ymax)];
     let side = |u, v, axis: usize| Some(model.rectify(&Vector2::new(u, v))?[axis]);
@@ -98,7 +99,7 @@ fn rectified(model: &dyn AnyCamera, seen: &BoundingBox) -> Option<BoundingBox> {
 mod tests {
     use super::*;
 
-    /// The calibration of freiburg1, as the benchmark publishes it.
+    /// Returns the calibration of freiburg1, as the benchmark publishes it.
     fn freiburg1(distortion: [f64; 5]) -> Rectification {
         let named = serde_json::from_value::<CameraChoice>("freiburg1".into()).unwrap();
         Rectification::new(&named, Some(Distortion(distortion))).unwrap()

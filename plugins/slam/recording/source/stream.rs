@@ -1,4 +1,4 @@
-//! Frames one at a time, as they come.
+//! Streams of frames that arrive one by one.
 pub mod confirmed;
 
 use super::SourceError;
@@ -13,20 +13,21 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// A sequence whose frames come one by one: from a file, from a simulator, from a sensor.
+/// A sequence whose frames arrive one by one: from a file, a simulator or a sensor.
 pub struct Stream {
-    /// What is known before the first frame.
+    /// Data that are known before the first frame.
     pub opening: Opening,
-    /// Frames in the order of time, as far as the source keeps it; what cannot be read is an error, and the next may be sound.
+    /// Frames in the order of the source, normally by time. Unreadable input is an error, and later frames
+    /// may be valid.
     pub observations: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send>,
-    /// Seconds: frames up to this time have come before, and come again at once.
+    /// Frames up to this time are repeated from a journal and arrive without delay. Unit: seconds.
     pub past: f64,
-    /// Frames that its journal could not keep.
+    /// Frames that the journal could not store.
     pub lost: Lost,
 }
 
 impl Stream {
-    /// Frames that come now.
+    /// Creates a stream of new frames.
     pub fn new(
         opening: Opening,
         observations: impl Iterator<Item = Result<Observation, SourceError>> + Send + 'static,
@@ -34,10 +35,10 @@ impl Stream {
         Self { opening, observations: Box::new(observations), past: f64::NEG_INFINITY, lost: Lost::default() }
     }
 
-    /// Waits for the last frame, and keeps all of them.
+    /// Waits for the last frame and returns all frames.
     ///
     /// # Errors
-    /// The first thing that cannot be read.
+    /// The first error.
     pub fn collect(self) -> Result<Sequence, SourceError> {
         let mut all = self.opening.into_sequence();
         for observation in Confirmed::new(self.observations) {
@@ -47,20 +48,20 @@ impl Stream {
     }
 }
 
-/// Frames that a thread of their own waits for, one ahead: who takes them can do something else while none comes.
+/// Frames that a separate thread reads, one ahead, so that the caller can work while no frame arrives.
 pub struct Awaited {
     frames: Receiver<Result<Observation, SourceError>>,
     reader: Option<JoinHandle<()>>,
 }
 
-/// While no frame comes, it is asked this often whether to go on.
+/// Interval at which `next` calls `goes_on` while no frame arrives.
 const NAP: Duration = Duration::from_millis(50);
 
 impl Awaited {
     /// Starts the thread that reads the frames.
     pub fn new(observations: Box<dyn Iterator<Item = Result<Observation, SourceError>> + Send>) -> Self {
         let (sender, frames) = sync_channel(0);
-        // it ends with the frames, or with the first that nobody takes
+        // the thread ends with the frames, or with the first frame that has no receiver
         let read = move || {
             for frame in observations {
                 if sender.send(frame).is_err() {
@@ -71,7 +72,8 @@ impl Awaited {
         Self { frames, reader: Some(std::thread::spawn(read)) }
     }
 
-    /// The next frame, `None` after the last; `Break` where `goes_on` says so before one comes.
+    /// Returns the next frame, or `None` after the last. Returns `Break` if `goes_on` breaks before a frame
+    /// arrives.
     pub fn next(
         &mut self,
         mut goes_on: impl FnMut() -> ControlFlow<()>,

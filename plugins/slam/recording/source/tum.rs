@@ -10,12 +10,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// A sequence of the TUM RGB-D benchmark, with detections beside it.
+/// A sequence of the TUM RGB-D benchmark, with detections.
 ///
-/// `sequence` is a folder: an absolute path, one beside the document, or one in the folder that `--data` or the
-/// environment variable `MANIFACTOR_DATA` names. In it lie `odometry`, a trajectory whose consecutive relative poses
-/// are the motion that was measured; `detections`, a CSV of boxes with the objects that they show; and, where there
-/// are any, `groundtruth.txt` and `accelerometer.txt`. Each pose of the odometry is a frame.
+/// `sequence` is a folder: an absolute path, a path relative to the document, or a path in the folder that
+/// `--data` or the environment variable `MANIFACTOR_DATA` names. It contains `odometry`, a trajectory whose
+/// consecutive relative poses are the measured motion; `detections`, a CSV file of boxes with the objects
+/// that they show; and optionally `groundtruth.txt` and `accelerometer.txt`. Each odometry pose is a frame.
 ///
 /// ```toml
 /// source = { type = "tum", sequence = "rgbd_dataset_freiburg1_desk", odometry = "trajectories/dvo_vo.txt" }
@@ -23,27 +23,29 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TumRgbd {
-    /// The folder of the sequence.
+    /// Folder of the sequence.
     pub sequence: PathBuf,
-    /// The odometry in it, in TUM's format.
+    /// Odometry file in the folder, in TUM's format.
     pub odometry: PathBuf,
-    /// The detections in it.
+    /// Detections file in the folder.
     #[serde(default = "detections")]
     pub detections: PathBuf,
-    /// The ground truth in it. Default: `groundtruth.txt`, if there is such a file.
+    /// Ground-truth file in the folder. Default: `groundtruth.txt`, if there is such a file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
-    /// The camera: by name, or by its numbers. Default: the one that the folder's name tells.
+    /// Camera by name or by its parameters. Default: the camera that the folder's name contains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<CameraChoice>,
-    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV: boxes are rectified. Default: none.
+    /// Coefficients k₁, k₂, p₁, p₂, k₃ of a `radial_tangential` camera, in the order of OpenCV, to rectify
+    /// boxes. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distortion: Option<Distortion>,
-    /// How far apart in time a detection and its pose may be, in seconds. Time stamps are written to the
-    /// microsecond: as it stands, only equal ones match.
+    /// Largest time difference between a detection and its pose. Timestamps are written to the microsecond,
+    /// so the default matches only equal ones. Unit: seconds.
     #[serde(default = "exact")]
     pub max_time_difference: NotNegative,
-    /// Largest expected share of detections without a pose at their time, from 0 to 1. With more, the run ends with exit code 1.
+    /// Largest expected share of detections without a pose at their time, from 0 to 1. If more lack a pose,
+    /// the run ends with exit code 1.
     #[serde(default = "a_tenth", skip_serializing_if = "is_a_tenth")]
     pub max_without_pose: Share,
 }

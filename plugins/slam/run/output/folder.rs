@@ -1,81 +1,84 @@
-//! Folders of results: what may be written into one, and that only one process does.
+//! Result folders: protects foreign files, and gives write access to one process at a time.
 //!
-//! A command that writes a folder leaves the file `.manifactor` in it, which names the command and its document:
-//! `manifactor run "/robot/desk.toml"`. The two may write there again. A folder that holds other files and no such marker,
-//! or a marker of something else, is refused. The marker is locked while the command runs, and says which process has
-//! the lock. The folder of a variant lies in that of its run, and may be written by runs of any document.
+//! A command that writes a folder creates the marker file `.manifactor` in it. The marker names the command
+//! and its document: `manifactor run "/robot/desk.toml"`. This command may write into the folder again with
+//! this document. A folder is refused if it contains files but no such marker, or the marker of a different
+//! command or document. The marker is locked while the command runs, and contains the number of the process
+//! with the lock. The folder of a variant is inside the folder of its run, and runs of any document may write
+//! into it.
 use manifactor_formats::whole::{open_regular, remove_unfinished};
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// The name of the file that says whose a folder is.
+/// Name of the file that names the owner of a folder.
 const MARKER: &str = ".manifactor";
-/// More bytes than a marker has.
+/// Upper bound of the size of a marker, in bytes.
 const LONG: u64 = 1 << 16;
 
-/// Why results cannot go into a folder.
+/// Error that prevents results from being written into a folder.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FolderError {
-    /// A folder that cannot be made or written into.
+    /// The folder cannot be created or written into.
     #[error("{}: {source}", path.display())]
     Io {
-        /// Which; or its marker.
+        /// The folder or its marker.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Another process writes into it.
+    /// A different process writes into the folder.
     #[error("{} is in use: {} writes into it", folder.display(), process.map_or("another process".to_owned(), |id| format!("process {id}")))]
     InUse {
-        /// Which.
+        /// The folder.
         folder: PathBuf,
-        /// The number of the process, where it is known.
+        /// Number of the process, if known.
         process: Option<u32>,
     },
-    /// It holds files that nothing shows to be results.
+    /// The folder contains files that are not known to be results.
     #[error("{} holds files that Manifactor has not written, such as {found}", folder.display())]
     Foreign {
-        /// Which.
+        /// The folder.
         folder: PathBuf,
-        /// The first of its files.
+        /// First of these files.
         found: String,
     },
-    /// It holds the results of another command or document.
+    /// The folder contains the results of a different command or document.
     #[error("{} holds the results of `{writer}`, and `{owner}` would mix with them", folder.display())]
     Other {
-        /// Which.
+        /// The folder.
         folder: PathBuf,
-        /// What was to write into it: a command and its document.
+        /// The command and document that were refused.
         owner: String,
-        /// What has written it.
+        /// The command and document that have written the folder.
         writer: String,
     },
 }
 
-/// A folder that this process alone writes results into, until this is dropped.
+/// A folder of results that only this process writes into, until this value is dropped.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
     marker: File,
-    /// How many bytes of the marker stay.
+    /// Bytes of the marker that remain after the drop.
     kept: u64,
 }
 
 impl OutputFolder {
-    /// Makes a folder, or takes one, for the results of a command such as `run` and its document. Removes what killed
-    /// runs of the same have left unfinished. With `force` it is taken whatever is in it, unless another process uses it.
+    /// Claims a folder for the results of a command such as `run` and its document, and creates it if
+    /// necessary. Removes unfinished files of earlier killed runs by this command and document. With `force`,
+    /// existing files do not matter, unless a different process uses the folder.
     ///
     /// # Errors
-    /// If it cannot be made or written, is in use, or holds what others have written; it is unchanged then.
+    /// If the folder cannot be created or written, is in use, or contains foreign files. It stays unchanged.
     pub fn claim(path: &Path, command: &str, document: &Path, force: bool) -> Result<Self, FolderError> {
         let document = document.canonicalize().unwrap_or_else(|_| document.to_owned());
-        // quoted, so that it is one line whatever the name
+        // quoted, so that any name stays on one line
         let owner = format!("manifactor {command} {document:?}\n");
         make(path).map_err(|source| FolderError::Io { path: path.to_owned(), source })?;
         let place = path.join(MARKER);
-        // no marker is put into a folder that is refused; a process that was killed at once leaves an empty one
+        // a refused folder gets no marker; a process that was killed immediately leaves an empty one
         let unmarked = place.symlink_metadata().map_or(true, |at| at.len() == 0);
         if !force && unmarked && !lies_in_one_of(path, command) {
             refuse_others(path)?;
@@ -91,19 +94,20 @@ impl OutputFolder {
         if !ours && !force {
             refuse_other_results(path, owner.trim_end(), &found)?;
         }
-        // a file system without locks is no reason not to run, but others may be at work there
+        // a file system without locks does not prevent a run, but then a different process may be using the
+        // folder
         if ours && locked.is_ok() {
             clean(path);
         }
         let kept = owner.len() as u64;
         let process = format!("process {}\n", std::process::id());
-        // a kill between the two leaves a marker that is ours still
+        // the process may be killed between these two steps; the marker still names this owner then
         let (length, text) = if ours { (kept, process) } else { (0, owner + &process) };
         marker.set_len(length).and_then(|()| marker.write_all(text.as_bytes())).map_err(io)?;
         Ok(Self { path: path.to_owned(), marker, kept })
     }
 
-    /// Where it is.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -111,7 +115,7 @@ impl OutputFolder {
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
-        // a process that is named and has ended does no harm
+        // harmless if it fails: the marker then names a process that has ended
         let _ = self.marker.set_len(self.kept);
     }
 }
@@ -123,29 +127,29 @@ fn make(folder: &Path) -> io::Result<()> {
     }
 }
 
-/// Returns whether the folder around it belongs to the command, as that of a run does around that of a variant.
+/// Returns whether the parent folder belongs to the command, as a run's folder does for its variants.
 fn lies_in_one_of(folder: &Path, command: &str) -> bool {
     let Ok(folder) = folder.canonicalize() else { return false };
     let Some(place) = folder.parent().map(|outer| outer.join(MARKER)) else { return false };
-    // opening a pipe would wait for somebody at its other end
+    // opening a pipe would block until its writer opens it
     let is_file = place.symlink_metadata().is_ok_and(|at| at.is_file());
     let ours = format!("manifactor {command} ");
     is_file && File::open(place).is_ok_and(|marker| text(&marker).starts_with(&ours))
 }
 
-/// What a marker says; on some systems one that is locked cannot be read.
+/// Returns the text of a marker. On some systems a locked marker cannot be read and gives an empty text.
 fn text(marker: &File) -> String {
     let mut bytes = vec![];
     let _ = marker.take(LONG).read_to_end(&mut bytes);
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// An error, if there is anything in a folder but a marker.
+/// Returns an error if a folder contains anything except a marker.
 fn refuse_others(folder: &Path) -> Result<(), FolderError> {
     let io = |source| FolderError::Io { path: folder.to_owned(), source };
     let names = std::fs::read_dir(folder).map_err(io)?.map(|entry| entry.map(|entry| entry.file_name()));
     let names = names.collect::<io::Result<Vec<_>>>().map_err(io)?;
-    // the same one each time
+    // the first name in order, so that the message is reproducible
     match names.into_iter().filter(|name| name != MARKER).min() {
         None => Ok(()),
         Some(name) => {
@@ -155,10 +159,11 @@ fn refuse_others(folder: &Path) -> Result<(), FolderError> {
     }
 }
 
-/// An error, if a folder's marker is not one, or if it names another owner and there is anything beside it.
+/// Returns an error if a folder's marker is invalid, or if it names a different owner and the folder contains
+/// further files.
 fn refuse_other_results(folder: &Path, owner: &str, marker: &str) -> Result<(), FolderError> {
     let Some(writer) = marker.lines().next() else {
-        // it was made just now
+        // the marker has just been created
         return Ok(());
     };
     if !writer.starts_with("manifactor ") {
@@ -171,7 +176,7 @@ fn refuse_other_results(folder: &Path, owner: &str, marker: &str) -> Result<(), 
     })
 }
 
-/// Removes what killed runs have left in a folder and in those of its variants.
+/// Removes unfinished files of killed runs from a folder and from the folders of its variants.
 fn clean(folder: &Path) {
     remove_unfinished(folder);
     let inner = std::fs::read_dir(folder).into_iter().flatten().flatten();
@@ -180,7 +185,7 @@ fn clean(folder: &Path) {
         .for_each(|inner| remove_unfinished(&inner.path()));
 }
 
-/// The number of the process that a marker names.
+/// Returns the number of the process that a marker names.
 fn process(marker: &str) -> Option<u32> {
     marker.lines().find_map(|line| line.strip_prefix("process "))?.parse().ok()
 }

@@ -1,4 +1,4 @@
-//! The map that a run leaves, for other runs to begin with.
+//! The map that a run writes for later runs.
 use manifactor_graph::{FactorEntry, Graph, Key, Noise};
 use manifactor_mapping::estimate::looks::{Looked, looks};
 use manifactor_mapping::estimate::{Estimate, Landmark};
@@ -13,31 +13,31 @@ use nalgebra::DMatrix;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// Why there is no map.
+/// Error while creating a map.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MapError {
-    /// The graph does not go with the estimate.
+    /// The graph does not match the estimate.
     #[error(transparent)]
     Compile(#[from] CompileError),
-    /// The solver's weights do not go with the graph.
+    /// The solver's weights do not match the graph.
     #[error(transparent)]
     Weights(#[from] WeightError),
-    /// It is not known how well objects are known.
+    /// The covariances of the objects cannot be computed.
     #[error(transparent)]
     Covariance(#[from] CovarianceError),
 }
 
-/// A factor whose loss gives it less counts this much.
+/// Smallest weight of a factor after its robust loss.
 const LEAST_WEIGHT: f64 = 1e-9;
-/// As well as an object is known of which nothing is known: rad, m, and the logarithm of its axes.
+/// Standard deviations of an unobserved object: rotation (rad), centre (m), log semi-axes.
 const UNKNOWN: [f64; 9] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0, 1.0, 1.0, 1.0];
 
-/// The map of an estimate, without those objects that are gone. Objects of that map without new views are as they were
-/// read, so that a map does not fade from run to run.
+/// Returns the map of an estimate, without objects that are gone. Objects of the prior map without new
+/// views are kept as they were read, so that a map does not fade from run to run.
 ///
 /// # Errors
-/// If there are no covariances.
+/// If the covariances cannot be computed.
 pub fn map_of(estimate: &Estimate, settings: &Settings) -> Result<PriorMap, MapError> {
     let new = looks(estimate, *settings.detections.border_px);
     let mut covariances = covariances(estimate)?;
@@ -66,12 +66,13 @@ pub fn map_of(estimate: &Estimate, settings: &Settings) -> Result<PriorMap, MapE
     Ok(PriorMap::new(estimate.mapping.frame.up, objects))
 }
 
-/// The smallest chance to miss an object in all looks at which it is believed to be there.
+/// An object counts as gone if the probability of missing it in all looks since its last detection is smaller
+/// than this.
 const MISSED: f64 = 0.001;
-/// An object that is gone was looked at so many times.
+/// Smallest number of looks since its last detection at which an object can count as gone.
 const LOOKS: usize = 8;
 
-/// The mapped objects that are not there any more, by number.
+/// Returns the numbers of mapped objects that are gone.
 pub(super) fn gone(estimate: &Estimate, settings: &Settings) -> Vec<ObjectId> {
     let looks = looks(estimate, *settings.detections.border_px);
     let is_gone = |(id, looked): (ObjectId, Looked)| {
@@ -81,16 +82,18 @@ pub(super) fn gone(estimate: &Estimate, settings: &Settings) -> Vec<ObjectId> {
     looks.into_iter().filter_map(is_gone).collect()
 }
 
-/// Returns whether an object is not there any more: it should have been seen since it was seen last, in this run or before, and was not.
+/// Returns whether an object is gone: at its detection rate so far, it should have been detected again since
+/// its last detection in this run or before, but was not.
 fn is_gone(measured: &Measured, looked: Looked, settings: &Settings) -> bool {
     let prior = measured.prior.as_ref().map(|prior| prior.looks).unwrap_or_default();
     let missed = (1.0 - prior.plus(looked.before).rate()).powf(looked.since as f64);
-    // boxes that are held out are not missed
+    // held-out boxes do not count as missed
     settings.evaluation.holdout.is_none() && looked.since >= LOOKS && missed < MISSED
 }
 
-/// Has the factors of an earlier map count by the covariances that were read, and not by those that were trusted: what is written says again
-/// what white noise would leave. Their loss gives them as much weight as in the solve.
+/// Gives the factors of the prior map the covariances that were read, without the settings' `sigma_scale` and
+/// `shape_error`. The written covariances are then again those of white noise. Each factor keeps the weight
+/// that its robust loss had in the solve.
 fn as_written(graph: &mut Graph, estimate: &Estimate) {
     let weights: HashMap<usize, f64> =
         estimate.solution.factors.iter().map(|f| (f.entry, f.weight)).collect();
@@ -105,13 +108,14 @@ fn as_written(graph: &mut Graph, estimate: &Estimate) {
         let Some(prior) = known(entry) else { continue };
         let weight = weights.get(&place).copied().unwrap_or(1.0).max(LEAST_WEIGHT);
         let noise = Noise::covariance(DMatrix::from_fn(9, 9, |r, c| prior.covariance[r][c] / weight));
-        // what was read has one
+        // a map that was read has a valid covariance
         entry.noise = noise.unwrap_or_default();
         entry.loss = None;
     }
 }
 
-/// The covariance of each object, by its key. Directions that nothing determines are known as badly as can be.
+/// Returns the covariance of each object by key. Undetermined directions get the standard deviations of
+/// `UNKNOWN`.
 fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, MapError> {
     let (mut graph, values) = (estimate.mapping.graph.clone(), &estimate.solution.values);
     let keys: HashSet<&str> = estimate.mapping.mapped().map(|object| object.key.as_str()).collect();
@@ -124,7 +128,7 @@ fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, Ma
             keys: vec![landmark.object.key.clone()],
             name: None,
             factor: Arc::new(QuadricPrior { value: *landmark.quadric }),
-            // literals that are positive
+            // the literals are positive
             noise: Noise::sigmas(&UNKNOWN).unwrap_or_default(),
             loss: None,
         });
@@ -132,7 +136,7 @@ fn covariances(estimate: &Estimate) -> Result<HashMap<String, [[f64; 9]; 9]>, Ma
     let mut problem = Problem::compile(&graph, values)?;
     let weights = &estimate.solution.weights;
     if !weights.is_empty() {
-        // what the solver has rejected says nothing; weak priors come last, and count
+        // factors that the solver has rejected do not count; the weak priors come last and count fully
         let added = graph.factors().len().saturating_sub(weights.len());
         problem.set_weights(&[weights.as_slice(), &vec![1.0; added]].concat())?;
     }

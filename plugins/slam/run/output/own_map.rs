@@ -1,17 +1,17 @@
-//! That a run does not write over the map that it reads.
+//! Check that a run does not overwrite the map that it reads.
 use super::{MAP, variant_folder};
 use manifactor_config::{Diagnostics, Errors, Fault};
 use manifactor_mapping::settings::run_document::RunDocument;
 
-/// Refuses a run of which a variant reads a map that the run itself writes: one that does not find its place in it would leave a map of
-/// its own there, and the one that was read would be lost.
+/// Refuses a run if a variant reads a map that the run itself writes. If relocalization failed, the run would
+/// replace this map by a new one, and the map would be lost.
 ///
 /// # Errors
-/// Each such map, where the document names it.
+/// All such maps, each at its position in the document.
 pub fn refuse_own_maps(run: &RunDocument) -> Result<(), Diagnostics> {
     let errors = Errors::new();
     let written = run.variants.iter().map(|variant| variant_folder(&run.output, &variant.name).join(MAP));
-    // what is not there yet was not read
+    // a file that does not exist yet was not read
     let written: Vec<_> = written.filter_map(|file| file.canonicalize().ok()).collect();
     for prior in run.variants.iter().filter_map(|variant| variant.settings.prior_map.as_ref()) {
         let Some(file) = &prior.read_from else { continue };

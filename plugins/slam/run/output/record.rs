@@ -1,6 +1,7 @@
-//! The record of a run: all that there is to draw, in one frame.
+//! Record of a run: all data to draw, in one frame.
 //!
-//! `record.json` holds it, so that pictures can be made again from a run's folder; `frames.jsonl` holds its frames, one a line.
+//! `record.json` contains the record, so that pictures can be drawn again from the folder of a run.
+//! `frames.jsonl` contains its frames, one per line.
 use manifactor_graph::Direction;
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::settings::Settings;
@@ -22,97 +23,97 @@ pub use frames::{FrameRecord, SeenBox, TrackedPose};
 pub use objects::{ObjectRecord, Solid};
 pub use variables::OwnVariable;
 
-/// The file that holds it, in the folder of the run.
+/// File of the record in the folder of the run.
 pub(crate) const RECORD: &str = "record.json";
 
-/// Why a record could not be read.
+/// Error while reading a record.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// There is none, or it cannot be read.
+    /// The file does not exist or cannot be read.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// It is not one, or one with other fields, as another version may have written.
+    /// The file is not a record, or has different fields, for example from a different version.
     #[error("{} is not a record of a run, as this version writes them: {source}", path.display())]
     NotARecord {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The reason.
         source: serde_json::Error,
     },
-    /// Pictures would be written somewhere else.
+    /// Pictures would be written to a different folder.
     #[error("{}: the variant {variant:?} has the folder {folder:?}, which is not that of its name", path.display())]
     Folder {
         /// The file.
         path: PathBuf,
-        /// The variant.
+        /// Name of the variant.
         variant: String,
-        /// What the file says.
+        /// Folder in the record.
         folder: String,
     },
 }
 
-/// A run, variant by variant.
+/// Record of a run, variant by variant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
-    /// Of the program that made it.
+    /// Version of the program.
     pub version: String,
-    /// What the run is called.
+    /// Title of the run.
     pub title: String,
-    /// In the order of the document.
+    /// Variants in the order of the document.
     pub variants: Vec<VariantRecord>,
 }
 
-/// One variant. Poses, objects and up are in the frame of the truth where there is one, and in that of the map where
-/// there is none.
+/// Record of one variant. Poses, objects and the up direction are in the ground-truth frame, or in the map
+/// frame if there is no ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VariantRecord {
-    /// Its name.
+    /// Name of the variant.
     pub name: String,
-    /// What it does, in a sentence.
+    /// Description in one sentence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub about: Option<String>,
-    /// Its folder in that of the run.
+    /// Folder of the variant within the folder of the run.
     pub folder: String,
-    /// Up; in a map whose up is unknown, up in the first image.
+    /// Up direction. If it is unknown, the up direction of the first image.
     pub up: Direction,
-    /// The camera; the same for all frames.
+    /// Camera, shared by all frames.
     pub camera: Camera,
-    /// How errors were aligned; `None` where there is no truth to compare with.
+    /// Alignment of the errors; `None` without ground truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<Alignment>,
-    /// Over how many frames relative errors are taken.
+    /// Number of frames that relative errors span.
     pub relative_over: usize,
-    /// By time.
+    /// Frames, sorted by time.
     pub frames: Vec<FrameRecord>,
     /// Detected objects by number, then true ones that were never detected.
     pub objects: Vec<ObjectRecord>,
-    /// Variables of the run's own.
+    /// Variables that the document declares itself.
     pub variables: Vec<OwnVariable>,
-    /// The cost after each accepted step; the first is where the solve began.
+    /// Cost after each accepted step; the first entry is the initial cost.
     #[serde(deserialize_with = "finite_or_nan")]
     pub cost: Vec<f64>,
     /// Residuals at the estimate, by type of factor.
     pub residuals: Vec<FactorResiduals>,
-    /// How many images the run's pictures show.
+    /// Number of images in the pictures of the run.
     pub images: usize,
 }
 
 impl RunRecord {
-    /// The record of these variants.
+    /// Creates the record of these variants.
     pub fn new(title: &str, variants: Vec<VariantRecord>) -> Self {
         Self { version: env!("CARGO_PKG_VERSION").to_owned(), title: title.to_owned(), variants }
     }
 
-    /// Reads the record of a run's folder.
+    /// Reads the record in the folder of a run.
     ///
     /// # Errors
-    /// If there is none, it cannot be read, or a variant's folder is not within that of the run.
+    /// If the file does not exist, cannot be read, or names a variant's folder outside the folder of the run.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let path = folder.join(RECORD);
         let text = std::fs::read_to_string(&path)
@@ -131,7 +132,7 @@ impl RunRecord {
 }
 
 impl VariantRecord {
-    /// The record of an estimate.
+    /// Creates the record of an estimate.
     pub fn new(variant: &Variant, estimate: &Estimate) -> Self {
         let settings: &Settings = &variant.settings;
         let drawn = drawn::Frames::of(estimate, *settings.evaluation.max_time_difference);
@@ -153,7 +154,7 @@ impl VariantRecord {
         }
     }
 
-    /// The classes of its objects, in alphabetical order.
+    /// Returns the classes of the objects in alphabetical order.
     pub fn classes(&self) -> Vec<&str> {
         let mut names: Vec<&str> = self.objects.iter().map(|object| object.class.as_str()).collect();
         names.sort_unstable();
@@ -162,13 +163,14 @@ impl VariantRecord {
     }
 }
 
-/// Numbers, of which those that are not finite were written as null.
+/// Reads numbers; null stands for a number that was not finite and becomes NaN.
 fn finite_or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
     let numbers = Vec::<Option<f64>>::deserialize(from)?;
     Ok(numbers.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
 }
 
-/// Up in the frame of the record. If it is unknown, up in the first image is the best guess.
+/// Returns the up direction in the frame of the record. If it is unknown, it is guessed as up in the first
+/// image.
 fn up(estimate: &Estimate, drawn: &drawn::Frames) -> Direction {
     let image_up = || estimate.trajectory().first().map(|p| p.pose.rotation.act(&-Vector3::y()));
     let known = estimate.mapping.frame.up.map(|up| *up);

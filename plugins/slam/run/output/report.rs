@@ -1,4 +1,4 @@
-//! What a run has to tell, for scripts and for people.
+//! Report of a run, for scripts and for people.
 use crate::output::map::gone;
 use manifactor_graph::Direction;
 use manifactor_mapping::estimate::variance::Components;
@@ -30,145 +30,146 @@ pub use table::Row;
 pub use trajectory::name as alignment_name;
 pub use trajectory::{TrajectoryError, TrajectoryReport};
 
-/// A run, variant by variant.
+/// Report of a run, variant by variant.
 #[derive(Debug, Clone, Serialize)]
 pub struct RunReport {
-    /// Of the program that made it.
+    /// Version of the program.
     pub version: &'static str,
-    /// What the run is called.
+    /// Title of the run.
     pub title: String,
-    /// Whether all variants were run, each to its end; not, where somebody interrupted it.
+    /// True if all variants were run to their end; false if the user interrupted the run.
     pub complete: bool,
-    /// In the order of the document.
+    /// Variants in the order of the document.
     pub variants: Vec<VariantReport>,
-    /// All of it, from reading to the last metric.
+    /// Duration from reading to the last metric. Unit: seconds.
     pub seconds: f64,
 }
 
-/// One variant.
+/// Report of one variant.
 #[derive(Debug, Clone, Serialize)]
 pub struct VariantReport {
-    /// Its name.
+    /// Name of the variant.
     pub name: String,
-    /// What it does, in a sentence.
+    /// Description in one sentence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub about: Option<String>,
-    /// Of its [settings](Settings::fingerprint), which `config.toml` has, and of the program's version.
+    /// Fingerprint of the [settings](Settings::fingerprint) in `config.toml` and of the program's version.
     pub fingerprint: String,
-    /// How much there is of what.
+    /// Numbers of frames, boxes, objects and factors.
     pub counts: Counts,
-    /// Up in the map's frame, where it is known.
+    /// Up direction in the map frame, if known.
     pub up: Option<Direction>,
-    /// The noise as it was estimated, round by round.
+    /// Estimated noise of each round.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub variance_components: Vec<Components>,
-    /// How boxes were put to objects, where the source did not say, or was not asked.
+    /// Result of data association, unless the objects of the source were used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub association: Option<AssociationReport>,
-    /// How it went in a map that was made before.
+    /// Result with the prior map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior_map: Option<PriorMapReport>,
-    /// How the stream went, where frames came one by one: the solve is then what followed it.
+    /// Result of the stream, if frames arrived one by one. `solve` then describes the solve after it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub online: Option<OnlineReport>,
-    /// How the solve went.
+    /// Result of the solve.
     pub solve: SolveReport,
-    /// The trajectory against the truth, where there is one: once for each alignment.
+    /// Errors of the trajectory, if there is ground truth: one entry per alignment.
     pub trajectory: Vec<TrajectoryReport>,
-    /// The objects against the truth, where there is one.
+    /// Errors of the objects, if there is ground truth.
     pub landmarks: Option<LandmarkReport>,
-    /// Whether both are off by as much as the estimate says, where there is a truth.
+    /// Consistency of these errors with the estimated covariances, if there is ground truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub consistency: Option<ConsistencyReport>,
-    /// How well boxes are predicted that the estimate did without.
+    /// Prediction of held-out boxes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOutReport>,
-    /// Each object that was detected, by number.
+    /// All detected objects, sorted by number.
     pub objects: Vec<ObjectReport>,
-    /// Mapped objects that are not there any more at the end, by number: they should have been seen again, and were not. `map.json` is without them.
+    /// Numbers of mapped objects that are gone at the end: they should have been detected again, but were
+    /// not. `map.json` does not contain them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub gone: Vec<ObjectId>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
-    /// Reading, mapping, solving and evaluating.
+    /// Duration of reading, mapping, solving and evaluating. Unit: seconds.
     pub seconds: f64,
 }
 
-/// How much there is of what.
+/// Numbers of frames, boxes, objects and factors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Poses.
     pub frames: usize,
-    /// Detections in them.
+    /// Detections in these frames.
     pub detections: usize,
-    /// Detections of no object.
+    /// Detections without an object.
     pub unassociated: usize,
     /// Detections without width or height.
     pub without_area: usize,
-    /// Detections that score too low.
+    /// Detections with too low a score.
     pub low_score: usize,
     /// Boxes dropped because the border cuts them.
     pub cut: usize,
     /// Boxes replaced by a later one of the same object in the same frame.
     pub duplicates: usize,
-    /// Objects that were detected.
+    /// Detected objects.
     pub objects_detected: usize,
     /// Objects in the map.
     pub objects: usize,
-    /// Boxes of these objects: factors.
+    /// Boxes of these objects, each a factor.
     pub boxes: usize,
     /// Semantic factors.
     pub semantic_factors: usize,
 }
 
-/// How a solve went.
+/// Result of a solve.
 #[derive(Debug, Clone, Serialize)]
 pub struct SolveReport {
-    /// ½ Σ ρ where it began.
+    /// Initial cost ½ Σ ρ.
     pub initial_cost: f64,
-    /// ½ Σ ρ where it ended.
+    /// Final cost ½ Σ ρ.
     pub final_cost: f64,
-    /// Linearizations followed by a step.
+    /// Number of linearizations followed by a step.
     pub iterations: usize,
-    /// How it ended.
+    /// Reason of the termination.
     pub termination: Termination,
-    /// Factors.
+    /// Number of factors.
     pub factors: usize,
-    /// Factors that take no part at the end.
+    /// Number of factors that are inactive at the end.
     pub inactive: usize,
-    /// Their share of all, from 0 to 1.
+    /// Share of inactive factors, from 0 to 1.
     pub inactive_share: f64,
-    /// Factors that the solver has found to be outliers.
+    /// Factors that the solver rejected as outliers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rejected: Vec<Rejected>,
-    /// The factors that fit worst, and the condition of the linear system.
+    /// Worst-fitting factors, and the condition of the linear system.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<Diagnosis>,
-    /// Where the time of the solver went.
+    /// Solver times by stage.
     pub times: Times,
-    /// Time spent on objects alone.
+    /// Time for the refinement of single objects. Unit: seconds.
     pub refinement_seconds: f64,
 }
 
-/// One object.
+/// Report of one object.
 #[derive(Debug, Clone, Serialize)]
 pub struct ObjectReport {
-    /// What was detected of it, and what was done with it.
+    /// Detections of the object, and its state in the map.
     #[serde(flatten)]
     pub object: MappedObject,
-    /// The same in words: why it is not mapped.
+    /// Reason why the object is not mapped, in words.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected_because: Option<String>,
-    /// What it is estimated to be, in the map's frame.
+    /// Estimate in the map frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate: Option<DualQuadric>,
-    /// How far that is from the truth.
+    /// Error of the estimate, if the truth is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<LandmarkError>,
 }
 
 impl VariantReport {
-    /// Compares an estimate with the truth.
+    /// Compares an estimate with ground truth.
     pub fn new(name: &str, estimate: &Estimate, settings: &Settings, seconds: f64) -> Self {
         let mapping = &estimate.mapping;
         let mut warnings = mapping.warnings.clone();
@@ -205,7 +206,7 @@ impl VariantReport {
 }
 
 impl VariantReport {
-    /// Tells how it went in the map that the run was to begin with.
+    /// Adds the report about the prior map, and a warning if the run was not located in it.
     pub(crate) fn tell_prior_map(&mut self, estimate: &Estimate, settings: &Settings, found: Option<Found>) {
         self.prior_map = PriorMapReport::new(estimate, settings, found, &self.gone);
         if let Some(prior) = self.prior_map.as_ref().filter(|prior| !prior.is_located) {
@@ -265,7 +266,7 @@ impl SolveReport {
     }
 }
 
-/// How far each object is from the truth, where that is known.
+/// Returns the errors of objects whose true shape is known.
 pub(super) fn object_errors(estimate: &Estimate) -> Vec<(ObjectId, LandmarkError)> {
     let errors = landmarks::in_truth_frame(estimate, estimate.landmarks());
     errors.into_iter().map(|(landmark, error)| (landmark.object.id, error)).collect()

@@ -1,11 +1,12 @@
-//! Ellipsoids with a shape that boxes do not limit: plates, and those that reach beyond the farthest camera.
+//! Ellipsoids whose shape is not limited by boxes: plates, and ellipsoids that reach beyond the farthest
+//! camera.
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::mapping::Warning;
 
-/// How many times longer the longest semi-axis may be than the shortest. A sheet of paper on a desk has about 100.
+/// Largest ratio of the longest to the shortest semi-axis. A sheet of paper on a desk has about 100.
 const PLATE: f64 = 200.0;
 
-/// The objects with such shapes, if there are any.
+/// Returns a warning with these objects, if there are any.
 pub(super) fn run_away(estimate: &Estimate) -> Option<Warning> {
     let poses = estimate.trajectory();
     let mut objects = vec![];

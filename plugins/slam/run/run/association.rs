@@ -1,4 +1,4 @@
-//! Boxes are put to objects, frame by frame and once more when all are there.
+//! Data association in a batch: frame by frame, then a second pass with all frames known.
 use super::RunError;
 use crate::output::report::{AssociationReport, Naming};
 use manifactor_mapping::settings::Settings;
@@ -8,20 +8,20 @@ use manifactor_solve::Observer;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Boxes put to objects.
+/// Result of the data association.
 pub(super) struct Associated {
-    /// The sequence with these names.
+    /// The sequence with the assigned objects.
     pub sequence: Arc<Sequence>,
-    /// How well it went; `None` where the names are those of the source.
+    /// Report; `None` if the source provides the objects.
     pub report: Option<AssociationReport>,
 }
 
-/// The sequence with its boxes put to objects by the settings' `association`: frame by frame, as they would have come, then once more
-/// by what is known in the end. Frames that cannot be mapped so, and those after an interruption by `observer`, have boxes of no
-/// object.
+/// Assigns the boxes of a sequence to objects with the `association` of the settings: frame by frame as in a
+/// stream, then once more with the final estimate. Boxes of frames that the mapper rejects, and of frames
+/// after an interruption by `observer`, have no object.
 ///
 /// # Errors
-/// If the session cannot begin.
+/// If the smoother cannot be started.
 pub(super) fn associated(
     sequence: Arc<Sequence>,
     settings: &Settings,
@@ -67,7 +67,7 @@ pub(super) fn associated(
     Ok(Associated { sequence: Arc::new(named), report })
 }
 
-/// The frames of a sequence, each with the places of its boxes among all.
+/// Returns the frames of a sequence, each with the index range of its boxes.
 fn with_boxes(sequence: &Sequence) -> impl Iterator<Item = (Observation, Range<usize>)> {
     let mut first = 0;
     sequence.observations().map(move |observation| {

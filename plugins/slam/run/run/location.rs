@@ -1,4 +1,4 @@
-//! Where a run begins in a map that was made before.
+//! Search for the start pose in a prior map.
 use super::RunError;
 use crate::output::report::Found;
 use manifactor_mapping::settings::Settings;
@@ -7,16 +7,17 @@ use manifactor_recording::prior_map::PriorMap;
 use manifactor_recording::sequence::Sequence;
 use manifactor_solve::Observer;
 
-/// A search for the place of a stream in a map, as long as it is not known.
+/// Repeated search for the pose of a stream in a prior map, until it is found.
 #[derive(Debug)]
 pub(super) struct Search {
-    /// With its objects as they are trusted.
+    /// The prior map with trusted covariances.
     map: Option<PriorMap>,
-    /// Frames since it was last looked for.
+    /// Frames since the last search.
     frames: usize,
 }
 
-/// It is looked for when an object is new, and after so many frames, in which those that are there have become better known.
+/// Frames after which the search is repeated without a new object, because the existing objects are more
+/// accurate by then.
 const FRAMES: usize = 15;
 
 impl Search {
@@ -24,7 +25,7 @@ impl Search {
         Self { map: settings.unknown_start().map(|prior| prior.trusted_map()), frames: 0 }
     }
 
-    /// Looks for the place after a frame; it is found once at most.
+    /// Searches for the pose after a frame. Returns it at most once.
     pub(super) fn look(&mut self, report: &FrameReport, mapper: &Mapper) -> Option<Located> {
         let map = self.map.as_ref()?;
         self.frames += 1;
@@ -38,10 +39,10 @@ impl Search {
     }
 }
 
-/// Where a sequence begins in the settings' prior map, if that is to be found, and is.
+/// Searches for the start pose of a sequence in the prior map of the settings.
 ///
 /// # Errors
-/// If a session cannot begin.
+/// If the smoother cannot be started.
 pub(super) fn find(
     sequence: &Sequence,
     settings: &Settings,
@@ -56,7 +57,7 @@ pub(super) fn find(
         if observer.poll().is_break() {
             break;
         }
-        // what cannot be taken is told when all is mapped
+        // rejected frames are reported when the sequence is mapped
         let Ok(report) = mapper.take(&observation) else { continue };
         if let Some(located) = search.look(&report, &mapper) {
             return Ok(Some(Found { frame: report.frame, located }));

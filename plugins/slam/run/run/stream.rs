@@ -1,4 +1,4 @@
-//! A stream, mapped while it comes.
+//! Mapping of a stream while its frames arrive.
 use super::RunError;
 use super::location::Search;
 use crate::output::report::{Found, Naming, OnlineReport, VariantReport};
@@ -14,12 +14,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Maps a stream frame by frame, solves all of it at the end, and evaluates. `watch` is told of each frame, with the map and
-/// the seconds that it took; it can end the stream there. Frames are waited for in a thread of their own, one ahead; where the stream is ended
-/// before its source is, that thread ends with the next frame.
+/// Maps a stream frame by frame, solves the whole graph at the end, and evaluates the result. Calls `watch`
+/// for each frame with the map and the processing time in seconds; `watch` can end the stream. A separate
+/// thread waits for the next frame. If the stream ends before its source, that thread ends with the next
+/// frame.
 ///
 /// # Errors
-/// If the session cannot begin, or no graph can be made in the end. Frames that are refused are told to `watch`.
+/// If the smoother cannot be started, or the final graph cannot be created. Rejected frames are reported to
+/// `watch`.
 pub fn online(
     name: &str,
     stream: Stream,
@@ -68,7 +70,8 @@ pub fn online(
             break;
         }
     }
-    // what waits for a frame may wait for good, but holds what it reads no longer than it has to
+    // the reader thread may wait forever for a frame; dropping its handle lets it release the source as early
+    // as possible
     drop(awaited);
     progress.tell(&taken.mapper.settle());
     progress.end(&mut taken.mapper);
@@ -92,7 +95,7 @@ pub fn online(
     Ok((estimate, report))
 }
 
-/// Frames that were taken, and what was made of them.
+/// The accepted frames with the map made from them.
 struct Taken {
     mapper: Mapper,
     sequence: Sequence,
@@ -112,7 +115,8 @@ impl Taken {
         Ok(report)
     }
 
-    /// The same frames with other settings; `report` becomes that of the last, and tells of all that has happened to the new map.
+    /// Maps the same frames with different settings. Replaces `report` by the one of the last frame, with all
+    /// changes to the new map.
     fn again(self, settings: &Settings, report: &mut FrameReport) -> Self {
         let (mut again, mut before) = (Self::new(self.sequence.opening(), settings), None);
         let mut refused = vec![];
@@ -135,19 +139,21 @@ impl Taken {
     }
 }
 
-/// Watches frames as they come in.
+/// Observer of a stream of frames.
 pub trait Watch {
-    /// Now and then while no frame comes: to end the stream there.
+    /// Called now and then while no frame arrives. `Break` ends the stream.
     fn quiet(&mut self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    /// Before each frame, with its time stamp in seconds: returns when it is there, or to end the stream before it.
+    /// Called before each frame with its timestamp in seconds. Returns when the frame is due. `Break` ends
+    /// the stream before it.
     fn wait(&mut self, _timestamp: f64) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 
-    /// After each frame: what came of it, the frame if it could be read, the map, and the seconds that it took.
+    /// Called after each frame with the result, the frame if it was readable, the map, and the processing
+    /// time in seconds.
     fn frame(
         &mut self,
         report: Result<&FrameReport, &FrameError>,
@@ -156,6 +162,6 @@ pub trait Watch {
         seconds: f64,
     ) -> ControlFlow<()>;
 
-    /// After the last frame, before all of it is solved as one batch.
+    /// Called after the last frame, before the batch solve of the whole graph.
     fn end(&mut self, _mapper: &mut Mapper) {}
 }

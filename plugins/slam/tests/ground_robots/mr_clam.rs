@@ -1,8 +1,10 @@
-//! UTIAS MR.CLAM: a robot sees barcodes, by range and bearing, and finds its way among them, as Vicon saw it do.
+//! UTIAS MR.CLAM: a robot measures range and bearing of barcodes and localizes itself among them. Vicon gives
+//! the truth.
 //!
-//! Noises are what the sensors are, not what fits the truth. Odometry is the commanded speed: its error is a random walk, so that
-//! its variance grows with the way, the turn and the time, however often the robot looks. A camera tells ranges by a barcode's
-//! size, so their error grows with the range. Some barcodes are read as others: hence a robust loss.
+//! Noise models describe the sensors and are not fitted to the truth. Odometry is the commanded speed, with a
+//! random walk as its error. The variance therefore grows with distance, turn and time, at any frame rate. A
+//! camera derives ranges from the size of a barcode, so their error grows with the range. Some barcodes are
+//! misread, hence the robust loss.
 use super::{Seen, Step, aligned_errors, data, drive, errors};
 use manifactor_geometry::{BearingRange2, Point2, Se2, So2};
 use manifactor_graph::checked::Positive;
@@ -12,15 +14,15 @@ use nalgebra::{Vector2, Vector3};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Subjects up to this are robots.
+/// Subjects up to this number are robots.
 const ROBOTS: usize = 5;
 
-/// A table of numbers of the data set; `None` where it is not there.
+/// Reads a table of numbers of the data set; `None` if the file does not exist.
 fn table(name: &str) -> Option<Vec<Vec<f64>>> {
     data(&format!("mrclam7_robot3/{name}.dat")).map(super::rows)
 }
 
-/// Speeds, by the time from which they hold: metres and radians per second.
+/// Speeds, each with the start of its interval. Unit: metres and radians per second.
 struct Odometry {
     rows: Vec<Vec<f64>>,
     next: usize,
@@ -28,7 +30,7 @@ struct Odometry {
 }
 
 impl Odometry {
-    /// How the robot moves until `time`, and the standard deviations of that.
+    /// Returns the motion of the robot until `time`, and its standard deviations.
     fn until(&mut self, time: f64) -> (Se2, Noise) {
         let (mut relative, mut way, mut turn) = (Se2::identity(), 0.0, 0.0);
         let seconds = time - self.time;
@@ -43,14 +45,15 @@ impl Odometry {
             (way, turn) = (way + (v * step).abs(), turn + (w * step).abs());
             self.time = to;
         }
-        // 5 cm and 0.05 rad after a metre, 0.1 rad after a radian; 5 mm and 0.01 rad after a second, as where a wheel slips
+        // 5 cm and 0.05 rad after a metre, 0.1 rad after a radian; 5 mm and 0.01 rad after a second, as from
+        // wheel slip
         let place = (0.05_f64.powi(2) * way + 0.005_f64.powi(2) * seconds).sqrt();
         let angle = (0.05_f64.powi(2) * way + 0.1_f64.powi(2) * turn + 0.01_f64.powi(2) * seconds).sqrt();
         (relative, Noise::sigmas(&[place, place, angle]).unwrap())
     }
 }
 
-/// Measurements of landmarks by time, without other robots and unknown barcodes.
+/// Returns the measurements of landmarks by time, without robots and unknown barcodes.
 fn measurements(rows: &[Vec<f64>], barcodes: &[Vec<f64>]) -> Vec<(f64, Vec<Seen>)> {
     let subjects: HashMap<usize, usize> =
         barcodes.iter().map(|row| (row[1] as usize, row[0] as usize)).collect();
@@ -60,7 +63,7 @@ fn measurements(rows: &[Vec<f64>], barcodes: &[Vec<f64>]) -> Vec<(f64, Vec<Seen>
             continue;
         };
         let (range, bearing) = (row[2], So2::exp(row[3]));
-        // a degree, and a twentieth of the range
+        // one degree, and a twentieth of the range
         let noise = Noise::sigmas(&[0.0175, (0.05 * range).max(0.05)]).unwrap();
         let place = bearing.act(&Vector2::new(range, 0.0));
         let factor = Arc::new(BearingRange2::new(bearing, Positive::new(range).unwrap()));
@@ -73,7 +76,7 @@ fn measurements(rows: &[Vec<f64>], barcodes: &[Vec<f64>]) -> Vec<(f64, Vec<Seen>
     all
 }
 
-/// Where the truth has the robot at a time.
+/// Returns the true position of the robot at a time.
 fn truth_at(truth: &[Vec<f64>], time: f64) -> Vector2<f64> {
     let after = truth.partition_point(|row| row[0] < time).clamp(1, truth.len() - 1);
     let (a, b) = (&truth[after - 1], &truth[after]);
@@ -81,7 +84,7 @@ fn truth_at(truth: &[Vec<f64>], time: f64) -> Vector2<f64> {
     Vector2::new(a[1] + share * (b[1] - a[1]), a[2] + share * (b[2] - a[2]))
 }
 
-/// The stream from the first measurement on, and where Vicon saw the robot and the landmarks.
+/// The stream from the first measurement on, and the Vicon positions of the robot and the landmarks.
 struct Recording {
     steps: Vec<Step>,
     truth: Vec<Vector2<f64>>,
@@ -120,6 +123,6 @@ fn a_robot_finds_its_way_among_barcodes() {
     println!("{:?} ms", driven.latencies());
     assert!(ate.0 < 0.15 && of_newest.0 < 0.3 && ate.0 < 0.1 * of_odometry.0);
     assert!(known.len() == 15 && of_landmarks.1 < 0.4);
-    // what is left goes with `Settings.bend`: at a tenth of its default, the gap is a tenth
+    // the remaining gap scales with `Settings.bend`: at a tenth of its default, the gap is a tenth
     assert!(driven.gaps.iter().all(|gap| *gap < 0.05) && driven.gaps.last().unwrap() < &0.02);
 }

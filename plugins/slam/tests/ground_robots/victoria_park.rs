@@ -1,4 +1,4 @@
-//! Victoria Park: a car among trees, which a laser sees (Nebot, ACFR; prepared by Kaess).
+//! Victoria Park: a car among trees that a laser measures (Nebot, ACFR; prepared by Kaess).
 use super::{Seen, Step, aligned_errors, data, drive};
 use manifactor_geometry::{Coordinates, Landmark, Se2, So2};
 use manifactor_graph::Noise;
@@ -6,10 +6,12 @@ use nalgebra::{DMatrix, Vector2};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Standard deviations of the odometry, as multiples of the file's. With the ids, the heading drifts over 200 poses by nine times the
-/// file's noise; a steering error of 0.00195 rad per metre and 0.068 of the turn explains 96 % of it.
+/// Standard deviations of the odometry, as multiples of the file's values. Measured with the ids, the heading
+/// drifts over 200 poses by nine times the file's noise. A steering error of 0.00195 rad per metre and 0.068
+/// of the turn explains 96 % of it.
 const ODOMETRY: f64 = 2.0;
-/// The standard deviation of a tree's position, in metres. The file has 0.63; measured with the ids: 0.15 to 0.35.
+/// Standard deviation of a tree's position. The file has 0.63; measured with the ids: 0.15 to 0.35. Unit:
+/// metres.
 const TREES: f64 = 0.2;
 /// Standard deviations of the steering error: radians per metre, and a share of the turn.
 const STEERING: [f64; 2] = [0.005, 0.1];

@@ -77,7 +77,7 @@ fn an_estimate_far_away_does_not_shrink_the_rest() {
     scene.objects[0].estimate = Some(ellipsoid([1e5, 0.0, 0.0], [1.0, 1.0, 1.0], 0.0));
     let svg = svg(&scene, Viewpoint::Top);
     assert!(svg.contains("1 of 4 objects outside the picture"));
-    // the ticks are those of a frame of three metres
+    // the ticks of a frame of three metres
     assert!(svg.contains(">0.5<") && !svg.contains(">100000<"));
 }
 

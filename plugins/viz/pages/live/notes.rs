@@ -1,16 +1,16 @@
-//! What has happened to the map, in words, and how often.
+//! Events of the map: their counts, and the newest as text.
 use manifactor_slam::association::Move;
 use manifactor_slam::online::FrameReport;
 use manifactor_slam::sequence::ObjectId;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 
-/// Notes that are kept: the newest.
+/// Number of notes that are kept.
 const KEPT: usize = 100;
-/// Characters of a note.
+/// Largest length of a note. Unit: characters.
 const LONGEST: usize = 300;
 
-/// Counts of all, and the newest in words.
+/// Counts of all events, and the newest as text.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Notes {
     born: usize,
@@ -19,19 +19,19 @@ pub(super) struct Notes {
     merged: usize,
     forgotten: usize,
     refused: usize,
-    /// Frames, of the refused.
+    /// Number of refused frames, included in `refused`.
     left_out: usize,
     rejected: usize,
-    /// Each with the frame that it belongs to.
+    /// Notes with their frames.
     newest: VecDeque<(usize, String)>,
 }
 
 impl Notes {
-    /// Takes in what came of a frame; `now` is what an object is called now.
+    /// Adds the events of a frame; `now` maps an object to its current id.
     pub(super) fn take(&mut self, report: &FrameReport, now: impl Fn(ObjectId) -> ObjectId) {
         let frame = report.frame;
         if let Some(located) = &report.located {
-            // what was told is of a map that is no more, and this report tells of all frames
+            // earlier counts refer to the discarded map, and this report covers all frames
             let (frames, newest) = (self.left_out, std::mem::take(&mut self.newest));
             *self = Self { left_out: frames, refused: frames, newest, ..Self::default() };
             let matches = located.matches.len();
@@ -75,19 +75,19 @@ impl Notes {
         }
     }
 
-    /// A frame that could not be taken.
+    /// Counts and notes a frame that was refused.
     pub(super) fn left_out(&mut self, frame: usize, text: &str) {
         self.left_out += 1;
         self.refused(frame, text);
     }
 
-    /// Something that could not be taken.
+    /// Counts and notes refused input.
     fn refused(&mut self, frame: usize, text: &str) {
         self.refused += 1;
         self.note(frame, text);
     }
 
-    /// The text may be somebody else's, of any length.
+    /// Adds a note. The text may be foreign and of any length.
     fn note(&mut self, frame: usize, text: &str) {
         let text: String = text.chars().take(LONGEST).collect();
         if self.newest.len() == KEPT {
@@ -96,7 +96,7 @@ impl Notes {
         self.newest.push_back((frame, text));
     }
 
-    /// Counts by name, and the newest notes, each with its frame.
+    /// Returns the counts by name, and the newest notes with their frames.
     pub(super) fn to_json(&self) -> Value {
         json!({
             "counts": {

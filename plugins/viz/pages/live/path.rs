@@ -1,11 +1,11 @@
-//! The path of the camera so far, as many frames of it as a screen can show.
+//! The path of the camera so far, limited to the resolution of a screen.
 use manifactor_geometry::Se3;
 use manifactor_slam::record::FrameRecord;
 
-/// Frames that are kept at most, apart from the last one.
+/// Largest number of frames that are kept, besides the last one.
 const MOST: usize = 1000;
 
-/// Every frame at first; every second, fourth, … as it grows.
+/// A path that keeps every frame at first, then every second, fourth, … as it grows.
 #[derive(Debug, Clone)]
 pub(super) struct Path {
     every: usize,
@@ -40,7 +40,7 @@ impl Path {
         self.frames += 1;
     }
 
-    /// Moves poses to where they are estimated to be now, by the numbers of their frames.
+    /// Sets the poses to their current estimates, by frame number.
     pub(super) fn correct(&mut self, pose: impl Fn(usize) -> Option<Se3>) {
         let kept = self.kept.iter_mut().enumerate().map(|(place, frame)| (place * self.every, frame));
         let last = self.last.iter_mut().map(|(number, frame)| (*number, frame));
@@ -49,7 +49,7 @@ impl Path {
         }
     }
 
-    /// Moves the path of odometry as a whole, so that it begins at this pose.
+    /// Moves the path of odometry rigidly, so that it begins at this pose.
     pub(super) fn begin_odometry_at(&mut self, start: &Se3) {
         let Some(first) = self.kept.first() else { return };
         let moved = start.compose(&first.odometry.pose.inverse());
@@ -58,7 +58,7 @@ impl Path {
         }
     }
 
-    /// Those that are kept, then the last one.
+    /// Returns the kept frames, then the last one.
     pub(super) fn frames(&self) -> impl Iterator<Item = &FrameRecord> {
         let last = self.last.iter().filter(|(number, _)| !number.is_multiple_of(self.every));
         self.kept.iter().chain(last.map(|(_, frame)| frame))
@@ -72,7 +72,7 @@ impl Path {
         self.kept.first().map(|first| &first.estimate.pose)
     }
 
-    /// The time of the first frame.
+    /// Timestamp of the first frame.
     pub(super) fn start(&self) -> f64 {
         self.kept.first().map_or(0.0, |first| first.timestamp)
     }

@@ -36,7 +36,7 @@ fn a_box_has_its_label_behind_what_is_drawn() {
     assert_eq!(LiveBox::Named(seen, "cup 7".to_owned()).to_json(), json!([7, [1, 2, 3, 4.5], null, "cup 7"]));
 }
 
-/// Shows a stream that finds its place in an earlier map, and looks closely at the frame that shows it.
+/// Shows a stream that is located in a prior map, and checks the state at the frame that locates it.
 struct Shown {
     live: LiveMap,
     located: usize,
@@ -68,7 +68,7 @@ impl Watch for Shown {
         }
         let notes = self.live.notes.to_json();
         assert!(notes["newest"].to_string().contains("the place in the prior map is found"), "{notes}");
-        // those that were born in the map that is no more are not counted
+        // objects that were added to the discarded map are not counted
         assert_eq!(notes["counts"]["born"], report.map_or(0, |report| report.born.len()));
         ControlFlow::Continue(())
     }
@@ -97,7 +97,7 @@ fn what_was_shown_moves_into_the_map_that_is_found() {
     let (made, _) = estimate("first", sequence(&first), &first, &mut Silent).unwrap();
     let mut second = settings(2);
     second.prior_map.as_mut().unwrap().map = Arc::new(map_of(&made, &first).unwrap());
-    // its odometry begins elsewhere
+    // the odometry of the second stream begins elsewhere
     let (mut stream, all) = (sequence(&second).opening().into_sequence(), sequence(&second));
     let begin = all.frames[0].world_from_camera;
     stream.up = all.up.and_then(|up| Direction::new(begin.rotation.inverse().act(&up)).ok());

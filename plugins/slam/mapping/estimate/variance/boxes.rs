@@ -1,4 +1,4 @@
-//! The noise of boxes: its size, its growth with the box, its differences between objects, and its correlation.
+//! Noise of boxes: its size, its growth with the box, its differences between objects, and its correlation.
 use super::correlation::autocorrelation_time;
 use super::{BoxGroups, VarianceSettings};
 use crate::mapping::{MappedObject, Mapping};
@@ -12,44 +12,44 @@ use serde::Serialize;
 /// The noise of a group of boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct BoxComponent {
-    /// Of each side of a box, in pixels: what does not grow with it.
+    /// Constant standard deviation of each side, in pixels.
     pub sigma_px: f64,
-    /// What it has besides, as a part of the width for a left or right side, of the height for an upper or lower one; the two add up as
-    /// squares. 0 where that is not asked for.
+    /// Standard deviation relative to the size: to the width for left and right sides, to the height for
+    /// upper and lower ones. Its variance adds to that of `sigma_px`. 0 if the setting `size` is off.
     pub of_size: f64,
-    /// How many consecutive boxes say as much as one alone.
+    /// Number of consecutive boxes with as much information as one independent box.
     pub correlation_time: f64,
     /// Standard deviation in the graph, for a box of the mean size: √(correlation_time) · σ.
     pub effective_px: f64,
 }
 
-/// Half of all normal deviates are below this.
+/// Median of |x| for a standard normal x.
 const MEDIAN: f64 = 0.674_489_750_196_081_7;
-/// The variance of the logarithm of a standard deviation by the median of n deviates is this, by n (Rousseeuw and Croux, *Alternatives to
-/// the Median Absolute Deviation*, 1993: its efficiency is 37 %).
+/// Variance of the logarithm of a standard deviation from the median of n samples, times n. The efficiency of
+/// the median is 37 % (Rousseeuw and Croux, *Alternatives to the Median Absolute Deviation*, 1993).
 const MEDIAN_VARIANCE: f64 = 0.5 / 0.3678;
-/// Rows that are controlled less than this say nothing of their noise.
+/// Redundancy 1 - h below which a row has no information about its noise.
 const LEAST_REDUNDANCY: f64 = 1e-9;
-/// Parts that errors are sorted into, by size, and the least of each.
+/// Number of bins of box sizes, at most; `LEAST_OF_PART` is the smallest number of errors in a bin.
 const PARTS: usize = 8;
 const LEAST_OF_PART: usize = 20;
-/// A share of the squares of sizes: with less variance than this they are alike.
+/// Variance of the squared sizes, relative to their mean square, below which all sizes count as equal.
 const ALIKE: f64 = 1e-6;
 
 impl BoxComponent {
-    /// `size` is the mean size of boxes, in pixels.
+    /// Creates the noise of a group. `size` is the mean size of its boxes, in pixels.
     pub(super) fn of(sigma_px: f64, of_size: f64, correlation_time: f64, size: f64) -> Self {
         let new = Self { sigma_px, of_size, correlation_time, effective_px: 0.0 };
         Self { effective_px: new.at(size) * new.inflation(), ..new }
     }
 
-    /// The same, larger by a factor.
+    /// Returns the noise multiplied by a factor.
     fn scaled(self, by: f64) -> Self {
         let Self { sigma_px, of_size, effective_px, .. } = self;
         Self { sigma_px: by * sigma_px, of_size: by * of_size, effective_px: by * effective_px, ..self }
     }
 
-    /// Of a box of these extents.
+    /// Returns the noise of a box with these extents.
     pub(super) fn noise(&self, size: Option<[f64; 2]>) -> Result<Noise, NoiseError> {
         match size.filter(|_| self.of_size > 0.0) {
             None => Noise::sigma(self.effective_px),
@@ -60,23 +60,23 @@ impl BoxComponent {
         }
     }
 
-    /// How many times as large as that of residuals the standard deviation in the graph is.
+    /// Returns the ratio of the standard deviation in the graph to the one of residuals.
     fn inflation(&self) -> f64 {
         self.correlation_time.sqrt()
     }
 
-    /// Of a side of a box of this extent.
+    /// Returns the standard deviation of a side, for the extent of its box.
     pub(super) fn at(&self, size: f64) -> f64 {
         self.sigma_px.hypot(self.of_size * size)
     }
 }
 
-/// The box that a factor measures; `None` for a factor that measures none.
+/// Returns the box factor of an entry; `None` for other factors.
 pub(super) fn box_of(entry: &FactorEntry) -> Option<&BoundingBoxFactor> {
     entry.factor.erased().as_any().downcast_ref()
 }
 
-/// Width and height of the box that a factor measures; `None` for what has no box.
+/// Returns width and height of the measured box; `None` for factors without a box.
 pub(super) fn size(entry: &FactorEntry) -> Option<[f64; 2]> {
     let factor = box_of(entry)?;
     Some([factor.bounding_box.width(), factor.bounding_box.height()])
@@ -86,15 +86,15 @@ pub(super) fn size(entry: &FactorEntry) -> Option<[f64; 2]> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Errors([Vec<SideError>; 4]);
 
-/// In pixels.
+/// Unit: pixels.
 #[derive(Debug, Clone, Copy)]
 struct SideError {
     error: f64,
-    /// The box's width, for a left or right side, or its height; 0 where that is not known.
+    /// Width of the box for a left or right side, height for an upper or lower one; 0 if unknown.
     size: f64,
 }
 
-/// A box at the estimate, and what is known of its factor.
+/// A box factor at the estimate.
 pub(super) struct Observed<'a> {
     pub(super) entry: &'a FactorEntry,
     pub(super) state: &'a FactorState,
@@ -102,7 +102,8 @@ pub(super) struct Observed<'a> {
 }
 
 impl Errors {
-    /// Residuals at the estimate are less than errors: σ²(1 - h), h the leverage of a row.
+    /// Adds the errors of a box. Residuals are smaller than errors: their variance is σ²(1 - h), with the
+    /// leverage h of the row.
     pub(super) fn add(&mut self, observed: &Observed<'_>) {
         let Observed { entry, state, leverage } = observed;
         let (size, rows) = (size(entry).unwrap_or_default(), entry.noise.observed());
@@ -117,7 +118,7 @@ impl Errors {
     }
 }
 
-/// The group of an object's boxes.
+/// Returns the name of the group of an object's boxes.
 pub(super) fn group(object: &MappedObject, by: BoxGroups) -> String {
     match by {
         BoxGroups::All | BoxGroups::Given => "all".to_owned(),
@@ -128,8 +129,9 @@ pub(super) fn group(object: &MappedObject, by: BoxGroups) -> String {
     }
 }
 
-/// The noise of each group. Those of several groups are that of all boxes, larger or smaller by a factor that is drawn towards their mean
-/// the more, the less a group has to say (empirical Bayes: as if logarithms of σ were normal).
+/// Returns the noise of each group. With several groups, each has the noise of all boxes times a factor. The
+/// factors shrink towards their mean, more strongly for groups with few boxes (empirical Bayes with
+/// log-normal σ).
 pub(super) fn components(
     mapping: &Mapping,
     boxes: &IndexMap<Key, Errors>,
@@ -149,7 +151,7 @@ pub(super) fn components(
     let own = groups.values().map(|series| {
         let relative = median(series.iter().copied().flatten().map(|e| (e.error / of_all.at(e.size)).abs()));
         let rows = series.iter().map(|errors| errors.len()).sum::<usize>() as f64;
-        // one without errors says nothing
+        // a group without errors has no information
         let relative = relative.map(f64::ln).filter(|log| log.is_finite());
         relative.map_or((0.0, 0.0), |log| (log, rows / of_all.correlation_time))
     });
@@ -157,8 +159,9 @@ pub(super) fn components(
     groups.into_keys().zip(factors).map(|(name, by)| (name, of_all.scaled(by.exp()))).collect()
 }
 
-/// Logarithms of standard deviations, each by so many deviates, drawn towards their mean: by as much as they differ from it by chance. Those of
-/// no deviates are the mean. The spread is DerSimonian and Laird's (*Meta-analysis in Clinical Trials*, 1986).
+/// Shrinks logarithms of standard deviations, each from a number of samples, towards their mean. The
+/// shrinkage is stronger if their spread is explained by chance. An entry without samples gets the mean. The
+/// spread is estimated as by DerSimonian and Laird (*Meta-analysis in Clinical Trials*, 1986).
 fn shrunk(own: &[(f64, f64)]) -> Vec<f64> {
     let variance = |deviates: f64| MEDIAN_VARIANCE / deviates.max(1.0);
     let known = || own.iter().filter(|(_, deviates)| *deviates > 0.0);
@@ -182,7 +185,8 @@ fn shrunk(own: &[(f64, f64)]) -> Vec<f64> {
     own.iter().map(one).collect()
 }
 
-/// The standard deviation that half of the deviates would be below of if they were normal: half of them may be wrong.
+/// Returns the standard deviation of normal samples from their median. Up to half of the samples may be
+/// outliers.
 fn median(deviates: impl Iterator<Item = f64>) -> Option<f64> {
     let mut sizes: Vec<f64> = deviates.collect();
     sizes.sort_by(f64::total_cmp);
@@ -201,19 +205,20 @@ fn component(series: &[&[SideError]], settings: &VarianceSettings) -> Option<Box
     if !settings.correlation {
         return Some(one);
     }
-    // gross errors are detections of something else, and no correlated noise
+    // gross errors are detections of something else, not correlated noise
     let within = |errors: &&[SideError]| -> Vec<SideError> {
         errors.iter().filter(|e| e.error.abs() < 3.0 * one.at(e.size)).copied().collect()
     };
     let within: Vec<Vec<SideError>> = series.iter().map(within).collect();
-    // what does not grow is in pixels as it was: the same bits
+    // without growth the errors stay in pixels, which keeps the result bit-identical
     let in_units = |e: &SideError| if of_size > 0.0 { e.error / one.at(e.size) } else { e.error };
     let errors: Vec<Vec<f64>> = within.iter().map(|series| series.iter().map(in_units).collect()).collect();
     let time = autocorrelation_time(&errors);
     Some(BoxComponent::of(sigma_px, of_size, time, size))
 }
 
-/// What does not grow, and what grows with size: σ² = σ₀² + κ² size², by medians over parts of like size. `None` for too few.
+/// Fits σ² = σ₀² + κ² size² to medians over bins of similar size. Returns σ₀ and κ; `None` for too few
+/// errors.
 fn grown(errors: &[SideError]) -> Option<(f64, f64)> {
     let mut sorted: Vec<SideError> = errors.iter().filter(|e| e.size > 0.0).copied().collect();
     sorted.sort_by(|a, b| a.size.total_cmp(&b.size));
@@ -224,20 +229,20 @@ fn grown(errors: &[SideError]) -> Option<(f64, f64)> {
     let points = sorted.chunks(sorted.len().div_ceil(parts)).filter_map(|part| {
         let variance = median(part.iter().map(|e| e.error.abs()))?.powi(2);
         let square = part.iter().map(|e| e.size * e.size).sum::<f64>() / part.len() as f64;
-        // the error of a variance is in proportion to it
+        // weight: the standard deviation of a variance is proportional to the variance
         (variance > 0.0).then_some((square, variance, variance.powi(-2)))
     });
     let points: Vec<(f64, f64, f64)> = points.collect();
     let sum = |of: fn(&(f64, f64, f64)) -> f64| points.iter().map(of).sum::<f64>();
     let (w, x, y) = (sum(|p| p.2), sum(|p| p.2 * p.0), sum(|p| p.2 * p.1));
     let (xx, xy) = (sum(|p| p.2 * p.0 * p.0), sum(|p| p.2 * p.0 * p.1));
-    // sizes that are all alike tell nothing
+    // equal sizes do not determine the slope
     if points.len() < 2 || w * xx - x * x <= ALIKE * w * xx {
         return None;
     }
     let slope = (w * xy - x * y) / (w * xx - x * x);
     let offset = (y - slope * x) / w;
-    // neither is negative
+    // neither may be negative
     let (offset, slope) = match (offset > 0.0, slope > 0.0) {
         (true, true) => (offset, slope),
         (true, false) => (y / w, 0.0),
@@ -298,9 +303,9 @@ mod tests {
         assert!((many[0] + 0.5).abs() < 1e-3 && (many[1] - 0.5).abs() < 1e-3, "{many:?}");
         let mixed = shrunk(&[(-0.5, 1e6), (0.5, 10.0), (0.0, 1e6)]);
         assert!((mixed[0] + 0.5).abs() < 1e-3 && (0.05..0.3).contains(&mixed[1]), "{mixed:?}");
-        // differences that chance explains are none
+        // differences explained by chance vanish
         assert_eq!(shrunk(&[(-0.1, 10.0), (0.1, 10.0)]), [0.0, 0.0]);
-        // a few of little to say do not move one that is known, and one of nothing to say is as all are
+        // groups of few samples do not move a well-known one, and an empty group gets the mean
         let found = shrunk(&[(0.0, 400.0), (-0.7, 2.0), (-0.6, 2.0), (0.0, 0.0)]);
         assert!(found.iter().all(|log| log.abs() < 0.02), "{found:?}");
         assert_eq!(shrunk(&[]), Vec::<f64>::new());

@@ -17,47 +17,47 @@ use std::any::TypeId;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Standard deviations, as they are estimated.
+/// The estimated noise of odometry and boxes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Components {
-    /// Of odometry; `None` where it is as given.
+    /// Noise of odometry; `None` if it stays as given.
     pub odometry: Option<MotionChoice>,
-    /// Of boxes, by group.
+    /// Noise of boxes, by group.
     pub boxes: IndexMap<String, BoxComponent>,
 }
 
-/// Why the noise could not be estimated.
+/// Reason why the noise could not be estimated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VarianceError {
     /// The estimate has no covariance.
     #[error("the variance components cannot be estimated: {0}")]
     Covariance(#[from] CovarianceError),
-    /// A standard deviation that is zero or not finite.
+    /// A standard deviation is zero or not finite.
     #[error("the variance components cannot be estimated: {0}")]
     Noise(#[from] NoiseError),
-    /// A correlation time that is zero or not finite.
+    /// A correlation time is zero or not finite.
     #[error("the correlation time of the boxes: {0}")]
     CorrelationTime(#[from] OutOfDomain),
-    /// A graph without some of the objects is none.
+    /// The graph without some of the objects cannot be compiled.
     #[error("the variance components cannot be estimated: {0}")]
     Compile(#[from] CompileError),
 }
 
-/// Kind of measurement that a factor makes.
+/// Kind of measurement of a factor.
 pub(super) enum Measures {
     Motion,
     Box { object: Key },
     Other,
 }
 
-/// Of boxes, in pixels, where the search begins.
+/// Initial standard deviation of boxes, in pixels.
 const BEGIN_PX: f64 = 10.0;
-/// As long as the noise of boxes changes by less than this share, that of odometry stays as it was chosen.
+/// Relative change of the box noise above which the noise of odometry is chosen again.
 const SAME_BOXES: f64 = 0.2;
 
 impl Components {
-    /// What the search begins with, whatever a document says.
+    /// Returns the noise before the first round. It does not depend on the run document.
     pub(in crate::estimate) fn begin(mapping: &Mapping, settings: &VarianceSettings) -> Self {
         let component = BoxComponent::of(BEGIN_PX, 0.0, 1.0, 0.0);
         let boxes = mapping.mapped().filter(|_| settings.boxes != BoxGroups::Given);
@@ -66,7 +66,8 @@ impl Components {
         Self { odometry: is_chosen.then(MotionChoice::begin), boxes }
     }
 
-    /// Out of an estimate: the noise of boxes from their residuals, that of odometry by what objects say of it that take no part.
+    /// Estimates the noise: of boxes from their residuals, of odometry by cross-validation with left-out
+    /// objects.
     ///
     /// # Errors
     /// If the estimate has no covariance.
@@ -81,7 +82,8 @@ impl Components {
         let mut boxes: IndexMap<Key, Errors> = IndexMap::new();
         for (state, leverage) in estimate.solution.factors.iter().zip(&leverages) {
             let Some(entry) = graph.factors().get(state.entry).filter(|_| state.defined) else { continue };
-            // factors are in the order of the graph: an object's boxes in the order of their frames
+            // factors are in the order of the graph, so the boxes of an object are in the order of their
+            // frames
             if let Measures::Box { object } = measures(entry) {
                 boxes.entry(object).or_default().add(&Observed { entry, state, leverage });
             }
@@ -105,11 +107,11 @@ impl Components {
         Ok(found)
     }
 
-    /// Gives the graph this noise, and boxes a loss whose scale is in units of their own σ: ρ(τs)/τ. An outlier is then one among
-    /// boxes, and not among averages of τ of them.
+    /// Sets this noise in the graph. The loss of boxes becomes ρ(τs)/τ, with its scale in units of the σ of a
+    /// single box. So a box is an outlier by its own error, not by the error of an average of τ boxes.
     ///
     /// # Errors
-    /// A standard deviation that is zero or not finite.
+    /// If a standard deviation is zero or not finite.
     pub fn apply(
         &self,
         mapping: &mut Mapping,
@@ -143,7 +145,7 @@ impl Components {
         Ok(())
     }
 
-    /// The largest change of any standard deviation of boxes, as a share of it.
+    /// Returns the largest relative change of a standard deviation of boxes.
     pub fn change(&self, before: &Self) -> f64 {
         let boxes = self.boxes.iter().filter_map(|(name, now)| {
             before.boxes.get(name).map(|before| (&now.effective_px, &before.effective_px))
@@ -152,7 +154,7 @@ impl Components {
     }
 }
 
-/// The measurement that a factor makes. Odometry is between the poses of consecutive frames.
+/// Returns the kind of measurement of a factor. Odometry is a factor between the poses of consecutive frames.
 pub(super) fn measures(entry: &FactorEntry) -> Measures {
     let pose = TypeId::of::<Se3>();
     let are_poses = || entry.factor.erased().signature().variables.iter().all(|variable| *variable == pose);

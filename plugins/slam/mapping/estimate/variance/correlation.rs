@@ -1,17 +1,17 @@
-//! How long errors last.
+//! Correlation time of errors.
 
-/// The longest lag that is looked at.
+/// Longest lag.
 const LONGEST: usize = 300;
-/// A window of this many times τ (Sokal, Monte Carlo Methods in Statistical Mechanics, 1996).
+/// Window of the sum, in multiples of τ (Sokal, Monte Carlo Methods in Statistical Mechanics, 1996).
 const WINDOW: f64 = 5.0;
 
-/// The integrated autocorrelation time τ = 1 + 2 Σ ρₖ of series of errors around zero, at least 1: the mean of n errors has τ
-/// times the variance that it would have if they were independent. Series are pooled.
+/// Returns the integrated autocorrelation time τ = 1 + 2 Σ ρₖ of series of errors around zero, at least 1.
+/// The mean of n such errors has τ times the variance of the mean of independent errors. All series are
+/// pooled.
 ///
-/// The lag k counts the errors of a series, and not the frames between them. τ says what the errors that there are have in
-/// common: those of a detector that runs on every fifth image, or that misses objects at random, have less of it than those
-/// of every image. ρₖ is Σᵢ xᵢ xᵢ₊ₖ / Σᵢ xᵢ², where a short series has few pairs at long lags: n errors are
-/// never fewer than one.
+/// The lag k counts entries of a series, not frames. So τ describes the errors that exist: a detector that
+/// runs on every fifth image, or misses objects at random, has a smaller τ. ρₖ is Σᵢ xᵢ xᵢ₊ₖ / Σᵢ xᵢ²; short
+/// series have few pairs at long lags, so n errors never count as less than one.
 pub(super) fn autocorrelation_time(series: &[Vec<f64>]) -> f64 {
     let product = |lag: usize| -> f64 {
         let later = |series: &Vec<f64>| -> f64 {
@@ -23,7 +23,7 @@ pub(super) fn autocorrelation_time(series: &[Vec<f64>]) -> f64 {
     let mut tau = 1.0;
     for lag in 1..=LONGEST {
         let share = product(lag) / power;
-        // past this, it is noise that is summed
+        // beyond the window, the sum would only add noise
         if !(share > 0.0 && lag as f64 <= WINDOW * tau) {
             break;
         }
@@ -39,7 +39,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64;
 
-    /// xₜ = a xₜ₋₁ + noise, of unit variance, at the times that are kept.
+    /// Returns xₜ = a xₜ₋₁ + noise with unit variance, at the selected times.
     fn autoregressive(a: f64, n: usize, seed: u64, mut kept: impl FnMut(usize) -> bool) -> Vec<f64> {
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut x: f64 = StandardNormal.sample(&mut rng);
@@ -81,14 +81,14 @@ mod tests {
         for p in [0.1, 0.3, 0.7] {
             let mut rng = Pcg64::seed_from_u64(3);
             let tau = autocorrelation_time(&[autoregressive(a, 200_000, 4, |_| rng.random_bool(p))]);
-            // 1 + 2 Σₖ p aᵏ: any earlier error is there with probability p
+            // 1 + 2 Σₖ p aᵏ: each earlier error is present with probability p
             assert_near(tau, 1.0 + 2.0 * p * a / (1.0 - a));
         }
     }
 
     #[test]
     fn an_autoregression_seen_in_visits_has_the_time_of_a_visit() {
-        // 20 images, and 500 without the object
+        // 20 images with the object, then 500 without it
         let (a, n) = (0.9f64, 20);
         let tau = autocorrelation_time(&[autoregressive(a, 520 * 1000, 5, |t| t % 520 < n)]);
         let pairs = (1..n).map(|k| (1.0 - k as f64 / n as f64) * a.powi(k as i32));

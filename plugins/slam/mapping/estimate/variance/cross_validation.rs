@@ -1,9 +1,9 @@
-//! Whether a correction of the trajectory is one: objects that took no part in it say so.
+//! Cross-validation of a corrected trajectory with objects that were left out of it.
 //!
-//! The trajectory is estimated by some of the objects, and held; the others are then fitted to their boxes under it. Where the
-//! correction is right they fit better than under the odometry as it came in. Where it follows what detections of some objects get
-//! wrong, the others do not: what a detector or an ellipsoid gets wrong is not the same for all. No ground truth takes part, and it
-//! need not be known how wrong boxes are.
+//! The trajectory is estimated from some of the objects and fixed. Each remaining object is then fitted to
+//! its boxes under it. A correct trajectory gives a better fit than the input odometry. A trajectory that
+//! follows detector errors of some objects does not, because these errors differ between objects. This needs
+//! neither ground truth nor the size of the box noise.
 use super::MotionComponent;
 use super::components::{Measures, VarianceError, measures};
 use crate::estimate::refine::{alone, roughly};
@@ -16,50 +16,52 @@ use manifactor_solve::{CompileError, Optimizer, Problem, Silent, solve};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Parts that the objects are dealt into, of which each is left out once.
+/// Number of folds. Each is left out once.
 const FOLDS: usize = 5;
-/// Fewer objects than this say nothing of one another.
+/// Smallest number of objects for a cross-validation.
 const LEAST_OBJECTS: usize = 4;
-/// The best of some twenty is better for more than so many standard errors, and not by chance.
+/// Significance threshold in standard errors. It is high because the best of about twenty candidates is
+/// selected.
 const CLEAR: f64 = 2.0;
-/// A solve ends after so many iterations, or with one that lowers the cost by less than this share: scores differ by nats.
+/// A solve ends after this number of iterations, or at the relative decrease `SETTLED` of the cost: scores
+/// differ by whole nats.
 const ITERATIONS: usize = 10;
 const SETTLED: f64 = 1e-4;
-/// What a box costs whose object a trajectory has put where it cannot be seen, in nats.
+/// Cost of a box whose object is not visible from its pose, in nats.
 const LOST: f64 = 50.0;
 
-/// What objects say of a noise of odometry that had no part in the trajectory which it leads to.
+/// Cross-validation score of an odometry noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Score {
-    /// What their boxes cost, less what they cost under the odometry as it came in; in nats.
+    /// Cost of the boxes of left-out objects minus their cost under the input odometry, in nats.
     pub cost: f64,
-    /// The standard error of that, from how it differs by object.
+    /// Standard error of the cost, from its spread over objects.
     pub deviation: f64,
 }
 
 impl Score {
-    /// Returns whether the trajectory is better than the odometry, by more than chance may have it.
+    /// Returns whether the trajectory is significantly better than the odometry.
     pub fn is_better(&self) -> bool {
         self.cost < -CLEAR * self.deviation
     }
 }
 
-/// The objects of a map, and the graphs without some of them.
+/// The folds of a map: for each, the graph without some of the objects.
 pub(super) struct CrossValidation<'a> {
     values: &'a Values,
     folds: Vec<Fold>,
 }
 
-/// Some of the objects, and the graph of all the others.
+/// Some of the objects, and the graph of the rest.
 struct Fold {
     graph: Graph,
-    /// Where its motions are among its factors.
+    /// Indices of the motion factors.
     motions: Vec<usize>,
     start: Values,
     left_out: Vec<LeftOut>,
 }
 
-/// An object with its factors, and what its boxes cost under the odometry as it came in.
+/// An object with its factors and the cost of its boxes under the input odometry.
 struct LeftOut {
     key: Key,
     entries: Vec<FactorEntry>,
@@ -67,12 +69,13 @@ struct LeftOut {
 }
 
 impl<'a> CrossValidation<'a> {
-    /// Returns whether there are objects enough.
+    /// Returns whether there are enough objects.
     pub(super) fn is_possible(mapping: &Mapping) -> bool {
         mapping.mapped().count() >= LEAST_OBJECTS
     }
 
-    /// Of a map whose boxes have their noise; `values` are near its estimate. `None` for a map of too few objects.
+    /// Creates the folds of a map with known box noise. `values` are close to the estimate. `None` for too
+    /// few objects.
     pub(super) fn new(mapping: &Mapping, values: &'a Values) -> Option<Self> {
         if !Self::is_possible(mapping) {
             return None;
@@ -96,10 +99,10 @@ impl<'a> CrossValidation<'a> {
         Some(Self { values, folds: (0..FOLDS.min(keys.len())).into_par_iter().map(fold).collect() })
     }
 
-    /// What is said of each of these.
+    /// Returns the score of each candidate.
     ///
     /// # Errors
-    /// If a graph without some objects is none.
+    /// If the graph of a fold cannot be compiled.
     pub(super) fn scores(&self, tried: &[MotionComponent]) -> Result<Vec<Score>, VarianceError> {
         let tasks: Vec<(&MotionComponent, &Fold)> =
             tried.iter().flat_map(|motion| self.folds.iter().map(move |fold| (motion, fold))).collect();
@@ -109,7 +112,7 @@ impl<'a> CrossValidation<'a> {
     }
 }
 
-/// The sum, with its standard error.
+/// Returns the sum and its standard error.
 fn score(costs: &[f64]) -> Score {
     let n = costs.len() as f64;
     let cost: f64 = costs.iter().sum();
@@ -118,7 +121,7 @@ fn score(costs: &[f64]) -> Score {
 }
 
 impl Fold {
-    /// What the boxes of each object cost more with this noise than with the odometry as it came in.
+    /// Returns the cost of the boxes of each object minus its cost under the input odometry.
     fn gains(&self, motion: &MotionComponent, shapes: &Values) -> Result<Vec<f64>, VarianceError> {
         let (mut graph, noise) = (self.graph.clone(), motion.noise()?);
         let factors = graph.factors_mut();
@@ -141,12 +144,13 @@ impl LeftOut {
         };
         let entries = mapping.graph.factors().iter().filter(is_alone).cloned().collect();
         let mut object = Self { key: key.clone(), entries, before: 0.0 };
-        // a graph that is none is told where it is solved
+        // an invalid graph is reported when it is solved
         object.before = object.cost(&mapping.values, shapes).unwrap_or_default();
         object
     }
 
-    /// What its boxes cost where it fits best, from the shape that it has in the map of all objects.
+    /// Returns the cost of the boxes at the best fit. The fit starts from the shape in the map of all
+    /// objects.
     fn cost(&self, poses: &Values, shapes: &Values) -> Result<f64, CompileError> {
         let Ok(shape) = shapes.get::<DualQuadric>(&self.key) else { return Ok(0.0) };
         let (graph, values) = alone(&self.key, *shape, self.entries.iter(), poses);
@@ -158,7 +162,7 @@ impl LeftOut {
             entry.is_some_and(|entry| matches!(measures(entry), Measures::Box { .. }))
         });
         let costs = boxes.map(|state| if state.defined { state.cost } else { LOST });
-        // not a number is no better than lost
+        // a cost that is not finite counts as an invisible object
         Ok(costs.map(|cost| if cost.is_finite() { cost } else { LOST }).sum())
     }
 }

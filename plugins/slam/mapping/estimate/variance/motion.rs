@@ -1,4 +1,4 @@
-//! The noise of odometry, and how it is found.
+//! Noise of odometry, and the search for it.
 use super::components::VarianceError;
 use super::cross_validation::{CrossValidation, Score};
 use crate::estimate::{Estimate, Landmark};
@@ -11,36 +11,38 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// The noise of a motion: it turns the camera about a point in front of it, and shifts that point.
+/// The noise of a motion: a rotation about a point in front of the camera, and a translation of that point.
 ///
-/// An odometry that sees errs by turning about what it sees: a rotation that is too large comes with the translation that keeps
-/// the scene in view. Where the pivot is the camera itself, rotation and translation are independent.
+/// Visual odometry errs by rotating about the observed scene: a rotation that is too large comes with the
+/// translation that keeps the scene in view. If the pivot is the camera itself, rotation and translation are
+/// independent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MotionComponent {
     /// σ of the rotation about each axis, in rad.
     pub rotation: f64,
     /// σ of the translation of the pivot along each axis, in m.
     pub translation: f64,
-    /// How far in front of the camera the pivot is, in m.
+    /// Distance of the pivot in front of the camera, in m.
     pub pivot: f64,
 }
 
-/// The noise of odometry that leads to the trajectory which suits objects best that had no part in it.
+/// The odometry noise with the best cross-validation score.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MotionChoice {
-    /// What the graph is given: next to no noise, where the odometry is kept.
+    /// Noise in the graph: almost zero if the odometry is kept.
     pub noise: MotionComponent,
-    /// What objects say for the best that was found. Where that is no more than chance may have it, the odometry is kept.
+    /// Score of the best noise. The odometry is kept unless the score is significant.
     pub score: Score,
     #[serde(skip)]
     place: Place,
 }
 
-/// So small a noise leaves the odometry as it came in: in rad, and in m.
+/// Noise that leaves the odometry unchanged, in rad and m.
 const KEPT: f64 = 1e-5;
 
 impl MotionComponent {
-    /// Of a motion's residual (ω, v) in the frame of the later camera: v = p × ω + ε, p the pivot.
+    /// Returns the noise of the residual (ω, v) of a motion, in the frame of the later camera: v = p × ω + ε
+    /// with the pivot p.
     pub(super) fn noise(&self) -> Result<Noise, NoiseError> {
         let Self { rotation: turn, translation: shift, pivot } = *self;
         if pivot == 0.0 {
@@ -63,23 +65,24 @@ impl MotionComponent {
 }
 
 impl MotionChoice {
-    /// Before anything is known.
+    /// Returns the choice before the search.
     pub(super) fn begin() -> Self {
         Self { noise: component(BEGIN, 0.0), score: Score { cost: 0.0, deviation: 0.0 }, place: BEGIN }
     }
 
-    /// Returns whether the odometry is kept as it came in.
+    /// Returns whether the input odometry is kept.
     pub fn is_kept(&self) -> bool {
         !self.score.is_better()
     }
 }
 
-/// A place in the grid of noises: half decades of both standard deviations, from 1e-3 on, and whether there is a pivot.
+/// A point of the search grid: both standard deviations in half decades relative to 1e-3, and whether there
+/// is a pivot.
 type Place = (i32, i32, bool);
 
-/// Where the search begins: 1e-3 rad and 1e-3 m, whatever a document says.
+/// Start of the search: 1e-3 rad and 1e-3 m, independent of the run document.
 const BEGIN: Place = (0, 0, false);
-/// The grid ends at 1e-5 and at 1.
+/// Limits of the grid: 1e-5 and 1.
 const ENDS: [i32; 2] = [-4, 6];
 
 fn component((turn, shift, turns): Place, pivot: f64) -> MotionComponent {
@@ -91,7 +94,7 @@ fn component((turn, shift, turns): Place, pivot: f64) -> MotionComponent {
     }
 }
 
-/// What has been tried of the grid.
+/// State of the grid search.
 struct Search<'a> {
     observer: &'a mut dyn Observer,
     validation: &'a CrossValidation<'a>,
@@ -114,12 +117,12 @@ impl Search<'_> {
     }
 
     fn best(&self) -> Option<(Place, Score)> {
-        // of equals the first
+        // the first of equal ones
         let best = self.scores.iter().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
         best.map(|(place, score)| (*place, *score))
     }
 
-    /// Goes from the best place so far to the best of those around it, as long as there is a better one.
+    /// Moves to the best neighbour of the best point until there is no better one.
     fn descend(&mut self, step: i32) -> Result<(), VarianceError> {
         while let Some(((turn, shift, turns), _)) = self.best() {
             let steps = [-step, 0, step];
@@ -134,7 +137,7 @@ impl Search<'_> {
     }
 }
 
-/// How far away what the camera sees is, in metres: the median over all boxes.
+/// Returns the median distance of objects from the camera over all boxes, in metres.
 pub(super) fn distance(estimate: &Estimate) -> f64 {
     let (values, measurements) = (&estimate.solution.values, &estimate.mapping.measurements);
     let of_object = |landmark: Landmark<'_>| {
@@ -147,11 +150,12 @@ pub(super) fn distance(estimate: &Estimate) -> f64 {
     distances.get(distances.len() / 2).copied().unwrap_or_default()
 }
 
-/// Searches the grid, by decades and then by halves of them; by halves alone from what was chosen `before`, when boxes had another
-/// noise. `pivot` is how far away what the camera sees is, in metres.
+/// Searches the grid in steps of a decade, then of half a decade. If a noise was chosen `before`, for a
+/// different box noise, searches from there in half decades only. `pivot` is the distance of the observed
+/// scene, in metres.
 ///
 /// # Errors
-/// If a graph without some objects is none.
+/// If the graph of a fold cannot be compiled.
 pub(super) fn choose(
     validation: &CrossValidation<'_>,
     pivot: f64,
@@ -186,7 +190,7 @@ mod tests {
             let r = DVector::from_iterator(6, turn.iter().chain(shift.iter()).copied());
             (r.transpose() * noise.information_matrix(6).unwrap() * &r)[(0, 0)]
         };
-        // a point p stays where it is under Exp(ω, v) for v = p × ω
+        // a point p does not move under Exp(ω, v) with v = p × ω
         let turn = Vector3::new(0.1, -0.2, 0.3);
         assert!((squared(turn, pivot.cross(&turn)) - turn.norm_squared() / 0.01).abs() < 1e-9);
         let shift = Vector3::new(0.01, 0.0, 0.02);

@@ -1,7 +1,8 @@
-//! Agreement of the boxes of a stream with a place in a map.
+//! Agreement of the boxes of a stream with a pose in a prior map.
 //!
-//! A place predicts boxes. Boxes of matched objects should lie on the outlines of the map's ellipsoids. Other objects of the map should be
-//! detected too if they are in view: in another room, a few objects may stand as in the map, but the others are missing.
+//! A pose predicts boxes. Boxes of matched objects should lie on the projections of the prior ellipsoids.
+//! Other prior objects in view should be detected too: in a different room, a few objects may stand as in the
+//! map, but the rest is missing.
 use super::layout::{Aligned, Layout};
 use crate::mapper::Mapper;
 use manifactor_geometry::Se3;
@@ -12,41 +13,42 @@ use manifactor_recording::prior_map::{PriorMap, PriorObject};
 use manifactor_recording::sequence::ObjectId;
 use std::collections::BTreeSet;
 
-/// How well boxes agree with a place.
+/// Agreement of boxes with a pose in the prior map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Agreement {
-    /// Mean intersection over union of the boxes of matched objects with the outlines of the map's.
+    /// Mean intersection over union of the boxes of matched objects with the projections of the prior
+    /// ellipsoids.
     pub overlap: f64,
-    /// Of what should have been seen of the map, the share that was, from 0 to 1.
+    /// Detected share of the prior objects that should be visible, from 0 to 1.
     pub seen: f64,
 }
 
-/// A place is believed where boxes agree with it by this,
+/// Agreement at which a pose is accepted. Chosen on the streams listed in `docs/decisions/prior-maps.md`.
 const BELIEVED: f64 = 0.45;
-/// and it has to be ahead of all other places with which they agree by this.
+/// Agreement at which a pose counts as a rival of the best one.
 const POSSIBLE: f64 = 0.3;
 
 impl Agreement {
-    /// The overlap, where what should have been seen and was not counts as none.
+    /// Returns the overlap times the detected share: an undetected object counts as no overlap.
     fn whole(self) -> f64 {
         self.overlap * self.seen
     }
 
-    /// Returns whether a place is good enough.
+    /// Returns whether the agreement is good enough to accept a pose.
     pub(super) fn is_believed(self) -> bool {
         self.whole() >= BELIEVED
     }
 }
 
-/// Boxes of an object that are compared with its outline.
+/// Number of boxes per object that are compared with projections, at most.
 const BOXES: usize = 20;
-/// The last frames of a stream, which are searched for what should be in them.
+/// Number of last frames that are searched for prior objects.
 const FRAMES: usize = 300;
-/// A box of an object that may be one of the map shows it if it overlaps its outline by this.
+/// Intersection over union at which a box shows a prior object.
 const SHOWN: f64 = 0.3;
 
 impl Mapper {
-    /// How well boxes agree with a place; `None` where it is too little for any place.
+    /// Returns the agreement of boxes with a pose; `None` if it is too low for any pose.
     pub(super) fn agreement(&self, aligned: &Aligned, layout: &Layout, map: &PriorMap) -> Option<Agreement> {
         let overlap = Some(self.overlap(aligned, map)).filter(|overlap| *overlap >= POSSIBLE)?;
         let seen = self.seen(&aligned.known_from_local, layout, map);
@@ -67,7 +69,8 @@ impl Mapper {
         mean(aligned.matches.iter().filter_map(of_pair)).unwrap_or_default()
     }
 
-    /// Looks at objects of the map from a place: how many are expected to show them, by how often looks did before, and how many do.
+    /// Returns the detected share of the prior objects at a pose. The expected number is the sum of the
+    /// detection rates over all opportunities.
     fn seen(&self, place: &Se3, layout: &Layout, map: &PriorMap) -> f64 {
         let expected = |object: &PriorObject| Expected::new(object.id, object.quadric, object.least_px);
         let objects: Vec<Expected> = map.objects.iter().map(|object| expected(object)).collect();
@@ -75,7 +78,7 @@ impl Mapper {
         let poses = frames
             .filter_map(|(frame, live)| Some((frame, live.timestamp, place.compose(&self.pose_of(frame)?))));
         let (mut expected, mut seen) = (0.0, 0.0);
-        // in the look that goes on
+        // objects detected in the current opportunity
         let mut is_seen = BTreeSet::new();
         let border = self.settings.detections.border_px;
         sights(&objects, poses, &self.camera, *border, |sight| {
@@ -89,11 +92,11 @@ impl Mapper {
                 is_seen.insert(sight.id);
             }
         });
-        // less than one is no evidence
+        // less than one expected detection is no evidence
         f64::min(seen / f64::max(expected, 1.0), 1.0)
     }
 
-    /// Returns whether an object of the map has a box where it is there to be seen.
+    /// Returns whether a visible prior object has a matching box.
     fn is_shown(&self, sight: &Sight, object: &PriorObject, layout: &Layout) -> bool {
         layout.may_be(object.id).any(|local| {
             let view = self.measured(local).and_then(|measured| measured.view(sight.frame));

@@ -1,7 +1,8 @@
-//! Where a map lies in another, by the classes and the layout of its objects.
+//! Relocalization by the classes and the layout of objects.
 //!
-//! Two pairs of objects of like classes, as far apart in the one map as in the other, make a hypothesis where up is known; three, where it
-//! is not. What else fits under it, and what should and does not, is its score; it is believed where no other one comes near.
+//! If the up direction is known, two pairs of objects with similar classes and equal distances in both
+//! maps give a hypothesis; otherwise three pairs do. Its score counts the other objects that match, and those
+//! that should match and do not. The best hypothesis is accepted if no other one has a similar score.
 use super::agreement::Agreement;
 use manifactor_association::best_assignment;
 use manifactor_geometry::{PointPairs, Se3};
@@ -18,91 +19,93 @@ use std::sync::Arc;
 
 mod hypotheses;
 
-/// An object by which a place is known again.
+/// An object used for relocalization.
 #[derive(Debug, Clone)]
 pub(crate) struct Mark {
     pub id: ObjectId,
     centre: Vector3<f64>,
-    /// How far off that may be, in metres.
+    /// Standard deviation of the centre, in metres.
     sigma: f64,
     classes: HashMap<String, f64>,
 }
 
-/// Two sets of marks.
+/// The objects of the run (local) and of the prior map (known).
 #[derive(Debug)]
 pub(crate) struct Layout {
     local: Vec<Mark>,
     known: Vec<Mark>,
-    /// Up in both.
+    /// Up direction in both.
     up: Option<[Direction; 2]>,
     /// Pairs that may show one object.
     pairs: Vec<Pair>,
-    /// Logarithm of the volume that the known marks lie in, m³.
+    /// Logarithm of the volume of the known marks, in m³.
     log_volume: f64,
-    /// How far known marks usually are from the next.
+    /// Median distance of a known mark to its nearest neighbour.
     gap: f64,
 }
 
-/// A mark in both sets.
+/// A candidate match of a local and a known mark.
 #[derive(Debug, Clone, Copy)]
 struct Pair {
     local: usize,
     known: usize,
-    /// What speaks for it before places are looked at, in nats: their classes, and that it is one of all known marks that the local one may
-    /// be, where its name does not say which.
+    /// Log-likelihood ratio of the match before poses are compared, in nats: from the classes, minus the
+    /// logarithm of the number of known marks. Zero if equal ids identify the mark.
     evidence: f64,
-    /// How far apart the two may be, in metres.
+    /// Standard deviation of the offset between both, in metres.
     sigma: f64,
 }
 
-/// Where the local marks lie among the known ones.
+/// A pose of the local marks in the prior map.
 #[derive(Debug, Clone)]
 pub(crate) struct Aligned {
     pub known_from_local: Se3,
-    /// Marks that are the same: of the local ones, of the known ones.
+    /// Matched marks: local ids, known ids.
     pub matches: Vec<(ObjectId, ObjectId)>,
-    /// What speaks for it and not for the next best place, in nats.
+    /// Log-likelihood lead over the second best pose, in nats.
     pub lead: f64,
     centre: Vector3<f64>,
-    /// Standard deviations, rad and m, at the centre of the local marks that have matches.
+    /// Standard deviations in rad and m, at the centre of the matched local marks.
     sigmas: [f64; 2],
-    /// Up in the map, where it is known in both.
+    /// Up direction in the prior map, if known in both.
     up: Option<Direction>,
 }
 
-/// An object's place is known to this part of its size at best.
+/// Standard deviation added to the centre of an object, relative to its mean semi-axis.
 const OF_SIZE: f64 = 0.5;
-/// Classes that two objects of one class have in common, as a share, at least.
+/// Smallest similarity of the classes of matching marks (Bhattacharyya coefficient).
 const ALIKE: f64 = 0.3;
-/// The share of boxes with a class that says nothing, among so many classes.
+/// Share of boxes with a random class, one of `CLASSES`.
 const CLASS_ERROR: f64 = 0.1;
 const CLASSES: f64 = 20.0;
-/// Marks that are further apart than so many standard deviations are no match.
+/// Distance of matching marks, at most, in standard deviations.
 const GATE: f64 = 3.0;
-/// What it costs, in nats, that a local mark among the known ones has no match.
+/// Cost of a local mark inside the prior map without a match, in nats.
 const NEW: f64 = 1.6;
-/// Hypotheses that are looked at closely, no two of the same place.
+/// Number of distinct hypotheses that are refined.
 const LOOKED_AT: usize = 40;
-/// Rounds in which matches are found and the place by them.
+/// Rounds that alternate between matching and pose estimation.
 const ROUNDS: usize = 5;
-/// Two places are one where all marks move by less than so many standard deviations.
+/// Two poses count as one if each mark moves by less than this, in units of twice its σ.
 const SAME: f64 = 3.0;
-/// A place is believed where so many marks match,
+/// Required number of matches.
 const MATCHES: usize = 4;
-/// this share of the local ones among the known ones,
+/// Required share of matches among the local marks inside the prior map.
 const MOST: f64 = 0.6;
-/// and it is so far ahead, in nats.
+/// Required lead over the second best pose, in nats. Chosen on the streams listed in
+/// `docs/decisions/prior-maps.md`.
 const LEAD: f64 = 12.0;
 
-/// How much better than by all marks together up is known.
+/// Weight of the up direction relative to all marks together.
 const UP: f64 = 10.0;
-/// How well up is known: standard deviation in radians.
+/// Standard deviation of the tilt, in radians. With equal σ in all directions, the trajectory tilted by up to
+/// 13° on fr1 (`docs/decisions/prior-maps.md`).
 const TILT: f64 = 0.01;
-/// Directions whose spread is a smaller part of the largest are not determined.
+/// Relative spread of the marks below which a direction is undetermined.
 const FLAT: f64 = 1e-3;
 
 impl Mark {
-    /// An object whose centre has this variance, the mean over three directions, in m².
+    /// Creates a mark. `variance` is the variance of the centre, the mean over three directions, in m².
     pub(crate) fn new(id: ObjectId, quadric: &DualQuadric, variance: f64, classes: &Fusion) -> Self {
         let size = quadric.semi_axes.mean();
         let sigma = (variance + (OF_SIZE * size).powi(2)).sqrt();
@@ -116,7 +119,8 @@ impl Mark {
 }
 
 impl Layout {
-    /// Of local marks, and up among them, in a map. With `by_name`, one number is one object in both.
+    /// Creates the layout of local marks in a prior map. `up` is the up direction of the local marks.
+    /// With `by_name`, equal ids are the same object.
     pub(crate) fn new(local: Vec<Mark>, up: Option<Direction>, map: &PriorMap, by_name: bool) -> Self {
         let mark = |object: &Arc<PriorObject>| {
             let variance = object.covariance().fixed_view::<3, 3>(3, 3).trace() / 3.0;
@@ -157,7 +161,7 @@ impl Layout {
             for (k, known) in self.known.iter().enumerate() {
                 let alike: f64 =
                     classes.iter().map(|(class, share)| (*share * known.share(class)).sqrt()).sum();
-                // what was never given a class may be anything
+                // a mark without a class may match any class
                 let is_nameless = local.classes.is_empty() || known.classes.is_empty();
                 let evidence = match by_name {
                     true if local.id == known.id => 0.0,
@@ -175,20 +179,20 @@ impl Layout {
         pairs
     }
 
-    /// The local marks that may be this known one.
+    /// Returns the local marks that may match this known one.
     pub(super) fn may_be(&self, known: ObjectId) -> impl Iterator<Item = ObjectId> {
         let pairs = self.pairs.iter().filter(move |pair| self.known[pair.known].id == known);
         pairs.map(|pair| self.local[pair.local].id)
     }
 
-    /// Where the local marks lie, if there is one place for them. `agreement` says how well boxes agree with a place; one with which they do not
-    /// is none, whatever its score.
+    /// Returns the pose of the local marks, if it is unique. `agreement` returns the agreement of boxes with
+    /// a pose. A pose without agreement is rejected, whatever its score.
     pub(super) fn align(
         &self,
         agreement: impl Fn(&Aligned) -> Option<Agreement>,
     ) -> Option<(Aligned, Agreement)> {
         let mut ranked = self.ranked();
-        // what boxes say of a place is costly, and no lead is more than a score
+        // the agreement is expensive to compute, and no lead exceeds the score
         if ranked.first().is_none_or(|(score, ..)| *score < LEAD) {
             return None;
         }
@@ -209,7 +213,7 @@ impl Layout {
         (is_clear && agreement.is_believed()).then_some((best, agreement))
     }
 
-    /// Places where the local marks may lie, each with its score and its matches, the best first.
+    /// Returns candidate poses with scores and matches, the best first.
     fn ranked(&self) -> Vec<(f64, Se3, Vec<Pair>)> {
         let mut places: Vec<(f64, Se3, Vec<Pair>)> = vec![];
         for place in self.promising() {
@@ -224,7 +228,8 @@ impl Layout {
         places
     }
 
-    /// The places that may score most. Many hypotheses are of one place; each counts once, so that the next best place is among them.
+    /// Returns the poses with the highest score bounds. Many hypotheses describe one pose; each pose is
+    /// listed once, so that the second best pose is included.
     fn promising(&self) -> Vec<Se3> {
         let hypotheses = self.hypotheses().into_iter();
         let mut rough: Vec<(f64, Se3)> = hypotheses.map(|place| (self.at_most(&place), place)).collect();
@@ -241,7 +246,7 @@ impl Layout {
         places
     }
 
-    /// Returns whether two pairs may both be right: what they join is as far apart in both sets.
+    /// Returns whether two pairs are compatible: the marks have equal distances in both sets.
     fn go_together(&self, a: &Pair, b: &Pair) -> bool {
         if a.local == b.local || a.known == b.known {
             return false;
@@ -250,11 +255,11 @@ impl Layout {
         let known = self.known[b.known].centre - self.known[a.known].centre;
         let (sigma, apart) = (a.sigma.hypot(b.sigma), local.norm());
         let is_as_high = self.up.is_none_or(|[u, v]| (local.dot(&u) - known.dot(&v)).abs() < GATE * sigma);
-        // what is too close says nothing of the direction
+        // marks that are too close do not determine a direction
         apart > sigma && (apart - known.norm()).abs() < GATE * sigma && is_as_high
     }
 
-    /// The place that brings pairs closest, in the mean square (Umeyama); `None` where it is not determined.
+    /// Returns the least squares pose of some pairs (Umeyama); `None` if it is not determined.
     fn place(&self, pairs: &[Pair]) -> Option<Se3> {
         if pairs.len() < 2 {
             return None;
@@ -263,13 +268,13 @@ impl Layout {
         let weighted = |pair: &Pair| (centres(pair).0, centres(pair).1, pair.sigma.powi(-2));
         let mut points = PointPairs::new(pairs.iter().map(weighted));
         if let Some([u, v]) = self.up {
-            // up is known better than any mark
+            // the up direction is more accurate than any mark
             points.add_direction(&u, &v, UP);
         }
         points.rigid(FLAT).map(|found| Se3::new(found.rotation, found.translation))
     }
 
-    /// What speaks for a pair at a place, in nats; `None` where the two are too far apart.
+    /// Returns the log-likelihood ratio of a pair at a pose, in nats; `None` if the marks are too far apart.
     fn gain(&self, place: &Se3, pair: &Pair) -> Option<f64> {
         let apart = place.act(&self.local[pair.local].centre) - self.known[pair.known].centre;
         let square = apart.norm_squared() / (pair.sigma * pair.sigma);
@@ -277,7 +282,7 @@ impl Layout {
         Some(pair.evidence + density + self.log_volume).filter(|_| square < GATE * GATE)
     }
 
-    /// The score of a place at most: as if a known mark could match several local ones.
+    /// Returns an upper bound of the score of a pose: it lets a known mark match several local ones.
     fn at_most(&self, place: &Se3) -> f64 {
         let mut best = vec![0.0_f64; self.local.len()];
         for pair in &self.pairs {
@@ -288,12 +293,12 @@ impl Layout {
         best.iter().sum()
     }
 
-    /// The place near this one that fits its matches best, with its score and its matches.
+    /// Returns the best pose near this one, with its score and matches.
     fn refined(&self, mut place: Se3) -> Option<(f64, Se3, Vec<Pair>)> {
         for _ in 0..ROUNDS {
             place = self.place(&self.matches(&place))?;
         }
-        // what the last move has taken out of reach is no match
+        // the last step may have moved marks apart, so match again
         let matches = self.matches(&place);
         let gained: f64 = matches.iter().filter_map(|pair| self.gain(&place, pair)).sum();
         let is_matched = |l: usize| matches.iter().any(|pair: &Pair| pair.local == l);
@@ -313,14 +318,14 @@ impl Layout {
         self.pairs.iter().filter(is_match).copied().collect()
     }
 
-    /// Returns whether two places put all marks at about the same points.
+    /// Returns whether two poses place all marks at about the same points.
     fn is_same(&self, one: &Se3, two: &Se3) -> bool {
         self.local
             .iter()
             .all(|mark| (one.act(&mark.centre) - two.act(&mark.centre)).norm() < SAME * 2.0 * mark.sigma)
     }
 
-    /// Returns whether a point lies where the known marks lie.
+    /// Returns whether a point lies among the known marks.
     fn is_among(&self, point: &Vector3<f64>) -> bool {
         let nearest =
             self.known.iter().map(|mark| (mark.centre - point).norm()).fold(f64::INFINITY, f64::min);
@@ -345,7 +350,7 @@ impl Layout {
     }
 }
 
-/// How far marks usually are from the next: the median.
+/// Returns the median distance of a mark to its nearest neighbour.
 fn gap(marks: &[Mark]) -> f64 {
     let to_next = |mark: &Mark| {
         let others = marks.iter().filter(|other| other.id != mark.id);
@@ -357,10 +362,10 @@ fn gap(marks: &[Mark]) -> f64 {
 }
 
 impl Aligned {
-    /// How well a local pose is known in the map: rad, then m, in its own frame.
+    /// Returns the noise of a local pose in the prior map: rad, then m, in its own frame.
     ///
     /// # Errors
-    /// If the place is not finite.
+    /// If the pose is not finite.
     pub(crate) fn noise(&self, local: &Se3) -> Result<Noise, NoiseError> {
         let [turn, shift] = self.sigmas;
         let shift = shift.hypot(turn * (local.translation - self.centre).norm());

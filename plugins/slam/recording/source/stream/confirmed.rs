@@ -1,29 +1,31 @@
-//! Timestamps far ahead, which a second frame has to confirm.
+//! Confirmation of timestamps that are far ahead, by later frames.
 use crate::sequence::Observation;
 use crate::source::SourceError;
 use std::collections::VecDeque;
 
-/// A frame that is so many seconds ahead of the one before waits for the next one. A longer pause of a robot delays one frame.
+/// A frame that is more than this number of seconds ahead of the previous frame waits for the next one. A
+/// longer pause of a robot delays one frame.
 const AHEAD: f64 = 10.0;
-/// The same as a multiple of the time between the two frames before, for sources with a frame a minute.
+/// This limit as a multiple of the last interval between frames, for sources with, for example, one frame per
+/// minute.
 const INTERVALS: f64 = 10.0;
 
 type Read = Result<Observation, SourceError>;
 
-/// Frames in their order. A frame whose timestamp jumps ahead is given on once a later one is close behind it, or two later
-/// ones go on from there: a single wrong timestamp would make all later frames look old. The first frame waits for the
-/// second one, for the same reason.
+/// Frames in their order. A frame whose timestamp jumps ahead is delayed until a later frame is close behind
+/// it, or until two later frames continue from there. Without this check, a single wrong timestamp would make
+/// all later frames look old. The first frame waits for the second one for the same reason.
 pub struct Confirmed<I> {
     frames: I,
-    /// Timestamp of the last frame that was given on, in seconds.
+    /// Timestamp of the last frame that was returned. Unit: seconds.
     last: Option<f64>,
-    /// Time between the last two of these, in seconds.
+    /// Interval between the last two returned frames. Unit: seconds.
     interval: f64,
-    /// Frames that were read to confirm another one.
+    /// Frames that were read early to confirm a timestamp.
     ahead: VecDeque<Read>,
 }
 
-/// The timestamp of a frame that can be read, if it is a number.
+/// Returns the timestamp of a readable frame, if it is finite.
 fn timestamp(read: &Read) -> Option<f64> {
     let timestamp = read.as_ref().ok()?.frame.timestamp;
     timestamp.is_finite().then_some(timestamp)
@@ -43,8 +45,8 @@ impl<I: Iterator<Item = Read>> Confirmed<I> {
         Some(read)
     }
 
-    /// Gives the first timestamp unless the next two frames rule it out: they ascend, and both come before it. A pause after
-    /// the first frame is no contradiction, as it makes no later frame look old.
+    /// Returns the first frame unless the next two frames contradict it: they ascend, and both come before
+    /// it. A pause after the first frame is no contradiction, because it makes no later frame look old.
     fn first(&mut self, read: Read, first: f64) -> Option<Read> {
         if let Some(second) = self.later(0).filter(|second| *second < first)
             && let Some(third) = self.later(1).filter(|third| *third > second && *third < first)
@@ -54,7 +56,7 @@ impl<I: Iterator<Item = Read>> Confirmed<I> {
         self.give(read)
     }
 
-    /// The timestamp of a frame after the next one, from 0; `None` at the end.
+    /// Returns the timestamp of the `n`-th later frame, from 0; `None` at the end.
     fn later(&mut self, n: usize) -> Option<f64> {
         loop {
             if let Some(found) = self.ahead.iter().filter_map(timestamp).nth(n) {
@@ -78,7 +80,7 @@ impl<I: Iterator<Item = Read>> Iterator for Confirmed<I> {
             return self.give(read);
         }
         let is_confirmed = match self.later(0) {
-            // the last frame makes no other one look old
+            // the last frame makes no later frame look old
             None => true,
             Some(next) if next <= here => false,
             Some(next) if next - here <= limit => true,
@@ -111,7 +113,7 @@ mod tests {
     fn a_single_timestamp_far_ahead_is_refused() {
         let expected = [Some(0.0), Some(0.1), None, Some(0.2), Some(0.3)];
         assert_eq!(confirmed(&[0.0, 0.1, 1e12, 0.2, 0.3]), expected);
-        // two wrong ones, apart from each other and in a row
+        // two wrong timestamps, apart from each other and consecutive
         assert_eq!(confirmed(&[0.0, 500.0, 0.1, 700.0, 0.2]), [Some(0.0), None, Some(0.1), None, Some(0.2)]);
         assert_eq!(confirmed(&[0.0, 0.1, 1e12, 2e12, 0.2, 0.3])[2..], [None, None, Some(0.2), Some(0.3)]);
     }
@@ -119,11 +121,11 @@ mod tests {
     #[test]
     fn a_first_timestamp_ahead_of_the_next_two_is_refused() {
         assert_eq!(confirmed(&[1e12, 1.0, 1.1, 1.2]), [None, Some(1.0), Some(1.1), Some(1.2)]);
-        // a frame a minute, and two wrong ones
+        // one frame per minute, and two wrong timestamps
         assert_eq!(confirmed(&[1e12, 60.0, 120.0]), [None, Some(60.0), Some(120.0)]);
         assert_eq!(confirmed(&[2e12, 1e12, 1.0, 1.1, 1.2])[2..], [Some(1.0), Some(1.1), Some(1.2)]);
         assert_eq!(confirmed(&[1e12, 1.0, 5e11, 1.1]), [None, Some(1.0), None, Some(1.1)]);
-        // a frame without a number between them
+        // a frame with NaN as its timestamp in between
         assert_eq!(confirmed(&[1e12, f64::NAN, 1.0, 1.1])[2..], [Some(1.0), Some(1.1)]);
     }
 
@@ -157,9 +159,9 @@ mod tests {
     fn a_pause_is_confirmed_by_the_next_frame() {
         let stamps = [0.0, 0.1, 1000.0, 1000.1, 1000.2];
         assert_eq!(confirmed(&stamps), stamps.map(Some));
-        // one that cannot be a time says nothing
+        // NaN confirms nothing
         assert_eq!(confirmed(&[0.0, 0.1, 1e12, f64::NAN, 0.2])[2], None);
-        // one frame a minute
+        // one frame per minute
         let slow = [0.0, 60.0, 120.0, 180.0];
         assert_eq!(confirmed(&slow), slow.map(Some));
     }

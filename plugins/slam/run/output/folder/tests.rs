@@ -6,7 +6,7 @@ fn claim(folder: &Path, command: &str, force: bool) -> Result<OutputFolder, Fold
     OutputFolder::claim(folder, command, Path::new("/robot/desk.toml"), force)
 }
 
-/// A folder in which there is one file.
+/// Returns a folder with one file.
 fn with(name: &str, text: &str) -> TempDir {
     let folder = tempdir().unwrap();
     fs::write(folder.path().join(name), text).unwrap();
@@ -64,7 +64,7 @@ fn a_file_that_is_called_like_a_marker_is_none() {
     let refused = claim(folder.path(), "run", false).unwrap_err();
     assert!(refused.to_string().ends_with("such as .manifactor"), "{refused}");
     assert_eq!(fs::read_to_string(folder.path().join(MARKER)).unwrap(), "notes");
-    // as a process leaves it that was killed before it wrote anything
+    // the marker of a process that was killed before it wrote anything
     for text in ["", "manifactor simulate \"a.toml\"\nprocess 12\n"] {
         let folder = with(MARKER, text);
         assert!(claim(folder.path(), "run", false).is_ok());
@@ -95,7 +95,7 @@ fn the_folder_of_a_variant_belongs_to_its_run() {
     fs::create_dir(&variant).unwrap();
     fs::write(variant.join("config.toml"), "").unwrap();
     assert!(claim(&variant, "experiment", false).is_err());
-    // of its own config, which is another document
+    // as a run of its `config.toml`, which is a different document
     let config = variant.join("config.toml");
     assert!(OutputFolder::claim(&variant, "run", &config, false).is_ok());
 }
@@ -110,7 +110,7 @@ fn leftovers_of_a_killed_run_are_removed_and_other_files_are_not() {
         fs::write(place.join(left), "half").unwrap();
         fs::write(place.join("thesis.unfinished"), "precious").unwrap();
     }
-    // what is there when a folder is taken by force was not made by this command
+    // files that exist before a forced claim were not written by this command
     drop(claim(folder.path(), "experiment", true).unwrap());
     assert!(inner.join(left).exists() && folder.path().join(left).exists());
     drop(claim(folder.path(), "experiment", false).unwrap());

@@ -1,18 +1,20 @@
-//! Where an estimate is drawn: in the frame of the truth, where there is one.
+//! Frame of the drawings: the ground-truth frame, if there is ground truth.
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
 use manifactor_mapping::estimate::Estimate;
 use manifactor_metrics::{Alignment, Similarity, align, associate};
 
-/// From the map's frame to that of the record.
+/// Transformations from the map frame to the frame of the record.
 pub(super) struct Frames {
     pub(super) odometry: Similarity,
     pub(super) estimate: Similarity,
 }
 
 impl Frames {
-    /// Simulated trajectories as they stand, as their objects are measured; recorded ones each aligned to the truth by
-    /// SE(3), poses within `max_time_difference` seconds. Without a truth, the frame of the map.
+    /// Returns the transformations. Simulated trajectories are not aligned, because the errors of their
+    /// objects are measured without alignment. Odometry and estimate of recorded data are aligned separately
+    /// to the ground truth with SE(3), using poses within `max_time_difference` seconds. Without ground truth
+    /// the frame is the map frame.
     pub(super) fn of(estimate: &Estimate, max_time_difference: f64) -> Self {
         let truth = estimate.sequence.ground_truth.as_ref();
         let to_truth = |poses: &[StampedPose]| match truth {

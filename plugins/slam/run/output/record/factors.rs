@@ -1,4 +1,4 @@
-//! Residuals at the estimate: by type of factor, and of each object's own.
+//! Residuals at the estimate: by type of factor, and of the factors of each object.
 use manifactor_graph::Key;
 use manifactor_graph::batch::FactorState;
 use manifactor_mapping::estimate::Estimate;
@@ -9,29 +9,29 @@ use std::collections::HashMap;
 /// Whitened residuals of one type of factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FactorResiduals {
-    /// The type.
+    /// Type of the factors.
     pub factor: String,
-    /// How many take part.
+    /// Number of factors that are defined at the estimate.
     pub count: usize,
-    /// How many are not defined at the estimate.
+    /// Number of factors that are not defined at the estimate.
     pub inactive: usize,
-    /// The mean of the weights that losses give them.
+    /// Mean weight from the robust losses.
     pub weight: f64,
-    /// All rows of all factors, in standard deviations.
+    /// All rows of all factors. Unit: standard deviations.
     #[serde(deserialize_with = "super::finite_or_nan")]
     pub rows: Vec<f64>,
 }
 
-/// A factor that a rule brought to an object.
+/// A factor that a rule added to an object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AppliedFactor {
-    /// Its type.
+    /// Type of the factor.
     pub factor: String,
-    /// Why, in words.
+    /// Reason in words.
     pub because: String,
-    /// The other variables that it connects.
+    /// Further variables that the factor connects.
     pub with: Vec<String>,
-    /// Its residual at the estimate, in standard deviations; empty where it takes no part.
+    /// Residual at the estimate, empty if it is not defined. Unit: standard deviations.
     #[serde(deserialize_with = "super::finite_or_nan")]
     pub residual: Vec<f64>,
 }
@@ -59,7 +59,7 @@ pub(super) fn residuals(estimate: &Estimate) -> Vec<FactorResiduals> {
     all
 }
 
-/// The states of an estimate's factors, to be found by variable.
+/// States of an estimate's factors, indexed by variable.
 pub(super) struct FactorStates<'a> {
     by_key: HashMap<&'a Key, Vec<OfVariable<'a>>>,
 }
@@ -80,7 +80,7 @@ impl<'a> FactorStates<'a> {
         Self { by_key }
     }
 
-    /// The root mean square of an object's box residuals.
+    /// Returns the root mean square of an object's box residuals.
     pub(super) fn box_rms(&self, object: &Key) -> Option<f64> {
         let factors = self.by_key.get(object)?.iter();
         let boxes = factors.filter(|(name, _, state)| name.starts_with("bounding_box") && state.defined);
@@ -89,7 +89,7 @@ impl<'a> FactorStates<'a> {
         (!rows.is_empty()).then(|| (squares / rows.len() as f64).sqrt())
     }
 
-    /// A factor of an object, with its residual.
+    /// Returns a factor of an object, with its residual.
     pub(super) fn applied(&self, applied: &Applied, object: &Key) -> AppliedFactor {
         let factors = self.by_key.get(object).into_iter().flatten();
         let mut same = factors.filter(|(name, keys, state)| {

@@ -1,4 +1,4 @@
-//! Each frame: where the camera was, and what it saw.
+//! Poses and boxes of each frame.
 use super::drawn::Frames;
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
@@ -14,49 +14,49 @@ use std::collections::BTreeMap;
 /// One frame. Poses are `world_from_camera`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameRecord {
-    /// Seconds.
+    /// Timestamp. Unit: seconds.
     pub timestamp: f64,
-    /// Where the camera was, if that is known for this time.
+    /// True pose, if it is known for this time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<Se3>,
-    /// Where odometry alone puts it.
+    /// Pose from odometry alone.
     pub odometry: TrackedPose,
-    /// Where the solver puts it.
+    /// Pose from the solver.
     pub estimate: TrackedPose,
-    /// Boxes in it, by object.
+    /// Boxes in the frame, with their objects.
     pub boxes: Vec<SeenBox>,
 }
 
-/// A pose, and how far it is from the truth.
+/// A pose and its errors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrackedPose {
     /// The pose.
     pub pose: Se3,
-    /// The absolute error of its position, metres, under the run's alignment.
+    /// Absolute position error under the run's alignment. Unit: metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<f64>,
-    /// The error of the motion that ends here: metres, radians.
+    /// Error of the relative motion that ends here. Unit: metres, radians.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relative: Option<[f64; 2]>,
 }
 
-/// An object in one frame. Boxes are xmin, ymin, xmax, ymax in pixels.
+/// A box of an object in one frame. Boxes are xmin, ymin, xmax, ymax in pixels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SeenBox {
-    /// Its number.
+    /// Number of the object.
     pub object: ObjectId,
-    /// The detector's box.
+    /// Box of the detector.
     pub measured: BoundingBox,
-    /// The box around the estimated ellipsoid's outline, where it is in front of the camera.
+    /// Box around the outline of the estimated ellipsoid, if the ellipsoid is in front of the camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub projected: Option<[f64; 4]>,
-    /// That outline, the points centre + x with xᵀΣ⁻¹x ≤ 1: u, v, Σ's uu, uv, vv.
+    /// This outline as the points centre + x with xᵀΣ⁻¹x ≤ 1: u, v, and the entries uu, uv, vv of Σ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ellipse: Option<[f64; 5]>,
 }
 
 impl SeenBox {
-    /// A box of an object, beside what `estimate` puts there: the pose of the camera, and the object.
+    /// Creates a box of an object, with the projection of the `estimate`: camera pose and object.
     pub fn new(
         object: ObjectId,
         measured: BoundingBox,
@@ -74,7 +74,7 @@ impl SeenBox {
     }
 }
 
-/// Errors of one trajectory by time stamp.
+/// Errors of one trajectory, by timestamp.
 #[derive(Default)]
 struct Errors {
     absolute: Vec<(f64, f64)>,
@@ -82,7 +82,7 @@ struct Errors {
     truth: Vec<(f64, Se3)>,
 }
 
-/// All frames, and how their errors are aligned.
+/// Returns all frames, and the alignment of their errors.
 pub(super) fn frames(
     estimate: &Estimate,
     settings: &EvaluationSettings,
@@ -106,7 +106,7 @@ pub(super) fn frames(
 }
 
 impl Errors {
-    /// `None` where there is no truth that it can be compared with.
+    /// Returns the errors; `None` if there is no ground truth to compare with.
     fn of(
         estimate: &Estimate,
         poses: &[StampedPose],
@@ -136,13 +136,13 @@ impl Errors {
     }
 }
 
-/// What a list by time has for a time.
+/// Returns the entry of a sorted list at a timestamp.
 fn at<T: Copy>(list: &[(f64, T)], timestamp: f64) -> Option<T> {
     let place = list.binary_search_by(|(own, _)| own.total_cmp(&timestamp)).ok()?;
     list.get(place).map(|(_, value)| *value)
 }
 
-/// What is seen, by frame.
+/// Returns the boxes, by frame.
 fn boxes(estimate: &Estimate) -> BTreeMap<usize, Vec<SeenBox>> {
     let landmarks = estimate.landmarks();
     let quadrics: BTreeMap<ObjectId, &DualQuadric> =

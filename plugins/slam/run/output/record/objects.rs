@@ -1,4 +1,4 @@
-//! Each object: what was detected, what is estimated, and what it is.
+//! Detections, estimate and ground truth of each object.
 use super::drawn::Frames;
 use super::factors::{AppliedFactor, FactorStates};
 use crate::output::report::object_errors;
@@ -13,47 +13,47 @@ use serde::{Deserialize, Serialize};
 /// One object: detected, true, or both.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectRecord {
-    /// Its number.
+    /// Number of the object.
     pub id: ObjectId,
-    /// Its key in the graph.
+    /// Key in the graph.
     pub key: String,
-    /// Its class; `unknown` where no detection named one.
+    /// Class; `unknown` if no detection has one.
     pub class: String,
-    /// The score of its class, averaged over the detections.
+    /// Score of the class, averaged over the detections.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<f64>,
-    /// Boxes that passed the filters.
+    /// Number of boxes that passed the filters.
     pub boxes: usize,
-    /// The root mean square of its boxes' residuals at the estimate, in standard deviations.
+    /// Root mean square of the box residuals at the estimate. Unit: standard deviations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub box_rms: Option<f64>,
-    /// Where the solve began.
+    /// Initial value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub initial: Option<DualQuadric>,
-    /// Where it ended.
+    /// Estimate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub estimate: Option<DualQuadric>,
-    /// What it is, where that is known.
+    /// True shape, if known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<Solid>,
-    /// How far the estimate is from that.
+    /// Error of the estimate, if the true shape is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<LandmarkError>,
-    /// Factors that semantic rules brought it.
+    /// Factors that semantic rules added.
     pub factors: Vec<AppliedFactor>,
-    /// Rules that are for its class and were not applied, and why.
+    /// Rules of the object's class that were not applied, with the reason.
     pub left_out: Vec<String>,
-    /// Why it is not mapped.
+    /// Reason why the object is not mapped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<String>,
 }
 
-/// The cuboid that encloses a true object.
+/// Cuboid that encloses a true object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Solid {
-    /// Its centre and its axes.
+    /// Centre and axes.
     pub pose: Se3,
-    /// Half its extents along its own axes, metres.
+    /// Half extents along the axes. Unit: metres.
     pub half_extents: [f64; 3],
 }
 
@@ -80,7 +80,7 @@ pub(super) fn objects(estimate: &Estimate, drawn: &Frames) -> Vec<ObjectRecord> 
             rejected: object.rejected.as_ref().map(Rejection::to_string),
         }
     });
-    // what is there and was not detected is worth seeing too
+    // also true objects that were never detected
     let unseen = truths.iter().filter(|t| !estimate.mapping.objects.iter().any(|o| o.id == t.id));
     detected.chain(unseen.map(never_detected)).collect()
 }

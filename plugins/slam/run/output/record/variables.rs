@@ -1,17 +1,17 @@
-//! Variables of the run's own, such as the plane of a table.
+//! Variables that the document of a run declares, such as the plane of a table.
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::settings::OwnGraph;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// A variable that the run's document has added, in the frame of the map.
+/// A variable that the document of a run declares, in the map frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OwnVariable {
-    /// Its key.
+    /// Key in the graph.
     pub key: String,
-    /// Where the solve began, as documents write it.
+    /// Initial value, in the form of documents.
     pub initial: Value,
-    /// Where it ended.
+    /// Estimate, in the form of documents.
     pub estimate: Value,
 }
 

@@ -1,4 +1,4 @@
-//! How boxes were put to objects.
+//! Report of data association.
 use manifactor_association::{Association, Names};
 use manifactor_metrics::{IdentityScores, identity};
 use manifactor_online::FrameReport;
@@ -7,45 +7,45 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-/// An association of boxes with objects, scored by the names that the source gives where it gives any.
+/// A data association, scored with the objects of the source if it has them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AssociationReport {
-    /// What it was done by: a type of `association`.
+    /// Type of the `association`.
     pub by: &'static str,
-    /// Objects that turned out to be others.
+    /// Number of objects that were merged into others.
     pub merged: usize,
-    /// Boxes that were given to another object later, while frames came.
+    /// Number of boxes that were later moved to a different object while frames arrived.
     pub moved: usize,
-    /// With the names that boxes had when they came.
+    /// Scores of the objects that boxes had when they arrived.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_the_time: Option<IdentityScores>,
-    /// With those that they had in the end.
+    /// Scores of the objects that boxes have at the end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub in_the_end: Option<IdentityScores>,
 }
 
-/// The names of all boxes, in order of time: of the source, and given.
+/// Objects of all boxes in order of time: from the source, and from data association.
 #[derive(Debug, Default)]
 pub(crate) struct Naming {
     boxes: Vec<Named>,
-    /// Names that are of nothing.
+    /// Dropped object candidates, whose boxes have no object.
     forgotten: BTreeSet<ObjectId>,
 }
 
 #[derive(Debug)]
 struct Named {
-    /// Of the source.
+    /// Object of the source.
     truth: Option<ObjectId>,
-    /// When it came.
+    /// Object when the box arrived.
     then: Option<ObjectId>,
-    /// Its frame, as the map counts them, and its place in that.
+    /// Frame in the map, and index in the frame.
     place: (usize, usize),
-    /// When all was looked at once more in the end, if it was.
+    /// Object after a final association of all frames, if there was one.
     again: Option<Option<ObjectId>>,
 }
 
 impl Named {
-    /// In the end.
+    /// Returns the object at the end.
     fn now(&self, names: &Names) -> Option<ObjectId> {
         let (frame, place) = self.place;
         self.again.unwrap_or_else(|| self.then.map(|name| names.of(name, frame, place)))
@@ -53,7 +53,7 @@ impl Named {
 }
 
 impl Naming {
-    /// Takes note of a frame's boxes, and of what was made of them; nothing, where the frame was left out.
+    /// Records a frame's boxes and their objects; the boxes of a skipped frame have no object.
     pub(crate) fn note(&mut self, detections: &[Detection], taken: Option<&FrameReport>) {
         let given = |place: usize| taken.and_then(|report| report.names.get(place).copied().flatten());
         let frame = taken.map_or(0, |report| report.frame);
@@ -64,11 +64,11 @@ impl Naming {
             again: None,
         };
         self.boxes.extend(detections.iter().enumerate().map(named));
-        // objects that are none: their boxes have no name in the end
+        // boxes of dropped candidates have no object in the end
         self.forgotten.extend(taken.map_or(&[][..], |report| &report.forgotten));
     }
 
-    /// Gives some boxes other names for those that they have.
+    /// Assigns new objects to some boxes, computed from their current objects.
     pub(crate) fn replace(
         &mut self,
         boxes: Range<usize>,
@@ -82,12 +82,12 @@ impl Naming {
         }
     }
 
-    /// The names of all boxes as they are now.
+    /// Returns the current objects of all boxes.
     pub(crate) fn now<'a>(&'a self, names: &'a Names) -> impl Iterator<Item = Option<ObjectId>> + 'a {
         self.boxes.iter().map(|named| named.now(names).filter(|name| !self.forgotten.contains(name)))
     }
 
-    /// The report; none, where the names are those of the source.
+    /// Returns the report; `None` if the objects of the source are used.
     pub(crate) fn report(&self, by: &dyn Association, names: &Names) -> Option<AssociationReport> {
         let is_known = self.boxes.iter().any(|named| named.truth.is_some());
         let score = |put: &mut dyn Iterator<Item = Option<ObjectId>>| {

@@ -1,4 +1,4 @@
-//! Whether errors are as large as the estimate says.
+//! Consistency of errors with the estimated covariances.
 use super::trajectory::by_first_pose;
 use manifactor_geometry::Se3;
 use manifactor_graph::{Key, Manifold};
@@ -9,22 +9,23 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use std::collections::HashMap;
 
-/// Normalized estimation errors squared, eᵀ Σ⁻¹ e by degree of freedom, Σ the marginal covariance (Bar-Shalom, Li and Kirubarajan,
-/// *Estimation with Applications to Tracking and Navigation*, 2001, section 5.4): near 1 on average where Σ is right, more where the
-/// estimate thinks better of itself.
+/// Normalized estimation errors squared, eᵀ Σ⁻¹ e per degree of freedom, with the marginal covariance Σ
+/// (Bar-Shalom, Li and Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section
+/// 5.4). Their mean is near 1 if Σ is right, and larger if the estimate is overconfident.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ConsistencyReport {
-    /// Mean over poses, six degrees of freedom, each against the true pose nearest in time. The first of them brings all into the frame of the
-    /// truth, and so counts as 0.
+    /// Mean over poses with six degrees of freedom, each compared with the true pose nearest in time. The
+    /// first pose aligns the trajectory with the ground truth, so its error is 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poses: Option<f64>,
-    /// Mean over the centres of objects, where the truth has objects, in the frame of the odometry; three degrees of freedom.
+    /// Mean over the centres of objects with three degrees of freedom, in the odometry frame, if the ground
+    /// truth has objects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub objects: Option<f64>,
 }
 
 impl ConsistencyReport {
-    /// `None` where there is no truth, or no covariance.
+    /// Returns the report; `None` without ground truth or covariances.
     pub(super) fn new(estimate: &Estimate, settings: &EvaluationSettings) -> Option<Self> {
         let truth = estimate.sequence.ground_truth.as_ref()?;
         let marginals = estimate.solution.marginals(&estimate.mapping.graph, &[]).ok()?;
@@ -43,7 +44,7 @@ impl ConsistencyReport {
         let objects = landmarks.iter().filter_map(|landmark| {
             let pose: Se3 = truth_from_map.compose(&landmark.quadric.pose);
             let off = landmark.truth?.bounding_box.centroid() - pose.translation;
-            // the tangent of a pose turns with it: its translation is in the frame of the object
+            // the tangent of a pose rotates with the pose, so the translation is in the object's frame
             let off = pose.rotation.inverse().act(&off);
             let covariance = covariances.get(&landmark.object.key)?.view((3, 3), (3, 3)).into_owned();
             normalized(&DVector::from_column_slice(off.as_slice()), covariance)
@@ -53,7 +54,7 @@ impl ConsistencyReport {
     }
 }
 
-/// eᵀ Σ⁻¹ e / n; `None` where Σ has no inverse.
+/// Returns eᵀ Σ⁻¹ e / n; `None` if Σ has no inverse.
 fn normalized(error: &DVector<f64>, covariance: DMatrix<f64>) -> Option<f64> {
     let n = error.len() as f64;
     Some(error.dot(&covariance.cholesky()?.solve(error)) / n)

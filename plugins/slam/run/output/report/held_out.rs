@@ -1,4 +1,4 @@
-//! Boxes that the estimate did without, against those that it predicts.
+//! Held-out boxes, compared with the boxes that the estimate predicts.
 use manifactor_geometry::Se3;
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::mapping::measurements::{ObjectBox, Sifted, sift};
@@ -9,44 +9,46 @@ use manifactor_recording::sequence::{Detection, ObjectId};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// How well boxes are predicted that had no part in the estimate: once they pass the filters, and show an object of the map.
+/// Prediction errors of held-out boxes that pass the filters and show a mapped object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldOutReport {
-    /// Which they are.
+    /// The holdout.
     pub holdout: Holdout,
-    /// Boxes of objects that are not in the map.
+    /// Number of boxes of objects that are not in the map.
     pub unmapped: usize,
-    /// All boxes that are predicted.
+    /// Result of all predicted boxes.
     pub all: Prediction,
-    /// By class.
+    /// Results by class.
     pub classes: BTreeMap<String, Prediction>,
 }
 
-/// Boxes as they are predicted, against those that were detected.
+/// Predicted boxes, compared with detected boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Prediction {
-    /// How many.
+    /// Number of boxes.
     pub boxes: usize,
-    /// Objects that they show.
+    /// Number of objects that the boxes show.
     pub objects: usize,
-    /// Those of which no outline is in view: their intersection over union is 0, and they have no error in pixels.
+    /// Number of boxes without a predicted outline in view. Their intersection over union is 0, and they have
+    /// no error in pixels.
     pub out_of_view: usize,
     /// Mean intersection over union, 0 to 1.
     pub iou: Mean,
-    /// Mean over boxes of the root mean square over their sides, in pixels.
+    /// Mean over boxes of the root mean square error of their sides. Unit: pixels.
     pub pixels: Mean,
 }
 
-/// A mean with its standard error: boxes of one object err alike, so that objects are what is counted. `None` for a single object.
+/// A mean with its standard error. Boxes of one object have similar errors, so objects are the independent
+/// samples. `None` for a single object.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mean {
     /// The mean.
     pub mean: f64,
-    /// Its standard error.
+    /// Standard error of the mean.
     pub error: Option<f64>,
 }
 
-/// One box.
+/// Prediction of one box.
 struct Predicted {
     object: ObjectId,
     iou: f64,
@@ -78,7 +80,7 @@ impl HeldOutReport {
     }
 }
 
-/// `None` for an object that is not in the map.
+/// Predicts a box; `None` if the object is not in the map.
 fn predicted(
     estimate: &Estimate,
     object: ObjectId,
@@ -121,7 +123,7 @@ impl Prediction {
 }
 
 impl Mean {
-    /// Over values by object.
+    /// Returns the mean of values that are grouped by object.
     fn of(objects: &[Vec<f64>]) -> Self {
         let n = objects.iter().map(Vec::len).sum::<usize>() as f64;
         let mean = objects.iter().flatten().sum::<f64>() / n;
@@ -142,7 +144,7 @@ mod tests {
         let (few, many) = (Mean::of(&[vec![0.4], vec![0.8]]), Mean::of(&[vec![0.4; 50], vec![0.8; 50]]));
         assert!((few.mean - many.mean).abs() < 1e-12);
         assert!((few.error.unwrap() - many.error.unwrap()).abs() < 1e-12);
-        // the standard error of a mean of two
+        // the standard error of a mean of two values
         assert!((few.error.unwrap() - 0.2).abs() < 1e-12);
     }
 }

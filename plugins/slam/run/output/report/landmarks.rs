@@ -2,28 +2,28 @@ use manifactor_mapping::estimate::{Estimate, Landmark};
 use manifactor_quadric::LandmarkError;
 use serde::Serialize;
 
-/// Landmarks against the truth, over all objects of which it is known.
+/// Errors of all landmarks with known truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LandmarkReport {
-    /// How many objects are compared.
+    /// Number of objects that are compared.
     pub objects: usize,
-    /// Where the solve began.
+    /// Errors of the initial values.
     pub initial: LandmarkSummary,
-    /// Where it ended.
+    /// Errors of the estimate.
     pub estimate: LandmarkSummary,
 }
 
-/// Errors of several landmarks in one.
+/// Summary of the errors of several landmarks.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LandmarkSummary {
-    /// The averages, as the paper's authors take them in later code.
+    /// Means, as in later code of the paper's authors.
     pub mean: LandmarkError,
-    /// The roots of the averages of the squares, as the paper has it for positions.
+    /// Root mean squares, as in the paper for positions.
     pub rmse: LandmarkError,
 }
 
-/// The error of each landmark whose truth is known. Simulated truth lies in the frame of the odometry, which may be
-/// another than the map's.
+/// Returns the error of each landmark with known truth. Simulated truth is in the odometry frame, which may
+/// differ from the map frame.
 pub(super) fn in_truth_frame<'a>(
     estimate: &Estimate,
     landmarks: Vec<Landmark<'a>>,
@@ -39,7 +39,7 @@ pub(super) fn in_truth_frame<'a>(
 }
 
 impl LandmarkReport {
-    /// Summaries before and after; `None` where no truth is known.
+    /// Creates the summaries before and after the solve; `None` without known truth.
     pub(super) fn new(
         before: &[(Landmark<'_>, LandmarkError)],
         after: &[(Landmark<'_>, LandmarkError)],
@@ -55,7 +55,7 @@ impl LandmarkSummary {
         Self::over(&errors)
     }
 
-    /// `None` for no landmarks.
+    /// Creates the summary; `None` without landmarks.
     pub fn over(errors: &[LandmarkError]) -> Option<Self> {
         let average = |of: fn(&LandmarkError) -> f64, power: i32| {
             let sum: f64 = errors.iter().map(|error| of(error).powi(power)).sum();

@@ -1,4 +1,4 @@
-//! How a stream went.
+//! Report of a stream.
 use super::trajectory::{self, TrajectoryReport};
 use manifactor_formats::replay::Latencies;
 use manifactor_formats::tum::StampedPose;
@@ -10,53 +10,54 @@ use serde::Serialize;
 /// A stream, from its first frame to its last.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct OnlineReport {
-    /// How long frames took, from when they were there to the new estimate.
+    /// Durations of frames, from their arrival to the new estimate.
     pub latencies: Latencies,
-    /// Seconds, frame by frame.
+    /// Duration of each frame. Unit: seconds.
     #[serde(skip)]
     pub seconds: Vec<f64>,
-    /// The poses as they were estimated when their frames came.
+    /// Poses as they were estimated when their frames arrived.
     #[serde(skip)]
     pub live: Vec<StampedPose>,
-    /// Whether somebody ended it before its last frame.
+    /// True if the user ended the stream before its last frame.
     pub interrupted: bool,
-    /// Objects that came into the map.
+    /// Number of objects added to the map.
     pub born: usize,
-    /// Objects that were taken out again.
+    /// Number of objects that were removed again.
     pub withdrawn: usize,
-    /// Times that rules were asked about an object again, as its class had changed.
+    /// Number of times that rules were applied again to an object because its class had changed.
     pub revised: usize,
-    /// Frames that were left out, and what else could not be taken; the first of them in words.
+    /// Skipped frames and rejected input; the first of them in words.
     pub refused: Vec<String>,
-    /// How many these are.
+    /// Number of skipped frames and rejected inputs.
     pub refusals: usize,
-    /// Those of them that are frames, in words and all.
+    /// The skipped frames among them: the first of them in words, and the number of all.
     #[serde(skip)]
     left_out: (Vec<String>, usize),
-    /// Updates that ended in a batch solve, as shorter steps did not help.
+    /// Number of updates that ended in a batch solve because shorter steps did not help.
     pub solved_batch: usize,
-    /// Objects in the map after the last frame.
+    /// Number of objects in the map after the last frame.
     pub objects: usize,
-    /// ½ Σ ρ after the last frame.
+    /// Cost ½ Σ ρ after the last frame.
     pub cost: f64,
-    /// Bytes of the factorization.
+    /// Size of the factorization. Unit: bytes.
     pub bytes: usize,
-    /// These poses against the truth: once for each alignment.
+    /// Errors of the poses in `live`: one entry per alignment.
     pub trajectory: Vec<TrajectoryReport>,
 }
 
-/// Refusals that are told in words.
+/// Largest number of refusals that are reported in words.
 const TOLD: usize = 20;
 
 impl OnlineReport {
-    /// Forgets what was counted of a map that is made anew, of the same frames: how long they took, and those that were left out, stay.
+    /// Resets the counts of the map when the map is rebuilt from the frames so far. Durations and skipped
+    /// frames are kept.
     pub(crate) fn begin_again(&mut self) {
         let Self { seconds, left_out, .. } = std::mem::take(self);
         let (refused, refusals) = left_out.clone();
         *self = Self { seconds, left_out, refused, refusals, ..Self::default() };
     }
 
-    /// Counts a frame in.
+    /// Counts a frame.
     pub(crate) fn count(&mut self, report: Result<&FrameReport, &FrameError>, seconds: f64) {
         self.seconds.push(seconds);
         match report {
@@ -70,7 +71,7 @@ impl OnlineReport {
         }
     }
 
-    /// Counts what a frame came to.
+    /// Counts the results of a frame.
     pub(crate) fn tell(&mut self, report: &FrameReport) {
         self.born += report.born.len();
         self.withdrawn += report.withdrawn.len();
@@ -85,7 +86,7 @@ impl OnlineReport {
         self.refused.extend(refused.iter().take(room).cloned());
     }
 
-    /// What there is to tell after the last frame.
+    /// Completes the report after the last frame.
     pub(crate) fn end(&mut self, mapper: &mut Mapper) {
         self.latencies = Latencies::of(&self.seconds);
         self.objects = mapper.mapped();
@@ -94,10 +95,10 @@ impl OnlineReport {
         self.live = mapper.live().to_vec();
     }
 
-    /// Compares the poses as they were estimated when their frames came with the truth.
+    /// Compares the live poses with ground truth.
     pub(crate) fn compare(&mut self, estimate: &Estimate, settings: &EvaluationSettings) {
         let poses = [estimate.odometry(), self.live.clone()];
-        // the report of the estimate tells what keeps it from being compared
+        // the report of the estimate has the warnings if a comparison is impossible
         self.trajectory =
             trajectory::compare(estimate.sequence.ground_truth.as_ref(), &poses, settings, &mut vec![]);
     }

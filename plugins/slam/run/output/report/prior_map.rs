@@ -1,4 +1,4 @@
-//! How a run went in a map that was made before.
+//! Report of a run with a prior map.
 use manifactor_mapping::estimate::Estimate;
 use manifactor_mapping::mapping::measurements::Measured;
 use manifactor_mapping::settings::Settings;
@@ -7,38 +7,38 @@ use manifactor_recording::sequence::ObjectId;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// A run that began with a map.
+/// A run that began with a prior map.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PriorMapReport {
-    /// Its file.
+    /// File of the map.
     pub file: PathBuf,
-    /// Whether it is known where the run is in it; where it is not, the run has made a map of its own.
+    /// True if the start in the map is known. Otherwise the run has made a new map.
     pub is_located: bool,
-    /// How that was found, where the start was unknown.
+    /// Result of the relocalization, if the start was unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub found: Option<Found>,
-    /// Objects in it.
+    /// Number of objects in the map.
     pub objects: usize,
-    /// Those that were seen again.
+    /// Objects of the map that were detected again.
     pub seen: Vec<ObjectId>,
-    /// Those that should have been seen, or seen again, and were not.
+    /// Objects of the map that should have been detected, or detected again, but were not.
     pub gone: Vec<ObjectId>,
-    /// Objects that are new.
+    /// New objects.
     pub added: Vec<ObjectId>,
 }
 
-/// A start that was found.
+/// A start that relocalization found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Found {
-    /// The frame after which it was, from 0.
+    /// The frame after which it was found, from 0.
     pub frame: usize,
-    /// Where the run began, and by what that was found.
+    /// Pose at the start of the run, and the evidence for it.
     #[serde(flatten)]
     pub located: Located,
 }
 
 impl PriorMapReport {
-    /// The report, where these objects are `gone`; none, where there was no map before.
+    /// Creates the report, with the objects that are `gone`; `None` without a prior map.
     pub(crate) fn new(
         estimate: &Estimate,
         settings: &Settings,

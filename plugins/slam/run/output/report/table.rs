@@ -1,48 +1,48 @@
 use super::{RunReport, VariantReport};
 use serde::Serialize;
 
-/// One variant on one line. What is not known is left out.
+/// One variant as one row. Unknown values are left out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// The variant.
+    /// Name of the variant.
     pub variant: String,
-    /// Objects in the map.
+    /// Number of objects in the map.
     pub objects: usize,
-    /// Boxes of these objects.
+    /// Number of boxes of these objects.
     pub boxes: usize,
-    /// Semantic factors.
+    /// Number of semantic factors.
     pub semantic_factors: usize,
-    /// ½ Σ ρ where the solve ended.
+    /// Final cost ½ Σ ρ.
     pub final_cost: f64,
-    /// Linearizations followed by a step.
+    /// Number of linearizations followed by a step.
     pub iterations: usize,
-    /// Whether it ended in a minimum.
+    /// True if the solve ended in a minimum.
     pub converged: bool,
-    /// The alignment under which the trajectories are compared: the first that is configured.
+    /// Alignment of the trajectories: the first that is configured.
     pub alignment: Option<String>,
-    /// RMSE of positions by odometry alone, in metres.
+    /// RMSE of positions from odometry alone. Unit: metres.
     pub odometry_ate: Option<f64>,
-    /// RMSE of positions, in metres.
+    /// RMSE of positions. Unit: metres.
     pub ate: Option<f64>,
-    /// RMSE of the landmarks' positions, in metres.
+    /// RMSE of the landmarks' positions. Unit: metres.
     pub position: Option<f64>,
     /// Mean Jaccard distance of the landmarks' shapes, 0 to 1.
     pub shape: Option<f64>,
-    /// Mean Jaccard distance of the landmarks where they stand, 0 to 1.
+    /// Mean Jaccard distance of the landmarks at their estimated poses, 0 to 1.
     pub quality: Option<f64>,
-    /// Of the solve, refinements included.
+    /// Duration of the solve, including refinements. Unit: seconds.
     pub seconds: f64,
 }
 
 impl RunReport {
-    /// A line for each variant.
+    /// Returns a row for each variant.
     pub fn table(&self) -> Vec<Row> {
         self.variants.iter().map(VariantReport::row).collect()
     }
 }
 
 impl VariantReport {
-    /// This variant on one line.
+    /// Returns this variant as a row.
     pub fn row(&self) -> Row {
         let trajectory = self.trajectory.first();
         let landmarks = self.landmarks.map(|landmarks| landmarks.estimate);

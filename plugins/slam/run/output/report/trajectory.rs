@@ -8,34 +8,36 @@ use manifactor_metrics::{
 use manifactor_recording::sequence::GroundTruth;
 use serde::Serialize;
 
-/// The trajectory against the truth, before and after.
+/// Errors of the trajectory before and after the solve.
 #[derive(Debug, Clone, Serialize)]
 pub struct TrajectoryReport {
-    /// How it was brought into the frame of the truth.
+    /// Alignment with the ground truth.
     pub alignment: Alignment,
-    /// Poses of the estimate for which there is a true one, and all of its poses.
+    /// Number of estimated poses with a true pose, and number of all estimated poses.
     pub covered: [usize; 2],
     /// Number of true poses.
     pub truth_poses: usize,
-    /// By odometry alone.
+    /// Errors of odometry alone.
     pub odometry: TrajectoryError,
-    /// As it is estimated.
+    /// Errors of the estimate.
     pub estimate: TrajectoryError,
-    /// By how much its ATE is larger than that of odometry, as a share of it; with its interval.
+    /// Relative increase of the ATE over that of odometry, with its confidence interval.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub change: Option<Interval>,
 }
 
-/// How far a trajectory is from the truth.
+/// Errors of a trajectory.
 #[derive(Debug, Clone, Serialize)]
 pub struct TrajectoryError {
-    /// Absolute error of positions, in metres.
+    /// Absolute position errors. Unit: metres.
     pub ate: Statistics,
-    /// Relative pose error over [`EvaluationSettings::relative_over`] frames; `None` for trajectories shorter than that.
+    /// Relative pose error over [`EvaluationSettings::relative_over`] frames; `None` for shorter
+    /// trajectories.
     pub rpe: Option<RelativeError>,
 }
 
-/// One report for each alignment, of the trajectory by odometry and the one that is estimated. An error that grew is a warning, and so is a truth that cannot be used.
+/// Returns one report for each alignment, of odometry and of the estimate. Adds a warning if an error has
+/// grown or if the ground truth cannot be used.
 pub(super) fn compare(
     truth: Option<&GroundTruth>,
     [before, after]: &[Vec<StampedPose>; 2],
@@ -74,7 +76,7 @@ pub(super) fn compare(
     reports
 }
 
-/// Poses of an estimate beside the true ones, in the frame of the truth by the first of them.
+/// Returns the estimated and true poses, aligned by the first pose.
 pub(super) fn by_first_pose(
     truth: &GroundTruth,
     estimate: &[StampedPose],
@@ -93,7 +95,8 @@ fn aligned(
     Ok(align(&pairs, alignment)?.1)
 }
 
-/// A figure over less than half of the poses says little of the rest.
+/// Returns a warning if less than half of the poses are compared, because the result hardly applies to the
+/// rest.
 fn few(report: &TrajectoryReport, settings: &EvaluationSettings) -> Option<Warning> {
     let [covered, poses] = report.covered;
     let truth = report.truth_poses;
@@ -103,12 +106,12 @@ fn few(report: &TrajectoryReport, settings: &EvaluationSettings) -> Option<Warni
 
 fn worse(report: &TrajectoryReport) -> Option<Warning> {
     let (odometry, estimate) = (report.odometry.ate.rmse, report.estimate.ate.rmse);
-    // to rounding: a graph without objects leaves the odometry as it is
+    // tolerates rounding: a graph without objects leaves the odometry unchanged
     let grew = estimate > odometry * (1.0 + 1e-6);
     grew.then(|| Warning::WorseThanOdometry { alignment: name(report.alignment), odometry, estimate })
 }
 
-/// As documents write it.
+/// Returns the name of an alignment in documents.
 pub fn name(alignment: Alignment) -> String {
     let json = serde_json::to_value(alignment).unwrap_or_default();
     json.as_str().unwrap_or_default().to_owned()

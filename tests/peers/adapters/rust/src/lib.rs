@@ -1,4 +1,4 @@
-//! What every adapter is told and tells (adapters/protocol.py says it in words), and pose graphs as lines.
+//! The protocol of the adapters (described in adapters/protocol.py), and pose graphs as lines.
 use std::fmt::Display;
 use std::fs;
 use std::io::Write;
@@ -27,7 +27,7 @@ impl Task {
     }
 }
 
-/// Runs what is timed.
+/// Runs the timed part.
 pub fn timed<T>(solve: impl FnOnce() -> T) -> (T, f64) {
     let began = Instant::now();
     let solution = solve();

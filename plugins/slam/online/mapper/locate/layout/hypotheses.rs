@@ -1,15 +1,16 @@
-//! Places at which a few marks match.
+//! Pose hypotheses from a few matching marks.
 use super::{Layout, Pair};
 use manifactor_geometry::Se3;
 
-/// Hypotheses that are made at most,
+/// Maximum number of hypotheses.
 const HYPOTHESES: usize = 2000;
-/// of so many groups of local marks.
+/// Maximum number of groups of local marks.
 const GROUPS: usize = 2000;
 
 impl Layout {
-    /// Places at which two local marks match known ones; three, where up is unknown. Each group of local marks is tried with all known ones
-    /// that it may show: with many objects of one class, a few pairs of each would hardly ever hold two that are right.
+    /// Returns poses at which two local marks match known ones; three if the up direction is unknown.
+    /// Each group of local marks is tried with all possible matches. Sampling a few pairs per mark would
+    /// rarely contain two right ones if many objects share a class.
     pub(super) fn hypotheses(&self) -> Vec<Se3> {
         let (options, size) = (self.options(), if self.up.is_some() { 2 } else { 3 });
         let mut places = vec![];
@@ -27,19 +28,19 @@ impl Layout {
         places
     }
 
-    /// The pairs of each local mark that has any; first of the marks whose classes say most.
+    /// Returns the candidate matches of each local mark. Marks with the most distinctive classes come first.
     fn options(&self) -> Vec<Vec<Pair>> {
         let mut options = vec![vec![]; self.local.len()];
         for pair in &self.pairs {
             options[pair.local].push(*pair);
         }
         options.retain(|pairs| !pairs.is_empty());
-        // those of a mark are in order, and so are equals
+        // the matches of a mark are already sorted, and the sort is stable
         options.sort_by(|a, b| b[0].evidence.total_cmp(&a[0].evidence));
         options
     }
 
-    /// Pairs, with each of these that goes together with all of them.
+    /// Extends compatible pairs by each further pair that is compatible with all of them.
     fn with_one_more<'a>(
         &'a self,
         pairs: &'a [Pair],
@@ -50,7 +51,8 @@ impl Layout {
     }
 }
 
-/// Groups of two or three of so many marks, each in order; the first ones are in the first groups, and none is in all of these.
+/// Returns groups of two or three marks, each in ascending order. Groups of the first marks come first, but
+/// no mark is in all of the first groups.
 fn groups(marks: usize, size: usize) -> impl Iterator<Item = Vec<usize>> {
     let pairs = move |sum: usize, from: usize| {
         let firsts = from..sum.div_ceil(2);

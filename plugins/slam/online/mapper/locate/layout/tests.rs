@@ -4,7 +4,7 @@ use manifactor_recording::class::Aliases;
 use manifactor_recording::prior_map::Looks;
 use manifactor_recording::sequence::ClassScores;
 
-/// Boxes that agree with every place.
+/// An agreement that accepts every pose.
 const AGREES: Agreement = Agreement { overlap: 1.0, seen: 1.0 };
 const CLASSES: [&str; 3] = ["cup", "book", "bottle"];
 
@@ -23,7 +23,7 @@ fn object(id: u32, class: &str, centre: Vector3<f64>) -> Arc<PriorObject> {
     })
 }
 
-/// Objects on a table, each of one of the classes.
+/// Objects on a table, with the classes in turn.
 fn table(classes: &[&str], up: Option<Direction>) -> PriorMap {
     let places =
         [[0.0, 0.0], [0.7, 0.1], [1.5, -0.2], [0.3, 0.9], [1.1, 1.0], [-0.4, 0.6], [1.9, 0.8], [0.8, 1.7]];
@@ -34,7 +34,7 @@ fn table(classes: &[&str], up: Option<Direction>) -> PriorMap {
     PriorMap::new(up, all.collect())
 }
 
-/// The same objects, seen from elsewhere; the first ones are not.
+/// Returns the objects seen from a different pose, without the first `without` of them.
 fn seen(map: &PriorMap, known_from_local: &Se3, without: usize) -> (Vec<Mark>, Option<Direction>) {
     let local = known_from_local.inverse();
     let mark = |object: &Arc<PriorObject>| {
@@ -45,14 +45,14 @@ fn seen(map: &PriorMap, known_from_local: &Se3, without: usize) -> (Vec<Mark>, O
     (map.objects.iter().skip(without).map(mark).collect(), up)
 }
 
-/// A map of objects of these classes, at these places on a floor.
+/// A map of objects on a floor, with the given places and classes.
 fn floor(objects: impl IntoIterator<Item = ([f64; 2], &'static str)>) -> PriorMap {
     let all = objects.into_iter().zip(10..);
     let all = all.map(|(([x, y], class), id)| object(id, class, Vector3::new(x, y, 0.0)));
     PriorMap::new(Some(Direction::Z), all.collect())
 }
 
-/// Places on a floor without any order.
+/// Irregular places on a floor.
 fn scattered(n: u32) -> impl Iterator<Item = [f64; 2]> {
     let part = |i: u32, step: f64| (f64::from(i + 1) * step).fract();
     (0..n).map(move |i| [8.0 * part(i * i, 0.618_033_988_7), 8.0 * part(i * i, 0.414_213_562_4)])
@@ -82,7 +82,7 @@ fn what_looks_the_same_from_two_sides_is_nowhere() {
     let map = PriorMap::new(Some(Direction::Z), bottles.collect());
     let (marks, up) = seen(&map, &elsewhere(), 0);
     assert!(Layout::new(marks, up, &map, false).align(|_| Some(AGREES)).is_none());
-    // names tell them apart
+    // ids resolve the symmetry
     let (mut marks, up) = seen(&map, &elsewhere(), 0);
     marks.iter_mut().for_each(|mark| mark.id.0 += 10);
     let found = Layout::new(marks, up, &map, true).align(|_| Some(AGREES)).unwrap().0;
@@ -98,10 +98,10 @@ fn a_place_is_one_where_boxes_agree_with_it() {
     let is_right = |aligned: &Aligned| aligned.known_from_local.between(&elsewhere()).log().norm() < 0.1;
     let found = layout.align(|aligned| is_right(aligned).then_some(AGREES)).unwrap().0;
     assert!(is_right(&found), "{found:?}");
-    // others are possible as well
+    // other poses are possible as well
     let less = Agreement { seen: 0.5, ..AGREES };
     assert!(layout.align(|aligned| Some(if is_right(aligned) { AGREES } else { less })).is_none());
-    // most of what should be seen is missing
+    // most expected objects are undetected
     let missing = Agreement { seen: 0.4, ..AGREES };
     assert!(layout.align(|aligned| is_right(aligned).then_some(missing)).is_none());
     assert!(layout.align(|_| None).is_none());
@@ -131,7 +131,7 @@ fn tilt_is_known_better_than_heading() {
 
 #[test]
 fn the_next_best_place_is_that_of_a_room_that_is_nearly_the_same_from_two_sides() {
-    // five pairs under a half turn, and two objects whose partners are of another class
+    // five pairs under a half turn, and two objects whose partners have different classes
     let half = [[1.9, 0.2], [1.2, 1.1], [0.4, 1.7], [1.7, -0.8], [0.8, 0.5]];
     let classes = ["cup", "book", "bottle", "laptop", "cup"];
     let both = half.iter().zip(classes).flat_map(|([x, y], class)| [([*x, *y], class), ([-x, -y], class)]);
@@ -144,7 +144,7 @@ fn the_next_best_place_is_that_of_a_room_that_is_nearly_the_same_from_two_sides(
     assert!(first.1.between(&elsewhere()).log().norm() < 1e-6, "{first:?}");
     assert!(second.1.between(&half_turn.compose(&elsewhere())).log().norm() < 1e-6, "{second:?}");
     assert_eq!((first.2.len(), second.2.len()), (12, 10));
-    // two matches, and two that are alone
+    // two more matches, and two marks without a match
     let gain = layout.gain(&first.1, &first.2[0]).unwrap();
     assert!((first.0 - second.0 - 2.0 * (gain + NEW)).abs() < 2.0, "{} {gain}", first.0 - second.0);
 }
@@ -183,7 +183,7 @@ fn one_pair_or_none_is_no_place() {
 
 #[test]
 fn matches_are_within_reach_of_the_place_that_they_are_told_with() {
-    // walks that disagree by more than is believed, so that matches come and go
+    // marks with larger errors than assumed, so that matches come and go
     let map = table(&["cup"], Some(Direction::Z));
     let mut looked_at = 0;
     for draw in 0..40 {

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Quaternion, Vector3};
 use peers::{PoseGraph, Task, report, timed, write};
 use std::collections::HashMap;
 
-/// Its order is x y z qw qx qy qz.
+/// Converts to the order of apex-solver: x y z qw qx qy qz.
 fn own_order(pose: &[f64]) -> Vec<f64> {
     match pose {
         [x, y, z, qx, qy, qz, qw] => vec![*x, *y, *z, *qw, *qx, *qy, *qz],
@@ -46,7 +46,7 @@ fn main() {
     for (id, pose) in &graph.vertices {
         keys.insert(*id, problem.add_variable(kind.clone(), DVector::from_vec(own_order(pose))));
     }
-    // its Gauss-Newton holds no variable: a prior, which costs nothing at the start
+    // its Gauss-Newton cannot fix a variable: a prior, whose cost at the start is zero
     let (first, pose) = &graph.vertices[0];
     let prior: Box<dyn Factor + Send> = match graph.spatial {
         true => Box::new(PriorFactor::new(se3(pose))),

@@ -1,5 +1,5 @@
-//! apex-solver on a bundle adjustment in BAL's form, as its own program does it, with no loss. Methods: lm+schur, explicit;
-//! lm+implicit, by conjugate gradients that never form the Schur complement.
+//! apex-solver on a bundle adjustment in BAL's format, configured like its own program, without a loss.
+//! Methods: lm+schur, explicit; lm+implicit, by conjugate gradients that never form the Schur complement.
 use apex_solver::JacobianMode;
 use apex_solver::apex_camera_models::{BALPinholeCameraStrict, DistortionModel, PinholeParams};
 use apex_solver::apex_manifolds::{LieGroup, ManifoldType};
@@ -90,7 +90,7 @@ fn main() {
     };
     line(&[poses.len() as f64, points.len() as f64, 0.0]);
     for (pose, own) in poses.iter().zip(&intrinsics) {
-        // its order is x y z qw qx qy qz
+        // the order of apex-solver is x y z qw qx qy qz
         let pose = estimate(pose);
         let q = UnitQuaternion::from_quaternion(Quaternion::new(pose[3], pose[4], pose[5], pose[6]));
         line(&[q.scaled_axis().as_slice(), &pose.as_slice()[..3], estimate(own).as_slice()].concat());

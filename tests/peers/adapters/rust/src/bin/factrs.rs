@@ -31,7 +31,7 @@ fn pose(values: &Values, id: u64) -> Option<Vec<f64>> {
 fn main() {
     let task = Task::from_arguments();
     let ids = PoseGraph::read(&task.input).vertices.into_iter().map(|(id, _)| id);
-    // its own reader, which puts a prior on the first pose
+    // its reader puts a prior on the first pose
     let (graph, start) = load_g20(&task.input);
     let base = BaseOptParams {
         max_iterations: task.max_iterations,
@@ -56,7 +56,7 @@ fn main() {
     report(seconds, steps.load(Ordering::Relaxed), status);
 }
 
-/// Both optimizers behind one type.
+/// Both optimizers as one type.
 trait ErasedOptimizer {
     fn run(&mut self, start: Values, count: Count) -> Result<Values, OptError>;
 }

@@ -1,4 +1,5 @@
-//! tiny-solver on a pose graph. Methods: gn, lm. Its own factors take no information: these are whitened.
+//! tiny-solver on a pose graph. Methods: gn, lm. Its own factors accept no information matrix, so these
+//! factors are whitened.
 use peers::{Edge, PoseGraph, Task, report, timed, write};
 use std::any::TypeId;
 use std::collections::HashMap;
@@ -8,11 +9,11 @@ use tiny_solver::factors::{Factor, PriorFactor, na};
 use tiny_solver::manifold::se3::{SE3, SE3Manifold};
 use tiny_solver::{GaussNewtonOptimizer, LevenbergMarquardtOptimizer, Optimizer, OptimizerOptions, Problem};
 
-/// Linearizations, counted at the first edge: the optimizers do not tell.
+/// Linearizations, counted at the first edge, because the optimizers do not report them.
 static LINEARIZATIONS: AtomicUsize = AtomicUsize::new(0);
 
 struct Between {
-    /// Its order: rotation, then translation.
+    /// The measurement in the order of tiny-solver: rotation, then translation.
     measured: na::DVector<f64>,
     /// L' of L L' = information, in that order.
     root: na::DMatrix<f64>,
@@ -52,7 +53,8 @@ fn planar<T: na::RealField>(z: &na::DVector<T>, a: &na::DVector<T>, b: &na::DVec
     na::DVector::from_vec(vec![angle, u, k * y - half * x])
 }
 
-/// The same; its logarithm leaves the translation as it is, so V^-1 is applied here.
+/// Log of Z^-1 Xi^-1 Xj in space. The library's logarithm does not transform the translation, so V^-1 is
+/// applied here.
 fn spatial<T: na::RealField>(z: &na::DVector<T>, a: &na::DVector<T>, b: &na::DVector<T>) -> na::DVector<T> {
     let pose = |x: &na::DVector<T>| SE3::from_vec(x.as_view());
     let log = (pose(z).inverse() * pose(a).inverse() * pose(b)).log();
@@ -71,7 +73,7 @@ fn spatial<T: na::RealField>(z: &na::DVector<T>, a: &na::DVector<T>, b: &na::DVe
     na::DVector::from_iterator(6, w.iter().chain(v.iter()).cloned())
 }
 
-/// Rotation first.
+/// Converts to the order of tiny-solver, rotation first.
 fn own_order(pose: &[f64]) -> na::DVector<f64> {
     let translation = if pose.len() == 3 { 2 } else { 3 };
     na::DVector::from_vec([&pose[translation..], &pose[..translation]].concat())
@@ -108,7 +110,7 @@ fn main() {
         let rows = if graph.spatial { 6 } else { 3 };
         problem.add_residual_block(rows, &[&a, &b], Box::new(between(edge, i == 0)), None);
     }
-    // it holds no variable that has a manifold: a prior, which costs nothing at the start
+    // it cannot fix a variable on a manifold: a prior, whose cost at the start is zero
     let (first, pose) = &graph.vertices[0];
     let prior = PriorFactor { v: own_order(pose) };
     problem.add_residual_block(pose.len(), &[&name(*first)], Box::new(prior), None);
