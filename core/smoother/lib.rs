@@ -35,4 +35,4 @@ pub use factor_id::FactorId;
 pub use report::{Rejection, Report, Shared};
 pub use saved::{LoadError, SaveError};
 pub use session::{CovarianceError, Finished, Session};
-pub use settings::{ManifoldType, NotOneSpan, Outliers, Settings, Span, UnknownManifold, Window};
+pub use settings::{NotOneSpan, Outliers, Settings, Span, Window};

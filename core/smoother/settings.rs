@@ -2,12 +2,13 @@
 mod window;
 
 use manifactor_graph::checked::NotNegative;
-use manifactor_solve::{FactorType, Probability};
+use manifactor_graph::{Factor, TypeName};
+use manifactor_solve::Probability;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
 
-pub use window::{ManifoldType, NotOneSpan, Span, UnknownManifold, Window};
+pub use window::{NotOneSpan, Span, Window};
 
 /// Settings of the smoother. The defaults suit any graph, because thresholds are in units of the estimate's
 /// precision.
@@ -61,7 +62,7 @@ pub struct Outliers {
     pub gain: NotNegative,
     /// Types of factors that can be candidates. Default: all types.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub types: Vec<FactorType>,
+    pub types: Vec<TypeName<dyn Factor>>,
 }
 
 impl Default for Outliers {

@@ -6,6 +6,7 @@
 mod inspect;
 mod linear;
 mod observer;
+pub mod odometry;
 mod outcome;
 mod problem;
 mod strategy;
@@ -19,9 +20,8 @@ pub use outcome::{InactiveFactor, IterationRecord, Moving, Outcome, Rejected, Ti
 pub use outcome::{Stall, Termination, Tolerance, Undetermined};
 pub use problem::{ChangeError, CompileError, Problem, WeightError};
 pub use strategy::{
-    Auto, Candidates, Descent, DiagonalLimits, Dogleg, FactorType, GaussNewton, Given, Gnc, Growth,
-    LevenbergMarquardt, NotLimits, Optimizer, Probability, Start, StartError, Step, Stopping, Tried,
-    Truncation, UnknownFactor, is_sequential,
+    Auto, Candidates, Descent, DiagonalLimits, Dogleg, GaussNewton, Given, Gnc, Growth, LevenbergMarquardt,
+    NotLimits, Optimizer, Probability, Start, StartError, Step, Stopping, Tried, Truncation,
 };
 
 /// The dense kernel of a front, for solvers that store their fronts themselves.

@@ -21,8 +21,8 @@ use super::update::Undo;
 use crate::factor_id::FactorId;
 use crate::report::{Rejection, Report};
 use fit::Fit;
-use manifactor_graph::{FactorEntry, Resolved};
-use manifactor_solve::is_sequential;
+use manifactor_graph::{FactorEntry, Key, Resolved};
+use manifactor_solve::odometry::{best_fit, by_variables, is_sequential};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest number of factors that one update rejects because they no longer fit.
@@ -44,22 +44,23 @@ impl Session {
     /// in this update. It counts as odometry if the variables are neighbours. The order of the factors does
     /// not matter.
     pub(super) fn best_between(&self, changes: &[Change]) -> BTreeMap<Vec<u32>, u32> {
-        let mut all: BTreeMap<Vec<u32>, Vec<(u32, &FactorEntry)>> = BTreeMap::new();
-        if self.schedule.settings().outliers.is_some() {
-            for change in changes {
-                let Change::Insert { number, entry, resolved, .. } = change else { continue };
-                all.entry(ascending(&resolved.variables)).or_default().push((*number, entry));
-            }
+        if self.schedule.settings().outliers.is_none() {
+            return BTreeMap::new();
         }
-        let misfit =
-            |entry: &FactorEntry| entry.squared(|key| self.estimate(key.as_str())).unwrap_or(f64::INFINITY);
-        all.retain(|variables, factors| variables.len() > 1 && factors.len() > 1);
-        let best = all.into_iter().filter_map(|(variables, factors)| {
-            let misfits = factors.into_iter().map(|(number, entry)| (misfit(entry), number));
-            let best = misfits.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
-            Some((variables, best.1))
+        let new = changes.iter().filter_map(|change| match change {
+            Change::Insert { number, entry, resolved, .. } => {
+                Some((resolved.variables.to_vec(), (*number, entry)))
+            }
+            _ => None,
         });
-        best.collect()
+        let estimate = |key: &Key| self.estimate(key.as_str());
+        let misfit = |entry: &FactorEntry| entry.squared(estimate).unwrap_or(f64::INFINITY);
+        let parallel = by_variables(new).into_iter().filter(|(_, factors)| factors.len() > 1);
+        parallel
+            .filter_map(|(variables, factors)| {
+                Some((variables, best_fit(factors, |(_, entry)| misfit(entry))?.0))
+            })
+            .collect()
     }
 
     /// Returns the bounds of a new factor if it is a candidate.

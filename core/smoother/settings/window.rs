@@ -1,6 +1,6 @@
 //! Settings of the window.
-use manifactor_graph::catalogue;
 use manifactor_graph::checked::Positive;
+use manifactor_graph::{TypeName, Variable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::num::NonZeroUsize;
@@ -14,7 +14,7 @@ pub struct Window {
     /// Length of the window.
     pub span: Span,
     /// Types whose variables always stay.
-    pub keep: Vec<ManifoldType>,
+    pub keep: Vec<TypeName<dyn Variable>>,
 }
 
 /// Length of a window.
@@ -42,7 +42,7 @@ struct Document {
     seconds: Option<Positive>,
     /// Names of types whose variables always stay, for example `"dual_quadric"`. Default: none.
     #[serde(default)]
-    keep: Vec<ManifoldType>,
+    keep: Vec<TypeName<dyn Variable>>,
 }
 
 /// A window with both `poses` and `seconds`, or with neither.
@@ -81,50 +81,5 @@ impl From<Span> for Window {
     /// Returns a window that keeps no type.
     fn from(span: Span) -> Self {
         Self { span, keep: vec![] }
-    }
-}
-
-/// The name of a registered type of variables.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "String", into = "String")]
-#[schemars(with = "String")]
-pub struct ManifoldType(String);
-
-/// A name that is not a registered type of variables.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown type of variables `{name}`: {}", advice(.name))]
-pub struct UnknownManifold {
-    name: String,
-}
-
-fn advice(name: &str) -> String {
-    let known: Vec<String> = catalogue::entries(KIND).iter().map(|entry| entry.name.to_owned()).collect();
-    let advice = manifactor_document::advice(name, &known);
-    advice.unwrap_or_else(|| "this program has none; link the crate that registers it".to_owned())
-}
-
-/// Name of the kind of variables in the catalogue.
-const KIND: &str = <dyn manifactor_graph::Variable as catalogue::Kind>::NAME;
-
-impl TryFrom<String> for ManifoldType {
-    type Error = UnknownManifold;
-    fn try_from(name: String) -> Result<Self, UnknownManifold> {
-        match catalogue::find(KIND, &name) {
-            Some(_) => Ok(Self(name)),
-            None => Err(UnknownManifold { name }),
-        }
-    }
-}
-
-impl From<ManifoldType> for String {
-    fn from(name: ManifoldType) -> Self {
-        name.0
-    }
-}
-
-impl ManifoldType {
-    /// Returns the name.
-    pub fn as_str(&self) -> &str {
-        &self.0
     }
 }

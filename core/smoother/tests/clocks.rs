@@ -176,7 +176,7 @@ fn a_window_is_either_by_poses_or_by_seconds() {
     complains("{\"minutes\": 1}", "unknown field `minutes`");
     complains(
         "{\"poses\": 7, \"keep\": [\"toy_spice\"]}",
-        "unknown type of variables `toy_spice`: did you mean `toy_space`?",
+        "there is no variable `toy_spice`: did you mean `toy_space`?",
     );
 }
 

@@ -4,7 +4,7 @@ use crate::toy::{Apart, At, Centre, Distance, Plane};
 use crate::world::{Beyond, Near, Shadow, Space};
 use manifactor_graph::checked::NotNegative;
 use manifactor_graph::loss::Huber;
-use manifactor_graph::{Fixed, Graph, Key, Noise, Values, Variable};
+use manifactor_graph::{Fixed, Graph, Key, Noise, TypeName, Values, Variable};
 use manifactor_smoother::{ChangeError, FactorId, Outliers, Report, Session, Settings, Span, Window};
 use manifactor_solve::{GaussNewton, Silent};
 use proptest::prelude::*;
@@ -41,7 +41,7 @@ pub(crate) fn change() -> impl Strategy<Value = Change> {
 }
 
 pub(crate) fn window() -> impl Strategy<Value = Window> {
-    let keep = prop_oneof![Just(vec![]), Just(vec!["toy_space".to_owned().try_into().unwrap()])];
+    let keep = prop_oneof![Just(vec![]), Just(vec![TypeName::new("toy_space").unwrap()])];
     (1..6usize, keep)
         .prop_map(|(poses, keep)| Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep })
 }

@@ -3,7 +3,7 @@ use crate::history::{Change, History, change};
 use crate::toy::{Apart, At, Distance, Logarithm, Plane};
 use crate::world::Ahead;
 use manifactor_graph::checked::NotNegative;
-use manifactor_graph::{Fixed, Graph, Key, Values, Variable};
+use manifactor_graph::{Fixed, Graph, Key, TypeName, Values, Variable};
 use manifactor_smoother::{ChangeError, Session, Settings, Span, Window};
 use manifactor_solve::{LevenbergMarquardt, Problem, Silent};
 use proptest::prelude::*;
@@ -73,7 +73,7 @@ pub(crate) fn step(i: usize) -> (Graph, Values) {
 }
 
 fn windowed(poses: usize, keep: &[&str]) -> Session {
-    let keep = keep.iter().map(|name| (*name).to_owned().try_into().unwrap()).collect();
+    let keep = keep.iter().map(|name| TypeName::new(name).unwrap()).collect();
     let window = Some(Window { span: Span::Poses(NonZeroUsize::new(poses).unwrap()), keep });
     Session::new(Settings { window, ..Settings::default() })
 }

@@ -17,7 +17,7 @@ use gravity::Up;
 use manifactor_association::{Associator, Image, Learned, Map, Names};
 use manifactor_formats::tum::StampedPose;
 use manifactor_geometry::Se3;
-use manifactor_graph::manifold_name;
+use manifactor_graph::{TypeName, manifold_name};
 use manifactor_mapping::estimate::{Estimate, EstimateError};
 use manifactor_mapping::gravity::GravityError;
 use manifactor_mapping::mapping::measurements::{Measured, Measurements};
@@ -28,7 +28,7 @@ use manifactor_mapping::semantics::RuleError;
 use manifactor_mapping::settings::Settings;
 use manifactor_quadric::{Camera, DualQuadric};
 use manifactor_recording::sequence::{Frame, ObjectId, Observation, Opening, Sequence};
-use manifactor_smoother::{ChangeError, ManifoldType, Session, UpdateError};
+use manifactor_smoother::{ChangeError, Session, UpdateError};
 use manifactor_solve::Observer;
 use object::Tracked;
 use std::any::TypeId;
@@ -124,7 +124,7 @@ impl Mapper {
             // only poses leave the window
             let own = settings.own.values.iter().map(|(_, value)| value.typetag_name());
             let kept = own.chain([manifold_name(TypeId::of::<DualQuadric>())]);
-            window.keep.extend(kept.filter_map(|name| ManifoldType::try_from(name.to_owned()).ok()));
+            window.keep.extend(kept.filter_map(|name| TypeName::new(name).ok()));
         }
         let trusted = settings.prior_map.as_ref().filter(|prior| prior.start.is_some());
         let known = trusted.map(|prior| prior.trusted_map().objects).unwrap_or_default();
