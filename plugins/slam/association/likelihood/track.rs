@@ -31,8 +31,6 @@ pub(super) struct Track {
     pub seen_at: Option<f64>,
     /// Number of boxes at which it is compared with its neighbours again.
     pub next_look: usize,
-    /// Number of boxes at which it is checked for a split again.
-    pub next_doubt: usize,
 }
 
 /// A box of an object.
@@ -63,8 +61,6 @@ pub(super) struct Expected<'a> {
 const VAGUE: f64 = 0.5;
 /// Boxes of an object at its first comparison with neighbours.
 const FIRST_LOOK: usize = 3;
-/// Boxes of an object at its first check for a split.
-const FIRST_DOUBT: usize = 8;
 /// Growth of the number of boxes until the next check.
 const MORE: f64 = 1.3;
 
@@ -92,7 +88,6 @@ impl Track {
             boxes: vec![],
             seen_at: None,
             next_look: FIRST_LOOK,
-            next_doubt: FIRST_DOUBT,
         }
     }
 
@@ -204,15 +199,6 @@ impl Track {
             self.next_look = self.next();
             self.id
         })
-    }
-
-    /// Returns whether a check for a split is due, and schedules the next one.
-    pub(super) fn is_doubtful(&mut self, frame: usize) -> bool {
-        let is_due = self.is_seen_in(frame) && self.boxes.len() >= self.next_doubt;
-        if is_due {
-            self.next_doubt = self.next();
-        }
-        is_due
     }
 
     fn is_seen_in(&self, frame: usize) -> bool {

@@ -94,8 +94,7 @@ impl Associator for Tracker {
         }
         let forgotten = self.forget(image.timestamp);
         self.past.push_back(Past::new(image, names));
-        let mut moved = self.look_again(image.timestamp, map);
-        moved.extend(self.divide(image.frame, map));
+        let moved = self.look_again(image.timestamp, map);
         Learned { moved, merged: self.merge(image.frame), forgotten }
     }
 

@@ -28,10 +28,10 @@ const ALIKE: f64 = 0.1;
 const STRICTER: f64 = 1.4;
 /// Similarity of classes above which the limit is multiplied by `LOOSER`, if one object contains the centre
 /// of the other and both places are known well enough.
-pub(super) const SAME: f64 = 0.5;
+const SAME: f64 = 0.5;
 /// Multiplies `merge_error` for objects of one class in one place: no ellipsoid explains all boxes of a
 /// complex shape.
-pub(super) const LOOSER: f64 = 2.0;
+const LOOSER: f64 = 2.0;
 
 /// Objects per frame that are compared with their neighbours, at most.
 const LOOKS: usize = 20;
@@ -142,7 +142,6 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
     track.boxes.dedup_by_key(|seen| seen.frame());
     track.seen_at = more.seen_at.into_iter().chain(fewer.seen_at).reduce(f64::max);
     track.next_look = track.next_look.max(fewer.next_look);
-    track.next_doubt = track.next_doubt.max(fewer.next_doubt);
     sightings.thin(&fitted.quadric.centroid());
     track.fitted = fit(&more.belief, fitted.quadric, sightings.all(), camera, &noise)?;
     track.sightings = sightings;
@@ -150,7 +149,7 @@ fn of(one: &Track, two: &Track, camera: &Camera, settings: &Likelihood) -> Optio
 }
 
 /// Returns the similarity of the class distributions, from 0 to 1 (Bhattacharyya coefficient).
-pub(super) fn alike(one: &Track, two: &Track) -> f64 {
+fn alike(one: &Track, two: &Track) -> f64 {
     one.votes.keys().map(|class| (one.share(class) * two.share(class)).sqrt()).sum()
 }
 
