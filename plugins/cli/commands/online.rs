@@ -131,7 +131,7 @@ impl Frames<'_> {
 
     fn tell(&self, report: &FrameReport, mapper: &Mapper, took: f64) {
         let (objects, undetermined) =
-            (mapper.mapped(), report.updates.last().map_or(0, |u| u.undetermined.len()));
+            (mapper.mapped(), report.updates.last().map_or(0, |u| u.undetermined_directions.len()));
         if self.command.options.json {
             output::json_line(&json!({ "seconds": took, "objects": objects, "report": report }));
         } else {

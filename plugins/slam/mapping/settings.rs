@@ -85,7 +85,7 @@ pub struct Settings {
     pub solver: Arc<dyn Optimizer>,
     /// Incremental smoother that `manifactor online` updates with each frame.
     #[serde(default)]
-    pub online: manifactor_smoother::Settings,
+    pub online: manifactor_smoother::SmootherSettings,
     /// Comparison of the estimate with ground truth and with held-out boxes.
     #[serde(default)]
     pub evaluation: EvaluationSettings,
