@@ -149,7 +149,7 @@ pub mod prelude {
     pub use manifactor_graph::prelude::*;
     pub use manifactor_solve::{
         Auto, Descent, Dogleg, GaussNewton, Gnc, Interrupt, LevenbergMarquardt, Observer, Optimizer, Outcome,
-        Problem, Silent, Solution, Start, StartError, Step, Stopping, Termination, Tried, solve,
+        Problem, Silent, Solution, Start, StartError, Stopping, Termination, TrialResult, TrialStep, solve,
     };
 }
 

@@ -236,7 +236,7 @@ impl Model {
             factor: residual.factor.erased().as_any(),
             index: &index,
             starts: &starts,
-            held: &held,
+            fixed: &held,
             slots: &slots,
             whitener: &resolved.whitener,
             loss: residual.loss.as_deref(),

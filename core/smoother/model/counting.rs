@@ -59,7 +59,7 @@ impl Model {
     pub(crate) fn pass_held_directions(&mut self, number: u32) {
         let Some(factor) = self.factors.get(number).filter(|factor| factor.entry.is_some()) else { return };
         let (starts, held) = self.starts(factor, self.regions[factor.region]);
-        self.batches.as_mut_slice()[factor.batch as usize].hold(factor.index as usize, &starts, &held);
+        self.batches.as_mut_slice()[factor.batch as usize].set_fixed(factor.index as usize, &starts, &held);
     }
 
     /// Sets the held directions of a variable. Returns the previous ones. The caller linearizes its factors

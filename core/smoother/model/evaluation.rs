@@ -21,7 +21,7 @@ impl Model {
         for (b, indices) in listed.iter_mut().enumerate().filter(|(_, indices)| !indices.is_empty()) {
             indices.sort_unstable();
             let to = &mut self.regions.normal_equations();
-            total = total.and(self.batches.as_mut_slice()[b].linearize_at(indices, &self.trial, to));
+            total = total.merge(self.batches.as_mut_slice()[b].linearize_at(indices, &self.trial, to));
             indices.clear();
         }
         self.listed = listed;
@@ -56,7 +56,7 @@ impl Model {
             true => self.batches.as_slice()[factor.batch as usize].cost_at(&[factor.index], &self.trial),
             false => self.prior_cost(factor, delta),
         };
-        factors.map(one).fold(Evaluation::default(), Evaluation::and)
+        factors.map(one).fold(Evaluation::default(), Evaluation::merge)
     }
 
     /// Returns whether any factor has a robust loss.

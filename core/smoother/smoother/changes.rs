@@ -139,7 +139,7 @@ impl Smoother {
     }
 
     /// Removes factors. Takes effect at the next [`update`](Self::update). Variables that become undetermined
-    /// are parked.
+    /// are excluded until more factors determine them.
     ///
     /// # Errors
     /// If one of them does not exist. None is removed then.

@@ -40,9 +40,9 @@ impl Smoother {
     ///
     /// Their factors become a linear prior on the neighbours. The neighbours keep their linearization points
     /// until they are marginalized as well. Estimates and covariances of the remaining variables do not
-    /// change. Factors that do not count, because they are not defined at the last linearization or have a
-    /// parked variable, are dropped, and the report names them. If a prior overflows, all of these variables
-    /// stay, and the report names them. The key of a variable without factors can be used again.
+    /// change. Factors that do not count, because they are not defined at the last linearization or have an
+    /// undetermined variable, are dropped, and the report names them. If a prior overflows, all of these
+    /// variables stay, and the report names them. The key of a variable without factors can be used again.
     ///
     /// # Errors
     /// If a variable does not exist, or is marginalized already. None is marginalized then.

@@ -31,7 +31,9 @@ impl Smoother {
     pub(super) fn control_step(&mut self, report: &mut UpdateReport) {
         if self.schedule.is_idle() {
             let (_, before, after) = self.steps.last_step(&mut self.model);
-            if after.left > before.left || after.cost > before.cost * (1.0 + ROUNDING_SHARE) {
+            if after.became_undefined > before.became_undefined
+                || after.cost > before.cost * (1.0 + ROUNDING_SHARE)
+            {
                 report.solved_batch |= self.solve_batch(report);
             }
         } else if !self.shorten_long_steps(report) {

@@ -13,7 +13,7 @@ use manifactor::formats::replay::{Latencies, Replay as Steps, Step};
 use manifactor::graph::{Graph, Key};
 use manifactor::slam::output::OutputFolder;
 use manifactor::smoother::{Finished, Rejection, Smoother, Span, UpdateReport};
-use manifactor::solve::{All, Interrupt, Silent};
+use manifactor::solve::{AllObservers, Interrupt, Silent};
 use manifactor::viz::latencies;
 use serde_json::json;
 use std::collections::HashSet;
@@ -97,7 +97,7 @@ impl Replay {
         let mut replayed = self.replay(&input, &interrupt)?;
         let cost = replayed.session.cost();
         let clock = Instant::now();
-        let observer = &mut All(vec![&mut interrupt]);
+        let observer = &mut AllObservers(vec![&mut interrupt]);
         let finished = match replayed.interrupted {
             true => None,
             false => Some(replayed.session.finish(&*input.optimizer, observer).map_err(Failure::input)?),

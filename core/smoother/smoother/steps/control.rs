@@ -146,7 +146,7 @@ impl Steps {
 fn rises(before: &Evaluation, after: &Evaluation) -> bool {
     let is_lower = after.cost <= before.cost * (1.0 + COST_TOLERANCE);
     // also true if the cost is NaN
-    after.left > before.left || !is_lower
+    after.became_undefined > before.became_undefined || !is_lower
 }
 
 /// Returns the largest diagonal entry of H of a variable.

@@ -1,5 +1,5 @@
 //! Selection of the factors that may be outliers.
-use crate::problem::{FactorPlace, Problem};
+use crate::problem::{Problem, ProblemFactor};
 use manifactor_graph::{VariableIndices, catalogue};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -61,7 +61,7 @@ impl Candidates {
         for factor in problem.model.factors.iter().filter(|factor| factor.variables.len() > 1) {
             *connections.entry(sorted(&factor.variables)).or_default() += 1;
         }
-        let may = |factor: &FactorPlace| match self {
+        let may = |factor: &ProblemFactor| match self {
             Self::All => true,
             Self::LoopClosures => {
                 let place = |variable: &u32| &problem.model.variables[*variable as usize];

@@ -1,4 +1,4 @@
-//! The solved problem, kept for queries about its estimate without a second compilation.
+//! The solved problem, for queries about its estimate without a second compilation.
 use crate::Solution;
 use crate::linear::Method;
 use crate::problem::CompileError;
@@ -8,9 +8,9 @@ use std::sync::{Arc, Mutex};
 
 /// A compiled problem that handles one query at a time.
 #[derive(Debug, Clone)]
-pub(crate) struct Kept(Arc<Mutex<Problem>>);
+pub(crate) struct SharedProblem(Arc<Mutex<Problem>>);
 
-impl Kept {
+impl SharedProblem {
     pub(crate) fn new(problem: Problem) -> Self {
         Self(Arc::new(Mutex::new(problem)))
     }
@@ -23,7 +23,7 @@ impl Solution {
     ///
     /// # Errors
     /// If `graph` is not the solved graph.
-    pub(crate) fn ask<R>(
+    pub(crate) fn query<R>(
         &self,
         graph: &Graph,
         question: impl FnOnce(&mut Problem) -> R,
@@ -34,7 +34,7 @@ impl Solution {
         {
             // only if necessary, because the factorization of an earlier query would be lost
             if !problem.model.is_at(&self.values) {
-                problem.model.put(&self.values);
+                problem.model.set_values(&self.values);
             }
             return Ok(question(&mut problem));
         }
@@ -48,7 +48,7 @@ impl Solution {
     pub fn problem(&self, graph: &Graph) -> Result<Problem, CompileError> {
         let mut problem = Problem::compile(graph, &self.values)?;
         if !self.weights.is_empty() {
-            problem.model.weigh(&self.weights);
+            problem.model.set_weights(&self.weights);
         }
         Ok(problem)
     }

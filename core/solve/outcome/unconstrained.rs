@@ -17,7 +17,7 @@ pub struct InactiveFactor {
 
 /// Variables without an active factor, and so without information.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Untouched {
+pub struct UnconstrainedVariables {
     /// Their keys, in the order of the values, without fixed variables.
     pub keys: Vec<Key>,
     /// Number of active factors: they are defined, and have nonzero weight.
@@ -26,12 +26,12 @@ pub struct Untouched {
     pub factors: usize,
 }
 
-impl fmt::Display for Untouched {
+impl fmt::Display for UnconstrainedVariables {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const SHOWN: usize = 3;
-        let keys: Vec<_> = self.keys.iter().take(SHOWN).map(ToString::to_string).collect();
+        const MAX_LISTED: usize = 3;
+        let keys: Vec<_> = self.keys.iter().take(MAX_LISTED).map(ToString::to_string).collect();
         write!(f, "no factor that takes part touches {}", keys.join(", "))?;
-        match self.keys.len().saturating_sub(SHOWN) {
+        match self.keys.len().saturating_sub(MAX_LISTED) {
             0 => {}
             1 => f.write_str(" and 1 more variable")?,
             more => write!(f, " and {more} more variables")?,
